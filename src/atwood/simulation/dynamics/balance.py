@@ -22,6 +22,7 @@ from atwood.numerics.matrices import (
     is_full,
     scaled,
 )
+from atwood.numerics.newton import Missing, newton
 from atwood.numerics.solutions import least_norm
 from atwood.simulation.dynamics.columns import mass_at
 from atwood.simulation.dynamics.kinematic_map import KinematicMap, kinematic_map_of
@@ -174,21 +175,17 @@ class Balance:
         q = self.kinematic_map.normalized(q)
         if not self.constraints:
             return q, u
-        still = np.zeros_like(u)
-        last = np.inf
         errors = self.errors.near(t, q, scales)
         on_positions = errors if self._all else errors[self.holonomic]
-        for _ in range(iterations if len(self.holonomic) else 0):
-            jacobian, value = self.on_positions(self.constraints_at(t, q, still))
+
+        def look(place: FloatArray) -> Missing:
+            jacobian, value = self.on_positions(self.constraints_at(t, place, np.zeros_like(u)))
             rows = row_scales(jacobian, scales, on_positions)
-            miss = float(np.max(np.abs(value / rows)))
-            if miss == 0.0 or (miss < tolerances.MET and miss >= 0.5 * last):
-                break
-            last = miss
-            even = self.errors.shared(rows, self.holonomic)
-            missing = value / even
-            step = least_norm(scaled(jacobian, scales, even), missing, 1.0, float(np.max(np.abs(missing))))
-            q = self.kinematic_map.moved(t, q, -scales * step)
+            return Missing(value, rows, lambda: jacobian, self.errors.shared(rows, self.holonomic))
+
+        if len(self.holonomic):
+            moved = partial(self.kinematic_map.moved, t)
+            q, _ = newton(look, moved, q, scales, steps=iterations, met=tolerances.MET, is_even=True)
         now = self.constraints_at(t, q, u)
         rows = row_scales(now.jacobian, scales, errors)
         for _ in range(2):  # the second pass takes out the rounding of the first

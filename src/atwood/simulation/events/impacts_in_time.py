@@ -18,7 +18,7 @@ from atwood.late import replace
 from atwood.mechanics.constraints.knots import BALANCES
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.numerics.matrices import scaled, to_array
-from atwood.numerics.solutions import least_squares
+from atwood.numerics.newton import Missing, newton
 from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_of
 from atwood.simulation.dynamics.orientation_coordinates import Reassemble
 from atwood.simulation.dynamics.reactions import maximal_state
@@ -170,15 +170,18 @@ def _values_after(after: Assembly, balance: Balance, t: float, q: FloatArray, u:
 def _rebalanced(balance: Balance, t: float, q: FloatArray, now: BalanceValues) -> FloatArray:
     """Return the coordinates at which forces that have jumped balance: what has no mass goes there at once."""
     free = ~np.any(to_array(now.mass) != 0.0, axis=1)
-    still = np.zeros(len(free))
-    for _ in range(_ITERATIONS):
-        step = np.zeros_like(still)
-        step[free] = least_squares(to_array(now.jacobian)[:, free], -now.value)
-        q = balance.kinematic_map.moved(t, q, step)
-        if np.max(np.abs(step)) <= _ROUNDED * np.max(np.abs(q)):
-            break
-        now = balance.at(t, q, still)
-    return q
+
+    def look(place: FloatArray) -> Missing:
+        there = balance.constraints_at(t, place, np.zeros(len(free)))
+        return Missing(there.value, np.ones(len(there.value)), lambda: to_array(there.jacobian)[:, free])
+
+    def moved(place: FloatArray, by: FloatArray) -> FloatArray:
+        step = np.zeros(len(free))
+        step[free] = by
+        return balance.kinematic_map.moved(t, place, step)
+
+    far = _ROUNDED * float(np.max(np.abs(q)))
+    return newton(look, moved, q, np.ones(int(free.sum())), steps=_ITERATIONS, still=far)[0]
 
 
 def _check_places(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from atwood.forms.quantities import observer
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.mechanics.outputs.event_functions import UPDATE, EventFunction, list_event_functions
 from atwood.numerics.matrices import is_full, scaled, to_array
+from atwood.numerics.newton import Missing, newton
 from atwood.numerics.solutions import least_norm
 from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_of
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of, reference_coordinates
@@ -192,6 +194,9 @@ def _reaction_event_functions(assembly: Assembly) -> tuple[EventFunction, ...]:
     return assembly.shared.get(_REACTION_EVENTS, make)
 
 
+_STEPS, _STILL = 30, 1e-14
+"""So many steps lead to generalized coordinates at most, the last of them so short beside these."""
+
 _LIGHT = 1e-12
 """A body that is lighter than the heaviest one by more is rounding of its mass matrix."""
 
@@ -264,17 +269,17 @@ def generalized_state(
             q[list(orientation.coordinates)] = maximal[0][turned[orientation.body]]
     q = reduced_map.normalized(q)
     scales, own_scales = motion_scales(after.maximal, length), motion_scales(equations, length)
-    matrix = np.zeros((len(scales), len(still)))
-    for _ in range(30):
-        now, _, entries = kernel([t], q, still)
+
+    def look(place: FloatArray) -> Missing:
+        found, _, entries = kernel([t], place, still)
+        matrix = np.zeros((len(scales), len(still)))
         matrix[rows, columns] = entries
-        miss = maximal_map.difference(t, maximal_map.normalized(np.asarray(now)), maximal[0]) / scales
-        step = least_norm(matrix / scales[:, None], miss)
-        q = reduced_map.moved(t, q, step)
-        far = np.max(np.abs(q) / coordinate_scales(equations, length), initial=1.0)
-        if np.max(np.abs(step) / own_scales, initial=0.0) < 1e-14 * far:
-            break
-    return q, generalized_speeds(after, t, q, maximal[1], scales), miss
+        apart = maximal_map.difference(t, maximal_map.normalized(np.asarray(found)), maximal[0])
+        return Missing(-apart, scales, lambda: matrix)
+
+    far = _STILL * float(np.max(np.abs(q) / coordinate_scales(equations, length), initial=1.0))
+    q, now = newton(look, partial(reduced_map.moved, t), q, own_scales, steps=_STEPS, still=far)
+    return q, generalized_speeds(after, t, q, maximal[1], scales), now.value / scales
 
 
 def generalized_speeds(after: Assembly, t: float, q: FloatArray, speeds: FloatArray, sizes: FloatArray) -> FloatArray:

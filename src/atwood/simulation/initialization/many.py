@@ -40,7 +40,7 @@ def meet_positions(
 ) -> NDArray[np.bool_]:
     """Move coordinates to the nearest place that meets constraints and what is fixed, as `find_start` does.
 
-    The steps are those of `atwood.simulation.initialization.system.newton`; runs for which one of them does not lessen
+    The steps are those of `atwood.simulation.initialization.system.nearest`; runs for which one of them does not lessen
     what is missing are left to it.
 
     Parameters

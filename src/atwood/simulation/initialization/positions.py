@@ -22,7 +22,7 @@ from atwood.simulation.initialization.assembly_branch import wrongly_turned
 from atwood.simulation.initialization.body_by_body import placed_in_turn
 from atwood.simulation.initialization.errors import Failed, explain_positions, far_from_guess, wrong_way_round
 from atwood.simulation.initialization.loop_closure import closest, places_around, units_of_rows
-from atwood.simulation.initialization.system import System, counted, newton
+from atwood.simulation.initialization.system import System, counted, nearest
 from atwood.simulation.initialization.targets import Level, named_once, said
 from atwood.simulation.initialization.whole_turns import unwound
 from atwood.tolerances import tolerances
@@ -96,7 +96,7 @@ def solve_positions(
         q = _better_placed(equations, system, scales, length, t, near_to, near)
     q = rough = unwound(assembly, equations, every, False, scales, length, t, near_to, q)
     system = System(assembly, equations, level.fixed, True)
-    q, residual, matrix = newton(system, scales, t, q)
+    q, residual, matrix = nearest(system, scales, t, q)
     if not _is_met(residual) or wrongly_turned(assembly, equations, t, q):
         failed = Failed(assembly, equations, level, scales, length, t, rough, q, residual)
         q, matrix = _elsewhere(failed, system)
@@ -149,7 +149,7 @@ def _elsewhere(failed: Failed, system: System) -> tuple[FloatArray, Matrix]:
             near = closest(system, units, scales, t, place, iterations=40)
             if not near.size < 0.1:
                 continue
-            q, residual, matrix = newton(system, scales, t, near.coordinates)
+            q, residual, matrix = nearest(system, scales, t, near.coordinates)
             if not _is_met(residual):
                 continue
         except (KernelEvaluationError, np.linalg.LinAlgError):
@@ -184,14 +184,14 @@ def _brought_near(system: System, equations: Equations, scales: FloatArray, t: f
     """Return a configuration near what is said of it; orientations begin elsewhere where they do not get there."""
     near: FloatArray | None = None
     try:
-        near, residual, _ = newton(system, scales, t, q, iterations=20)
+        near, residual, _ = nearest(system, scales, t, q, iterations=20)
         if not equations.orientation_coordinates or _is_met(residual):
             return near
     except KernelEvaluationError:
         if not equations.orientation_coordinates:
             raise
     turned = best_rough_orientation(equations, lambda trial: _far_off(system, scales, t, trial), q)
-    found = newton(system, scales, t, turned, iterations=20)[0]
+    found = nearest(system, scales, t, turned, iterations=20)[0]
     # What is said may not fit together; then the better of the two is what was meant.
     if near is None or _far_off(system, scales, t, found) < _far_off(system, scales, t, near):
         return found
@@ -205,7 +205,7 @@ def _better_placed(
     left = _far_off(system, scales, t, near)
     if not left > 1e-12:
         return near
-    found = newton(system, scales, t, placed_in_turn(equations, system, length, t, q), iterations=20)[0]
+    found = nearest(system, scales, t, placed_in_turn(equations, system, length, t, q), iterations=20)[0]
     return found if _far_off(system, scales, t, found) < 0.5 * left else near
 
 

@@ -1,8 +1,9 @@
-"""The conditions of a start in numbers, and Newton's method on them."""
+"""The conditions of a start in numbers, and the nearest place that meets them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -21,14 +22,14 @@ from atwood.numerics.matrices import (
     scaled,
     to_array,
 )
+from atwood.numerics.newton import Missing, newton
 from atwood.numerics.rank import open_directions
-from atwood.numerics.solutions import least_norm
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.rounding import RowErrors
 from atwood.simulation.initialization.targets import Target
 from atwood.tolerances import tolerances
 
-__all__ = ["Conditions", "System", "counted", "newton", "start_conditions"]
+__all__ = ["Conditions", "System", "counted", "nearest", "start_conditions"]
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,10 @@ def start_conditions(
         return Conditions(program, *places, (len(expressions), len(unknowns)))
 
     return assembly.shared.get(_CONDITIONS, make, tuple(one.path for one in targets), constrained, of_speeds)
+
+
+_EXACT, _LONGEST, _HALVINGS = 1e-15, 0.5, 8
+"""In the scene's sizes: what is rounding, and how far a step leads at most; it is halved as often where it misses."""
 
 
 class System:
@@ -132,55 +137,27 @@ class System:
         return residual, matrix
 
 
-def newton(
+def nearest(
     system: System, scales: FloatArray, t: float, q: FloatArray, iterations: int = 60
 ) -> tuple[FloatArray, FloatArray, Matrix]:
     """Move to the nearest configuration that fulfils a system; return it with what is missing, scaled."""
-    still = np.zeros_like(scales)
-    residual, matrix = system.at(t, q, still)
+    assert system.kinematic_map is not None
     errors = system.errors.near(t, q, scales)
-    rows = row_scales(matrix, scales, errors)
-    for _ in range(iterations):
-        size = _largest(residual / rows)
-        if size < 1e-15:
-            break
-        even = system.errors.shared(rows)  # which components of a law are small depends on how a scene is turned
-        slopes, missing = scaled(matrix, scales, even), residual / even
-        for miss in (_largest(missing), 0.0):
-            step = scales * least_norm(slopes, missing, 1.0, miss)
-            trial, new_residual, new_matrix, new_size = _nearer(system, scales, rows, t, q, step, size)
-            if new_size < 0.5 * size:
-                break
-        if new_size >= size and size < tolerances.MET:
-            break
-        q, residual, matrix = trial, new_residual, new_matrix
+
+    def look(place: FloatArray) -> Missing:
+        residual, matrix = system.at(t, place, np.zeros_like(scales))
         rows = row_scales(matrix, scales, errors)
+        # Which components of a law are small depends on how a scene is turned.
+        return Missing(residual, rows, lambda: matrix, system.errors.shared(rows))
+
+    moved = partial(system.kinematic_map.moved, t)
+    limits = {"met": tolerances.MET, "exact": _EXACT, "longest": _LONGEST}
+    q, now = newton(look, moved, q, scales, steps=iterations, halvings=_HALVINGS, is_even=True, **limits)
     # What hardly changes with any coordinate, as where links line up, is measured by the scene.
-    sizes = np.maximum(rows, 1e-4 * max(rows.max(initial=0.0), scales.max(initial=0.0)))
+    sizes = np.maximum(now.units, 1e-4 * max(now.units.max(initial=0.0), scales.max(initial=0.0)))
     # What rounding could have left of a condition that nothing changes, as of a speed that a drive prescribes, is met.
     sizes = np.maximum(sizes, certain(errors, np.zeros_like(errors)) / tolerances.MET)
-    return q, residual / sizes, scaled(matrix, scales)
-
-
-def _nearer(
-    system: System, scales: FloatArray, rows: FloatArray, t: float, q: FloatArray, step: FloatArray, size: float
-) -> tuple[FloatArray, FloatArray, Matrix, float]:
-    """Return where a step leads, shortened until less is missing there: the place, residual, derivatives and miss."""
-    assert system.kinematic_map is not None
-    longest = _largest(step / scales)
-    step = step * (0.5 / longest) if longest > 0.5 else step
-    for _ in range(8):
-        trial = system.kinematic_map.moved(t, q, -step)
-        residual, matrix = system.at(t, trial, np.zeros_like(scales))
-        missing = _largest(residual / rows)
-        if missing < size or longest < 1e-9:
-            break
-        step = 0.5 * step
-    return trial, residual, matrix, missing
-
-
-def _largest(values: FloatArray) -> float:
-    return float(np.abs(values).max(initial=0.0))
+    return q, now.value / sizes, scaled(now.slopes(), scales)
 
 
 def counted(

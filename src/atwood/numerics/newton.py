@@ -1,0 +1,165 @@
+"""Newton's method for systems that need not be square: steps of least norm, shortened where they lead no nearer.
+
+Of all solutions of the linear system each step takes the shortest, so that what nothing determines stays as it is (the
+method of Gauss and Newton; P. Deuflhard, *Newton Methods for Nonlinear Problems*, 2004, sections 3.2 and 4.4). Unknowns
+need be no vector: a step is a displacement, and the caller says where it leads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf
+from typing import Any, TypeVar
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.late import dataclass
+from atwood.numerics.matrices import Matrix, scaled
+from atwood.numerics.solutions import least_norm
+
+__all__ = ["Missing", "largest", "newton"]
+
+_Place = TypeVar("_Place")
+
+_MUCH = 0.5
+"""A step that leaves more than this share of what was missing is rounding if that had met its tolerance."""
+
+_SHORT = 1e-9
+"""In units of the scales: a shorter step is not shortened any more."""
+
+
+@dataclass(frozen=True, eq=False)
+class Missing:
+    """What is missing at a place.
+
+    Attributes
+    ----------
+    value
+        By how much each equation is missed.
+    units
+        The size of each, in which what is missing is measured.
+    slopes
+        Gives the derivatives by displacements.
+    even
+        The sizes by which rows are divided to be solved, unless these are the units.
+    """
+
+    value: FloatArray
+    units: FloatArray
+    slopes: Callable[[], Matrix]
+    even: FloatArray | None = None
+
+    @property
+    def miss(self) -> float:
+        """The most that an equation is missed by, in its unit."""
+        return largest(self.value / self.units)
+
+
+def largest(values: FloatArray) -> float:
+    """Return the largest absolute value, zero for none."""
+    return float(np.abs(values).max(initial=0.0))
+
+
+def newton(
+    look: Callable[[_Place], Missing],
+    moved: Callable[[_Place, FloatArray], _Place],
+    place: _Place,
+    scales: FloatArray,
+    *,
+    steps: int,
+    met: float = 0.0,
+    exact: float = 0.0,
+    still: float = 0.0,
+    longest: float = inf,
+    halvings: int = 0,
+    is_even: bool = False,
+    refused: tuple[type[Exception], ...] = (),
+) -> tuple[_Place, Missing]:
+    """Return the place near by at which nothing is missing, or that to which so many steps have led.
+
+    Parameters
+    ----------
+    look
+        What is missing at a place.
+    moved
+        Where a displacement leads from a place.
+    place
+        Where to begin.
+    scales
+        Size of a displacement along each unknown.
+    steps
+        The largest number of steps.
+    met
+        What is missed by less is met: from there on steps are taken as long as they help, up to rounding.
+    exact
+        What is missed by no more needs no further step.
+    still
+        The last step is one that displaces nothing by more, in units of the scales; none unless given.
+    longest
+        No step displaces anything by more, in units of the scales.
+    halvings
+        So often a step is halved until less is missing than before; 0 for full steps.
+    is_even
+        Whether rows of known size have size one (`row_scales`), so that what is missing says how well they are known;
+        see `least_norm`.
+    refused
+        Errors by which a place has no values: steps there are halved as well.
+
+    Returns
+    -------
+    place, missing
+        The place, and what is missing there; where the last step was `still`, what was missing before it.
+    """
+    now = look(place)
+    last = inf
+    for _ in range(steps):
+        miss = now.miss
+        if miss <= exact or (not halvings and miss < met and miss >= _MUCH * last):
+            break
+        rows = now.units if now.even is None else now.even
+        matrix, right = scaled(now.slopes(), scales, rows), now.value / rows
+        for off in (largest(right), 0.0) if is_even else (0.0,):
+            step = scales * least_norm(matrix, right, float(is_even), off)
+            far = largest(step / scales)
+            step = step * (longest / far) if far > longest else step
+            if not halvings:
+                break
+            trial, there, left = _nearer(look, moved, place, step, now, far, halvings, refused)
+            if left < _MUCH * miss:
+                break
+        if halvings:
+            if left >= miss and (miss < met or left == inf):
+                break
+            place, now, last = trial, there, miss
+            continue
+        place = moved(place, -step)
+        if far <= still:
+            break
+        now, last = look(place), miss
+    return place, now
+
+
+def _nearer(
+    look: Callable[[Any], Missing],
+    moved: Callable[[Any, FloatArray], Any],
+    place: Any,
+    step: FloatArray,
+    now: Missing,
+    far: float,
+    halvings: int,
+    refused: tuple[type[Exception], ...],
+) -> tuple[Any, Missing, float]:
+    """Return where a step leads, halved until less is missing in today's units, what is missing there, and how much."""
+    trial, there, left = place, now, inf
+    for _ in range(halvings):
+        try:
+            trial = moved(place, -step)
+            there = look(trial)
+            left = largest(there.value / now.units)
+        except refused:
+            left = inf
+        if left < now.miss or far < _SHORT:
+            break
+        step = 0.5 * step
+    return trial, there, left
