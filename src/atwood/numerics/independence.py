@@ -201,7 +201,8 @@ def review_rows(
 def _made_of(kept: Matrix, others: Matrix) -> FloatArray:
     """Return how often each kept row is in others, shape (others, kept)."""
     if is_full(kept):
-        return least_squares(kept.T, others.T).T
+        found: FloatArray = least_squares(kept.T, others.T).T
+        return found
     from atwood.numerics.sparse import csr_made_of
 
     return csr_made_of(kept, others)

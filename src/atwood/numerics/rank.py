@@ -12,7 +12,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from atwood.arrays import FloatArray
+from atwood.arrays import BoolArray, FloatArray, IntArray
 from atwood.clock import within_time
 from atwood.late import dataclass
 from atwood.tolerances import tolerances
@@ -26,6 +26,7 @@ __all__ = [
     "null_space",
     "open_directions",
     "rank",
+    "ranks",
     "significant",
     "singular_values",
     "span",
@@ -74,7 +75,7 @@ class Decomposition:
         return self.left[:, self.rank :]
 
 
-def significant(values: FloatArray, errors: Errors = None) -> FloatArray:
+def significant(values: FloatArray, errors: Errors = None) -> BoolArray:
     """Return which singular values are there in truth; of stacks of matrices, for each.
 
     Parameters
@@ -115,10 +116,14 @@ def singular_values(matrix: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.svd(matrix, compute_uv=False))
 
 
-def rank(matrix: FloatArray, errors: Errors = None) -> int | FloatArray:
-    """Return the rank of a matrix, or of each of a stack; see `decompose`."""
-    found = np.sum(significant(singular_values(matrix), errors), axis=-1)
-    return int(found) if matrix.ndim == 2 else np.asarray(found)
+def rank(matrix: FloatArray, errors: Errors = None) -> int:
+    """Return the rank of a matrix; see `decompose`."""
+    return int(ranks(matrix, errors))
+
+
+def ranks(matrices: FloatArray, errors: Errors = None) -> IntArray:
+    """Return the rank of each of a stack of matrices; see `decompose`."""
+    return np.asarray(np.sum(significant(singular_values(matrices), errors), axis=-1))
 
 
 def null_space(matrix: FloatArray, errors: Errors = None, rank: int | None = None) -> FloatArray:

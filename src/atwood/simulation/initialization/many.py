@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.numerics.rank import rank
+from atwood.numerics.rank import ranks
 from atwood.numerics.solutions import least_norm
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales
 from atwood.simulation.initialization.system import Conditions
@@ -115,7 +115,7 @@ def _least_steps(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray, NDA
             found = np.asarray(across @ np.linalg.solve(matrix @ across, right[:, :, None]), dtype=np.float64)
     except np.linalg.LinAlgError:  # rows of one run depend on each other
         found = least_norm(matrix, right[:, :, None])
-        known[:] = rank(matrix) == matrix.shape[1]
+        known[:] = ranks(matrix) == matrix.shape[1]
     return found[:, :, 0], known
 
 

@@ -151,8 +151,18 @@ def nearest(
         return Missing(residual, rows, lambda: matrix, system.errors.shared(rows))
 
     moved = partial(system.kinematic_map.moved, t)
-    limits = {"met": tolerances.MET, "exact": _EXACT, "longest": _LONGEST}
-    q, now = newton(look, moved, q, scales, steps=iterations, halvings=_HALVINGS, is_even=True, **limits)
+    q, now = newton(
+        look,
+        moved,
+        q,
+        scales,
+        steps=iterations,
+        met=tolerances.MET,
+        exact=_EXACT,
+        longest=_LONGEST,
+        halvings=_HALVINGS,
+        is_even=True,
+    )
     # What hardly changes with any coordinate, as where links line up, is measured by the scene.
     sizes = np.maximum(now.units, 1e-4 * max(now.units.max(initial=0.0), scales.max(initial=0.0)))
     # What rounding could have left of a condition that nothing changes, as of a speed that a drive prescribes, is met.
