@@ -14,7 +14,8 @@ import atwood.reporting
 import atwood.solids
 import atwood.study
 from atwood.result.trajectories import Group
-from atwood.showing import LINES, WIDTH, fitted, html_table
+from atwood.showing import LINES, WIDTH, fitted
+from atwood.table import Table, facts, table
 from atwood_library import Ground, PointMass, Rod
 from atwood_library.scenes import Chain, DoublePendulum, FourBar, HeavyTop, Kepler, SimplePendulum
 
@@ -254,7 +255,7 @@ def test_notebooks_show_a_table(roots, name):
 
 
 def test_texts_in_tables_are_escaped():
-    assert "<script>" not in html_table("<script>", ("<script>",), [("<script>", 1.0)], "<script>")
+    assert "<script>" not in table(("<script>",), [("<script>",)], "<script>", ["<script>"]).html()
 
 
 def test_keys_are_completed(roots):
@@ -272,3 +273,22 @@ def test_only_what_does_not_fit_is_cut(lines):
     assert (fitted(text) == text) is (lines <= LINES)
     assert _screen_lines(fitted(text)) <= LINES
     assert _screen_lines(fitted("word " * 40 * lines)) <= LINES
+
+
+def _modes() -> Table:
+    return table(("mode", "growth, 1/s>"), [("0", 0.25), ("12_b", -1.0)], "Modes", ["Two."])
+
+
+def test_a_table_is_one_value_behind_text_data_and_latex() -> None:
+    assert _modes().text() == "Modes\nmode  growth, 1/s\n0            0.25\n12_b           -1\nTwo."
+    data = _modes().to_data()
+    assert data["columns"] == [{"name": "mode", "unit": ""}, {"name": "growth", "unit": "1/s"}]
+    assert data["rows"] == [["0", 0.25], ["12_b", -1.0]]
+    assert _modes().latex().split("\n")[1:4] == [r"mode & growth, 1/s \\", r"\hline", r"0 & 0.25 \\"]
+    assert r"12\_b & -1 \\" in _modes().latex()
+
+
+def test_facts_wrap_their_sentences_under_themselves() -> None:
+    told = facts([("long", "one two three four five six seven"), ("x", "")], "Facts")
+    assert told.lines(26) == ["long  one two three four", "      five six seven", "x"]
+    assert told.brief() == "<Facts>\n    long: one two three four five six seven\n    x: "

@@ -90,6 +90,8 @@ class _Completion:
                 else:
                     setattr(cls, name, value.default)
         self.made = {name for name in _METHODS if name not in own}
+        if any("__repr__" in vars(base) and "_completion" not in vars(base) for base in cls.__mro__[1:-1]):
+            self.made.discard("__repr__")  # it shows itself as its base does
 
     def complete(self) -> None:
         """Find out which fields there are, and which of them are compared, shown and given."""

@@ -1,12 +1,12 @@
-"""How values show themselves: `repr` in a few lines, and tables for notebooks."""
+"""How values show themselves: in a `repr` of a few lines, and as plain data."""
 
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-__all__ = ["brief", "count_of", "field_text", "fitted", "html_table", "listed"]
+__all__ = ["brief", "count_of", "data_of", "field_text", "fitted", "listed", "plain"]
 
 LINES, WIDTH = 10, 110
 """What a `repr` may take, in lines and columns."""
@@ -72,40 +72,32 @@ def listed(names: Iterable[object], shown: int = 6) -> str:
     return f"{', '.join(every[:shown])} and {len(every) - shown} more"
 
 
-def html_table(title: str, heads: Sequence[str], rows: Iterable[Sequence[object]], note: str = "") -> str:
-    """Return a table for a notebook; all texts are escaped.
+def data_of(value: object, *names: str) -> dict[str, Any]:
+    """Return attributes of a value as plain data by name."""
+    return {name: plain(getattr(value, name)) for name in names}
+
+
+def plain(value: Any) -> Any:
+    """Return a value as plain data: numbers, texts, lists and dictionaries, as JSON knows them.
 
     Parameters
     ----------
-    title
-        Stands above the table.
-    heads
-        Headings of the columns; none for a table of names and what is said of them.
-    rows
-        The cells; numbers are aligned to the right.
-    note
-        Stands below the table.
+    value
+        Data, arrays, expressions, or a value with fields.
     """
-    import html
-
-    lines = [f"<div><strong>{html.escape(title)}</strong>", "<table>"]
-    if heads:
-        cells = "".join(f"<th>{html.escape(head)}</th>" for head in heads)
-        lines.append(f"<thead><tr>{cells}</tr></thead>")
-    lines.append("<tbody>")
-    lines += [f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows]
-    lines.append("</tbody></table>")
-    if note:
-        lines.append(f"<p>{html.escape(note)}</p>")
-    return "\n".join([*lines, "</div>"])
-
-
-def _cell(value: object) -> str:
-    import html
-
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
-        return f'<td style="text-align: right">{value:.6g}</td>'
-    return f'<td style="text-align: left">{html.escape(str(value))}</td>'
+    if value is None or isinstance(value, (str, bool, int, float)):
+        return value
+    if isinstance(value, complex):
+        return [value.real, value.imag]
+    if isinstance(value, Mapping):
+        return {str(key): plain(one) for key, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(one) for one in value]
+    for own in ("to_data", "to_dict", "tolist"):
+        if hasattr(value, own):
+            return plain(getattr(value, own)())
+    fields = getattr(type(value), "__dataclass_fields__", None)
+    return str(value) if fields is None else data_of(value, *fields)
 
 
 class _Fields(reprlib.Repr):

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from typing import Any, Literal
 
 from atwood.late import dataclass
-from atwood.showing import fitted
+from atwood.showing import data_of, fitted
 
 __all__ = ["CheckReport", "Finding"]
 
@@ -84,13 +83,7 @@ class CheckReport:
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
-        return {
-            "component": self.component,
-            "ok": self.ok,
-            "spaces": list(self.spaces),
-            "tests": dict(self.tests),
-            "findings": [asdict(one) for one in self.findings],
-        }
+        return data_of(self, "component", "ok", "spaces", "tests", "findings")
 
     def __str__(self) -> str:
         made = ", ".join(f"{name} {count}" for name, count in self.tests.items())

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from atwood.cli.errors import FAILED
-from atwood.cli.output import console, print_json
+from atwood.cli.output import print_json, writer
 from atwood.cli.parts import library_parts, looks_like_a_part
 from atwood.cli.scenes import load_file
 from atwood.errors import UsageError, suggestion
+from atwood.table import table
 
 if TYPE_CHECKING:
     from atwood.checking import CheckReport
@@ -80,23 +81,18 @@ def _defined(module: ModuleType) -> dict[str, Any]:
 
 
 def _print(reports: Sequence[CheckReport]) -> None:
-    from rich.table import Table
-    from rich.text import Text
-
-    out = console()
-    table = Table(box=None, header_style="cyan", padding=(0, 2, 0, 0))
-    for column in ("component", "spaces", "comparisons", "result"):
-        table.add_column(column, no_wrap=column != "spaces")
+    rows = []
     for one in reports:
-        sound = Text("nothing to check", style="yellow") if one.is_empty else Text("sound", style="green")
-        result = sound if one.ok else Text(f"{len(one.failures)} wrong", style="red")
-        table.add_row(one.component, ", ".join(one.spaces), str(sum(one.tests.values())), result)
-    out.print(table)
+        sound = "nothing to check" if one.is_empty else "sound"
+        result = sound if one.ok else f"{len(one.failures)} wrong"
+        rows.append((one.component, ", ".join(one.spaces), str(sum(one.tests.values())), result))
+    out = writer()
+    out.show(table(("component", "spaces~", "comparisons", "result"), rows))
     for one in reports:
         for finding in one.findings:
-            text = Text.assemble((one.component, "bold"), " ", (f"{finding.gravity} ", _STYLES[finding.gravity]))
             place = ", ".join(word for word in (finding.test, finding.law, finding.space) if word)
-            out.print(text + Text(f"({place}): {finding.message}"), soft_wrap=True)
+            gravity = (f"{finding.gravity} ", _STYLES[finding.gravity])
+            out.line((one.component, "bold"), (" ", ""), gravity, (f"({place}): {finding.message}", ""))
 
 
 _STYLES = {"failure": "red", "note": "dim"}

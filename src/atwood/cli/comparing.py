@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from atwood.cli.output import console, print_json, warn
+from atwood.cli.output import print_json, progress_bar, warn, writer
 from atwood.cli.scenes import bundled_scenes, prepare
 from atwood.errors import AtwoodError, UsageError
 from atwood.late import dataclass
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from atwood.model.compose.composite import Model
     from atwood.study import Comparison
-from atwood.study.comparison.found import HEADINGS, RELATIVE
 
 __all__ = ["CompareRequest", "compare_scene"]
 
@@ -60,7 +55,7 @@ def compare_scene(request: CompareRequest) -> None:
     if request.periods is not None:
         _compare_long(request, scene, name)
         return
-    with _progress(request.progress) as progress:
+    with progress_bar(request.progress, "", _share) as progress:
         found = _compared(request, scene, name, progress)
     if request.plot is not None:
         found.plot(request.plot)
@@ -73,23 +68,22 @@ def compare_scene(request: CompareRequest) -> None:
     if request.as_json:
         print_json(found.to_dict())
         return
-    _print(found)
-    for option, file in (("plotted", request.plot), ("saved", request.save), ("written", request.html)):
-        if file is not None:
-            console().print(f"{option}: {file}", style="dim", soft_wrap=True)
+    out = writer()
+    out.show(*found.tables())
+    out.files(plotted=request.plot, saved=request.save, written=request.html)
 
 
 def _compare_long(request: CompareRequest, scene: Model, name: str) -> None:
     """Compare methods over many periods."""
     from atwood.study.comparison.long_runs import compare_long
 
-    with _progress(request.progress) as progress:
+    with progress_bar(request.progress, "", _share) as progress:
         limit = request.max_seconds or _LONG_RUN
         found = compare_long(scene, periods=request.periods or 1, max_seconds=limit, name=name, progress=progress)
     if request.as_json:
         print_json(found.to_dict())
         return
-    console().print(str(found), soft_wrap=True)
+    writer().show(*found.tables())
 
 
 _LONG_RUN = 20.0
@@ -153,7 +147,7 @@ def _compare_all(request: CompareRequest) -> None:
     found: list[Comparison] = []
     failed: dict[str, str] = {}
     names = list(bundled_scenes())
-    with _progress(request.progress) as progress:
+    with progress_bar(request.progress, "", _share) as progress:
         for number, name in enumerate(names):
             watch = None if progress is None else _within(progress, number, len(names), name)
             try:
@@ -176,13 +170,16 @@ def _compare_all(request: CompareRequest) -> None:
     if request.as_json:
         print_json({"comparisons": [one.to_dict() for one in found], "failed": failed})
         return
+    out = writer()
     for one in found:
-        console().print(f"{one.scene}: {one.verdict}", soft_wrap=True)
+        out.line((f"{one.scene}: {one.verdict}", ""))
     for name, reason in failed.items():
-        console().print(f"{name}: no answer: {reason}", soft_wrap=True)
-    for option, file in (("saved", request.save), ("written", request.html)):
-        if file is not None:
-            console().print(f"{option}: {file}", style="dim", soft_wrap=True)
+        out.line((f"{name}: no answer: {reason}", ""))
+    out.files(saved=request.save, written=request.html)
+
+
+def _share(what: str, done: int, of: int) -> tuple[float, str]:
+    return done / max(of, 1), what
 
 
 def _within(
@@ -190,58 +187,3 @@ def _within(
 ) -> Callable[[str, int, int], object]:
     """Return what shows the progress of one scene among all."""
     return lambda what, done, of: progress(f"{name} ({number + 1} of {count}): {what}", number * of + done, count * of)
-
-
-def _print(found: Comparison) -> None:
-    from rich.text import Text
-
-    out = console()
-    out.print(Text.assemble((found.scene, "bold"), f" to t = {found.t_end:g} s"))
-    out.print(Text(f"Errors are against {found.reference.description}."))
-    if found.reference.note:
-        out.print(Text(found.reference.note))
-    out.print()
-    out.print(_table(found))
-    out.print(RELATIVE, style="dim")
-    if any(row.within_reference for row in found.rows):
-        out.print("* within ten times the error of the reference itself", style="dim")
-    out.print()
-    out.print(Text(found.verdict, style="bold"))
-
-
-def _table(found: Comparison) -> Table:
-    from rich.table import Table
-
-    table = Table(box=None, header_style="cyan", padding=(0, 2, 0, 0))
-    table.add_column("form", no_wrap=True, min_width=22)
-    for heading in ("rtol", *HEADINGS):
-        table.add_column(heading, justify="right", no_wrap=True)
-    shown = ""
-    for row in found.rows:
-        if shown and row.label != shown:
-            table.add_section()
-        if row.reason:
-            table.add_row(row.label, f"{row.rtol:.0e}", "failed")
-        else:
-            table.add_row(row.label if row.label != shown else "", f"{row.rtol:.0e}", *row.cells())
-        shown = row.label
-    failed = [row for row in found.rows if row.reason]
-    if failed:
-        table.caption = "\n".join(f"{row.label} at {row.rtol:.0e} failed: {row.reason}" for row in failed)
-        table.caption_justify = "left"
-    return table
-
-
-@contextlib.contextmanager
-def _progress(wanted: bool) -> Iterator[Callable[[str, int, int], object] | None]:
-    """Say on standard error what is being done, if there is a terminal."""
-    if not (wanted and sys.stderr.isatty()):
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (BarColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=None)
-        yield lambda what, done, of: bar.update(task, description=what, completed=done, total=of)

@@ -7,6 +7,7 @@ import numpy as np
 from atwood.cli.output import Writer
 from atwood.result.part_energy import PartEnergies, PartEnergy
 from atwood.showing import count_of
+from atwood.table import table
 
 __all__ = ["print_energies"]
 
@@ -29,21 +30,16 @@ def print_energies(parts: PartEnergies, out: Writer) -> None:
     """
     shown = {path: parts[path] for path in (*parts, *parts.models)}
     nothing = max(_NOTHING, 3.0 * parts.max_error) * parts.exchanged
-    rows = {path: cells for path, one in shown.items() if (cells := _cells(one, nothing))}
+    found = {path: cells for path, one in shown.items() if (cells := _cells(one, nothing))}
     heads = ["", "gained>", "supplied>", "dissipated>", "constraints>", "impacts>", "came in through"]
-    table = [[path + ("" if shown[path].is_unique else " *"), *cells] for path, cells in list(rows.items())[:_MOST]]
-    used = [i for i in range(len(heads)) if i < 2 or any(row[i] for row in table)]
+    lines = [[path + ("" if shown[path].is_unique else " *"), *cells] for path, cells in list(found.items())[:_MOST]]
+    used = [i for i in range(len(heads)) if i < 2 or any(row[i] for row in lines)]
+    hidden = len(shown) - len(lines)
+    notes = [f"{count_of(hidden, 'more component')}: --json or --save FILE shows all"] if hidden else []
+    notes += [*["* not unique"] * bool(parts.undetermined), *parts.describe().split("\n")]
+    rows = [[row[i] for i in used] for row in lines]
     out.line()
-    out.line(("energy from start to end, J", "bold"))
-    if table:
-        out.table([heads[i] for i in used], [[row[i] for i in used] for row in table])
-    hidden = len(shown) - len(table)
-    if hidden:
-        out.line((f"{count_of(hidden, 'more component')}: --json or --save FILE shows all", "dim"))
-    if parts.undetermined:
-        out.line(("* not unique", "dim"))
-    for line in parts.describe().split("\n"):
-        out.line((line, ""))
+    out.show(table([heads[i] for i in used] if lines else (), rows, "energy from start to end, J", notes))
 
 
 def _cells(one: PartEnergy, nothing: float) -> list[str]:

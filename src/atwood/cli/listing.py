@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from atwood.cli.output import console, print_json
+from atwood.cli.output import print_json, writer
 from atwood.cli.scenes import bundled_scenes
+from atwood.table import facts
 
 __all__ = ["list_scenes"]
 
@@ -20,18 +21,10 @@ def list_scenes(as_json: bool) -> None:
     if as_json:
         print_json({"scenes": [{"name": name, "summary": summary} for name, summary in scenes.items()]})
         return
-    out = console()
     if not scenes:
-        out.print("No component library is installed.")
+        writer().line(("No component library is installed.", ""))
         return
-    from rich.table import Table
-
-    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
-    table.add_column(style="bold", no_wrap=True)
-    table.add_column()
-    for name, summary in scenes.items():
-        table.add_row(name, summary)
-    out.print(table)
+    writer().show(facts(scenes.items()))
 
 
 def _summary(kind: type) -> str:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import sys
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
 
 import click
 
-if TYPE_CHECKING:
-    from rich.console import Console
+from atwood.table import WIDTH, Table
 
-__all__ = ["Writer", "console", "print_json", "strict", "warn", "writer"]
+__all__ = ["Writer", "print_json", "progress_bar", "strict", "warn", "writer"]
 
 
 def print_json(data: Mapping[str, Any]) -> None:
@@ -42,32 +43,38 @@ def strict(value: Any) -> Any:
     return strict(value.item()) if hasattr(value, "item") else str(value)
 
 
-def console() -> Console:
-    """Return the console for texts on standard output; where there is no terminal it is 120 columns wide."""
-    from rich.console import Console
+class Writer:
+    """Writes texts with styles, and tables, to a file or a pipe: as wide as ``COLUMNS`` says, or 120 columns."""
 
-    made = Console(highlight=False)
-    if not made.is_terminal and "COLUMNS" not in os.environ:
-        made = Console(highlight=False, width=120)
-    return made
-
-
-class Writer(Protocol):
-    """Writes texts with styles, and tables, to standard output."""
-
-    width: int
+    def __init__(self) -> None:
+        told = os.environ.get("COLUMNS", "")
+        self.width = int(told) if told.isdecimal() and int(told) > 0 else WIDTH
 
     def line(self, *texts: tuple[str, str]) -> None:
         """Write a line of texts, each with its style."""
-        ...
+        click.echo("".join(text for text, _ in texts))
 
-    def pairs(self, rows: Sequence[tuple[str, str]]) -> None:
-        """Write labels and sentences; these are wrapped."""
-        ...
+    def show(self, *tables: Table) -> None:
+        """Write tables with their titles and notes, an empty line between them."""
+        for number, one in enumerate(tables):
+            if number:
+                self.line()
+            if one.title:
+                self.line((one.title, "bold"))
+            self.rows(one)
+            for note in one.notes:
+                self.line((note, "dim"))
 
-    def table(self, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-        """Write a table, whose cells are never cut; headings that end with ``>`` have their columns to the right."""
-        ...
+    def rows(self, table: Table) -> None:
+        """Write headings and rows of a table."""
+        for line in table.lines(self.width):
+            click.echo(line)
+
+    def files(self, **written: Path | None) -> None:
+        """Say which files were written, each with what was done."""
+        for done, file in written.items():
+            if file is not None:
+                self.line((f"{done}: {file}", "dim"))
 
 
 def writer() -> Writer:
@@ -75,40 +82,34 @@ def writer() -> Writer:
     if sys.stdout.isatty() or os.environ.get("FORCE_COLOR"):
         from atwood.cli.colours import ColourWriter
 
-        return ColourWriter(console())
-    return PlainWriter()
-
-
-class PlainWriter:
-    """Writes for a file or a pipe, as wide as ``COLUMNS`` says, or 120 columns."""
-
-    def __init__(self) -> None:
-        told = os.environ.get("COLUMNS", "")
-        self.width = int(told) if told.isdecimal() and int(told) > 0 else 120
-
-    def line(self, *texts: tuple[str, str]) -> None:
-        """Write a line."""
-        click.echo("".join(text for text, _ in texts))
-
-    def pairs(self, rows: Sequence[tuple[str, str]]) -> None:
-        """Write labels and sentences."""
-        from textwrap import wrap
-
-        left = max((len(label) for label, _ in rows), default=0) + 2
-        for label, text in rows:
-            for i, part in enumerate(wrap(text, max(20, self.width - left), break_on_hyphens=False) or [""]):
-                click.echo(f"{'' if i else label:{left}}{part}".rstrip())
-
-    def table(self, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-        """Write a table."""
-        to_right = [heading.endswith(">") for heading in headings]
-        lines = [[heading.removesuffix(">") for heading in headings], *rows]
-        widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-        for cells in lines:
-            placed = zip(cells, widths, to_right, strict=True)
-            click.echo("  ".join(f"{cell:{'>' if right else '<'}{w}}" for cell, w, right in placed).rstrip())
+        return ColourWriter()
+    return Writer()
 
 
 def warn(text: str) -> None:
     """Write a line to standard error."""
     click.echo(text, err=True)
+
+
+@contextlib.contextmanager
+def progress_bar(
+    wanted: bool, name: str, share: Callable[..., tuple[float, str]]
+) -> Iterator[Callable[..., object] | None]:
+    """Show a progress bar on standard error while something goes on, if there is a terminal.
+
+    Parameters
+    ----------
+    wanted
+        Whether to show one at all.
+    name
+        What goes on.
+    share
+        Returns how much is done, and what that is in words, for what a function gives its argument `progress`.
+    """
+    if not (wanted and sys.stderr.isatty()):
+        yield None
+        return
+    from atwood.cli.colours import bar
+
+    with bar(name) as update:
+        yield lambda *told: update(*share(*told))

@@ -7,9 +7,10 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from atwood.cli.output import console, print_json
+from atwood.cli.output import print_json, writer
 from atwood.errors import UsageError, near_matches, suggestion
 from atwood.model.compose.libraries import all_libraries
+from atwood.table import table
 
 if TYPE_CHECKING:
     from atwood.model.declare.component import Component
@@ -103,19 +104,12 @@ def list_parts(as_json: bool) -> None:
         rows = ((name, _said(kind)[0], list(_synonyms(kind))) for name, kind in parts.items())
         print_json({"parts": [dict(zip(("name", "summary", "synonyms"), row, strict=True)) for row in rows]})
         return
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
-    table.add_column(style="cyan", no_wrap=True)
-    table.add_column(style="bold", no_wrap=True)
-    table.add_column()
-    before = ""
+    listed, before = [], ""
     for name, kind in parts.items():
         group = kind.__module__.split(".")[-2]
-        table.add_row("" if group == before else group, name, Text(_said(kind)[0]))
+        listed.append(("" if group == before else group, name, _said(kind)[0]))
         before = group
-    console().print(table)
+    writer().show(table(("", "", "~"), listed))
 
 
 def show_part(name: str, as_json: bool, changed: bool = False) -> None:
@@ -160,23 +154,15 @@ def show_part(name: str, as_json: bool, changed: bool = False) -> None:
 
 
 def _print_part(name: str, kind: type[Component]) -> None:
-    tables = {heading: rows for heading, rows in _tables(kind) if rows}
-    from rich.table import Table
-    from rich.text import Text
-
-    out = console()
-    out.print(Text.assemble((name, "bold"), _only_in(kind.spaces)))
-    out.print(Text("\n".join(_said(kind))))
+    out, tables = writer(), {heading: rows for heading, rows in _tables(kind) if rows}
+    out.line((name, "bold"), (_only_in(kind.spaces), ""))
+    out.line(("\n".join(_said(kind)), ""))
     if _synonyms(kind):
-        out.print(Text(f"Also called: {', '.join(_synonyms(kind))}."))
+        out.line((f"Also called: {', '.join(_synonyms(kind))}.", ""))
     for heading, rows in tables.items():
-        table = Table(box=None, header_style="cyan", padding=(0, 2, 0, 0))
-        for column in rows[0]:
-            table.add_column(heading if column == "name" else column, no_wrap=column != "meaning")
-        for row in rows:
-            table.add_row(*(Text(value) for value in row.values()))
-        out.print()
-        out.print(table)
+        names = {"name": heading, "meaning": "meaning~"}
+        out.line()
+        out.show(table([names.get(column, column) for column in rows[0]], (row.values() for row in rows)))
 
 
 def _no_such_part(name: str) -> UsageError:

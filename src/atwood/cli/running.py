@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
-import sys
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from atwood.cli.errors import INTERRUPTED
-from atwood.cli.output import print_json, warn
+from atwood.cli.output import print_json, progress_bar, warn
 from atwood.cli.scenes import check_applies, pairs, prepare
 from atwood.errors import AtwoodError, UsageError
 from atwood.late import dataclass
@@ -22,7 +19,7 @@ if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
     from atwood.result.result import Result
 
-__all__ = ["RunRequest", "progress_bar", "run_scene"]
+__all__ = ["RunRequest", "run_scene"]
 
 
 @dataclass(frozen=True)
@@ -102,8 +99,12 @@ def _run(request: RunRequest) -> Result:
 
         monitor = conserved(assembly)
     t_start, t_end = assembly.flat.t_start, assembly.flat.t_end if request.t_end is None else request.t_end
+
+    def share(t: float) -> tuple[float, str]:
+        return (t - t_start) / (t_end - t_start), f"t = {t:.3g} s"
+
     try:
-        with progress_bar(request.progress, name, t_start, t_end) as progress:
+        with progress_bar(request.progress and t_end > t_start, name, share) as progress:
             return simulate(
                 assembly,
                 t_end=request.t_end,
@@ -272,29 +273,3 @@ def multiplier_labels(result: Result) -> list[str]:
         return []
     constraints = assembly.own_equations.constraints
     return [constraints[i].label for i in plan.finding.kept]
-
-
-@contextlib.contextmanager
-def progress_bar(wanted: bool, name: str, t_start: float, t_end: float) -> Iterator[Callable[[float], object] | None]:
-    """Show a progress bar on standard error while a run goes on, if there is a terminal.
-
-    Parameters
-    ----------
-    wanted
-        Whether to show one at all.
-    name
-        What is running.
-    t_start, t_end
-        Time span, s.
-    """
-    if not (wanted and sys.stderr.isatty() and t_end > t_start):
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    reached = TextColumn("t = {task.fields[time]:.3g} s")
-    columns = (TextColumn("{task.description}"), BarColumn(), reached, TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(name, total=t_end - t_start, time=t_start)
-        yield lambda t: bar.update(task, completed=t - t_start, time=t)

@@ -13,6 +13,7 @@ from atwood.cli.running import RunRequest, degrees_of_freedom, multiplier_labels
 from atwood.result.about import solver_name
 from atwood.showing import count_of
 from atwood.stages import STAGES
+from atwood.table import facts, table
 
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
@@ -36,15 +37,13 @@ def print_summary(result: Result, request: RunRequest) -> None:
         What was asked for.
     """
     out = writer()
-    out.line((result.assembly.flat.name, "bold"), (f", {result.method}", ""))
-    out.pairs(list(_facts(result)))
+    out.show(facts(_facts(result), f"{result.assembly.flat.name}, {result.method}"))
     out.line()
     paths = main_quantities(result)
-    out.table(*_quantities(result, paths[:_ROWS], out.width))
     hidden = len(result.paths) - min(len(paths), _ROWS)
-    if hidden:
-        more = count_of(hidden, "more quantity", "more quantities")
-        out.line((f"{more}: --json or --save FILE shows all", "dim"))
+    more = count_of(hidden, "more quantity", "more quantities")
+    notes = [f"{more}: --json or --save FILE shows all"] if hidden else []
+    out.show(table(*_quantities(result, paths[:_ROWS], out.width), notes=notes))
     if request.energy == "parts":
         from atwood.cli.energies import print_energies
 
@@ -52,10 +51,8 @@ def print_summary(result: Result, request: RunRequest) -> None:
     if request.timings:
         out.line()
         rows = [[name, f"{1e3 * spent:.3g}", STAGES[name]] for name, spent in result.timings.items()]
-        out.table(["stage", "ms>", "what it makes"], rows)
-    for option, file in (("saved", request.save), ("plotted", request.plot), ("drawn", request.draw)):
-        if file is not None:
-            out.line((f"{option}: {file}", "dim"))
+        out.show(table(("stage", "ms>", "what it makes"), rows))
+    out.files(saved=request.save, plotted=request.plot, drawn=request.draw)
 
 
 def _quantities(result: Result, paths: list[str], width: int) -> tuple[list[str], list[list[str]]]:

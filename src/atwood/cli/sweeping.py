@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import re
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,15 +11,14 @@ import click
 import numpy as np
 
 from atwood.cli.errors import INTERRUPTED
-from atwood.cli.output import console, print_json, warn
+from atwood.cli.output import print_json, progress_bar, warn, writer
 from atwood.cli.scenes import check_applies, pairs, prepare, warn_of_radians
 from atwood.errors import UsageError
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
+from atwood.table import Table, facts, table
 from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from atwood.study import Sweep
 
 __all__ = ["SweepRequest", "read_values", "sweep_scene"]
@@ -81,7 +78,7 @@ def sweep_scene(request: SweepRequest) -> None:
             warn_of_radians(scene, path, values, option, typed[path])
     from atwood.study import sweep
 
-    with _progress(request.progress, name) as progress:
+    with progress_bar(request.progress, name, lambda done, of: (done / of, f"{done}/{of}")) as progress:
         found = sweep(
             scene,
             vary,
@@ -178,24 +175,12 @@ def _check_files(request: SweepRequest) -> None:
 
 
 def _print(found: Sweep, request: SweepRequest) -> None:
-    from rich.table import Table
-    from rich.text import Text
-
-    out = console()
-    out.print(Text.assemble((found.scene, "bold"), f", {found.form} form, to t = {found.time[-1]:g} s"))
-    facts = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
-    facts.add_column(style="cyan", no_wrap=True)
-    facts.add_column()
-    for label, text in _facts(found):
-        facts.add_row(label, Text(text))
-    out.print(facts)
-    out.print()
-    out.print(_runs(found) if len(found) <= _ROWS else _extremes(found))
-    if len(found.paths) > _COLUMNS:
-        out.print(f"{len(found.paths) - _COLUMNS} more quantities: --json or --save FILE shows all", style="dim")
-    for option, file in (("saved", request.save), ("plotted", request.plot)):
-        if file is not None:
-            out.print(f"{option}: {file}", style="dim", soft_wrap=True)
+    out, more = writer(), len(found.paths) - _COLUMNS
+    out.show(facts(_facts(found), f"{found.scene}, {found.form} form, to t = {found.time[-1]:g} s"))
+    out.line()
+    notes = [f"{more} more quantities: --json or --save FILE shows all"] if more > 0 else []
+    out.show(replace(_runs(found) if len(found) <= _ROWS else _extremes(found), notes=tuple(notes)))
+    out.files(saved=request.save, plotted=request.plot)
 
 
 def _facts(found: Sweep) -> Iterator[tuple[str, str]]:
@@ -223,54 +208,31 @@ def _facts(found: Sweep) -> Iterator[tuple[str, str]]:
     yield "time", f"{statistics.wall_seconds:.3g} s, {each:.4g} microseconds a run, {threads}"
 
 
-def _table(*heads: str) -> Table:
-    from rich.table import Table
-
-    table = Table(box=None, header_style="cyan", padding=(0, 2, 0, 0))
-    for head in heads:
-        table.add_column(head, justify="left" if head in ("quantity", "unit", "status") else "right", no_wrap=True)
-    return table
-
-
 def _runs(found: Sweep) -> Table:
     """Return the table of all runs, each with what was varied and where it ends."""
-    table = _table("run", *found.varied, *found.paths[:_COLUMNS], "status")
-    for run, status in enumerate(found.status):
-        varied = [_text(values[run]) for values in found.varied.values()]
-        ends = [_text(found.end(path)[run]) for path in found.paths[:_COLUMNS]]
-        table.add_row(str(run), *varied, *ends, status.replace("_", " "))
-    return table
+    paths = found.paths[:_COLUMNS]
+    columns = [*found.varied.values(), *(found.end(path) for path in paths)]
+    rows = [
+        (str(run), *(_text(values[run]) for values in columns), status.replace("_", " "))
+        for run, status in enumerate(found.status)
+    ]
+    return table([*(f"{name}>" for name in ("run", *found.varied, *paths)), "status"], rows)
 
 
 def _extremes(found: Sweep) -> Table:
     """Return the table of the smallest and largest ends, and where they are."""
-    table = _table("quantity", "smallest", "in run", "largest", "in run", "unit")
+    rows = []
     for path in found.paths[:_COLUMNS]:
         ends = found.end(path)
-        if not np.any(np.isfinite(ends)):
-            table.add_row(path, "-", "", "-", "", found.units[path])
-            continue
-        places = [int(place) for place in (np.nanargmin(ends), np.nanargmax(ends))]
-        table.add_row(path, *(text for k in places for text in (_text(ends[k]), str(k))), found.units[path])
-    return table
+        cells = ["-", "", "-", ""]
+        if np.any(np.isfinite(ends)):
+            places = [int(place) for place in (np.nanargmin(ends), np.nanargmax(ends))]
+            cells = [text for k in places for text in (_text(ends[k]), str(k))]
+        rows.append((path, *cells, found.units[path]))
+    return table(("quantity", "smallest>", "in run>", "largest>", "in run>", "unit"), rows)
 
 
 def _text(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.6g}" if np.isfinite(value) else "-"
     return str(value)
-
-
-@contextlib.contextmanager
-def _progress(wanted: bool, name: str) -> Iterator[Callable[[int, int], object] | None]:
-    """Show a progress bar on standard error, if there is a terminal."""
-    if not (wanted and sys.stderr.isatty()):
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(name, total=None)
-        yield lambda done, of: bar.update(task, completed=done, total=of)

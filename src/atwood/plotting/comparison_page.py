@@ -13,7 +13,7 @@ from atwood.errors import UsageError
 from atwood.files import write_atomically
 from atwood.plotting.canvas import need_matplotlib
 from atwood.plotting.plots.precision import plot_comparison, style_of
-from atwood.study.comparison.found import HEADINGS, RELATIVE, Comparison, write_rows
+from atwood.study.comparison.found import RELATIVE, Comparison, write_rows
 from atwood.study.comparison.verdict import cost_at
 
 __all__ = ["check_page", "write_page"]
@@ -132,7 +132,7 @@ def _section(one: Comparison, labels: Sequence[str]) -> str:
 
 
 def _table(one: Comparison, labels: Sequence[str]) -> str:
-    heads = ("form", "rtol", *HEADINGS, "look-out, ms", "outputs, ms")
+    heads = [*(column.heading for column in one.tables()[0].columns), "look-out, ms", "outputs, ms"]
     rows = ["<tr>" + "".join(f"<th>{escape(head)}</th>" for head in heads) + "</tr>"]
     for row in one.rows:
         colour = style_of(row.label, labels)[0] if row.label in labels else "#8d99a6"
@@ -141,7 +141,7 @@ def _table(one: Comparison, labels: Sequence[str]) -> str:
             told = f"<td class='reason' colspan='{len(heads) - 2}'>{escape(row.reason)}</td>"
         else:
             more = (f"{1e3 * (spent or 0.0):.3g}" for spent in (row.monitor_s, row.outputs_s))
-            told = _cells((*row.cells(), *more))
+            told = _cells((*row.cells()[2:], *more))
         rows.append(f"<tr>{name}<td>{row.rtol:.0e}</td>{told}</tr>")
     return f"<details><summary>{len(one.rows)} runs</summary><table>{''.join(rows)}</table></details>"
 

@@ -31,7 +31,8 @@ from atwood.reporting.parts import (
     list_parameters,
     list_ties,
 )
-from atwood.showing import fitted, html_table
+from atwood.reporting.text import described, overview
+from atwood.showing import data_of, fitted, plain
 from atwood.simulation.dynamics.scales import motion_names
 from atwood.simulation.initialization.mobility import Immobile, find_immobile
 from atwood.simulation.initialization.report import InitializationReport, report_initialization
@@ -39,6 +40,7 @@ from atwood.simulation.initialization.start import Start, find_start, own_state,
 from atwood.simulation.problem.arguments import NAME, ORIENTATION
 from atwood.simulation.problem.preparation import make_plan
 from atwood.simulation.problem.problem import Plan
+from atwood.table import Shown, Table
 from atwood.tolerances import tolerances
 
 __all__ = [
@@ -53,7 +55,7 @@ __all__ = [
 
 
 @dataclass(frozen=True)
-class MechanismReport:
+class MechanismReport(Shown):
     """What Atwood made of a scene.
 
     Attributes
@@ -146,20 +148,15 @@ class MechanismReport:
     offers: tuple[Offer, ...]
     parameters: tuple[ParameterEntry, ...]
 
-    def __str__(self) -> str:
-        from atwood.reporting.text import as_text
+    def tables(self) -> tuple[Table, ...]:
+        """Return what the mechanism is."""
+        return (described(self),)
 
-        return as_text(self)
+    def __str__(self) -> str:
+        return described(self).text(_WIDTH)
 
     def __repr__(self) -> str:
-        from atwood.reporting.text import overview
-
         return fitted(f"<MechanismReport of {overview(self)}; print it to read all>")
-
-    def _repr_html_(self) -> str:
-        from atwood.reporting.text import facts, title
-
-        return html_table(title(self), (), facts(self))
 
     @property
     def loop_joints(self) -> tuple[str, ...]:
@@ -169,53 +166,32 @@ class MechanismReport:
     def to_dict(self) -> dict[str, Any]:
         """Return the report as plain data, with lists of paths."""
         return {
-            "scene": self.scene,
-            "space": self.space,
-            "gravity": self.gravity,
-            "degrees_of_freedom": self.degrees_of_freedom,
+            **data_of(self, "scene", "space", "gravity", "degrees_of_freedom"),
             "constraints": len(self.constraints),
             "loops": self.loops,
             "bodies": [one.path for one in self.bodies],
             "massless": list(self.massless),
             "joints": [one.path for one in self.joints],
-            "ties": list(self.ties),
-            "redundant": list(self.redundant),
+            **data_of(self, "ties", "redundant"),
             "merged": [one.path for one in self.merged],
             "dropped": [one.path for one in self.dropped],
-            "coordinates": list(self.coordinates),
-            "eliminated": list(self.eliminated),
-            "integrated": list(self.integrated),
-            "on_surfaces": list(self.on_surfaces),
-            "solved_speeds": list(self.solved_speeds),
-            "idle_spins": list(self.idle_spins),
-            "dependent": list(self.dependent),
-            "loop_joints": list(self.loop_joints),
+            **data_of(self, "coordinates", "eliminated", "integrated", "on_surfaces", "solved_speeds", "idle_spins"),
+            **data_of(self, "dependent", "loop_joints"),
             "constraint_labels": list(self.constraints),
-            "not_unique": list(self.not_unique),
-            "starts_singular": self.starts_singular,
-            "start": {
-                "free_coordinates": list(self.free_coordinates),
-                "free_speeds": list(self.free_speeds),
-                "repeated": list(self.repeated),
-            },
+            **data_of(self, "not_unique", "starts_singular"),
+            "start": data_of(self, "free_coordinates", "free_speeds", "repeated"),
             "placement": self.initialization.to_dict(),
-            "immobile": None if self.immobile is None else self.immobile.to_dict(),
-            "states": dict(self.states),
-            "operations": {form: dict(counts) for form, counts in self.operations.items()},
-            "offers": [one.to_dict() for one in self.offers],
+            **data_of(self, "immobile", "states", "operations", "offers"),
             "masses": {one.path: one.mass for one in self.bodies},
             "merged_into": {one.path: one.into for one in self.merged},
             "dropped_because": {one.path: one.why for one in self.dropped},
             "joint_kinds": {one.path: one.kind for one in self.joints},
-            "parameters": [
-                {"path": one.path, "value": _plain(one.value), "unit": one.unit, "meaning": one.meaning}
-                for one in self.parameters
-            ],
+            "parameters": plain(self.parameters),
         }
 
 
-def _plain(value: object) -> object:
-    return list(value) if isinstance(value, tuple) else value
+_WIDTH = 100
+"""Columns of a printed report."""
 
 
 @takes(scene=SCENE, name=NAME, orientation=optional(ORIENTATION))

@@ -23,6 +23,7 @@ from atwood.model.values.vector import Vector
 from atwood.numerics.independence import independent_rows
 from atwood.numerics.matrices import scaled
 from atwood.pipeline import assemble_flat
+from atwood.showing import data_of
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.start import Start, find_start, own_state
@@ -72,14 +73,7 @@ class Offer:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the offer as plain data."""
-        return {
-            "space": self.space,
-            "where": self.where,
-            "direction": list(self.direction),
-            "states": dict(self.states),
-            "operations": {form: dict(counts) for form, counts in self.operations.items()},
-            "why_not": self.why_not,
-        }
+        return data_of(self, "space", "where", "direction", "states", "operations", "why_not")
 
 
 def find_offers(assembly: Assembly, start: Start) -> tuple[Offer, ...]:

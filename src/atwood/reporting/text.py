@@ -3,44 +3,45 @@
 from __future__ import annotations
 
 import re
-import textwrap
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import groupby
+from itertools import groupby, islice
 from typing import TYPE_CHECKING
 
 from atwood.showing import count_of
+from atwood.table import Table, facts, table
 
 if TYPE_CHECKING:
     from atwood.reporting.mechanism import MechanismReport
 
-__all__ = ["as_text", "facts", "overview", "shorten", "title"]
+__all__ = ["described", "overview", "parameters", "shorten", "title"]
 
 _SHOWN = 12
 """Of a long list, so many are named."""
 
 _ARRAY = 4
-_WIDTH = 100
-_LABEL = 18
+
+_ROWS = 16
+"""So many parameters are shown."""
 
 
-def as_text(report: MechanismReport) -> str:
-    """Return a mechanism report as text.
+def described(report: MechanismReport) -> Table:
+    """Return a mechanism report as labels and sentences."""
+    return facts(_facts(report), title(report))
 
-    Parameters
-    ----------
-    report
-        The report.
-    """
-    lines = [title(report), ""]
-    for label, text in facts(report):
-        lines += textwrap.wrap(
-            f"{label:<{_LABEL}}{text}",
-            width=_WIDTH,
-            subsequent_indent=" " * _LABEL,
-            break_long_words=False,
-            break_on_hyphens=False,
-        )
-    return "\n".join(lines)
+
+def parameters(report: MechanismReport) -> Table:
+    """Return the numbers among the parameters, those that are alike in one row."""
+    groups: dict[tuple[str, float, str, str], list[str]] = {}
+    for one in report.parameters:
+        if isinstance(one.value, (int, float)):
+            alike = (re.sub(r"\[\d+\]", "[]", one.path), one.value, one.unit, one.meaning)
+            groups.setdefault(alike, []).append(one.path)
+    rows = (
+        (shorten(paths, 3, least=2), f"{value:g}", "" if unit == "1" else unit, meaning)
+        for (_, value, unit, meaning), paths in islice(groups.items(), _ROWS)
+    )
+    more = [f"... and {len(groups) - _ROWS} more; --json shows all"] if len(groups) > _ROWS else []
+    return table(("parameter", "value>", "unit", "meaning~"), rows, notes=more)
 
 
 def title(report: MechanismReport) -> str:
@@ -117,7 +118,7 @@ def _arrays(names: Sequence[str], least: int) -> Iterator[str]:
 _ELEMENT = re.compile(r"(.*?)\[(\d+)\](.*)$")
 
 
-def facts(report: MechanismReport) -> Iterator[tuple[str, str]]:
+def _facts(report: MechanismReport) -> Iterator[tuple[str, str]]:
     """Yield a mechanism report as labels and sentences."""
     yield "freedom", count_of(report.degrees_of_freedom, "degree") + " of freedom"
     yield "coordinates", shorten(report.coordinates) or "none: everything is fixed or prescribed"

@@ -40,6 +40,11 @@ class ConservedValues:
         moved = float(np.max(np.abs(known - known[:1]), initial=0.0))
         return moved / self.size if self.size > 0.0 else 0.0
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return start, end and drift as plain data."""
+        ends = {"start": float(self.values[0]), "end": float(self.values[-1])}
+        return {"kind": self.kind, "unit": self.unit, **ends, "max_drift": self.max_drift, "size": self.size}
+
 
 class ConservedLedger(Mapping[str, ConservedValues]):
     """The conserved quantities of a run by name.
@@ -75,17 +80,7 @@ class ConservedLedger(Mapping[str, ConservedValues]):
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
-        return {
-            one.name: {
-                "kind": one.kind,
-                "unit": one.unit,
-                "start": float(one.values[0]),
-                "end": float(one.values[-1]),
-                "max_drift": one.max_drift,
-                "size": one.size,
-            }
-            for one in self.values()
-        }
+        return {one.name: one.to_dict() for one in self.values()}
 
     def __repr__(self) -> str:
         return f"<ConservedLedger: {self.describe()}>"

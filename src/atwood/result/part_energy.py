@@ -14,7 +14,8 @@ from atwood.arguments import FILE, takes
 from atwood.arrays import FloatArray
 from atwood.errors import MissingQuantityError, suggestion_in_parts
 from atwood.late import dataclass
-from atwood.showing import count_of, fitted, html_table, listed
+from atwood.showing import count_of, fitted, listed
+from atwood.table import Shown, Table, table
 
 if TYPE_CHECKING:
     from atwood.result.files import SavedResult
@@ -97,7 +98,7 @@ class PartEnergy:
 _STATES = ("kinetic", "potential", "error")
 
 
-class PartEnergies(Mapping[str, PartEnergy]):
+class PartEnergies(Shown, Mapping[str, PartEnergy]):
     """The energies of all components of a run by path, and of all models within it.
 
     Parameters
@@ -246,20 +247,19 @@ class PartEnergies(Mapping[str, PartEnergy]):
         """
         return import_module("atwood.plotting.plots.energies").plot_energies(self, file)
 
+    def tables(self) -> tuple[Table, ...]:
+        """Return what each component gained from start to end, and where it came from."""
+        names = ("gained", "supplied", "dissipated", "constraints", "impacts")
+        rows = (
+            (path, *(f"{getattr(one, name)[-1]:.3g}" for name in names), f"{self._size(path, 'error'):.1e}")
+            for path, one in self._parts.items()
+        )
+        heads = ("component", "gained, J>", *(f"{name}>" for name in names[1:]), "error / exchanged>")
+        return (table(heads, rows, "Energy by component, from start to end", [self.describe()]),)
+
     def __repr__(self) -> str:
         of = count_of(len(self), "component")
         return fitted(f"<{type(self).__name__} of {of}: {self.describe()}>")
-
-    def _repr_html_(self) -> str:
-        rows = []
-        for path, one in self._parts.items():
-            cells = (
-                one.gained[-1],
-                *(getattr(one, name)[-1] for name in ("supplied", "dissipated", "constraints", "impacts")),
-            )
-            rows.append((path, *(f"{value:.3g}" for value in cells), f"{self._size(path, 'error'):.1e}"))
-        heads = ("component", "gained, J", "supplied", "dissipated", "constraints", "impacts", "error / exchanged")
-        return html_table("Energy by component, from start to end", heads, rows, self.describe())
 
     def _ipython_key_completions_(self) -> list[str]:
         return [*self._parts, *self._models]

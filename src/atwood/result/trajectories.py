@@ -11,7 +11,8 @@ from atwood.arguments import check, takes, whole
 from atwood.arrays import FloatArray
 from atwood.errors import MissingGroupError, MissingQuantityError, ResultError, suggestion, suggestion_in_parts
 from atwood.model.declare.quantities import PATH, PATHS, Quantity
-from atwood.showing import count_of, fitted, html_table, listed
+from atwood.showing import count_of, fitted, listed
+from atwood.table import Shown, Table, facts, table
 
 if TYPE_CHECKING:
     import os
@@ -28,7 +29,7 @@ def output_number(index: int, count: int) -> int:
     return int(check(kind, index, "index", "at", ResultError))
 
 
-class Trajectories(Mapping[str, FloatArray]):
+class Trajectories(Shown, Mapping[str, FloatArray]):
     """A mapping from the paths of quantities to their values at the output times.
 
     ``result["bob2.position.x"]`` is an array, shape (times,); ``result.parts.bob2`` is the `Group` of all quantities
@@ -210,13 +211,10 @@ class Trajectories(Mapping[str, FloatArray]):
     def _facts(self) -> Iterator[tuple[str, str]]:
         """Yield what there is to say of the run in a few lines; the first is its title."""
 
-    def __repr__(self) -> str:
-        (kind, title), *facts = self._facts()
-        return fitted("\n".join([f"<{kind} of {title}>", *(f"    {name}: {text}" for name, text in facts)]))
-
-    def _repr_html_(self) -> str:
-        (kind, title), *facts = self._facts()
-        return html_table(f"{kind} of {title}", (), facts)
+    def tables(self) -> tuple[Table, ...]:
+        """Return a few facts about the run."""
+        (kind, title), *rest = self._facts()
+        return (facts(rest, f"{kind} of {title}"),)
 
     def _ipython_key_completions_(self) -> list[str]:
         return list(self.paths)
@@ -302,7 +300,7 @@ class Group(Mapping[str, FloatArray]):
     def _repr_html_(self) -> str:
         paths = ((name, self._prefix + name) for name in self)
         rows = [(name, self._whole.unit(path), self._whole.describe(path)) for name, path in paths]
-        return html_table(f"Quantities of {self._path}".strip(), ("quantity", "unit", "meaning"), rows)
+        return table(("quantity", "unit", "meaning"), rows, f"Quantities of {self._path}".strip()).html()
 
     def _ipython_key_completions_(self) -> list[str]:
         return list(self)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,8 +11,9 @@ from atwood.cli.scenes import pairs, prepare, read_bounds, warn_of_radians
 from atwood.errors import UsageError
 
 if TYPE_CHECKING:
+    from atwood.forms.assembly import Assembly
     from atwood.model.compose.composite import Model
-    from atwood.theory.linearization import LinearModel, NormalModes
+    from atwood.theory.linearization import NormalModes
 
 __all__ = ["show_equilibria", "show_linear_model", "show_modes"]
 
@@ -38,10 +39,11 @@ def show_linear_model(
     as_json: bool,
 ) -> None:
     """Show the linear model of a scene; see the options of `atwood linearize`."""
+    from atwood.pipeline import assemble
     from atwood.theory.linearization import linearize
 
     model, name = prepare(scene, settings, ())
-    found = linearize(model, at=_state(model, at), inputs=inputs, outputs=outputs, form=form)
+    found = linearize(assemble(model, name=name), at=_state(model, at), inputs=inputs, outputs=outputs, form=form)
     if bode is not None:
         from atwood.plotting.plots.linear import plot_bode
 
@@ -49,55 +51,18 @@ def show_linear_model(
     if as_json:
         print_json({**found.to_data(), "scene": name})
         return
-    _print_model(found, name)
-    if bode is not None:
-        writer().line((f"plotted: {bode}", "dim"))
-
-
-def _print_model(found: LinearModel, name: str) -> None:
-    from atwood.theory.linearization.linear_model import complex_text
-
     out = writer()
-    out.line((name, "bold"), (f" ({found.form}), linear about a {found.kind}", ""))
-    stable = "no deviation grows" if found.is_stable else "some deviations grow"
-    zeros = f"; {found.spectrum.zeros} times 0" if found.spectrum.zeros else ""
-    out.pairs(
-        [
-            ("states", ", ".join(found.states)),
-            ("inputs", ", ".join(found.inputs) or "none: name some with --input"),
-            ("outputs", ", ".join(found.outputs) or "none: name some with --output"),
-            ("eigenvalues", ", ".join(complex_text(value) for value in found.spectrum.others) + f" 1/s{zeros}"),
-            ("stability", stable),
-        ]
-    )
-    if len(found.states) <= _SHOWN:
-        for matrix, rows, columns in (
-            ("A", found.states, found.states),
-            ("B", found.states, found.inputs),
-            ("C", found.outputs, found.states),
-            ("D", found.outputs, found.inputs),
-        ):
-            if rows and columns:
-                entries = getattr(found, matrix)
-                out.line(("", ""))
-                out.table(
-                    [matrix, *(f"{one}>" for one in columns)],
-                    [[row, *(f"{x:.6g}" for x in values)] for row, values in zip(rows, entries, strict=True)],
-                )
-    else:
-        out.line((f"Matrices of {len(found.states)} states: --json writes them.", "dim"))
-
-
-_SHOWN = 8
-"""Matrices of more states are not shown on a terminal."""
+    out.show(*found.tables())
+    out.files(plotted=bode)
 
 
 def show_modes(scene: str, settings: Sequence[str], at: Sequence[str], plot: Path | None, as_json: bool) -> None:
     """Show the normal modes of a scene; see the options of `atwood modes`."""
+    from atwood.pipeline import assemble
     from atwood.theory.linearization import equilibria, normal_modes
 
-    model, name = prepare(scene, settings, ())
-    state = _state(model, at)
+    made, name = prepare(scene, settings, ())
+    state, model = _state(made, at), assemble(made, name=name)
     if state is None:
         try:
             found = [normal_modes(model)]
@@ -112,10 +77,9 @@ def show_modes(scene: str, settings: Sequence[str], at: Sequence[str], plot: Pat
     if as_json:
         print_json({"scene": name, "modes": [one.to_data() for one in found]})
         return
-    for one in found:
-        _print_modes(one, name)
-    if plot is not None:
-        writer().line((f"plotted: {plot}", "dim"))
+    out = writer()
+    out.show(*(one for group in found for one in group.tables()))
+    out.files(plotted=plot)
 
 
 def _plot_modes(found: NormalModes, file: Path) -> None:
@@ -132,27 +96,6 @@ def _plot_modes(found: NormalModes, file: Path) -> None:
 _PICTURES = 12
 
 
-def _print_modes(found: NormalModes, name: str) -> None:
-    from atwood.theory.linearization.normal_modes import shape_text
-
-    out = writer()
-    out.line((name, "bold"), (f": {len(found)} modes about {_values(found.values)}", ""))
-    rows = []
-    for k, shape in enumerate(found.shapes):
-        omega, growth = found.angular_frequencies[k], found.growth_rates[k]
-        rows.append([str(k), f"{omega:.9g}", f"{found.frequencies[k]:.6g}", f"{growth:.6g}", shape_text(shape)])
-    out.table(["mode", "rad/s>", "Hz>", "growth, 1/s>", "shape"], rows)
-    for group in found.spaces:
-        if len(group) > 1:
-            text = ", ".join(map(str, group))
-            out.line((f"Modes {text} have equal eigenvalues: any combination of them is a mode.", "dim"))
-
-
-def _values(values: Mapping[str, float], most: int = 6) -> str:
-    shown = [f"{path} = {value:.6g}" for path, value in list(values.items())[:most]]
-    return ", ".join(shown) + (", ..." if len(values) > most else "")
-
-
 def show_equilibria(
     scene: str,
     settings: Sequence[str],
@@ -162,9 +105,11 @@ def show_equilibria(
     as_json: bool,
 ) -> None:
     """Show the equilibria of a scene; see the options of `atwood equilibria`."""
+    from atwood.pipeline import assemble
     from atwood.theory.linearization import equilibria
 
-    model, name = prepare(scene, settings, ())
+    made, name = prepare(scene, settings, ())
+    model = assemble(made, name=name)
     bounds = _region(region)
     if along is not None:
         _show_branches(model, name, along, bounds, plot, as_json)
@@ -175,15 +120,11 @@ def show_equilibria(
     if as_json:
         print_json({"scene": name, "equilibria": found.to_data()})
         return
-    out = writer()
-    out.line((name, "bold"), (f": {len(found)} equilibri{'um' if len(found) == 1 else 'a'}", ""))
-    kinds = [one.stability + (f", family of {one.family}" if one.family else "") for one in found]
-    rows = [[kind, f"{one.growth_rate:.6g}", _values(one.values)] for kind, one in zip(kinds, found, strict=True)]
-    out.table(["", "growth, 1/s>", "where"], rows)
+    writer().show(*found.tables())
 
 
 def _show_branches(
-    model: Model, name: str, along: str, region: dict[str, Any], plot: Path | None, as_json: bool
+    model: Assembly, name: str, along: str, region: dict[str, Any], plot: Path | None, as_json: bool
 ) -> None:
     from atwood.theory.linearization import equilibrium_branches
 
@@ -202,18 +143,8 @@ def _show_branches(
         print_json({**found.to_data(), "scene": name})
         return
     out = writer()
-    out.line((name, "bold"), (f": {len(found.branches)} branches of equilibria over {path}", ""))
-    rows = []
-    for branch in found.branches:
-        shares = f"{int(branch.stable.sum())} of {len(branch.stable)} points stable"
-        ends = ", ".join(f"{one} {x[0]:.5g} to {x[-1]:.5g}" for one, x in list(branch.values.items())[:3])
-        rows.append([f"{branch.parameter[0]:.6g} to {branch.parameter[-1]:.6g}", ends, shares])
-    out.table([path, "coordinates at the ends", ""], rows)
-    for kind, points in (("fold", found.folds), ("branch point", found.crossings)):
-        for one in points:
-            out.line((f"{kind} at {path} = {one.parameter:.10g}: {_values(one.values)}", ""))
-    if plot is not None:
-        out.line((f"plotted: {plot}", "dim"))
+    out.show(*found.tables())
+    out.files(plotted=plot)
 
 
 def _region(region: Sequence[str]) -> dict[str, Any]:

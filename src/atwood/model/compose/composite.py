@@ -34,7 +34,8 @@ from atwood.model.compose.part_rules import check_new_parts
 from atwood.model.declare.component import Component
 from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.declare.refusals import no_such_parameter
-from atwood.showing import count_of, field_text, fitted, html_table, listed
+from atwood.showing import count_of, field_text, fitted, listed
+from atwood.table import table
 
 PATH = Kind("a dotted path, such as 'left.rod'", NAME.read)
 
@@ -317,7 +318,7 @@ class Model(_State, Component):
         rows = ((name, type(part).__name__, _settings(part)) for name, part in islice(self._parts.items(), _SHOWN))
         rest = f"and {len(self._parts) - _SHOWN} more parts; " if len(self._parts) > _SHOWN else ""
         note = rest + "; ".join(f"{name}: {text}" for name, text in [*self._facts()][1:])
-        return html_table(Component.__repr__(self), ("part", "component", "set to"), rows, note)
+        return table(("part", "component", "set to"), rows, Component.__repr__(self), [note]).html()
 
     def _ipython_key_completions_(self) -> list[str]:
         return list(self._parts)

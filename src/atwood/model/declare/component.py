@@ -25,7 +25,8 @@ from atwood.model.declare.refusals import (
 from atwood.model.declare.states import StateSpec, discrete_state, state
 from atwood.model.values.outline import Outline
 from atwood.model.values.vector import Vector, dot, norm
-from atwood.showing import field_text, fitted, html_table
+from atwood.showing import field_text, fitted
+from atwood.table import table
 
 __all__ = ["Component"]
 
@@ -133,8 +134,9 @@ class Component(metaclass=ComponentType):
     def _repr_html_(self) -> str:
         fields = {**self._parameters, **self._signals}
         rows = ((name, field_text(self._value(name)), one.unit.text, one.doc) for name, one in fields.items())
-        title = f"{type(self).__name__} {self.path}".strip()
-        return html_table(title, ("parameter", "value", "unit", "meaning"), rows)
+        return table(
+            ("parameter", "value", "unit", "meaning"), rows, f"{type(self).__name__} {self.path}".strip()
+        ).html()
 
     # -- what a law reads ---------------------------------------------------------------------------------------
 

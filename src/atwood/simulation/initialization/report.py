@@ -9,7 +9,6 @@ said of a body tells its position, its orientation, both or neither: only what i
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -26,12 +25,14 @@ from atwood.numerics.independence import independent_rows, row_scales
 from atwood.numerics.matrices import scaled, to_array
 from atwood.numerics.rank import open_directions
 from atwood.numerics.solutions import least_norm
+from atwood.showing import data_of
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.closure_error import ClosureError, find_closure_errors
 from atwood.simulation.initialization.start import Start
 from atwood.simulation.initialization.system import System
 from atwood.simulation.initialization.targets import Level, sort_targets
+from atwood.table import Table, table
 from atwood.tolerances import tolerances
 
 __all__ = ["GuessMet", "InitializationReport", "MovedBody", "report_initialization"]
@@ -125,25 +126,67 @@ class InitializationReport:
     opened: tuple[ClosureError, ...]
     length: float
 
-    def __str__(self) -> str:
-        from atwood.simulation.initialization.report_text import as_table
+    def tables(self) -> tuple[Table, ...]:
+        """Return the bodies that moved, the guesses, and what was open."""
+        length = self.length
+        bodies = [
+            (one.path, _how_far(*one.moved, length) or "-", _how_far(*one.placed, length) or "-", ", ".join(one.by))
+            for one in self.bodies
+        ]
+        guesses = [
+            (one.path, f"{one.asked:.6g}", *_met(one, length), "" if one.unit == "1" else one.unit)
+            for one in self.guesses
+        ]
+        opened = [(one.part, one.describe(length)) for one in self.opened]
+        found: list[tuple[tuple[str, ...], Sequence[tuple[str, ...]]]] = [
+            (("body", "moved", "placed", "by"), bodies),
+            (("guess", "asked", "found", "off by", "unit"), guesses),
+            (("was open", "by"), opened),
+        ]
+        return tuple(table(headings, rows) for headings, rows in found if rows)
 
-        return as_table(self)
+    def __str__(self) -> str:
+        tables = "\n\n".join(one.text() for one in self.tables())
+        return tables or "Nothing was moved: everything starts where it was said."
 
     @property
     def summary(self) -> str:
         """One line: what moved and by how much, and what was placed; empty if nothing was moved or placed."""
-        from atwood.simulation.initialization.report_text import in_a_line
-
-        return in_a_line(self)
+        moved = [f"{one.path} by {far}" for one in self.bodies if (far := _how_far(*one.moved, self.length))]
+        placed = [one.path for one in self.bodies if _how_far(*one.placed, self.length)]
+        text = [f"moved by the initialization: {_few(moved)}"] if moved else []
+        if placed:
+            what = "it" if len(placed) == 1 else "them"
+            text.append(f"placed by the solver, as not all was said of {what}: {_few(placed)}")
+        if self.opened and text:
+            text.append(f"{self.opened[0].part} was open by {self.opened[0].describe(self.length)}")
+        return "; ".join(text)
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
-        return {
-            "bodies": [{**asdict(one), "by": list(one.by)} for one in self.bodies],
-            "guesses": [asdict(one) for one in self.guesses],
-            "opened": [asdict(one) for one in self.opened],
-        }
+        return data_of(self, "bodies", "guesses", "opened")
+
+
+_SHOWN = 3
+"""So many bodies are named in a line."""
+
+
+def _few(names: Sequence[str]) -> str:
+    rest = len(names) - _SHOWN
+    return ", ".join(names[:_SHOWN]) + (f" and {rest} more" if rest > 0 else "")
+
+
+def _how_far(distance: float, angle: float, length: float) -> str:
+    """Return a movement in words; rounding is left out."""
+    said = [f"{distance:.3g} m"] if distance > tolerances.CLOSED * length else []
+    return " and ".join([*said, *([f"{np.degrees(angle):.3g} deg"] if angle > tolerances.CLOSED else [])])
+
+
+def _met(guess: GuessMet, length: float) -> tuple[str, str]:
+    """Return what became of a guess and the difference, without rounding."""
+    size = length if guess.unit == "m" else max(1.0, abs(guess.asked))
+    is_met = abs(guess.off) <= tolerances.CLOSED * size
+    return (f"{guess.asked:.6g}", "0") if is_met else (f"{guess.found:.6g}", f"{guess.off:.3g}")
 
 
 def report_initialization(assembly: Assembly, start: Start) -> InitializationReport:

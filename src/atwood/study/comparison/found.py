@@ -15,21 +15,20 @@ from atwood.errors import UsageError
 from atwood.files import check_directory
 from atwood.late import dataclass, names_of
 from atwood.result.formats.companion import write_with_companion
-from atwood.showing import count_of, fitted, html_table
+from atwood.showing import count_of, data_of, fitted
 from atwood.simulation.problem.options import how_solved
 from atwood.study.comparison.reference import Reference
 from atwood.study.comparison.verdict import judge
+from atwood.table import Shown, Table, table
 
-__all__ = ["HEADINGS", "RELATIVE", "Comparison", "ComparisonRow", "check_rows_file", "write_rows"]
+__all__ = ["RELATIVE", "Comparison", "ComparisonRow", "check_rows_file", "write_rows"]
 
 RELATIVE = (
     "Errors and constraint drifts are relative to the size of the scene, or in rad; energy drifts to what it exchanges."
 )
 """What the figures of a comparison are relative to."""
 
-
-HEADINGS = ("error", "estimate", "ms", "steps", "residuals", "Jacobians", "energy", "constraint")
-"""What `ComparisonRow.cells` are."""
+_NUMBERS = ("rtol", "error", "estimate", "ms", "steps", "residuals", "Jacobians", "energy", "constraint")
 
 
 @dataclass(frozen=True)
@@ -96,17 +95,20 @@ class ComparisonRow:
         return how_solved(self.form, self.level, [self.solver])
 
     def cells(self) -> tuple[str, ...]:
-        """Return error, estimate, ms, steps, residuals, Jacobians, and drifts of energy and constraints as texts."""
+        """Return form, tolerance, error, estimate, ms, counts, and drifts of energy and constraints as texts."""
+        form = (self.label, f"{self.rtol:.0e}")
+        if self.reason:
+            return (*form, "failed", *[""] * (len(_NUMBERS) - 2))
         mark = "*" if self.within_reference else ""
         numbers = (self.estimate, 1e3 * (self.wall_s or 0.0), self.steps, self.residuals, self.jacobians)
         estimate, wall, *counts = ("" if one is None else one for one in numbers)
         drifts = (f"{drift or 0.0:.1e}" for drift in (self.energy_drift, self.constraint_drift))
         told = estimate if estimate == "" else f"{estimate:.1e}"
-        return (f"{self.error or 0.0:.1e}{mark}", told, f"{wall:.3g}", *(str(one) for one in counts), *drifts)
+        return (*form, f"{self.error or 0.0:.1e}{mark}", told, f"{wall:.3g}", *(str(one) for one in counts), *drifts)
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Comparison(Shown):
     """What each form costs for which error.
 
     Attributes
@@ -134,13 +136,17 @@ class Comparison:
         """What the comparison says, in one line."""
         return judge((row.label, row.error, row.wall_s) for row in self.rows if not row.reason)
 
-    def __str__(self) -> str:
-        lines = [f"{self.scene} to t = {self.t_end:g} s, against {self.reference.description}", ""]
-        lines.append(f"{'form':<24}{'rtol':>8}" + "".join(f"{head:>11}" for head in HEADINGS))
-        for row in self.rows:
-            shown = f"  {row.reason}" if row.reason else "".join(f"{cell:>11}" for cell in row.cells())
-            lines.append(f"{row.label:<24}{row.rtol:>8.0e}{shown}")
-        return "\n".join([*lines, RELATIVE, "", self.verdict])
+    def tables(self) -> tuple[Table, ...]:
+        """Return a row for each run, with why those failed that did."""
+        failed = [f"{row.label} at {row.rtol:.0e} failed: {row.reason}" for row in self.rows if row.reason]
+        near = any(row.within_reference for row in self.rows)
+        told = [f"Errors are against {self.reference.description}.", self.reference.note, *failed, RELATIVE]
+        told += ["* within ten times the error of the reference itself"] * near
+        title, notes = f"{self.scene} to t = {self.t_end:g} s", [*filter(None, told), "", self.verdict]
+        headings = ("form", *(f"{name}>" for name in _NUMBERS))
+        return (table(headings, [row.cells() for row in self.rows], title, notes),)
+
+    __str__ = Shown.as_text
 
     def __repr__(self) -> str:
         runs = f"{count_of(len(self.rows), 'run')} to t = {self.t_end:g} s, against {self.reference.description}"
@@ -148,31 +154,13 @@ class Comparison:
         lines = [f"<Comparison of {self.scene}: {runs}>", self.verdict, *([f"{failed} without numbers"] * bool(failed))]
         return fitted("\n    ".join(line for line in lines if line))
 
-    def _repr_html_(self) -> str:
-        heads = ("form", "rtol", *HEADINGS, "")
-        cells = [
-            (row.label, f"{row.rtol:.0e}", *(row.cells() if not row.reason else [""] * len(HEADINGS)), row.reason)
-            for row in self.rows
-        ]
-        title = f"{self.scene} to t = {self.t_end:g} s, against {self.reference.description}"
-        return html_table(title, heads, cells, f"{RELATIVE} {self.verdict}")
-
     def to_dict(self) -> dict[str, Any]:
         """Return the comparison as plain data."""
-        reference = self.reference
+        reference = data_of(self.reference, "kind", "description", "error", "note")
         return {
-            "scene": self.scene,
-            "t_end": self.t_end,
-            "reference": {
-                "kind": reference.kind,
-                "description": reference.description,
-                "error": reference.error,
-                "note": reference.note,
-                "quantities": list(reference.quantities),
-            },
-            "rows": [dict(vars(row)) for row in self.rows],
-            "verdict": self.verdict,
-            "environment": dict(self.environment),
+            **data_of(self, "scene", "t_end"),
+            "reference": reference | {"quantities": list(self.reference.quantities)},
+            **data_of(self, "rows", "verdict", "environment"),
         }
 
     @takes(file=FILE)

@@ -15,15 +15,16 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.forms.canonical import is_canonical
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.model.compose.composite import Model
 from atwood.pipeline import assemble, simulate
 from atwood.progress import told
 from atwood.result.result import Result
-from atwood.showing import fitted
+from atwood.showing import fitted, plain
 from atwood.simulation.problem.arguments import LIMITS, NAME, PROGRESS
 from atwood.simulation.problem.options import how_solved
 from atwood.study.comparison.environment import environment
+from atwood.table import Shown, Table, table
 from atwood.theory.symmetries import conserved
 
 __all__ = ["LongComparison", "LongRow", "compare_long"]
@@ -83,6 +84,10 @@ class LongRow:
         """Form, method and tolerance."""
         return f"{how_solved(self.form, 'ggl' * (self.form == 'dae'), [self.solver])}, rtol {self.rtol:.0e}"
 
+    def costs(self) -> tuple[str, str]:
+        """Return microseconds for a period, and steps, as texts."""
+        return f"{1e6 * self.wall_s / max(self.reached, 1e-9):.3g}", f"{self.steps:,}"
+
     @property
     def grows(self) -> bool:
         """Whether its error of the energy grows: at the end by more than the root of the time since the mark before.
@@ -97,7 +102,7 @@ class LongRow:
 
 
 @dataclass(frozen=True)
-class LongComparison:
+class LongComparison(Shown):
     """How conserved quantities drift over many periods.
 
     Attributes
@@ -142,35 +147,35 @@ class LongComparison:
             said.append(f"Out of time before the end: {'; '.join(late)}.")
         return " ".join(said)
 
-    def __str__(self) -> str:
-        heads = "".join(f"{f'{mark:,}':>12}" for mark in self.marks)
-        lines = [
+    def tables(self) -> tuple[Table, ...]:
+        """Return the errors of the energy, and those of the other conserved quantities, a row for each method."""
+        marks, costs = [f"{mark:,}>" for mark in self.marks], ("us/period>", "steps>")
+        title = (
             f"{self.scene}: error of the energy, relative to what is exchanged, after so many periods of "
-            f"{self.period:.4g} s",
-            "",
-            f"{'method':<32}{'us/period':>10}{'steps':>12}{heads}",
-        ]
-        for row in self.rows:
-            if row.reason:
-                lines.append(f"{row.label:<32}  {row.reason}")
-                continue
-            cost = f"{1e6 * row.wall_s / max(row.reached, 1e-9):>10.3g}{row.steps:>12,}"
-            lines.append(f"{row.label:<32}{cost}{_written(row.energy)}")
+            f"{self.period:.4g} s"
+        )
+        failed = [f"{row.label}  {row.reason}" for row in self.rows if row.reason]
+        rows = [(row.label, *row.costs(), *_written(row.energy)) for row in self.rows if not row.reason]
+        found = [table(("method", *costs, *marks), rows, title, failed)]
         if self.conserved:
-            lines += ["", f"the same of {', '.join(self.conserved)}, relative to their sizes", ""]
-            lines += [f"{row.label:<54}{_written(row.invariants)}" for row in self.rows if row.invariants]
-        return "\n".join([*lines, "", self.verdict])
+            title = f"the same of {', '.join(self.conserved)}, relative to their sizes"
+            rows = [(row.label, *_written(row.invariants)) for row in self.rows if row.invariants]
+            found.append(table(("method", *marks), rows, title))
+        found[-1] = replace(found[-1], notes=(*found[-1].notes, "", self.verdict))
+        return tuple(found)
+
+    __str__ = Shown.as_text
 
     def __repr__(self) -> str:
         return fitted(f"<LongComparison of {self.scene}, {self.marks[-1]:,} periods: {self.verdict}>")
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
-        return {**vars(self), "rows": [dict(vars(row)) for row in self.rows], "verdict": self.verdict}
+        return {**plain(vars(self)), "verdict": self.verdict}
 
 
-def _written(values: Sequence[float | None]) -> str:
-    return "".join(f"{'-' if one is None else f'{one:.1e}':>12}" for one in values)
+def _written(values: Sequence[float | None]) -> list[str]:
+    return ["-" if one is None else f"{one:.1e}" for one in values]
 
 
 @takes(

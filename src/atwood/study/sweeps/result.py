@@ -16,7 +16,8 @@ from atwood.arrays import FloatArray
 from atwood.errors import ResultError, near_matches, suggestion
 from atwood.late import dataclass
 from atwood.model.declare.quantities import PATH
-from atwood.showing import count_of, fitted, html_table, listed
+from atwood.showing import count_of, data_of, listed
+from atwood.table import Shown, Table, facts
 
 __all__ = ["Sweep", "SweepStatistics"]
 
@@ -54,7 +55,7 @@ class SweepStatistics:
 
 
 @dataclass(frozen=True, eq=False)
-class Sweep:
+class Sweep(Shown):
     """Many runs of one scene.
 
     ``sweep["bob2.position.x"]`` is a quantity of all runs, of shape (runs, times); where a run failed, or ended before
@@ -104,13 +105,10 @@ class Sweep:
     steps: NDArray[np.int64]
     statistics: SweepStatistics
 
-    def __repr__(self) -> str:
-        (_, title), *facts = self._facts()
-        return fitted("\n".join([f"<Sweep of {title}>", *(f"    {name}: {text}" for name, text in facts)]))
-
-    def _repr_html_(self) -> str:
-        (_, title), *facts = self._facts()
-        return html_table(f"Sweep of {title}", (), facts)
+    def tables(self) -> tuple[Table, ...]:
+        """Return a few facts about the sweep."""
+        (_, title), *rest = self._facts()
+        return (facts(rest, f"Sweep of {title}"),)
 
     def _ipython_key_completions_(self) -> list[str]:
         return list(self.paths)
@@ -186,29 +184,11 @@ class Sweep:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the sweep as plain data; what is nan becomes None."""
-        return {
-            "scene": self.scene,
-            "form": self.form,
-            "level": self.level,
-            "rtol": self.rtol,
-            "time": self.time.tolist(),
-            "shape": list(self.shape),
-            "parameters": {path: values.tolist() for path, values in self.parameters.items()},
-            "start": {path: values.tolist() for path, values in self.start.items()},
-            "quantities": {
-                path: [[one if np.isfinite(one) else None for one in row] for row in values.tolist()]
-                for path, values in self.quantities.items()
-            },
-            "units": dict(self.units),
-            "status": list(self.status),
-            "messages": {str(run): text for run, text in self.messages.items()},
-            "end_time": [one if np.isfinite(one) else None for one in self.end_time.tolist()],
-            "steps": self.steps.tolist(),
-            "statistics": {
-                **vars(self.statistics),
-                "reassembled": {str(run): text for run, text in self.statistics.reassembled.items()},
-            },
-        }
+        heads = data_of(self, "scene", "form", "level", "rtol", "time", "shape", "parameters", "start")
+        quantities = {path: [*map(_finite, values)] for path, values in self.quantities.items()}
+        told = data_of(self, "units", "status", "messages")
+        ends = {"end_time": _finite(self.end_time), **data_of(self, "steps", "statistics")}
+        return {**heads, "quantities": quantities, **told, **ends}
 
     def save(self, file: str | os.PathLike[str]) -> Path:
         """Save the sweep as ``.nc`` (NetCDF-3), ``.npz``, ``.mat`` (MATLAB), ``.csv`` or ``.json``.
@@ -273,6 +253,11 @@ class Sweep:
         """
         # Views stand above studies, and are looked up when one is wanted.
         return import_module("atwood.plotting.plots.sweep").plot_sweep(self, paths, file)
+
+
+def _finite(values: FloatArray) -> list[float | None]:
+    """Return numbers for JSON, None where there is none."""
+    return [one if np.isfinite(one) else None for one in values.tolist()]
 
 
 def _range(values: NDArray[Any]) -> str:

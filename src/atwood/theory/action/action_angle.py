@@ -14,6 +14,7 @@ from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
+from atwood.showing import data_of
 from atwood.simulation.initialization.start import find_start
 from atwood.theory.action.quadrature import Level, level_through
 from atwood.theory.hamiltonian import hamiltonian
@@ -120,14 +121,7 @@ class ActionAngle:
 
     def to_data(self) -> dict[str, Any]:
         """Return it as plain data."""
-        return {
-            "coordinate": self.coordinate,
-            "kind": self.kind,
-            "energy": self.energy,
-            "action": self.action,
-            "period": self.period,
-            "ends": list(self.level.ends),
-        }
+        return data_of(self, "coordinate", "kind", "energy", "action", "period") | {"ends": list(self.level.ends)}
 
     def __repr__(self) -> str:
         return (

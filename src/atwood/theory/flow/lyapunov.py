@@ -14,7 +14,7 @@ from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE
-from atwood.showing import fitted
+from atwood.showing import data_of, fitted
 from atwood.simulation.problem.arguments import RTOL, SOLVER, T_END
 from atwood.theory.flow.deviations import find_deviations
 
@@ -80,14 +80,7 @@ class LyapunovExponents:
 
     def to_data(self) -> dict[str, Any]:
         """Return them as plain data, for JSON."""
-        return {
-            "scene": self.scene,
-            "exponents": self.exponents.tolist(),
-            "errors": self.errors.tolist(),
-            "time": self.time.tolist(),
-            "running": self.running.tolist(),
-            "rtol": self.rtol,
-        }
+        return data_of(self, "scene", "exponents", "errors", "time", "running", "rtol")
 
     def __repr__(self) -> str:
         pairs = zip(self.exponents, self.errors, strict=True)

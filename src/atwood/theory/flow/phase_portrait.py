@@ -19,9 +19,11 @@ from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.pipeline import SCENE, assemble
-from atwood.showing import count_of, fitted
+from atwood.showing import count_of, data_of, fitted
 from atwood.simulation.dynamics.scales import scene_length
 from atwood.simulation.events.modes import find_event_functions
+from atwood.table import Shown, Table, facts, table
+from atwood.theory.linearization.linear_model import complex_text
 
 __all__ = ["PhasePortrait", "RestPoint", "phase_portrait"]
 
@@ -53,7 +55,7 @@ class RestPoint:
 
 
 @dataclass(frozen=True, eq=False)
-class PhasePortrait:
+class PhasePortrait(Shown):
     """The motions of a scene with one degree of freedom, as curves over coordinate and speed.
 
     Attributes
@@ -88,24 +90,24 @@ class PhasePortrait:
 
     def to_data(self) -> dict[str, Any]:
         """Return it as plain data, for JSON."""
-        return {
-            "scene": self.scene,
-            "coordinate": self.coordinate,
-            "speed": self.speed,
-            "units": list(self.units),
-            "window": [list(self.window.across), list(self.window.up)],
-            "everywhere_at_rest": self.everywhere_at_rest,
-            "rest_points": [
-                {
-                    "coordinate": one.coordinate,
-                    "kind": one.kind,
-                    "eigenvalues": [[value.real, value.imag] for value in one.eigenvalues],
-                }
-                for one in self.rest_points
-            ],
-            "curves": [one.tolist() for one in self.curves],
-            "separatrices": [one.tolist() for one in self.separatrices],
-        }
+        window = [list(self.window.across), list(self.window.up)]
+        told = data_of(self, "scene", "coordinate", "speed", "units")
+        points = [data_of(one, "coordinate", "kind", "eigenvalues") for one in self.rest_points]
+        ends = data_of(self, "curves", "separatrices")
+        return {**told, "window": window, "everywhere_at_rest": self.everywhere_at_rest, "rest_points": points, **ends}
+
+    def tables(self) -> tuple[Table, ...]:
+        """Return the states of rest."""
+        title, (low, high) = f"{self.scene}: {self.speed} over {self.coordinate}", self.window.across
+        if self.everywhere_at_rest:
+            return (facts((), title, ["It can stay at rest everywhere."]),)
+        if not self.rest_points:
+            return (facts((), title, [f"It can stay at rest nowhere from {low:.4g} to {high:.4g} {self.units[0]}."]),)
+        rows = [
+            (one.kind, f"{one.coordinate:.9g}", ", ".join(complex_text(value) for value in one.eigenvalues))
+            for one in self.rest_points
+        ]
+        return (table(("at rest", f"{self.coordinate}, {self.units[0]}>", "eigenvalues, 1/s"), rows, title),)
 
     def __repr__(self) -> str:
         points = ", ".join(f"{one.kind} at {one.coordinate:.4g}" for one in self.rest_points) or "no point of rest"

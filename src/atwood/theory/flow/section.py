@@ -15,7 +15,7 @@ from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assemble, simulate
-from atwood.showing import count_of, fitted
+from atwood.showing import count_of, data_of, fitted
 from atwood.simulation.problem.arguments import RTOL, SOLVER, T_END
 
 __all__ = ["PoincareSection", "poincare_section"]
@@ -56,14 +56,7 @@ class PoincareSection:
 
     def to_data(self) -> dict[str, Any]:
         """Return it as plain data, for JSON."""
-        return {
-            "scene": self.scene,
-            "surface": self.surface,
-            "time": self.time.tolist(),
-            "start": self.start.tolist(),
-            "values": {path: value.tolist() for path, value in self.values.items()},
-            "units": dict(self.units),
-        }
+        return data_of(self, "scene", "surface", "time", "start", "values", "units")
 
     def __repr__(self) -> str:
         points = f"{count_of(len(self), 'point')} of {count_of(int(np.max(self.start, initial=-1)) + 1, 'motion')}"

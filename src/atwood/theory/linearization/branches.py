@@ -17,10 +17,11 @@ from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assemble
-from atwood.showing import fitted
+from atwood.showing import data_of
 from atwood.simulation.dynamics.balance import balance_of
+from atwood.table import Shown, Table, table
 from atwood.theory.linearization.equilibria import equilibria
-from atwood.theory.linearization.normal_modes import modes_of
+from atwood.theory.linearization.normal_modes import modes_of, values_text
 from atwood.theory.linearization.operating_point import OperatingPoint, find_operating_point, moved_to, values_at
 
 __all__ = ["BranchPoint", "EquilibriumBranch", "EquilibriumBranches", "equilibrium_branches"]
@@ -71,7 +72,7 @@ class EquilibriumBranch:
 
 
 @dataclass(frozen=True, eq=False)
-class EquilibriumBranches:
+class EquilibriumBranches(Shown):
     """The equilibria of a scene over a parameter.
 
     Attributes
@@ -94,31 +95,24 @@ class EquilibriumBranches:
 
     def to_data(self) -> dict[str, Any]:
         """Return them as plain data, for JSON."""
-        return {
-            "scene": self.scene,
-            "path": self.path,
-            "branches": [
-                {
-                    "parameter": one.parameter.tolist(),
-                    "values": {path: values.tolist() for path, values in one.values.items()},
-                    "stable": one.stable.tolist(),
-                }
-                for one in self.branches
-            ],
-            "folds": [{"parameter": one.parameter, "values": dict(one.values)} for one in self.folds],
-            "crossings": [{"parameter": one.parameter, "values": dict(one.values)} for one in self.crossings],
-        }
+        return data_of(self, "scene", "path", "branches", "folds", "crossings")
 
-    def __str__(self) -> str:
-        lines = [f"{self.scene}: {len(self.branches)} branches of equilibria over {self.path}"]
-        for kind, points in (("fold", self.folds), ("branch point", self.crossings)):
-            for one in points[:3]:
-                named = ", ".join(f"{path} = {value:.6g}" for path, value in list(one.values.items())[:3])
-                lines.append(f"  {kind} at {self.path} = {one.parameter:.9g}: {named}")
-        return "\n".join(lines)
+    def tables(self) -> tuple[Table, ...]:
+        """Return where each branch goes, and where branches turn back or cross."""
+        rows = []
+        for one in self.branches:
+            shares = f"{int(one.stable.sum())} of {len(one.stable)} points stable"
+            ends = ", ".join(f"{path} {x[0]:.5g} to {x[-1]:.5g}" for path, x in list(one.values.items())[:3])
+            rows.append((f"{one.parameter[0]:.6g} to {one.parameter[-1]:.6g}", ends, shares))
+        notes = [
+            f"{kind} at {self.path} = {one.parameter:.10g}: {values_text(one.values)}"
+            for kind, points in (("fold", self.folds), ("branch point", self.crossings))
+            for one in points
+        ]
+        title = f"{self.scene}: {len(self.branches)} branches of equilibria over {self.path}"
+        return (table((self.path, "coordinates at the ends", ""), rows, title, notes),)
 
-    def __repr__(self) -> str:
-        return fitted(str(self))
+    __str__ = Shown.as_text
 
 
 def _read_span(value: Any) -> tuple[float, float]:

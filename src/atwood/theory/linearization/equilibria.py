@@ -19,9 +19,10 @@ from atwood.mechanics.build import extent
 from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.pipeline import SCENE
-from atwood.showing import fitted
+from atwood.showing import count_of, data_of
 from atwood.simulation.dynamics.balance import balance_of
-from atwood.theory.linearization.normal_modes import NormalModes, modes_of
+from atwood.table import Shown, Table, table
+from atwood.theory.linearization.normal_modes import NormalModes, modes_of, values_text
 from atwood.theory.linearization.operating_point import OperatingPoint, find_operating_point, moved_to, values_at
 
 __all__ = ["Equilibria", "Equilibrium", "equilibria"]
@@ -85,11 +86,14 @@ class Equilibrium:
 
     def __str__(self) -> str:
         named = ", ".join(f"{path} = {value:.6g}" for path, value in list(self.values.items())[:6])
-        more = f"   (one of a family in {self.family} direction{'s' * (self.family > 1)})" if self.family else ""
-        return f"{self.stability:<9} {named}{more}"
+        return f"{self.stability:<9} {named}{_family(self.family)}"
 
 
-class Equilibria(list[Equilibrium]):
+def _family(directions: int) -> str:
+    return f", one of a family in {count_of(directions, 'direction')}" if directions else ""
+
+
+class Equilibria(Shown, list[Equilibrium]):
     """The equilibria of a scene in a region."""
 
     def __init__(self, found: list[Equilibrium], scene: str) -> None:
@@ -98,25 +102,17 @@ class Equilibria(list[Equilibrium]):
 
     def to_data(self) -> list[dict[str, Any]]:
         """Return them as plain data, for JSON."""
-        return [
-            {
-                "values": dict(one.values),
-                "stable": one.stable,
-                "stability": one.stability,
-                "family": one.family,
-                "modes": one.modes.to_data(),
-            }
-            for one in self
+        return [data_of(one, "values", "stable", "stability", "family", "modes") for one in self]
+
+    def tables(self) -> tuple[Table, ...]:
+        """Return how stable each is, and where."""
+        rows = [
+            (one.stability + _family(one.family), f"{one.growth_rate:.6g}", values_text(one.values)) for one in self
         ]
+        title = f"{self.scene}: {len(self)} equilibri{'um' if len(self) == 1 else 'a'}"
+        return (table(("", "growth, 1/s>", "where"), rows, title),)
 
-    def __str__(self) -> str:
-        shown = [str(one) for one in self[:8]]
-        if len(self) > len(shown):
-            shown.append(f"... and {len(self) - len(shown)} more")
-        return "\n".join([f"{self.scene}: {len(self)} equilibri{'um' if len(self) == 1 else 'a'}", *shown])
-
-    def __repr__(self) -> str:
-        return fitted(str(self))
+    __str__ = Shown.as_text
 
 
 @takes(scene=SCENE, region=optional(BY_PATH))

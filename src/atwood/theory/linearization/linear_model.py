@@ -21,13 +21,14 @@ from atwood.arguments import ARRAY, check
 from atwood.arrays import ComplexArray, FloatArray
 from atwood.errors import UsageError
 from atwood.late import dataclass
-from atwood.showing import fitted
+from atwood.showing import data_of
+from atwood.table import Shown, Table, facts, table
 
 __all__ = ["LinearModel", "complex_text"]
 
 
 @dataclass(frozen=True, eq=False)
-class LinearModel:
+class LinearModel(Shown):
     """A linear model ``x' = A x + B w``, ``y = C x + D w`` of a scene about a state.
 
     Attributes
@@ -182,33 +183,39 @@ class LinearModel:
 
     def to_data(self) -> dict[str, Any]:
         """Return it as plain data, for JSON."""
-        return {
-            "scene": self.scene,
-            "form": self.form,
-            "about": self.about,
-            "values": dict(self.values),
-            "states": list(self.states),
-            "inputs": list(self.inputs),
-            "outputs": list(self.outputs),
-            "units": dict(self.units),
-            **{name: matrix.tolist() for name, matrix in zip("ABCD", self.matrices, strict=True)},
-            "eigenvalues": [[value.real, value.imag] for value in self.eigenvalues],
-        }
+        names = ("scene", "form", "about", "values", "states", "inputs", "outputs", "units", *"ABCD", "eigenvalues")
+        return data_of(self, *names)
 
-    def __str__(self) -> str:
-        head = f"{self.scene} ({self.form}), linear about a {self.kind}"
-        lines = [head, "states: " + _listed(self.states)]
-        lines += [
-            f"{kind}: {_listed(own)}" for kind, own in (("inputs", self.inputs), ("outputs", self.outputs)) if own
+    def tables(self) -> tuple[Table, ...]:
+        """Return states, inputs, outputs and eigenvalues, and the matrices where there are few states."""
+        zeros = f"; {self.spectrum.zeros} times 0" if self.spectrum.zeros else ""
+        rows = [
+            ("states", ", ".join(self.states)),
+            ("inputs", ", ".join(self.inputs) or "none: name some with --input"),
+            ("outputs", ", ".join(self.outputs) or "none: name some with --output"),
+            ("eigenvalues", ", ".join(complex_text(value) for value in self.spectrum.others) + f" 1/s{zeros}"),
+            ("stability", "no deviation grows" if self.is_stable else "some deviations grow"),
         ]
-        lines.append("eigenvalues, 1/s: " + _listed([complex_text(v) for v in self.spectrum.others], 8))
-        if self.spectrum.zeros:
-            lines[-1] += f"{'; and ' * bool(len(self.spectrum.others))}{self.spectrum.zeros} times 0"
-        return "\n".join(lines)
+        title = f"{self.scene} ({self.form}), linear about a {self.kind}"
+        if len(self.states) > _SHOWN:
+            return (facts(rows, title, [f"Matrices of {len(self.states)} states: --json writes them."]),)
+        of = {"A": (self.states, self.states), "B": (self.states, self.inputs)}
+        of |= {"C": (self.outputs, self.states), "D": (self.outputs, self.inputs)}
+        matrices = (
+            table(
+                (name, *(f"{one}>" for one in across)),
+                ((one, *(f"{x:.6g}" for x in values)) for one, values in zip(down, getattr(self, name), strict=True)),
+            )
+            for name, (down, across) in of.items()
+            if down and across
+        )
+        return (facts(rows, title), *matrices)
 
-    def __repr__(self) -> str:
-        return fitted(str(self))
+    __str__ = Shown.as_text
 
+
+_SHOWN = 8
+"""Matrices of more states are not shown."""
 
 _GROWING = 1e-9
 """Relative to the fastest eigenvalue: a real part below it is rounding."""
@@ -223,9 +230,3 @@ def complex_text(value: complex) -> str:
     real = f"{value.real:.6g} " if abs(value.real) > _GROWING * abs(value) else ""
     sign = ("+ " if value.imag > 0.0 else "- ") if real else "-" * int(value.imag < 0.0)
     return f"{real}{sign}{abs(value.imag):.6g}i"
-
-
-def _listed(names: Iterable[str], most: int = 12) -> str:
-    found = list(names)
-    more = f", and {len(found) - most} more" if len(found) > most else ""
-    return ", ".join(found[:most]) + more

@@ -19,7 +19,8 @@ from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE
 from atwood.result.result import Result
-from atwood.showing import fitted
+from atwood.showing import data_of, plain
+from atwood.table import Shown, Table, table
 from atwood.theory.linearization.linearize import not_steady
 from atwood.theory.linearization.mode_motion import mode_motion
 from atwood.theory.linearization.operating_point import AT, At, OperatingPoint, find_operating_point, values_at
@@ -31,7 +32,7 @@ _AMPLITUDE = number("a number above 0, in radians or in extents of the scene", a
 
 
 @dataclass(frozen=True, eq=False)
-class NormalModes:
+class NormalModes(Shown):
     """Modes of a scene about a state of rest or a steady motion.
 
     Attributes
@@ -108,35 +109,32 @@ class NormalModes:
 
     def to_data(self) -> dict[str, Any]:
         """Return them as plain data, for JSON."""
-        return {
-            "scene": self.scene,
-            "values": dict(self.values),
-            "angular_frequencies": self.angular_frequencies.tolist(),
-            "growth_rates": self.growth_rates.tolist(),
-            "shapes": [{path: _number(value) for path, value in shape.items()} for shape in self.shapes],
-            "spaces": [list(one) for one in self.spaces],
-        }
+        shapes = [{path: _number(value) for path, value in shape.items()} for shape in self.shapes]
+        told = data_of(self, "scene", "values", "angular_frequencies", "growth_rates")
+        return {**told, "shapes": shapes, "spaces": plain(self.spaces)}
 
-    def __str__(self) -> str:
-        lines = [f"{self.scene}: {len(self)} modes about {_state(self.values)}"]
-        lines.append(f"{'mode':>4} {'omega, rad/s':>14} {'growth, 1/s':>12}   shape")
-        for k, shape in enumerate(self.shapes[:_SHOWN]):
-            text = f"{k:>4} {self.angular_frequencies[k]:>14.6g} {self.growth_rates[k]:>12.4g}"
-            lines.append(f"{text}   {shape_text(shape)}")
-        if len(self) > _SHOWN:
-            lines.append(f"... and {len(self) - _SHOWN} more")
-        return "\n".join(lines)
+    def tables(self) -> tuple[Table, ...]:
+        """Return frequencies, growth and shape of each mode."""
+        columns = zip(self.angular_frequencies, self.frequencies, self.growth_rates, self.shapes, strict=True)
+        rows = [
+            (str(k), f"{omega:.9g}", f"{hertz:.6g}", f"{growth:.6g}", shape_text(shape))
+            for k, (omega, hertz, growth, shape) in enumerate(columns)
+        ]
+        notes = [
+            f"Modes {', '.join(map(str, group))} have equal eigenvalues: any combination of them is a mode."
+            for group in self.spaces
+            if len(group) > 1
+        ]
+        title = f"{self.scene}: {len(self)} modes about {values_text(self.values)}"
+        return (table(("mode", "rad/s>", "Hz>", "growth, 1/s>", "shape"), rows, title, notes),)
 
-    def __repr__(self) -> str:
-        return fitted(str(self))
-
-
-_SHOWN = 7
+    __str__ = Shown.as_text
 
 
-def _state(values: Mapping[str, float]) -> str:
-    shown = [f"{path} = {value:.4g}" for path, value in list(values.items())[:3]]
-    return ", ".join(shown) + (", ..." if len(values) > 3 else "")
+def values_text(values: Mapping[str, float], most: int = 6) -> str:
+    """Return values by path in a line."""
+    shown = [f"{path} = {value:.6g}" for path, value in list(values.items())[:most]]
+    return ", ".join(shown) + (", ..." if len(values) > most else "")
 
 
 def shape_text(shape: Mapping[str, complex], most: int = 4) -> str:

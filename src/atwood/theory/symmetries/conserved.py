@@ -23,8 +23,9 @@ from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of
 from atwood.result.conserved import ConservedLedger, ConservedValues
 from atwood.result.result import Result
-from atwood.showing import fitted, html_table, listed
+from atwood.showing import data_of, fitted, listed
 from atwood.simulation.problem.arguments import ORIENTATION
+from atwood.table import Shown, Table, table
 from atwood.theory.symmetries.monitor import along_run
 from atwood.theory.symmetries.stated import Symmetry, check_symmetry
 
@@ -115,17 +116,9 @@ class ConservedQuantity:
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
-        return {
-            "name": self.name,
-            "kind": self.kind,
-            "unit": self.unit,
-            "meaning": self.meaning,
-            "proven": self.proven,
-            "evidence": self.evidence,
-            "expression": str(self.expression) if self.formulas.is_readable else None,
-            "direction": list(self.direction),
-            "point": list(self.point),
-        }
+        expression = str(self.expression) if self.formulas.is_readable else None
+        told = data_of(self, "name", "kind", "unit", "meaning", "proven", "evidence")
+        return {**told, "expression": expression, **data_of(self, "direction", "point")}
 
     def __str__(self) -> str:
         return f"{self.name}: {self.meaning}; {self.evidence}"
@@ -137,7 +130,7 @@ class ConservedQuantity:
         return f"$\\displaystyle {self.latex()}$"
 
 
-class Conserved(Sequence[ConservedQuantity]):
+class Conserved(Shown, Sequence[ConservedQuantity]):
     """What is conserved along the motions of a scene: a sequence of quantities, also by name.
 
     What is proven and what was checked at states is in it; `proven`, `checked` and `not_looked_for` say which.
@@ -225,14 +218,9 @@ class Conserved(Sequence[ConservedQuantity]):
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
-        return {
-            "scene": self.scene,
-            "conserved": [one.to_dict() for one in self],
-            "proven": [one.name for one in self.proven],
-            "checked": [one.name for one in self.checked],
-            "not_looked_for": list(self.not_looked_for),
-            "notes": list(self.notes),
-        }
+        names = {kind: [one.name for one in getattr(self, kind)] for kind in ("proven", "checked")}
+        found = [one.to_dict() for one in self]
+        return {"scene": self.scene, "conserved": found, **names, **data_of(self, "not_looked_for", "notes")}
 
     def __str__(self) -> str:
         lines = [self._heading]
@@ -251,11 +239,12 @@ class Conserved(Sequence[ConservedQuantity]):
         told = "; ".join(f"{name} {listed([one.name for one in some])}" for name, some in parts if some)
         return f"Conserved({self.scene!r}: {told or 'nothing'})"
 
-    def _repr_html_(self) -> str:
+    def tables(self) -> tuple[Table, ...]:
+        """Return a row for each quantity, with how it is known."""
         rows = [(one.name, one.kind, one.text(), one.meaning, one.evidence) for one in self]
         heads = ("name", "kind", "expression", "meaning", "how it is known")
         below = [*(f"not looked for: {one}" for one in self.not_looked_for), *self.notes]
-        return html_table(self._heading, heads, rows, "; ".join(below))
+        return (table(heads, rows, self._heading, ["; ".join(below)]),)
 
 
 def _listed(value: Any) -> Any:
