@@ -132,11 +132,9 @@ class Component(metaclass=ComponentType):
         return fitted(f"{type(self).__name__}({settings})")
 
     def _repr_html_(self) -> str:
-        fields = {**self._parameters, **self._signals}
+        title, fields = f"{type(self).__name__} {self.path}".strip(), {**self._parameters, **self._signals}
         rows = ((name, field_text(self._value(name)), one.unit.text, one.doc) for name, one in fields.items())
-        return table(
-            ("parameter", "value", "unit", "meaning"), rows, f"{type(self).__name__} {self.path}".strip()
-        ).html()
+        return table(("parameter", "value", "unit", "meaning"), rows, title).html()
 
     # -- what a law reads ---------------------------------------------------------------------------------------
 
