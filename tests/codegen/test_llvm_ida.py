@@ -7,8 +7,8 @@ import pytest
 
 from atwood import expr as ex
 from atwood.codegen import compile_ida_callbacks, compile_native
+from atwood.codegen.sundials.layout import SundialsLayout, layout_for, sundials_layout
 from atwood.codegen.sundials.residuals import JACOBIAN_TYPE, RESIDUAL_TYPE, WEIGHTS_TYPE
-from atwood.codegen.sundials.text import SundialsLayout, layout_for, sundials_layout
 from atwood.errors import KernelEvaluationError, UsageError
 from atwood.integrators.compiled_functions import NativeCallbacks
 from atwood.integrators.ida import library as sundials_library, native as ida_native

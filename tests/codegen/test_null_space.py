@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import ctypes
 from ctypes import byref, c_double, c_void_p
 from itertools import combinations
 
 import numpy as np
 import pytest
 
-from atwood.codegen.llvm.routine import Routine
 from atwood.codegen.sundials.null_space import NullSpaceShape
 from atwood.codegen.sundials.null_space_residuals import compile_null_space_callbacks
 from atwood.codegen.sundials.residuals import JACOBIAN_TYPE, RESIDUAL_TYPE, WEIGHTS_TYPE
@@ -233,35 +231,3 @@ def test_counts_of_coordinates_and_speeds_are_apart():
     assert (shape.size, shape.stack, shape.free) == (13, 18, 4)
     assert shape.choice["end"] == 13 + 4 + 4 + 2 + 2 + 3 + 1
     assert shape.work["jacobian"] == 18
-
-
-def call(text, name, *arguments):
-    from atwood.codegen.llvm.engine import compile_text, load_code
-
-    loaded = load_code(compile_text(text, 1), [name], {})
-    kinds = [ctypes.c_int64 if isinstance(one, int) else c_void_p for one in arguments]
-    function = ctypes.CFUNCTYPE(c_double, *kinds)(loaded.addresses[name])
-    return function(*[one if isinstance(one, int) else one.ctypes.data for one in arguments])
-
-
-def test_loops_in_loops_carry_values():
-    code = Routine()
-    with code.loop(0, "%n", ("0.0", "1.0")) as outer:
-        with code.loop(outer.index, "%n", (outer.carried[0],)) as inner:
-            value = code.load("%a", inner.index)
-            with code.when(code.put(f"fcmp olt double {value}, 0.0")):
-                code.store("7.0", "%b", inner.index)
-            inner.following = (code.number("fadd", inner.carried[0], value),)
-        outer.following = (inner.carried[0], code.number("fmul", outer.carried[1], "2.0"))
-    code.do(f"ret double {code.number('fadd', *outer.carried)}")
-    text = code.function("define double @sums(i64 %n, ptr %a, ptr %b)")
-    a, b = np.array([1.0, -2.0, 3.0, 5.0]), np.zeros(4)
-    assert call(text, "sums", 4, a, b) == sum(np.sum(a[i:]) for i in range(4)) + 2.0**4
-    assert b.tolist() == [0.0, 7.0, 0.0, 0.0]
-    assert call(text, "sums", 0, a, b) == 1.0
-
-
-def test_what_a_loop_carries_must_be_handed_on():
-    code = Routine()
-    with pytest.raises(ValueError, match="hand on"), code.loop(0, 3, ("0.0",)):
-        pass

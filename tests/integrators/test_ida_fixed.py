@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from atwood.codegen.llvm.fixed_pivots import SLOTS
-from atwood.codegen.sundials.fixed_pivots import fixed_pivots_addresses
+from atwood.codegen.sundials.fixed_pivots import SLOTS, fixed_pivots_addresses
 from atwood.integrators.ida import native as ida_native
 from atwood.integrators.ida.callbacks import Record
 from atwood.integrators.ida.fixed import FixedSolver, table_layout

@@ -11,6 +11,10 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from atwood.arrays import FloatArray
 from atwood.clock import within_time
 from atwood.codegen.cache import Cache, default_cache, make_key
 from atwood.codegen.llvm.engine import (
@@ -23,8 +27,9 @@ from atwood.codegen.llvm.engine import (
 )
 from atwood.codegen.llvm.module import CodeOptions, ModuleText, Part, write_module
 from atwood.codegen.routines.source import RoutineSource
-from atwood.errors import UnsupportedError
+from atwood.errors import KernelEvaluationError, UnsupportedError
 from atwood.expr.core.operations import ExternalFunction
+from atwood.expr.core.program import Program
 from atwood.late import dataclass
 from atwood.stages import stage
 
@@ -39,18 +44,21 @@ GENERATORS = (
     "llvm/layout.py",
     "llvm/linear_systems.py",
     "llvm/module.py",
-    "llvm/routine.py",
     "llvm/routines.py",
     "llvm/text.py",
     "llvm/unit.py",
+    "routines/elimination.py",
+    "routines/kernels.py",
     "routines/kinds.py",
     "routines/language.py",
     "routines/tree.py",
 )
 """The files, by their place in the room of the code generators, on which the machine code of a program depends.
 
-What other modules write is handed over as text, which is part of the key by itself.
+What other modules write is part of the key by itself; see `RoutineSource`.
 """
+
+_PROLOGUE = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)
 
 _SMALL = 20_000
 """Beyond so many nodes LLVM's quickest level is used: it takes a sixth of the time, for code that is a tenth slower."""
@@ -108,6 +116,32 @@ class Built:
     from_cache: bool
     failures: Failures | None
 
+    def derive(self, name: str, program: Program, parameter_values: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Return what depends on parameters alone, and the room that the code needs.
+
+        Parameters
+        ----------
+        name, program
+            A part of the module.
+        parameter_values
+            The values in the order of the program's parameters.
+
+        Raises
+        ------
+        KernelEvaluationError
+            If the number of values is wrong.
+        """
+        values = np.array(parameter_values, dtype=np.float64)
+        count = len(program.parameters)
+        if values.shape != (count,):
+            raise KernelEvaluationError(
+                f"needs {count} parameter values but got an array of shape {values.shape}", where=program.name
+            )
+        derived, scratch = np.empty(len(program.prologue)), np.empty(self.scratch)
+        prologue = _PROLOGUE(self.code.addresses[f"{name}_prologue"])
+        prologue(values.ctypes.data, derived.ctypes.data, scratch.ctypes.data)
+        return derived, scratch
+
 
 def default_options(parts: Sequence[Part]) -> CodeOptions:
     """Return how to compile programs of this size on this machine."""
@@ -119,9 +153,7 @@ def build_code(
     parts: Sequence[Part],
     options: CodeOptions,
     *,
-    more: str = "",
     exports: Sequence[str] = (),
-    library: Sequence[str] = (),
     routines: RoutineSource | None = None,
     cached: bool = True,
 ) -> Built:
@@ -133,52 +165,51 @@ def build_code(
         The programs.
     options
         How to compile them.
-    more
-        Further functions in LLVM's language that call these.
     exports
-        The names of those functions.
-    library
-        The functions of the C library that they call.
+        The names of routines.
     routines
-        What writes routines that call these, or stand alone.
+        What writes routines that call the programs, or stand alone.
     cached
         Whether to use the cache.  Programs that call functions in Python are never kept: their names do not say
         what they do.
     """
     with stage("code"):
-        return within_time(lambda: _build(parts, options, more, exports, library, routines, cached))
+        return within_time(lambda: _build(parts, options, exports, routines, cached))
 
 
 def _build(
     parts: Sequence[Part],
     options: CodeOptions,
-    more: str,
     exports: Sequence[str],
-    library: Sequence[str],
     routines: RoutineSource | None,
     cached: bool,
 ) -> Built:
     names = [*exports, *(name for part in parts for name in (part.name, f"{part.name}_prologue"))]
     has_externals = any(node.operation == "external" for part in parts for node in part.program.nodes)
     store = default_cache() if cached and not has_externals else None
-    key = _key(parts, options, more, routines) if store else ""
+    key = _key(parts, options, routines) if store else ""
     if store is not None:
         found = _from_cache(store, key, names)
         if found is not None:
             return found
-    if routines is not None:
+    module = write_module(parts, options)
+    written = list(routines.write()) if routines is not None else []
+    text = module.text
+    if module.eliminates:
+        from atwood.codegen.routines.elimination import write_elimination
+
+        written += write_elimination()
+    if written:
         from atwood.codegen.llvm.routines import print_routines
 
-        more = f"{more}\n{print_routines(routines.write())}"
-    module = write_module(parts, options, more)
-    functions = (*module.library, *library)
-    code = compile_text(module.text, options.level, has_variables=routines is not None)
+        text = f"{text}\n{print_routines(written)}"
+    code = compile_text(text, options.level, has_variables=bool(written))
     failures = Failures() if module.externals else None
     callbacks = _callbacks(module, failures) if failures is not None else {}
     addresses = {name: ctypes.cast(call, ctypes.c_void_p).value or 0 for name, call in callbacks.items()}
-    loaded = load_code(code, names, require_symbols(functions) | addresses, tuple(callbacks.values()))
+    loaded = load_code(code, names, require_symbols(module.library) | addresses, tuple(callbacks.values()))
     if store is not None:
-        about = {"scratch": module.scratch, "library": functions}
+        about = {"scratch": module.scratch, "library": module.library}
         store.write(key, json.dumps(about).encode() + b"\n" + code)
     return Built(loaded, module.scratch, False, failures)
 
@@ -197,10 +228,10 @@ def _from_cache(store: Cache, key: str, names: Sequence[str]) -> Built | None:
         return None
 
 
-def _key(parts: Sequence[Part], options: CodeOptions, more: str, routines: RoutineSource | None) -> str:
+def _key(parts: Sequence[Part], options: CodeOptions, routines: RoutineSource | None) -> str:
     written = routines.key if routines is not None else ()
     programs = [(part.name, part.program.digest, part.positions, part.lanes, part.packed) for part in parts]
-    return make_key([_GENERATOR, hash_of_generators(), programs, options, more, written, target_description()])
+    return make_key([_GENERATOR, hash_of_generators(), programs, options, written, target_description()])
 
 
 @cache

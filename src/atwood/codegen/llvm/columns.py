@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ctypes
 from ctypes import c_int64, c_void_p
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,13 +16,15 @@ from atwood.arrays import FloatArray
 from atwood.clock import check_time
 from atwood.codegen.llvm.build import Built, build_code, default_options
 from atwood.codegen.llvm.module import Part
-from atwood.codegen.llvm.routine import Routine
+from atwood.codegen.routines.kernels import addresses
+from atwood.codegen.routines.kinds import ADDRESS, INTEGER
+from atwood.codegen.routines.language import Routine
+from atwood.codegen.routines.source import RoutineSource
 from atwood.expr.core.program import Program
 
-__all__ = ["ColumnKernel", "ColumnProgram", "compile_columns"]
+__all__ = ["ColumnKernel", "ColumnProgram", "compile_columns", "write_routines"]
 
 _COLUMNS = ctypes.CFUNCTYPE(None, *[c_void_p] * 5, c_int64)
-_PROLOGUE = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)
 
 
 def compile_columns(program: Program) -> ColumnProgram:
@@ -32,11 +35,10 @@ def compile_columns(program: Program) -> ColumnProgram:
     program
         What to compute; without functions in Python.
     """
-    inputs = [len(group.symbols) for group in program.inputs]
-    outputs = [len(group.expressions) for group in program.outputs]
-    part = Part("kernel", program)
-    text = _columns_text(inputs, outputs)
-    return ColumnProgram(program, build_code([part], default_options([part]), more=text, exports=["columns"]))
+    inputs = tuple(len(group.symbols) for group in program.inputs)
+    outputs = tuple(len(group.expressions) for group in program.outputs)
+    part, routines = Part("kernel", program), RoutineSource("codegen.llvm.columns", (), (inputs, outputs))
+    return ColumnProgram(program, build_code([part], default_options([part]), exports=["columns"], routines=routines))
 
 
 class ColumnProgram:
@@ -53,7 +55,6 @@ class ColumnProgram:
         self.call = _COLUMNS(built.code.addresses["columns"])
         self.inputs = [len(group.symbols) for group in program.inputs]
         self.outputs = [len(group.expressions) for group in program.outputs]
-        self._prologue = _PROLOGUE(built.code.addresses["kernel_prologue"])
 
     def bind(self, parameter_values: ArrayLike) -> ColumnKernel:
         """Compute once what depends on parameters alone.
@@ -63,9 +64,7 @@ class ColumnProgram:
         parameter_values
             The values in the order of the program's parameters.
         """
-        values = np.array(parameter_values, dtype=float)
-        derived, scratch = np.empty(len(self.program.prologue)), np.empty(self.built.scratch)
-        self._prologue(values.ctypes.data, derived.ctypes.data, scratch.ctypes.data)
+        derived, _ = self.built.derive("kernel", self.program, parameter_values)
         return ColumnKernel(self, derived)
 
 
@@ -111,27 +110,24 @@ def _full(values: FloatArray, shape: tuple[int, int]) -> FloatArray:
     return np.ascontiguousarray(values if values.shape == shape else np.broadcast_to(values, shape))
 
 
-def _columns_text(inputs: list[int], outputs: list[int]) -> str:
+def write_routines(inputs: tuple[int, ...], outputs: tuple[int, ...]) -> list[Routine]:
     """Write the loop over the states: each is gathered, worked on, and scattered."""
-    r = Routine()
-    lists = [r.put(f"alloca [{len(sizes)} x ptr]") for sizes in (inputs, outputs)]
-    places, begin = [], 0
-    for made, sizes in zip(lists, (inputs, outputs), strict=True):
-        for number, size in enumerate(sizes):
-            place = r.place("%room", begin)
-            r.do(f"store ptr {place}, ptr {r.put(f'getelementptr ptr, ptr {made}, i64 {number}')}")
-            places.append(place)
-            begin += size
-    given = [r.load_pointer("%inputs", number) for number in range(len(inputs))]
-    found = [r.load_pointer("%outputs", number) for number in range(len(outputs))]
-    with r.loop(0, "%states") as state:
-        for source, target, size in zip(given, places, inputs, strict=False):
-            with r.loop(0, size) as i:
-                r.store(r.load(source, r.index("mul", i.index, "%states"), state.index), target, i.index)
-        r.put(f"call i32 @kernel(ptr {lists[0]}, ptr %derived, ptr %scratch, ptr {lists[1]})")
-        for target, source, size in zip(found, places[len(inputs) :], outputs, strict=True):
-            with r.loop(0, size) as i:
-                r.store(r.load(source, i.index), target, r.index("mul", i.index, "%states"), state.index)
-    r.do("ret void")
-    arguments = "ptr %inputs, ptr %outputs, ptr %derived, ptr %scratch, ptr %room, i64 %states"
-    return r.function(f"define void @columns({arguments}) #0")
+    arguments = dict.fromkeys(("inputs", "outputs", "derived", "scratch", "room"), ADDRESS) | {"states": INTEGER}
+    r = Routine("columns", arguments, None, exported=True)
+    given, found, derived, scratch, room, states = r.arguments
+    sizes, begins = (*inputs, *outputs), [0, *accumulate((*inputs, *outputs))]
+    places = [room.at(begin) for begin in begins[:-1]]
+    arrays = [given.read(k, ADDRESS) for k in range(len(inputs))] + [
+        found.read(k, ADDRESS) for k in range(len(outputs))
+    ]
+    groups, middle = list(zip(arrays, places, sizes, strict=True)), len(inputs)
+    lists = [addresses(r, places[:middle]), addresses(r, places[middle:])]
+    with r.count(states) as state:
+        for array, place, size in groups[:middle]:
+            with r.count(size) as i:
+                place[i] = array[i * states + state]
+        r.call("kernel", lists[0], derived, scratch, lists[1])
+        for array, place, size in groups[middle:]:
+            with r.count(size) as i:
+                array[i * states + state] = place[i]
+    return [r]

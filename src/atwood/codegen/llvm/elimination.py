@@ -13,10 +13,12 @@ from typing import Any
 
 from atwood.codegen.llvm.build import Built, build_code
 from atwood.codegen.llvm.module import CodeOptions
-from atwood.codegen.llvm.routine import Routine
 from atwood.codegen.once import once
+from atwood.codegen.routines.kinds import ADDRESS, INTEGER
+from atwood.codegen.routines.language import Operand, Routine, Value
+from atwood.codegen.routines.source import RoutineSource
 
-__all__ = ["LISTS", "elimination_functions"]
+__all__ = ["LISTS", "elimination_functions", "write_routines"]
 
 LISTS = ("pivot", "begins", "others", "below", "starts", "first", "second", "changed")
 """The lists of places, in the order in which their addresses are given.
@@ -25,8 +27,6 @@ Of each step: the unknown that is eliminated; where its part of `others` and `be
 and `changed`, with one more at the end of either. Of each unknown that is touched: its number, and that of the entry
 below the pivot. Of each product: which two of the touched are multiplied, and the number of the entry that changes.
 """
-
-_HEAD = "define void @{name}(ptr %lists, ptr %entries, ptr %values, i64 %steps, i64 %size, i64 %states) #0"
 
 
 @once
@@ -43,76 +43,75 @@ def elimination_functions() -> tuple[Callable[..., Any], Callable[..., Any]]:
 
 @once
 def _code() -> Built:
-    text = _factorise() + _solve()
-    return build_code([], CodeOptions(level=2), more=text, exports=["factorise", "solve"])
+    routines = RoutineSource("codegen.llvm.elimination")
+    return build_code([], CodeOptions(level=2), exports=["factorise", "solve"], routines=routines)
 
 
-class _Lists:
-    """The lists of places, while a routine is being written."""
-
-    def __init__(self, routine: Routine) -> None:
-        self._routine = routine
-        self._at = {name: routine.load_pointer("%lists", number) for number, name in enumerate(LISTS)}
-
-    def row(self, name: str, *where: str | int) -> str:
-        """Return where the row of an entry of a list begins."""
-        return self._routine.index("mul", self._routine.load_index(self._at[name], *where), "%states")
-
-    def range(self, name: str, step: str) -> tuple[str, str]:
-        """Return where the part of a step begins and ends."""
-        r = self._routine
-        return r.load_index(self._at[name], step), r.load_index(self._at[name], step, 1)
-
-    def value(self, name: str, where: str) -> str:
-        return self._routine.load_index(self._at[name], where)
+def write_routines() -> list[Routine]:
+    """Write the routines that factorise and that solve."""
+    return [_factorise(), _solve()]
 
 
-def _factorise() -> str:
-    r = Routine()
-    lists = _Lists(r)
-    with r.loop(0, "%steps") as step:
-        pivot = lists.row("pivot", step.index)
-        begin, end = lists.range("begins", step.index)
-        with r.loop(begin, end) as k:
-            below, share = lists.row("below", k.index), r.index("mul", r.index("sub", k.index, begin), "%states")
-            with r.loop(0, "%states") as j:
-                value, divisor = r.load("%entries", below, j.index), r.load("%entries", pivot, j.index)
-                r.store(r.number("fdiv", value, divisor), "%values", share, j.index)
-        first, last = lists.range("starts", step.index)
-        with r.loop(first, last) as m:
-            one, changed = lists.row("first", m.index), lists.row("changed", m.index)
-            other = lists.row("below", begin, lists.value("second", m.index))
-            with r.loop(0, "%states") as j:
-                product = r.number("fmul", r.load("%values", one, j.index), r.load("%entries", other, j.index))
-                left = r.number("fsub", r.load("%entries", changed, j.index), product)
-                r.store(left, "%entries", changed, j.index)
-        with r.loop(begin, end) as k:
-            below, share = lists.row("below", k.index), r.index("mul", r.index("sub", k.index, begin), "%states")
-            with r.loop(0, "%states") as j:
-                r.store(r.load("%values", share, j.index), "%entries", below, j.index)
-    r.do("ret void")
-    return r.function(_HEAD.format(name="factorise"))
+class _Work:
+    """The arguments of a routine while it is being written, and rows of its arrays."""
+
+    def __init__(self, name: str) -> None:
+        arguments = dict.fromkeys(("lists", "entries", "values"), ADDRESS)
+        self.r = r = Routine(name, arguments | dict.fromkeys(("steps", "size", "states"), INTEGER), None, exported=True)
+        lists, self.entries, self.values, self.steps, self.size, self.states = r.arguments
+        self._lists = {name: lists.read(k, ADDRESS) for k, name in enumerate(LISTS)}
+
+    def listed(self, name: str, where: Operand) -> Value:
+        """Return an entry of a list."""
+        return self._lists[name].read(where, INTEGER)
+
+    def range(self, name: str, step: Value) -> tuple[Value, Value]:
+        """Return where the part of a step ends and begins, as loops take it."""
+        return self.listed(name, step + 1), self.listed(name, step)
+
+    def row(self, array: Value, number: Value) -> Value:
+        """Return a row of numbers, one for each state."""
+        return array.at(number * self.states)
 
 
-def _solve() -> str:
-    r = Routine()
-    lists = _Lists(r)
-    with r.loop(0, "%steps") as step:
-        _take_off(r, lists, step.index, forwards=True)
-    with r.loop(0, r.index("mul", "%size", "%states")) as k:  # the first entries are the diagonal
-        r.store(r.number("fdiv", r.load("%values", k.index), r.load("%entries", k.index)), "%values", k.index)
-    with r.loop(0, "%steps") as step:
-        _take_off(r, lists, r.index("sub", r.index("sub", "%steps", 1), step.index), forwards=False)
-    r.do("ret void")
-    return r.function(_HEAD.format(name="solve"))
+def _factorise() -> Routine:
+    w = _Work("factorise")
+    r = w.r
+    with r.count(w.steps) as step:
+        pivot, (end, begin) = w.row(w.entries, w.listed("pivot", step)), w.range("begins", step)
+        with r.count(end, begin) as k:
+            below, share = w.row(w.entries, w.listed("below", k)), w.row(w.values, k - begin)
+            with r.count(w.states) as j:
+                share[j] = below[j] / pivot[j]
+        with r.count(*w.range("starts", step)) as m:
+            one, changed = w.row(w.values, w.listed("first", m)), w.row(w.entries, w.listed("changed", m))
+            other = w.row(w.entries, w.listed("below", begin + w.listed("second", m)))
+            with r.count(w.states) as j:
+                changed[j] = changed[j] - one[j] * other[j]
+        with r.count(end, begin) as k:
+            below, share = w.row(w.entries, w.listed("below", k)), w.row(w.values, k - begin)
+            with r.count(w.states) as j:
+                below[j] = share[j]
+    return r
 
 
-def _take_off(r: Routine, lists: _Lists, step: str, forwards: bool) -> None:
+def _solve() -> Routine:
+    w = _Work("solve")
+    r = w.r
+    with r.count(w.steps) as step:
+        _take_off(w, step, forwards=True)
+    with r.count(w.size * w.states) as k:  # the first entries are the diagonal
+        w.values[k] = w.values[k] / w.entries[k]
+    with r.count(w.steps) as step:
+        _take_off(w, w.steps - 1 - step, forwards=False)
+    return r
+
+
+def _take_off(w: _Work, step: Value, forwards: bool) -> None:
     """Write what one step does to values: the pivot's to the others, or the others' to the pivot."""
-    pivot = lists.row("pivot", step)
-    with r.loop(*lists.range("begins", step)) as k:
-        other, below = lists.row("others", k.index), lists.row("below", k.index)
+    r, pivot = w.r, w.row(w.values, w.listed("pivot", step))
+    with r.count(*w.range("begins", step)) as k:
+        other, below = w.row(w.values, w.listed("others", k)), w.row(w.entries, w.listed("below", k))
         target, source = (other, pivot) if forwards else (pivot, other)
-        with r.loop(0, "%states") as j:
-            product = r.number("fmul", r.load("%entries", below, j.index), r.load("%values", source, j.index))
-            r.store(r.number("fsub", r.load("%values", target, j.index), product), "%values", target, j.index)
+        with r.count(w.states) as j:
+            target[j] = target[j] - below[j] * source[j]

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from atwood.codegen.llvm.layout import Body, Layout, lay_out, main_body, prologue_body
-from atwood.codegen.llvm.linear_systems import ROUTINES, Solver
+from atwood.codegen.llvm.linear_systems import Solver
 from atwood.codegen.llvm.text import LIBRARY_FUNCTIONS, Needs, Writer
 from atwood.codegen.llvm.unit import prologue, write_unit
 from atwood.errors import UnsupportedError
@@ -76,12 +76,15 @@ class ModuleText:
         The functions of the C library that it calls.
     externals
         The functions in Python that it calls, as ``external.0`` and so on, each with its number of arguments.
+    eliminates
+        Whether it calls the routines of `atwood.codegen.routines.elimination`, which are not in it.
     """
 
     text: str
     scratch: int
     library: tuple[str, ...]
     externals: tuple[tuple[ExternalFunction, int], ...]
+    eliminates: bool
 
 
 @dataclass(frozen=True)
@@ -110,7 +113,7 @@ class Part:
     packed: tuple[int, ...] = ()
 
 
-def write_module(programs: Sequence[Part], options: CodeOptions, more: str = "") -> ModuleText:
+def write_module(programs: Sequence[Part], options: CodeOptions) -> ModuleText:
     """Write the two functions of each program.
 
     Parameters
@@ -119,8 +122,6 @@ def write_module(programs: Sequence[Part], options: CodeOptions, more: str = "")
         What to compute.
     options
         What the code depends on.
-    more
-        Further functions, already written, that call these.
 
     Raises
     ------
@@ -144,11 +145,10 @@ def write_module(programs: Sequence[Part], options: CodeOptions, more: str = "")
         parts.append(_write_prologue(name))
     if options.contract:
         parts = [_contracted(text) for text in parts]
-    parts.append(more)
-    if needs.elimination:
-        parts.append(ROUTINES)
     parts.extend(_declarations(needs, options.sincos))
-    return ModuleText("\n".join(parts), scratch, tuple(sorted(needs.library)), tuple(needs.externals))
+    return ModuleText(
+        "\n".join(parts), scratch, tuple(sorted(needs.library)), tuple(needs.externals), needs.elimination
+    )
 
 
 def _contracted(text: str) -> str:

@@ -132,8 +132,8 @@ class _Printer:
         elif operation in ("store", "set"):
             align = ", align 8" if isinstance(values[0].kind, Lanes) else ""
             self.lines.append(f"  store {_typed(values[0])}, {_typed(values[1])}{align}")
-        elif operation == "copy":
-            self._copy(*values)
+        elif operation in ("copy", "copy of codes"):
+            self._copy(*values, 8 if operation == "copy" else 4)
         elif operation == "clear":
             self._clear(*values)
         else:
@@ -152,8 +152,8 @@ class _Printer:
             case "load" | "get":
                 align = ", align 8" if isinstance(result.kind, Lanes) else ""
                 return f"load {_type(result.kind)}, {_typed(a)}{align}"
-            case "offset":
-                return f"getelementptr double, {_typed(a)}, {_typed(values[1])}"
+            case "offset" | "offset of codes":
+                return f"getelementptr {'double' if operation == 'offset' else 'i32'}, {_typed(a)}, {_typed(values[1])}"
             case "choose":
                 return f"select {', '.join(map(_typed, values))}"
             case "not":
@@ -167,7 +167,8 @@ class _Printer:
             case "to number":
                 return f"sitofp i64 {_name(a)} to double"
             case "to code" | "to integer":
-                return f"{'sext' if a.kind is CODE else 'zext'} {_typed(a)} to {_type(result.kind)}"
+                word = {CODE: "sext", INTEGER: "trunc"}.get(a.kind, "zext")
+                return f"{word} {_typed(a)} to {_type(result.kind)}"
             case "spread":
                 return self._spread(result, a)
             case "sum of lanes" | "largest lane" | "any lane":
@@ -191,11 +192,11 @@ class _Printer:
         self.lines.append(f"  {first} = insertelement {kind} poison, {_typed(a)}, i32 0")
         return f"shufflevector {kind} {first}, {kind} poison, <{count} x i32> zeroinitializer"
 
-    def _copy(self, target: Value, source: Value, count: Value) -> None:
+    def _copy(self, target: Value, source: Value, count: Value, width: int) -> None:
         self._labels += 1
         size = f"%size{self._labels}"
         self.declared.add("declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)")
-        self.lines.append(f"  {size} = mul i64 {_name(count)}, 8")
+        self.lines.append(f"  {size} = mul i64 {_name(count)}, {width}")
         self.lines.append(
             f"  call void @llvm.memcpy.p0.p0.i64({_typed(target)}, {_typed(source)}, i64 {size}, i1 false)"
         )

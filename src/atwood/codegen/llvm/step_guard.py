@@ -13,51 +13,15 @@ from numpy.typing import ArrayLike
 from atwood.arrays import FloatArray
 from atwood.codegen.llvm.build import Built, build_code, default_options
 from atwood.codegen.llvm.module import Part
+from atwood.codegen.routines.kernels import call_kernel, place_of
+from atwood.codegen.routines.kinds import ADDRESS, NUMBER
+from atwood.codegen.routines.language import Routine
+from atwood.codegen.routines.source import RoutineSource
 from atwood.expr.core.program import Program
 
-__all__ = ["GuardCode", "GuardData", "compile_guard"]
+__all__ = ["GuardCode", "GuardData", "compile_guard", "write_routines"]
 
-_PROLOGUE = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)
 _GUARD = ctypes.CFUNCTYPE(c_int, c_double, c_void_p, c_void_p, c_double, c_void_p, c_void_p, c_void_p)
-
-_TEXT = (
-    """define i32 @guard(double %t0, ptr %y0, ptr %p0, double %t1, ptr %y1, ptr %p1, ptr %data) #0 {
-entry:
-  %first = alloca double
-  %second = alloca double
-  %share = alloca double
-  %inputs = alloca [7 x ptr]
-  %outputs = alloca ptr
-  %floor.at = getelementptr double, ptr %data, i64 3
-  %floor = load double, ptr %floor.at
-  %h = fsub double %t1, %t0
-  %is.short = fcmp ole double %h, %floor
-  br i1 %is.short, label %good, label %ask
-ask:
-  store double %t0, ptr %first
-  store double %t1, ptr %second
-"""
-    + "\n".join(
-        f"""  %in{i} = getelementptr ptr, ptr %inputs, i64 {i}
-  store ptr {name}, ptr %in{i}"""
-        for i, name in enumerate(("%first", "%y0", "%p0", "%second", "%y1", "%p1", "%reach.at"))
-    ).replace("  %in0", "  %reach.at = getelementptr double, ptr %data, i64 2\n  %in0", 1)
-    + """
-  store ptr %share, ptr %outputs
-  %derived = load ptr, ptr %data
-  %scratch.at = getelementptr ptr, ptr %data, i64 1
-  %scratch = load ptr, ptr %scratch.at
-  %code = call i32 @kernel(ptr %inputs, ptr %derived, ptr %scratch, ptr %outputs)
-  %found = load double, ptr %share
-  %passes = fcmp ole double %found, 1.0
-  br i1 %passes, label %good, label %bad
-good:
-  ret i32 0
-bad:
-  ret i32 1
-}
-"""
-)
 
 
 class GuardData(NamedTuple):
@@ -95,14 +59,12 @@ class GuardCode:
         shortest
             Steps that are no longer than this are not judged, s.
         """
-        addresses, program = self._built.code.addresses, self._program
-        values = np.array(parameter_values, dtype=np.float64)
-        derived, scratch = np.empty(max(1, len(program.prologue))), np.empty(max(1, self._built.scratch))
-        _PROLOGUE(addresses["kernel_prologue"])(values.ctypes.data, derived.ctypes.data, scratch.ctypes.data)
+        address = self._built.code.addresses["guard"]
+        derived, scratch = self._built.derive("kernel", self._program, parameter_values)
         data = np.zeros(4)
         data[:2].view(np.uint64)[:] = derived.ctypes.data, scratch.ctypes.data
         data[2:] = reach, shortest
-        call, place = _GUARD(addresses["guard"]), data.ctypes.data
+        call, place = _GUARD(address), data.ctypes.data
         keep = self._built, derived, scratch, data
 
         def passes(
@@ -112,7 +74,7 @@ class GuardCode:
             a, b, c, d = (one.ctypes.data for one in rows)
             return bool(call(t0, a, b, t1, c, d, place) == 0)
 
-        return GuardData(addresses["guard"], place, passes, keep)
+        return GuardData(address, place, passes, keep)
 
 
 def compile_guard(program: Program) -> GuardCode:
@@ -124,4 +86,18 @@ def compile_guard(program: Program) -> GuardCode:
         See `atwood.simulation.problem.curved_laws.watched_program`.
     """
     part = Part("kernel", program)
-    return GuardCode(program, build_code([part], default_options([part]), more=_TEXT, exports=["guard"]))
+    routines = RoutineSource("codegen.llvm.step_guard")
+    return GuardCode(program, build_code([part], default_options([part]), exports=["guard"], routines=routines))
+
+
+def write_routines() -> list[Routine]:
+    """Write what judges a step that is long enough: 0 where it is good, else 1."""
+    arguments = {"t0": NUMBER, "y0": ADDRESS, "p0": ADDRESS, "t1": NUMBER, "y1": ADDRESS, "p1": ADDRESS}
+    r = Routine("guard", arguments | {"data": ADDRESS}, exported=True)
+    t0, y0, p0, t1, y1, p1, data = r.arguments
+    with r.when(t1 - t0 <= data[3]):
+        r.give(0)
+    inputs, share = [place_of(r, t0), y0, p0, place_of(r, t1), y1, p1, data.at(2)], r.array(1)
+    call_kernel(r, "kernel", inputs, data.read(0, ADDRESS), data.read(1, ADDRESS), [share])
+    r.give((~(share[0] <= 1.0)).code())
+    return [r]

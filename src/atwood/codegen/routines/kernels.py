@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from atwood.codegen.routines.kinds import ADDRESS
 from atwood.codegen.routines.language import Routine, Value
 
-__all__ = ["addresses", "call_kernel"]
+__all__ = ["addresses", "call_kernel", "place_of"]
 
 
 def addresses(r: Routine, places: Sequence[Value]) -> Value:
@@ -16,6 +16,13 @@ def addresses(r: Routine, places: Sequence[Value]) -> Value:
     for k, place in enumerate(places):
         table.write(k, place, ADDRESS)
     return table
+
+
+def place_of(r: Routine, number: Value) -> Value:
+    """Return an array of this call's own that holds a number."""
+    place = r.array(1)
+    place[0] = number
+    return place
 
 
 def call_kernel(

@@ -40,6 +40,11 @@ class Lanes:
     count: int
     is_float: bool = True
 
+    @property
+    def name(self) -> str:
+        """What messages call them."""
+        return f"{self.count} lanes of {'numbers' if self.is_float else 'conditions'}"
+
 
 Kind: TypeAlias = Scalar | Lanes
 
@@ -50,7 +55,7 @@ INTEGER = Scalar("integer")
 """An integer of 64 bits, with sign."""
 
 CODE = Scalar("code")
-"""What a function returns: an integer of 32 bits, zero where all went well."""
+"""An integer of 32 bits: what a function returns, zero where all went well, or an element of a list of such."""
 
 BOOLEAN = Scalar("condition")
 """True or false."""

@@ -103,18 +103,20 @@ class Value:
     def __bool__(self) -> bool:
         raise TypeError("a value of a routine is not known while the routine is written: use `when` or `choose`")
 
-    def at(self, offset: Operand) -> Value:
-        """Return the address of an element of this array."""
-        return self.routine.put("offset", ADDRESS, self, self.routine.value(offset, INTEGER))
+    def at(self, offset: Operand, kind: Kind = NUMBER) -> Value:
+        """Return the address of an element of this array of numbers, or of another kind."""
+        operation = "offset of codes" if kind is CODE else "offset"
+        self.routine.require(self, ADDRESS)
+        return self.routine.put(operation, ADDRESS, self, self.routine.value(offset, INTEGER))
 
     def read(self, offset: Operand, kind: Kind = NUMBER) -> Value:
         """Return an element of this array, or the lanes that begin there."""
-        return self.routine.put("load", kind, self.at(offset))
+        return self.routine.put("load", kind, self.at(offset, kind))
 
     def write(self, offset: Operand, value: Operand, kind: Kind = NUMBER) -> None:
         """Set an element of this array, or the lanes that begin there."""
         given = value if isinstance(value, Value) else self.routine.value(value, kind)
-        self.routine.do("store", given, self.at(offset))
+        self.routine.do("store", given, self.at(offset, given.kind))
 
     def __getitem__(self, offset: Operand) -> Value:
         return self.read(offset)
@@ -139,7 +141,7 @@ class Value:
         return self.routine.put("bits", NUMBER, self)
 
     def code(self) -> Value:
-        """Return a condition as a code: 1 where it holds."""
+        """Return a condition as a code, 1 where it holds, or an integer that has room in one."""
         return self.routine.put("to code", CODE, self)
 
 
@@ -231,9 +233,18 @@ class Routine:
     def value(self, one: Operand, kind: Kind) -> Value:
         """Return a value, from a constant where it is one; a number is spread over lanes where these are asked for."""
         if isinstance(one, Value):
-            spreads = isinstance(kind, Lanes) and not isinstance(one.kind, Lanes)
-            return self.put("spread", kind, one) if spreads else one
+            if isinstance(kind, Lanes) and one.kind is NUMBER:
+                return self.put("spread", kind, one)
+            self.require(one, kind)
+            return one
+        if not kind.is_float and one != int(one):
+            raise TypeError(f"a value of the kind {kind.name} is needed in {self.name}, not {one}")
         return Value(self, kind, float(one) if kind.is_float else int(one))
+
+    def require(self, one: Value, kind: Kind) -> None:
+        """Refuse a value of another kind, in the line that asks for this one."""
+        if one.kind != kind:
+            raise TypeError(f"a value of the kind {kind.name} is needed in {self.name}, not {one.kind.name}")
 
     def alike(self, a: Value, b: Operand) -> tuple[Value, Value]:
         """Return two operands as values of one kind."""
@@ -307,10 +318,10 @@ class Routine:
 
     def call(self, function: Routine | str | Value, *arguments: Operand, result: Kind | None = CODE) -> Value:
         """Call a routine of the module, or a function by its address; return its value, for what it is worth."""
-        kinds: Sequence[Kind | None] = [None] * len(arguments)
+        kinds: Sequence[Kind] = [one.kind if isinstance(one, Value) else NUMBER for one in arguments]
         if isinstance(function, Routine):
             kinds, result = [one.kind for one in function.arguments], function.result
-        given = tuple(self.value(one, kind or NUMBER) for one, kind in zip(arguments, kinds, strict=True))
+        given = tuple(self.value(one, kind) for one, kind in zip(arguments, kinds, strict=True))
         self._count += 1
         value = Value(self, result or CODE, f"v{self._count}")
         target = function.name if isinstance(function, Routine) else function
@@ -318,7 +329,8 @@ class Routine:
         return value
 
     def choose(self, condition: Value, a: Operand, b: Operand, kind: Kind = NUMBER) -> Value:
-        """Return the first value where a condition holds, and else the second."""
+        """Return the first value where a condition holds, and else the second; constants are of a kind."""
+        kind = next((one.kind for one in (a, b) if isinstance(one, Value)), kind)
         first, second = self.value(a, kind), self.value(b, kind)
         return self.put("choose", first.kind, condition, first, second)
 
@@ -364,9 +376,13 @@ class Routine:
         """Return the sum of the lanes, from the first to the last."""
         return self.put("sum of lanes", NUMBER, a)
 
-    def copy(self, target: Value, source: Value, count: Operand) -> None:
-        """Copy so many elements of 8 bytes each."""
-        self.do("copy", target, source, self.value(count, INTEGER))
+    def is_finite(self, a: Value) -> Value:
+        """Tell whether a number is one, and no infinite one."""
+        return a - a == 0.0
+
+    def copy(self, target: Value, source: Value, count: Operand, kind: Kind = NUMBER) -> None:
+        """Copy so many elements between arrays that do not overlap."""
+        self.do("copy of codes" if kind is CODE else "copy", target, source, self.value(count, INTEGER))
 
     def clear(self, begin: Value, end: Value) -> None:
         """Set all elements between two addresses to zero."""

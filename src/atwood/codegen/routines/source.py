@@ -28,19 +28,19 @@ class RoutineSource:
     module
         The module with the function ``write_routines``, within the package; it is imported only to write them.
     files
-        The source files that decide what it writes, by their places in the package.
+        The other source files of the package that decide what it writes, without those of the language.
     arguments
         What it is called with.
     """
 
     module: str
-    files: tuple[str, ...]
+    files: tuple[str, ...] = ()
     arguments: tuple[object, ...] = ()
 
     @property
     def key(self) -> tuple[object, ...]:
         """What the routines depend on."""
-        return (self.module, _hash(self.files), self.arguments)
+        return (self.module, _hash((self.module.replace(".", "/") + ".py", *self.files)), self.arguments)
 
     def write(self) -> Sequence[Routine]:
         """Write the routines."""

@@ -17,43 +17,24 @@ from numpy.typing import ArrayLike, NDArray
 
 from atwood.codegen.llvm.build import Built, build_code, default_options
 from atwood.codegen.llvm.module import Part
-from atwood.codegen.sundials.text import array_of, sundials_layout
+from atwood.codegen.routines.kernels import call_kernel, place_of
+from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, NUMBER
+from atwood.codegen.routines.language import Record, Routine, Value
+from atwood.codegen.routines.source import RoutineSource
+from atwood.codegen.sundials.ida_routines import array_of
+from atwood.codegen.sundials.layout import SundialsLayout, sundials_layout
 from atwood.codegen.tangents import SECANT, STEEP
 from atwood.errors import UsageError
 from atwood.expr.core.program import Program
 from atwood.late import dataclass
 
-__all__ = ["EVENTS_PLACE", "EventCode", "EventData", "compile_events"]
+__all__ = ["EVENTS_PLACE", "EventCode", "EventData", "compile_events", "write_routines"]
 
 EVENTS_PLACE = 31
 """Which of the pointers of IDA's user data leads to the data of the events."""
 
 _EVENTS = ctypes.CFUNCTYPE(c_int, c_double, *[c_void_p] * 4)
-_PROLOGUE = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)
-
-_TEXT = """define i32 @events(double %t, ptr %y, ptr %yp, ptr %values, ptr %data) #0 {{
-  %time = alloca double
-  %inputs = alloca [4 x ptr]
-  %outputs = alloca ptr
-  store double %t, ptr %time
-  %u = getelementptr double, ptr %y, i64 {count}
-  %shift.at = getelementptr ptr, ptr %data, i64 2
-  %shift = load ptr, ptr %shift.at
-  %second = getelementptr ptr, ptr %inputs, i64 1
-  %third = getelementptr ptr, ptr %inputs, i64 2
-  %fourth = getelementptr ptr, ptr %inputs, i64 3
-  store ptr %time, ptr %inputs
-  store ptr %y, ptr %second
-  store ptr %u, ptr %third
-  store ptr %shift, ptr %fourth
-  store ptr %values, ptr %outputs
-  %derived = load ptr, ptr %data
-  %scratch.at = getelementptr ptr, ptr %data, i64 1
-  %scratch = load ptr, ptr %scratch.at
-  %code = call i32 @kernel(ptr %inputs, ptr %derived, ptr %scratch, ptr %outputs)
-  ret i32 %code
-}}
-"""
+_ARGUMENTS = {"t": NUMBER} | dict.fromkeys(("y", "yp", "values", "data"), ADDRESS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +57,7 @@ class EventData:
     memory
         What the functions remember from step to step.
     arrays
-        What depends on parameters alone, room for the code, and what is added to each value.
+        What depends on parameters alone, and what is added to each value.
     keep
         Whatever must live as long as the addresses are used.
     """
@@ -87,7 +68,7 @@ class EventData:
     address: int
     count: int
     memory: NDArray[np.float64]
-    arrays: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+    arrays: tuple[NDArray[np.float64], NDArray[np.float64]]
     keep: object
 
     def restart(self, t: float) -> None:
@@ -149,7 +130,6 @@ class EventCode:
         addresses = built.code.addresses
         self._plain, self._explicit = addresses["events"], addresses["look"]
         self._ida = addresses["ida_events"] if has_ida else 0
-        self._prologue = _PROLOGUE(addresses["kernel_prologue"])
 
     def bind(self, parameter_values: ArrayLike, shifts: ArrayLike) -> EventData:
         """Return the functions for one session.
@@ -161,25 +141,20 @@ class EventCode:
         shifts
             What is added to each value.
         """
-        derived, scratch = np.empty(len(self.program.prologue)), np.empty(self._built.scratch)
         shift = np.array(shifts, dtype=np.float64)
+        derived, scratch = self._built.derive("kernel", self.program, parameter_values)
         memory = np.zeros(3 + 3 * len(shift))
         arrays: tuple[NDArray[np.float64], ...] = (derived, scratch, shift, memory)
         data = (c_void_p * 4)(*(array.ctypes.data for array in arrays))
         functions = self._plain, self._explicit, self._ida
-        place, own = ctypes.addressof(data), (derived, scratch, shift)
-        made = EventData(*functions, place, len(shift), memory, own, (self._built, data))
-        self.fill(made, parameter_values, shifts)
-        return made
+        place, own = ctypes.addressof(data), (derived, shift)
+        return EventData(*functions, place, len(shift), memory, own, (self._built, scratch, data))
 
     def fill(self, data: EventData, parameter_values: ArrayLike, shifts: ArrayLike) -> None:
         """Give the functions of a session other parameters and shifts; arguments as of `bind`."""
-        values = np.array(parameter_values, dtype=np.float64)
-        if values.shape != (len(self.program.parameters),):
-            raise UsageError(f"needs {len(self.program.parameters)} parameter values, got an array of {values.shape}")
-        derived, scratch, shift = data.arrays
+        derived, shift = data.arrays
         shift[:] = shifts
-        self._prologue(values.ctypes.data, derived.ctypes.data, scratch.ctypes.data)
+        derived[:], _ = self._built.derive("kernel", self.program, parameter_values)
 
 
 def compile_events(program: Program, for_ida: bool) -> EventCode:
@@ -201,144 +176,87 @@ def compile_events(program: Program, for_ida: bool) -> EventCode:
     if len(groups) != 4 or groups[0] != 1 or [groups[3]] != [len(program.results)]:
         raise UsageError(f"needs the input groups t, q, u and shift, not groups of {groups}", where=program.name)
     part = Part("kernel", program)
-    text = _TEXT.format(count=groups[1]) + _look_text(groups[1] + groups[2], groups[3])
-    exports = ["events", "look"]
-    if for_ida:
-        text, exports = text + _ida_text(groups[3]), [*exports, "ida_events"]
-    return EventCode(program, build_code([part], default_options([part]), more=text, exports=exports), for_ida)
+    layout = sundials_layout() if for_ida else None
+    exports = ["events", "look", *(["ida_events"] if for_ida else [])]
+    files = ("codegen/sundials/ida_routines.py", "codegen/sundials/layout.py", "codegen/tangents.py")
+    routines = RoutineSource("codegen.sundials.events", files, (groups[1], groups[2], groups[3], layout))
+    return EventCode(program, build_code([part], default_options([part]), exports=exports, routines=routines), for_ida)
 
 
-def _look_text(size: int, count: int) -> str:
-    """Write the function that remembers the last point, and compares signs and tangents; -2 where zero may be passed.
+def write_routines(coordinates: int, speeds: int, count: int, layout: SundialsLayout | None) -> list[Routine]:
+    """Write the values of events, what compares them with those at the last point, and the function that IDA calls.
 
-    Its memory: the time of the last point, the length over which slopes are taken, whether it has said so, and then
-    values and slopes at the last point, and room for two rows of values.
+    Parameters
+    ----------
+    coordinates, speeds, count
+        The length of q and u, and the number of events.
+    layout
+        Where SUNDIALS' structures have their arrays, if IDA is to call them.
     """
-    return f"""define i32 @look(double %t, ptr %y, ptr %yp, ptr %values, ptr %data) #0 {{
-entry:
-  %shifted = alloca double, i64 {size}
-  %code = call i32 @events(double %t, ptr %y, ptr %yp, ptr %values, ptr %data)
-  %memory.at = getelementptr ptr, ptr %data, i64 3
-  %memory = load ptr, ptr %memory.at
-  %length.at = getelementptr double, ptr %memory, i64 1
-  %said.at = getelementptr double, ptr %memory, i64 2
-  %lasts = getelementptr double, ptr %memory, i64 3
-  %slopes = getelementptr double, ptr %memory, i64 {3 + count}
-  %others = getelementptr double, ptr %memory, i64 {3 + 2 * count}
-  %last = load double, ptr %memory
-  %width = fsub double %t, %last
-  %old = fcmp ole double %width, 0.0
-  %bad = icmp ne i32 %code, 0
-  %leave = or i1 %old, %bad
-  br i1 %leave, label %return, label %measure
-return:
-  ret i32 %code
-{_measure_text(size)}{_compare_text(count)}end:
-  %dips = and i1 %found.next, %known
-  br i1 %dips, label %say, label %nothing
-say:
-  store double 1.0, ptr %said.at
-  ret i32 -2
-nothing:
-  ret i32 0
-}}
-"""
+    written = [_values(coordinates), _look(coordinates + speeds, count)]
+    return [*written, _ida_events(layout, count)] if layout is not None else written
 
 
-def _measure_text(size: int) -> str:
-    """Write how events are evaluated a little before the point too, along its tangent."""
-    return f"""measure:
-  %known = fcmp ogt double %width, 0.0
-  %before = load double, ptr %length.at
-  %half = fmul double %before, 0.5
-  %longer = fcmp ogt double %width, %half
-  %length = select i1 %longer, double %width, double %half
-  store double %length, ptr %length.at
-  store double %t, ptr %memory
-  %past = fmul double %length, {SECANT}
-  %earlier = fsub double %t, %past
-  br label %shift
-shift:
-  %i = phi i64 [ 0, %measure ], [ %i.next, %shift ]
-  %y.at = getelementptr double, ptr %y, i64 %i
-  %yp.at = getelementptr double, ptr %yp, i64 %i
-  %to = getelementptr double, ptr %shifted, i64 %i
-  %y.i = load double, ptr %y.at
-  %yp.i = load double, ptr %yp.at
-  %moved = fmul double %yp.i, %past
-  %back = fsub double %y.i, %moved
-  store double %back, ptr %to
-  %i.next = add i64 %i, 1
-  %i.more = icmp slt i64 %i.next, {size}
-  br i1 %i.more, label %shift, label %slope
-slope:
-  %lost = call i32 @events(double %earlier, ptr %shifted, ptr %yp, ptr %others, ptr %data)
-  %has = icmp eq i32 %lost, 0
-  br label %each
-"""
+def _values(coordinates: int) -> Routine:
+    r = Routine("events", _ARGUMENTS, exported=True)
+    t, y, _, values, data = r.arguments
+    derived, scratch, shift = (data.read(k, ADDRESS) for k in range(3))
+    inputs = [place_of(r, t), y, y.at(coordinates), shift]
+    r.give(call_kernel(r, "kernel", inputs, derived, scratch, [values]))
+    return r
 
 
-def _compare_text(count: int) -> str:
-    """Write the loop that asks of each event whether the tangents at both points leave room for a dip between them."""
-    return f"""each:
-  %k = phi i64 [ 0, %slope ], [ %k.next, %each ]
-  %found = phi i1 [ false, %slope ], [ %found.next, %each ]
-  %value.at = getelementptr double, ptr %values, i64 %k
-  %other.at = getelementptr double, ptr %others, i64 %k
-  %last.at = getelementptr double, ptr %lasts, i64 %k
-  %slope.at = getelementptr double, ptr %slopes, i64 %k
-  %value = load double, ptr %value.at
-  %other = load double, ptr %other.at
-  %first = load double, ptr %last.at
-  %first.slope = load double, ptr %slope.at
-  %change = fsub double %value, %other
-  %quotient = fdiv double %change, %past
-  %end.slope = select i1 %has, double %quotient, double 0.0
-  store double %value, ptr %last.at
-  store double %end.slope, ptr %slope.at
-  %negative = fcmp olt double %value, 0.0
-  %sign = select i1 %negative, double -1.0, double 1.0
-  %a = fmul double %first, %sign
-  %b = fmul double %value, %sign
-  %signed = fmul double %width, %sign
-  %down = fmul double %first.slope, %signed
-  %up = fmul double %end.slope, %signed
-  %left = fadd double %a, %down
-  %right = fsub double %b, %up
-  %falls = fcmp ole double %left, 0.0
-  %rises = fcmp ole double %right, 0.0
-  %down.size = call double @llvm.fabs.f64(double %down)
-  %up.size = call double @llvm.fabs.f64(double %up)
-  %down.larger = fcmp ogt double %down.size, %up.size
-  %steepest = select i1 %down.larger, double %down.size, double %up.size
-  %a.larger = fcmp ogt double %a, %b
-  %largest = select i1 %a.larger, double %a, double %b
-  %bound = fmul double %largest, {STEEP}
-  %steep = fcmp ogt double %steepest, %bound
-  %a.same = fcmp ogt double %a, 0.0
-  %b.same = fcmp ogt double %b, 0.0
-  %same = and i1 %a.same, %b.same
-  %turns = or i1 %falls, %rises
-  %doubtful = or i1 %turns, %steep
-  %one.side = xor i1 %same, true
-  %this = or i1 %one.side, %doubtful
-  %found.next = or i1 %found, %this
-  %k.next = add i64 %k, 1
-  %k.more = icmp slt i64 %k.next, {count}
-  br i1 %k.more, label %each, label %end
-"""
+def _look(size: int, count: int) -> Routine:
+    """Remember the last point, and compare signs and tangents; -2 where zero may be passed.
+
+    The memory: the time of the last point, the length over which slopes are taken, whether it has said so, and then
+    values and slopes at the last point, and room for another row of values.
+    """
+    r = Routine("look", _ARGUMENTS, exported=True)
+    t, y, yp, values, data = r.arguments
+    code = r.call("events", t, y, yp, values, data)
+    memory, shifted = data.read(3, ADDRESS), r.array(size)
+    lasts, slopes, others = (memory.at(3 + k * count) for k in range(3))
+    own = Record(memory, dict.fromkeys(("last", "length", "said"), NUMBER))
+    width = t - own.last
+    with r.when((width <= 0.0) | (code != 0)):
+        r.give(code)
+    length = r.most(width, own.length * 0.5)
+    own.length, own.last = length, t
+    past = length * SECANT
+    with r.count(size) as i:
+        shifted[i] = y[i] - yp[i] * past
+    has_slopes = r.call("events", t - past, shifted, yp, others, data) == 0
+    found = r.variable(0, BOOLEAN)
+    with r.count(count) as k:
+        first, first_slope, value = lasts[k], slopes[k], values[k]
+        slope = r.choose(has_slopes, (value - others[k]) / past, 0.0)
+        lasts[k], slopes[k] = value, slope
+        found.now = found.now | _may_pass_zero(r, width, (first, first_slope), (value, slope))
+    with r.when(found.now & (width > 0.0)):
+        own.said = 1.0
+        r.give(-2)
+    r.give(0)
+    return r
 
 
-def _ida_text(count: int) -> str:
-    """Write the function that IDA calls."""
-    layout = sundials_layout()
-    vectors = array_of("y", "yy", layout.vector_data) + array_of("yp", "yyp", layout.vector_data)
-    places = [f"  %at.{i} = getelementptr double, ptr %values, i64 {i}\n" for i in range(count)]
-    calm = "".join(f"{place}  store double 1.0, ptr %at.{i}\n" for i, place in enumerate(places))
-    return f"""define i32 @ida_events(double %t, ptr %yy, ptr %yyp, ptr %values, ptr %user) #0 {{
-{vectors}  %data.at = getelementptr ptr, ptr %user, i64 {EVENTS_PLACE}
-  %data = load ptr, ptr %data.at
-  %code = call i32 @look(double %t, ptr %y, ptr %yp, ptr %values, ptr %data)
-{calm}  ret i32 %code
-}}
-"""
+def _may_pass_zero(r: Routine, width: Value, first: tuple[Value, Value], last: tuple[Value, Value]) -> Value:
+    """Tell whether signs differ, or tangents at both ends leave room for a dip between them."""
+    sign = r.choose(last[0] < 0.0, -1.0, 1.0)
+    a, b, signed = first[0] * sign, last[0] * sign, width * sign
+    down, up = first[1] * signed, last[1] * signed
+    turns = (a + down <= 0.0) | (b - up <= 0.0)
+    steep = r.most(r.size(down), r.size(up)) > r.most(a, b) * STEEP
+    return ~((a > 0.0) & (b > 0.0)) | turns | steep
+
+
+def _ida_events(layout: SundialsLayout, count: int) -> Routine:
+    """Write the function that IDA calls, to which nothing ever is zero."""
+    r = Routine("ida_events", _ARGUMENTS, exported=True)
+    t, *vectors, values, user = r.arguments
+    y, yp = (array_of(one, layout.vector_data) for one in vectors)
+    code = r.call("look", t, y, yp, values, user.read(EVENTS_PLACE, ADDRESS))
+    with r.count(count) as k:
+        values[k] = 1.0
+    r.give(code)
+    return r

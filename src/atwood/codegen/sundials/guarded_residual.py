@@ -16,71 +16,52 @@ from atwood.arrays import FloatArray
 from atwood.codegen.llvm.build import Built, build_code
 from atwood.codegen.llvm.module import CodeOptions
 from atwood.codegen.once import once
+from atwood.codegen.routines.kinds import ADDRESS, INTEGER
+from atwood.codegen.routines.language import Record, Routine
+from atwood.codegen.routines.source import RoutineSource
 from atwood.codegen.sundials.events import EVENTS_PLACE
-from atwood.codegen.sundials.text import array_of, sundials_layout
+from atwood.codegen.sundials.ida_routines import RESIDUAL, array_of
+from atwood.codegen.sundials.layout import SundialsLayout, sundials_layout
 from atwood.errors import UsageError
 
-__all__ = ["guarded_residual"]
+__all__ = ["guarded_residual", "write_routines"]
 
 _PLACE = EVENTS_PLACE - 1
 """Which of the pointers of IDA's user data leads to what is remembered here."""
 
-_FIELDS = ("guard", "guard_data", "residual", "kept", "tried", "verdict", "bytes")
+_FIELDS = dict.fromkeys(("guard", "guard_data", "residual", "kept", "tried", "verdict"), ADDRESS) | {"size": INTEGER}
 
 
 @once
 def _code() -> Built:
     """Return the code of the residual."""
-    layout = sundials_layout()
-    fields = "\n".join(
-        f"  %{name}.at = getelementptr ptr, ptr %own, i64 {i}\n  %{name} = load ptr, ptr %{name}.at"
-        for i, name in enumerate(_FIELDS)
-    )
-    text = f"""define i32 @guarded(double %t, ptr %y, ptr %yp, ptr %out, ptr %user) #0 {{
-entry:
-  %own.at = getelementptr ptr, ptr %user, i64 {_PLACE}
-  %own = load ptr, ptr %own.at
-{fields}
-{array_of("values", "y", layout.vector_data)}
-{array_of("rates", "yp", layout.vector_data)}
-  %size = ptrtoint ptr %bytes to i64
-  %all = mul i64 %size, 2
-  %both = add i64 %all, 8
-  %tried.y = getelementptr double, ptr %tried, i64 1
-  %tried.yp = getelementptr i8, ptr %tried.y, i64 %size
-  %kept.y = getelementptr double, ptr %kept, i64 1
-  %kept.yp = getelementptr i8, ptr %kept.y, i64 %size
-  %before = load double, ptr %tried
-  %is.same = fcmp oeq double %t, %before
-  br i1 %is.same, label %known, label %new
-known:
-  %said = load i64, ptr %verdict
-  %was.bad = icmp ne i64 %said, 0
-  br i1 %was.bad, label %bad, label %good
-new:
-  %is.later = fcmp ogt double %t, %before
-  br i1 %is.later, label %keep, label %ask
-keep:
-  call void @llvm.memcpy.p0.p0.i64(ptr %kept, ptr %tried, i64 %both, i1 false)
-  br label %ask
-ask:
-  store double %t, ptr %tried
-  %t0 = load double, ptr %kept
-  %code = call i32 %guard(double %t0, ptr %kept.y, ptr %kept.yp, double %t, ptr %values, ptr %rates, ptr %guard_data)
-  %wide = zext i32 %code to i64
-  store i64 %wide, ptr %verdict
-  %is.bad = icmp ne i32 %code, 0
-  br i1 %is.bad, label %bad, label %good
-good:
-  call void @llvm.memcpy.p0.p0.i64(ptr %tried.y, ptr %values, i64 %size, i1 false)
-  call void @llvm.memcpy.p0.p0.i64(ptr %tried.yp, ptr %rates, i64 %size, i1 false)
-  %found = call i32 %residual(double %t, ptr %y, ptr %yp, ptr %out, ptr %user)
-  ret i32 %found
-bad:
-  ret i32 1
-}}
-declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)"""
-    return build_code([], CodeOptions(level=2), more=text, exports=["guarded"])
+    files = tuple(f"codegen/sundials/{name}.py" for name in ("events", "ida_routines", "layout"))
+    routines = RoutineSource("codegen.sundials.guarded_residual", files, (sundials_layout(),))
+    return build_code([], CodeOptions(level=2), exports=["guarded"], routines=routines)
+
+
+def write_routines(layout: SundialsLayout) -> list[Routine]:
+    """Write the residual; the states kept and tried last are a time with values and rates each."""
+    r = Routine("guarded", RESIDUAL, exported=True)
+    t, y, yp, found, user = r.arguments
+    own = Record(user.read(_PLACE, ADDRESS), _FIELDS)
+    values, rates = (array_of(one, layout.vector_data) for one in (y, yp))
+    size, kept, tried, verdict = own.size, own.kept, own.tried, own.verdict
+    before = tried[0]
+    with r.when(t == before), r.when(verdict.read(0, INTEGER) != 0):
+        r.give(1)
+    with r.when(~(t == before)):
+        with r.when(t > before):
+            r.copy(kept, tried, size * 2 + 1)
+        tried[0] = t
+        code = r.call(own.guard, kept[0], kept.at(1), kept.at(size + 1), t, values, rates, own.guard_data)
+        verdict.write(0, code.integer())
+        with r.when(code != 0):
+            r.give(1)
+    r.copy(tried.at(1), values, size)
+    r.copy(tried.at(size + 1), rates, size)
+    r.give(r.call(own.residual, t, y, yp, found, user))
+    return [r]
 
 
 def guarded_residual(
@@ -102,7 +83,7 @@ def guarded_residual(
         raise UsageError(f"user data of {data_bytes} bytes leave no place for what judges steps")
     ctypes.memmove(block, user_data, data_bytes)
     states, verdict = np.zeros((2, 1 + 2 * size)), np.zeros(1, dtype=np.int64)
-    places = [*guard, residual, states[0].ctypes.data, states[1].ctypes.data, verdict.ctypes.data, 8 * size]
+    places = [*guard, residual, states[0].ctypes.data, states[1].ctypes.data, verdict.ctypes.data, size]
     own = (c_void_p * len(places))(*places)
     block[_PLACE] = ctypes.addressof(own)
 

@@ -16,24 +16,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from atwood.codegen.llvm.build import Built, build_code, default_options
 from atwood.codegen.llvm.module import Part
-from atwood.codegen.sundials.lookout_text import (
-    AT,
-    CAPACITY,
-    CARRIED,
-    FIELDS,
-    NOTICED,
-    PAUSED,
-    STATE,
-    Shape,
-    lookout_text,
-)
+from atwood.codegen.routines.source import RoutineSource
+from atwood.codegen.sundials.lookout_routines import AT, CAPACITY, CARRIED, FIELDS, NOTICED, PAUSED, STATE, Shape
 from atwood.errors import UsageError
 from atwood.expr.core.program import Program
 from atwood.late import dataclass
 
 __all__ = ["NOTICED", "PAUSED", "LookoutCode", "LookoutData", "Pace", "compile_lookout"]
 _LOOK = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, *[ctypes.c_void_p] * 3)
-_PROLOGUE = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)
 
 
 @dataclass(frozen=True)
@@ -104,10 +94,10 @@ class LookoutCode:
             When to look.
         """
         shape, program = self.shape, self.program
-        values = np.array(parameter_values, dtype=float)
+        derived, scratch = self.built.derive("held", program, parameter_values)
         arrays: dict[str, NDArray[Any]] = {
-            "derived": np.empty(len(program.prologue)),
-            "scratch": np.empty(self.built.scratch),
+            "derived": derived,
+            "scratch": scratch,
             "sizes": np.array(sizes, dtype=float),
             "values": np.empty(shape.conditions),
             "slopes": np.empty(len(shape.places)),
@@ -122,8 +112,6 @@ class LookoutCode:
             "best": np.zeros(1 + shape.coordinates),
             "state": np.zeros(len(STATE)),
         }
-        prologue = _PROLOGUE(self.built.code.addresses["held_prologue"])
-        prologue(values.ctypes.data, arrays["derived"].ctypes.data, arrays["scratch"].ctypes.data)
         numbers = {"move": pace.move, "whole": pace.whole, "idle": pace.idle, "low": pace.low**2}
         numbers["worn"] = pace.worn**2
         arrays["state"][[AT[name] for name in numbers]] = list(numbers.values())
@@ -233,6 +221,6 @@ def compile_lookout(program: Program, speeds: int, size: int, places: tuple[Arra
         raise UsageError(f"needs a program of (t, q, u), not of {inputs} with {outputs}", where=program.name)
     shape = Shape(inputs[1], speeds, size, outputs[0], tuple(zip(rows, columns, strict=True)))
     part = Part("held", program)
-    text = lookout_text(shape)
-    built = build_code([part], default_options([part]), more=text, exports=["look", "drive", "fill"])
+    routines = RoutineSource("codegen.sundials.lookout_routines", (), (shape,))
+    built = build_code([part], default_options([part]), exports=["look", "drive", "fill"], routines=routines)
     return LookoutCode(program, shape, built)

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from atwood.codegen.llvm.build import Built, build_code, default_options
 from atwood.codegen.llvm.module import Part
-from atwood.codegen.sundials.null_space import ATTENTION, FIELDS, LIMIT, RATE, NullSpaceShape, null_space_text
-from atwood.codegen.sundials.text import SundialsLayout, sundials_layout
-from atwood.errors import KernelEvaluationError, UsageError
+from atwood.codegen.sundials.layout import SundialsLayout, sundials_layout
+from atwood.codegen.sundials.null_space import ATTENTION, FIELDS, LIMIT, RATE, NullSpaceShape, null_space_source
+from atwood.codegen.sundials.residuals import check_groups
+from atwood.errors import UsageError
 from atwood.expr.core.program import Program
 from atwood.late import dataclass
 
 __all__ = ["NullSpaceCallbacks", "NullSpaceData", "compile_null_space_callbacks"]
-
-
-_PROLOGUE = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)
 _EXPORTS = ("ida_residual", "ida_jacobian", "ida_weights")
 
 
@@ -61,15 +58,15 @@ def compile_null_space_callbacks(
     jacobian_rows, jacobian_columns, rows, columns = (
         np.asarray(x, dtype=np.int64).ravel() for x in (*jacobian, *pattern)
     )
-    _check(stack, [1, shape.size, shape.size], shape.stack + len(jacobian_rows))
-    _check(derivatives, [1, shape.size, shape.size, 1, shape.rates], len(rows))
+    check_groups(stack, [1, shape.size, shape.size], shape.stack + len(jacobian_rows))
+    check_groups(derivatives, [1, shape.size, shape.size, 1, shape.rates], len(rows))
     placed = np.concatenate([np.arange(shape.stack), shape.stack + jacobian_rows * shape.speeds + jacobian_columns])
     parts = [
         Part("residual", stack, tuple(placed.tolist())),
         Part("jacobian", derivatives, tuple((columns * shape.stack + rows).tolist())),
     ]
-    more = null_space_text(layout or sundials_layout(), shape, sparse)
-    built = build_code(parts, default_options(parts), more=more, exports=_EXPORTS, cached=cache)
+    routines = null_space_source(layout or sundials_layout(), shape, sparse)
+    built = build_code(parts, default_options(parts), exports=_EXPORTS, routines=routines, cached=cache)
     return NullSpaceCallbacks(stack, derivatives, shape, built)
 
 
@@ -168,18 +165,9 @@ class NullSpaceCallbacks:
         KernelEvaluationError
             If the number of values is wrong.
         """
-        values = np.array(parameter_values, dtype=float)
-        arrays: dict[str, NDArray[np.generic]] = {"scratch": np.empty(self.built.scratch)}
+        arrays: dict[str, NDArray[np.generic]] = {}
         for name, program in self.programs.items():
-            count = len(program.parameters)
-            if values.shape != (count,):
-                raise KernelEvaluationError(
-                    f"needs {count} parameter values but got an array of shape {values.shape}", where=program.name
-                )
-            derived = np.empty(len(program.prologue))
-            prologue = _PROLOGUE(self.built.code.addresses[f"{name}_prologue"])
-            prologue(values.ctypes.data, derived.ctypes.data, arrays["scratch"].ctypes.data)
-            arrays[f"derived_{name}"] = derived
+            arrays[f"derived_{name}"], arrays["scratch"] = self.built.derive(name, program, parameter_values)
         chosen = np.array(choice, dtype=np.int64)
         arrays["choice"] = chosen
         arrays["relative"], arrays["absolute"] = np.zeros(self.shape.size), np.ones(self.shape.size)
@@ -190,13 +178,3 @@ class NullSpaceCallbacks:
             raise UsageError("the choice or the sizes have another length than the mechanism")
         pointers = _Pointers(*[arrays[name].ctypes.data for name in FIELDS])
         return NullSpaceData(ctypes.addressof(pointers), chosen, pointers, arrays)
-
-
-def _check(program: Program, inputs: Sequence[int], outputs: int) -> None:
-    found = [len(group.symbols) for group in program.inputs]
-    results = [len(group.expressions) for group in program.outputs]
-    if found != list(inputs) or results != [outputs]:
-        raise UsageError(
-            f"needs input groups of {list(inputs)} and one output group of {outputs}, not {found} and {results}",
-            where=program.name,
-        )

@@ -4,25 +4,19 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from atwood.codegen.llvm.build import Built, build_code, default_options
 from atwood.codegen.llvm.module import Part
-from atwood.codegen.sundials.text import (
-    SundialsLayout,
-    columns_text,
-    dense_text,
-    residual_text,
-    sparse_text,
-    sundials_layout,
-    weights_text,
-)
-from atwood.errors import KernelEvaluationError, UsageError
+from atwood.codegen.sundials.ida_routines import FIELDS, callbacks_source
+from atwood.codegen.sundials.layout import SundialsLayout, sundials_layout
+from atwood.errors import UsageError
 from atwood.expr.core.program import Program
 
-__all__ = ["IdaCallbacks", "IdaData", "compile_ida_callbacks"]
+__all__ = ["IdaCallbacks", "IdaData", "check_groups", "compile_ida_callbacks"]
 
 RESIDUAL_TYPE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, *[ctypes.c_void_p] * 4)
 """The signature of IDA's residual: time, y, y', the result, the user's data."""
@@ -32,8 +26,6 @@ JACOBIAN_TYPE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, ctypes.c_double,
 
 WEIGHTS_TYPE = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 3)
 """The signature of IDA's error weights: y, the weights, the user's data."""
-
-_PROLOGUE = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)
 
 
 def compile_ida_callbacks(
@@ -83,46 +75,35 @@ def compile_ida_callbacks(
     """
     at_rows = np.asarray(rows, dtype=np.int64).ravel()
     at_columns = np.asarray(columns, dtype=np.int64).ravel()
-    _check(residual, [1, size, size], size)
+    check_groups(residual, [1, size, size], size)
     if by_columns and sparse:
         raise UsageError("a Jacobian by columns is full, and needs a dense matrix", where=jacobian.name)
     if by_columns:
-        _check(jacobian, [1, size, size, 1, size], size)
+        check_groups(jacobian, [1, size, size, 1, size], size)
     else:
-        _check(jacobian, [1, size, size, 1], len(at_rows))
+        check_groups(jacobian, [1, size, size, 1], len(at_rows))
     if at_columns.shape != at_rows.shape or not _inside(at_rows, size) or not _inside(at_columns, size):
         raise UsageError(f"the entries of the Jacobian are not all inside {size} x {size}", where=jacobian.name)
     layout = layout or sundials_layout()
-    places: tuple[int, ...] | None
-    if by_columns:
-        places, more = None, columns_text(layout, size)
-    elif is_list:
-        places, more = None, dense_text(layout)
-    else:
-        places, more = _jacobian_for(layout, at_rows, at_columns, size, sparse)
-    parts = [Part("residual", residual), Part("jacobian", jacobian, places)]
+    places, starts = None, np.arange(size + 1)
+    if sparse:
+        order = np.lexsort((at_rows, at_columns))
+        places = np.argsort(order)
+        at_rows, starts = at_rows[order], np.searchsorted(at_columns[order], starts)
+    elif not (by_columns or is_list):
+        places = at_rows + size * at_columns
+    parts = [Part("residual", residual), Part("jacobian", jacobian, None if places is None else tuple(places.tolist()))]
+    form = "sparse" if sparse else "columns" if by_columns else "dense"
     built = build_code(
         parts,
         default_options(parts),
-        more=residual_text(layout) + weights_text(layout, size) + more,
         exports=("ida_residual", "ida_jacobian", "ida_weights"),
-        library=("memcpy",) if sparse else (),
+        routines=callbacks_source(layout, size, form, len(at_rows) if sparse else 0),
         cached=cache,
     )
-    return IdaCallbacks(residual, jacobian, size, len(at_rows), sparse, built)
-
-
-def _jacobian_for(
-    layout: SundialsLayout, rows: NDArray[np.int64], columns: NDArray[np.int64], size: int, sparse: bool
-) -> tuple[tuple[int, ...], str]:
-    """Return where each entry goes in the matrix's array, and the Jacobian with IDA's signature."""
-    if not sparse:
-        return tuple((rows + size * columns).tolist()), dense_text(layout)
-    order = np.lexsort((rows, columns))
-    positions = np.empty(len(order), dtype=np.int64)
-    positions[order] = np.arange(len(order))
-    starts = np.searchsorted(columns[order], np.arange(size + 1))
-    return tuple(positions.tolist()), sparse_text(layout, rows[order], starts)
+    index = np.int32 if layout.index_bytes == 4 else np.int64
+    pattern = (at_rows.astype(index), starts.astype(index)) if sparse else (np.empty(0), np.empty(0))
+    return IdaCallbacks(residual, jacobian, size, pattern, built)
 
 
 class IdaData(ctypes.Structure):
@@ -131,14 +112,8 @@ class IdaData(ctypes.Structure):
     It must live as long as IDA may call; `IdaCallbacks.bind` returns it with its arrays attached.
     """
 
-    _fields_ = (
-        ("derived_residual", ctypes.c_void_p),
-        ("derived_jacobian", ctypes.c_void_p),
-        ("scratch", ctypes.c_void_p),
-        ("relative", ctypes.c_void_p),
-        ("absolute", ctypes.c_void_p),
-    )
-    arrays: tuple[NDArray[np.float64], ...]
+    _fields_ = tuple((name, ctypes.c_void_p) for name in FIELDS)
+    arrays: dict[str, NDArray[Any]]
     """What the pointers point to."""
 
     @property
@@ -148,8 +123,8 @@ class IdaData(ctypes.Structure):
 
     def set_weights(self, relative: ArrayLike, absolute: ArrayLike) -> None:
         """Make the error weights ``1 / (relative[i] |y[i]| + absolute[i])``."""
-        for target, values in zip(self.arrays[-2:], (relative, absolute), strict=True):
-            target[:] = values
+        self.arrays["relative"][:] = relative
+        self.arrays["absolute"][:] = absolute
 
 
 class IdaCallbacks:
@@ -163,10 +138,8 @@ class IdaCallbacks:
         What they compute.
     size
         The length of y.
-    entries
-        The number of entries of the Jacobian that are not always zero.
-    sparse
-        Whether the matrix is sparse.
+    pattern
+        The row of each entry of a sparse matrix, and where each column starts.
     built
         The code; its ``failures`` hold what a function in Python raised, which IDA only sees as a missing value.
 
@@ -181,13 +154,10 @@ class IdaCallbacks:
     """
 
     def __init__(
-        self, residual: Program, jacobian: Program, size: int, entries: int, sparse: bool, built: Built
+        self, residual: Program, jacobian: Program, size: int, pattern: tuple[NDArray[Any], NDArray[Any]], built: Built
     ) -> None:
-        self.residual = residual
-        self.jacobian = jacobian
-        self.size = size
-        self.entries = entries
-        self.sparse = sparse
+        self._programs = {"residual": residual, "jacobian": jacobian}
+        self._size, self._pattern = size, pattern
         self.built = built
         self.residual_address = built.code.addresses["ida_residual"]
         self.jacobian_address = built.code.addresses["ida_jacobian"]
@@ -203,26 +173,17 @@ class IdaCallbacks:
         KernelEvaluationError
             If the number of values is wrong.
         """
-        values = np.array(parameter_values, dtype=float)
-        scratch = np.empty(self.scratch)
-        derived: list[NDArray[np.float64]] = []
-        for name, program in (("residual", self.residual), ("jacobian", self.jacobian)):
-            count = len(program.parameters)
-            if values.shape != (count,):
-                raise KernelEvaluationError(
-                    f"needs {count} parameter values but got an array of shape {values.shape}", where=program.name
-                )
-            array = np.empty(len(program.prologue))
-            prologue = _PROLOGUE(self.built.code.addresses[f"{name}_prologue"])
-            prologue(values.ctypes.data, array.ctypes.data, scratch.ctypes.data)
-            derived.append(array)
-        arrays = (*derived, scratch, np.zeros(self.size), np.ones(self.size))
-        data = IdaData(*[array.ctypes.data for array in arrays])
+        arrays: dict[str, NDArray[Any]] = dict(zip(("rows", "starts"), self._pattern, strict=True))
+        for name, program in self._programs.items():
+            arrays[f"derived_{name}"], arrays["scratch"] = self.built.derive(name, program, parameter_values)
+        arrays |= {"relative": np.zeros(self._size), "absolute": np.ones(self._size)}
+        data = IdaData(*[arrays[name].ctypes.data for name in FIELDS])
         data.arrays = arrays
         return data
 
 
-def _check(program: Program, inputs: Sequence[int], outputs: int) -> None:
+def check_groups(program: Program, inputs: Sequence[int], outputs: int) -> None:
+    """Refuse a program with other inputs than these, or another number of results in its only output group."""
     found = [len(group.symbols) for group in program.inputs]
     results = [len(group.expressions) for group in program.outputs]
     if found != list(inputs) or results != [outputs]:

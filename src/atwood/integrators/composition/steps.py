@@ -6,7 +6,7 @@ velocities; half steps that follow each other are one. Increments are added with
 
 from __future__ import annotations
 
-from atwood.codegen.routines.kernels import call_kernel
+from atwood.codegen.routines.kernels import call_kernel, place_of
 from atwood.codegen.routines.kinds import ADDRESS, NUMBER
 from atwood.codegen.routines.language import Routine, Value
 from atwood.codegen.routines.source import RoutineSource
@@ -22,8 +22,8 @@ def composition_source(layout: Layout, order: int) -> RoutineSource:
 
     They are those of `atwood.integrators.gauss.steps`, on the same memory.
     """
-    own = ("integrators/composition/steps.py", "integrators/composition/coefficients.py", "codegen/routines/kernels.py")
-    return RoutineSource("integrators.composition.steps", (*own, *FILES), (layout, order))
+    files = ("integrators/composition/coefficients.py", *FILES)
+    return RoutineSource("integrators.composition.steps", files, (layout, order))
 
 
 def write_routines(layout: Layout, order: int) -> list[Routine]:
@@ -67,8 +67,7 @@ def _kick(layout: Layout) -> Routine:
     """Change the momenta by the forces."""
     arguments = {"y": ADDRESS, "rest": ADDRESS, "t": NUMBER, "amount": NUMBER}
     r, m, (y, rest, t, amount) = open_routine(layout, "kick", arguments)
-    n, time = layout.coordinates, r.array(1)
-    time[0] = t
+    n, time = layout.coordinates, place_of(r, t)
     m.counts.evaluations = m.counts.evaluations + 1
     derived, scratch = m.pointers.derived, m.pointers.scratch
     _unless_found(r, call_kernel(r, "kernel", [time, y], derived, scratch, [m.at("main.F")]))

@@ -331,7 +331,6 @@ _ROUTINES = RoutineSource(
         "integrators/dop853/dense_output.py",
         "integrators/dop853/memory.py",
         "integrators/dop853/reference.py",
-        "integrators/dop853/steps.py",
         "integrators/dop853/tableau.py",
         "integrators/explicit_problem.py",
         "integrators/output_times.py",

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from atwood.codegen.routines.kernels import call_kernel
+from atwood.codegen.routines.kernels import call_kernel, place_of
 from atwood.codegen.routines.kinds import ADDRESS, CODE, NUMBER
-from atwood.codegen.routines.language import Routine, Value
+from atwood.codegen.routines.language import Routine
 from atwood.codegen.routines.source import RoutineSource
 from atwood.integrators.explicit_problem import MET, STEPS
 
@@ -23,7 +23,7 @@ def rates_source(coordinates: int, speeds: int, given: bool, projects: bool = Fa
     projects
         Whether the program ``nearer`` takes a step onto the constraints.
     """
-    files = ("integrators/dop853/rates.py", "integrators/explicit_problem.py", "codegen/routines/kernels.py")
+    files = ("integrators/explicit_problem.py",)
     return RoutineSource("integrators.dop853.rates", files, (coordinates, speeds, given, projects))
 
 
@@ -43,7 +43,7 @@ def _rates(coordinates: int, speeds: int, given: bool) -> Routine:
         r.copy(yp, u, speeds)
     outputs = [yp, accelerations] if given else [accelerations]
     derived, scratch = (data.read(k, ADDRESS) for k in range(2))
-    r.give(call_kernel(r, "kernel", [_place(r, t), y, u], derived, scratch, outputs))
+    r.give(call_kernel(r, "kernel", [place_of(r, t), y, u], derived, scratch, outputs))
     return r
 
 
@@ -56,7 +56,7 @@ def _project(coordinates: int, speeds: int) -> Routine:
     t, y, data = r.arguments
     derived, scratch, room = (data.read(k, ADDRESS) for k in range(3))
     moved = room.at(coordinates + speeds)
-    time = _place(r, t)
+    time = place_of(r, t)
     with r.count(STEPS):
         inputs, outputs = [time, y, y.at(coordinates)], [room, room.at(coordinates), moved]
         with r.when(call_kernel(r, "nearer", inputs, derived, scratch, outputs) != 0):
@@ -69,10 +69,3 @@ def _project(coordinates: int, speeds: int) -> Routine:
             r.give(0)
     r.give(r.value(1, CODE))
     return r
-
-
-def _place(r: Routine, number: Value) -> Value:
-    """Return an array that holds a number."""
-    place = r.array(1)
-    place[0] = number
-    return place

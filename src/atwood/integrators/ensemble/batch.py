@@ -184,7 +184,7 @@ class Batch:
 _RUN, _BUDGET = FIELDS.index("run"), FIELDS.index("budget")
 
 
-_ROUTINES = RoutineSource("integrators.ensemble.code", ("integrators/ensemble/code.py",))
+_ROUTINES = RoutineSource("integrators.ensemble.code")
 
 
 @once

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import inf
 
-from atwood.codegen.routines.kernels import call_kernel
+from atwood.codegen.routines.kernels import call_kernel, place_of
 from atwood.codegen.routines.kinds import ADDRESS, CODE, INTEGER, NUMBER
 from atwood.codegen.routines.language import Routine, Value
 from atwood.codegen.routines.source import RoutineSource
@@ -38,8 +38,7 @@ def gauss_source(layout: Layout, order: int) -> RoutineSource:
 
     They take a session's array, which `atwood.integrators.gauss.layout` lays out.
     """
-    files = ("integrators/gauss/steps.py", "integrators/gauss/tableau.py", "codegen/routines/kernels.py", *FILES)
-    return RoutineSource("integrators.gauss.steps", files, (layout, order))
+    return RoutineSource("integrators.gauss.steps", ("integrators/gauss/tableau.py", *FILES), (layout, order))
 
 
 def write_routines(layout: Layout, order: int) -> list[Routine]:
@@ -66,8 +65,7 @@ def _unless_found(r: Routine, code: Value, given: int = 1) -> None:
 def _evaluate(layout: Layout) -> Routine:
     """Evaluate the equations at the Y of a work area: F, and speeds from those at `guess`."""
     r, m, (w, t, guess) = open_routine(layout, "evaluate", {"w": ADDRESS, "t": NUMBER, "guess": ADDRESS})
-    n, time = layout.coordinates, r.array(1)
-    time[0] = t
+    n, time = layout.coordinates, place_of(r, t)
     y, f, v = (w.at(layout.within(key)) for key in ("Y", "F", "V"))
     inputs = [time, y, y.at(n), guess][: 4 if layout.takes_speeds else 3]
     outputs = [f, f.at(n), v][: 3 if layout.has_speeds else 2]

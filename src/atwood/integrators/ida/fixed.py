@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.codegen.llvm.fixed_pivots import AGAIN, SLOTS
-from atwood.codegen.sundials.fixed_pivots import fixed_pivots_addresses
+from atwood.codegen.sundials.fixed_pivots import AGAIN, SLOTS, fixed_pivots_addresses
 from atwood.late import dataclass
 from atwood.numerics.fixed_pivots import FixedPivots
 

@@ -281,7 +281,6 @@ _ROUTINES = RoutineSource(
         "integrators/taylor/convolutions.py",
         "integrators/taylor/memory.py",
         "integrators/taylor/problem.py",
-        "integrators/taylor/steps.py",
     ),
 )
 
