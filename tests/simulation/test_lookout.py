@@ -9,7 +9,7 @@ import pytest
 
 from atwood import simulate
 from atwood.codegen.python.backend import BoundKernel
-from atwood.codegen.sundials.lookout_routines import Shape
+from atwood.codegen.sundials.lookout import slope_lists
 from atwood.integrators.ida import library as sundials_library
 from atwood.numerics.matrices import to_array
 from atwood.simulation.singular.looks import Look
@@ -114,5 +114,5 @@ def test_outputs_between_looks_change_no_look(guards: list[SingularityMonitor]) 
 
 def test_conditions_that_depend_on_no_coordinate_have_lists() -> None:
     """As of a rope along a rod on a line, which the rod holds already."""
-    lists = Shape(coordinates=1, speeds=1, size=2, conditions=1, places=()).lists
+    lists = slope_lists(1, ())
     assert all(len(numbers) == 0 for numbers in lists.values())

@@ -1,8 +1,8 @@
 """Linear systems in LLVM's language: elimination with partial pivoting.
 
 Systems of up to three unknowns are eliminated in registers.  Larger ones are factorised in the scratch array by
-`atwood.codegen.routines.elimination`.  Systems with the same matrix share its factors.  A pivot that is zero becomes nan,
-and so does then every unknown.
+routines (`atwood.codegen.routines.elimination`).  Systems with the same matrix share its factors.  A pivot that is zero
+becomes nan, and so does then every unknown.
 """
 
 from __future__ import annotations

@@ -16,6 +16,7 @@ from atwood.codegen.routines.tree import Block, Branch, Call, Instruction, Jump,
 __all__ = ["print_routines"]
 
 _TYPES: dict[Kind, str] = {NUMBER: "double", INTEGER: "i64", CODE: "i32", BOOLEAN: "i1", ADDRESS: "ptr"}
+_CONVERTED: dict[Kind, str] = {CODE: "sext", INTEGER: "trunc"}
 _FLOATING = {"add": "fadd", "subtract": "fsub", "multiply": "fmul", "divide": "fdiv"}
 _WHOLE = {"add": "add", "subtract": "sub", "multiply": "mul", "divide": "sdiv", "and": "and", "or": "or"} | {
     "shift right": "lshr",
@@ -133,7 +134,7 @@ class _Printer:
             align = ", align 8" if isinstance(values[0].kind, Lanes) else ""
             self.lines.append(f"  store {_typed(values[0])}, {_typed(values[1])}{align}")
         elif operation in ("copy", "copy of codes"):
-            self._copy(*values, 8 if operation == "copy" else 4)
+            self._copy(8 if operation == "copy" else 4, *values)
         elif operation == "clear":
             self._clear(*values)
         else:
@@ -167,7 +168,7 @@ class _Printer:
             case "to number":
                 return f"sitofp i64 {_name(a)} to double"
             case "to code" | "to integer":
-                word = {CODE: "sext", INTEGER: "trunc"}.get(a.kind, "zext")
+                word = _CONVERTED.get(a.kind, "zext")
                 return f"{word} {_typed(a)} to {_type(result.kind)}"
             case "spread":
                 return self._spread(result, a)
@@ -192,7 +193,7 @@ class _Printer:
         self.lines.append(f"  {first} = insertelement {kind} poison, {_typed(a)}, i32 0")
         return f"shufflevector {kind} {first}, {kind} poison, <{count} x i32> zeroinitializer"
 
-    def _copy(self, target: Value, source: Value, count: Value, width: int) -> None:
+    def _copy(self, width: int, target: Value, source: Value, count: Value) -> None:
         self._labels += 1
         size = f"%size{self._labels}"
         self.declared.add("declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)")

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from atwood.late import dataclass
 
 __all__ = ["ADDRESS", "BOOLEAN", "CODE", "INTEGER", "NUMBER", "Kind", "Lanes", "Scalar"]
 
 
-@dataclass(frozen=True)
-class Scalar:
+class Scalar(NamedTuple):
     """A kind of one value.
 
     Attributes

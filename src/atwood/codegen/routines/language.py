@@ -243,7 +243,7 @@ class Routine:
 
     def require(self, one: Value, kind: Kind) -> None:
         """Refuse a value of another kind, in the line that asks for this one."""
-        if one.kind != kind:
+        if one.kind is not kind and one.kind != kind:
             raise TypeError(f"a value of the kind {kind.name} is needed in {self.name}, not {one.kind.name}")
 
     def alike(self, a: Value, b: Operand) -> tuple[Value, Value]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from atwood.late import dataclass
 
@@ -12,8 +12,7 @@ if TYPE_CHECKING:
 __all__ = ["Block", "Branch", "Call", "Instruction", "Jump", "Loop"]
 
 
-@dataclass(frozen=True, eq=False)
-class Instruction:
+class Instruction(NamedTuple):
     """An operation on values; `result` is None where it has none."""
 
     operation: str
@@ -21,8 +20,7 @@ class Instruction:
     arguments: tuple[Any, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Call:
+class Call(NamedTuple):
     """A call of a routine by its name, or of a function by its address."""
 
     result: Value | None

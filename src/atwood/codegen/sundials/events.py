@@ -178,7 +178,7 @@ def compile_events(program: Program, for_ida: bool) -> EventCode:
     part = Part("kernel", program)
     layout = sundials_layout() if for_ida else None
     exports = ["events", "look", *(["ida_events"] if for_ida else [])]
-    files = ("codegen/sundials/ida_routines.py", "codegen/sundials/layout.py", "codegen/tangents.py")
+    files = ("codegen/sundials/ida_routines.py", "codegen/tangents.py")
     routines = RoutineSource("codegen.sundials.events", files, (groups[1], groups[2], groups[3], layout))
     return EventCode(program, build_code([part], default_options([part]), exports=exports, routines=routines), for_ida)
 

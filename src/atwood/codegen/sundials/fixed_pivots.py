@@ -62,7 +62,7 @@ def fixed_pivots_addresses() -> Mapping[str, int]:
 
 @once
 def _code() -> Built:
-    files = ("codegen/sundials/ida_routines.py", "codegen/sundials/layout.py")
+    files = ("codegen/sundials/ida_routines.py",)
     routines = RoutineSource("codegen.sundials.fixed_pivots", files, (sundials_layout(),))
     return build_code([], CodeOptions(level=2), exports=_EXPORTS, routines=routines)
 

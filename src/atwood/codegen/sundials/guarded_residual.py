@@ -35,7 +35,7 @@ _FIELDS = dict.fromkeys(("guard", "guard_data", "residual", "kept", "tried", "ve
 @once
 def _code() -> Built:
     """Return the code of the residual."""
-    files = tuple(f"codegen/sundials/{name}.py" for name in ("events", "ida_routines", "layout"))
+    files = ("codegen/sundials/events.py", "codegen/sundials/ida_routines.py")
     routines = RoutineSource("codegen.sundials.guarded_residual", files, (sundials_layout(),))
     return build_code([], CodeOptions(level=2), exports=["guarded"], routines=routines)
 

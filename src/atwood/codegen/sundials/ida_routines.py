@@ -42,8 +42,7 @@ def callbacks_source(layout: SundialsLayout, size: int, form: str, entries: int)
     entries
         The number of entries of a sparse matrix.
     """
-    files = ("codegen/sundials/layout.py",)
-    return RoutineSource("codegen.sundials.ida_routines", files, (layout, size, form, entries))
+    return RoutineSource("codegen.sundials.ida_routines", (), (layout, size, form, entries))
 
 
 def write_routines(layout: SundialsLayout, size: int, form: str, entries: int) -> list[Routine]:

@@ -17,12 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 from atwood.codegen.llvm.build import Built, build_code, default_options
 from atwood.codegen.llvm.module import Part
 from atwood.codegen.routines.source import RoutineSource
-from atwood.codegen.sundials.lookout_routines import AT, CAPACITY, CARRIED, FIELDS, NOTICED, PAUSED, STATE, Shape
+from atwood.codegen.sundials.lookout_routines import AT, CAPACITY, CARRIED, FIELDS, LISTS, NOTICED, PAUSED, STATE, Shape
 from atwood.errors import UsageError
 from atwood.expr.core.program import Program
 from atwood.late import dataclass
 
-__all__ = ["NOTICED", "PAUSED", "LookoutCode", "LookoutData", "Pace", "compile_lookout"]
+__all__ = ["NOTICED", "PAUSED", "LookoutCode", "LookoutData", "Pace", "compile_lookout", "slope_lists"]
+
 _LOOK = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, *[ctypes.c_void_p] * 3)
 
 
@@ -56,8 +57,8 @@ class LookoutCode:
     ----------
     program
         See `compile_lookout`.
-    shape
-        How many there are of each.
+    shape, lists
+        How many there are of each, and where the slopes are; see `slope_lists`.
     built
         The code.
 
@@ -73,8 +74,9 @@ class LookoutCode:
         Address of the function that takes one look; see the same.
     """
 
-    def __init__(self, program: Program, shape: Shape, built: Built) -> None:
+    def __init__(self, program: Program, shape: Shape, lists: dict[str, NDArray[np.int64]], built: Built) -> None:
         self.program, self.shape, self.built = program, shape, built
+        self._lists = lists
         self.drive, self.fill = (built.code.addresses[name] for name in ("drive", "fill"))
         self.look_address = built.code.addresses["look"]
         self.look = _LOOK(self.look_address)
@@ -100,14 +102,14 @@ class LookoutCode:
             "scratch": scratch,
             "sizes": np.array(sizes, dtype=float),
             "values": np.empty(shape.conditions),
-            "slopes": np.empty(len(shape.places)),
+            "slopes": np.empty(shape.slopes),
             "drifts": np.empty(shape.conditions),
             "rows": np.zeros(shape.conditions),
             "changes": np.empty(shape.conditions),
             "matrix": np.empty(shape.conditions**2),
             **{name: np.zeros(shape.conditions) for name in ("pivots", "first", "most", "least", "earlier", "known")},
             "kept": np.array([len(kept), *kept], dtype=np.int64),
-            **shape.lists,
+            **self._lists,
             "notes": np.empty((CAPACITY, shape.note)),
             "best": np.zeros(1 + shape.coordinates),
             "state": np.zeros(len(STATE)),
@@ -219,8 +221,31 @@ def compile_lookout(program: Program, speeds: int, size: int, places: tuple[Arra
     inputs, outputs = [len(one.symbols) for one in program.inputs], [len(one.expressions) for one in program.outputs]
     if len(inputs) != 3 or inputs[2] != speeds or len(outputs) != 3 or outputs[1] != len(rows):
         raise UsageError(f"needs a program of (t, q, u), not of {inputs} with {outputs}", where=program.name)
-    shape = Shape(inputs[1], speeds, size, outputs[0], tuple(zip(rows, columns, strict=True)))
+    lists = slope_lists(outputs[0], list(zip(rows, columns, strict=True)))
+    shape = Shape(inputs[1], speeds, size, outputs[0], len(rows), len(lists["product"]))
     part = Part("held", program)
     routines = RoutineSource("codegen.sundials.lookout_routines", (), (shape,))
     built = build_code([part], default_options([part]), exports=["look", "drive", "fill"], routines=routines)
-    return LookoutCode(program, shape, built)
+    return LookoutCode(program, shape, lists, built)
+
+
+def slope_lists(conditions: int, places: Sequence[tuple[int, int]]) -> dict[str, NDArray[np.int64]]:
+    """Return row and column of each slope, which two are multiplied, and where in the lower half of ``G G^T``.
+
+    Parameters
+    ----------
+    conditions
+        The number of conditions.
+    places
+        Row and column of each slope.
+    """
+    by_column: dict[int, list[tuple[int, int]]] = {}
+    for entry, (row, column) in enumerate(places):
+        by_column.setdefault(column, []).append((row, entry))
+    products = [
+        (e, f, i * conditions + j) for column in by_column.values() for i, e in column for j, f in column if i >= j
+    ]
+    # There may be none, where no constraint depends on a coordinate.
+    entries = np.array(places, dtype=np.int64).reshape(-1, 2).T
+    pairs = np.array(products, dtype=np.int64).reshape(-1, 3).T
+    return dict(zip(LISTS[1:], map(np.ascontiguousarray, (*entries, *pairs)), strict=True))

@@ -3,18 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from atwood.codegen.routines.kernels import call_kernel, place_of
 from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER
 from atwood.codegen.routines.language import Record, Routine, Value
 from atwood.late import dataclass
 
-__all__ = ["AT", "CAPACITY", "CARRIED", "FIELDS", "NOTICED", "PAUSED", "STATE", "UNREADABLE", "Shape"]
-__all__ += ["write_routines"]
+__all__ = [
+    "AT",
+    "CAPACITY",
+    "CARRIED",
+    "FIELDS",
+    "LISTS",
+    "NOTICED",
+    "PAUSED",
+    "STATE",
+    "UNREADABLE",
+    "Shape",
+    "write_routines",
+]
 
 NOTICED = 98
 """The flag of `LookoutCode.drive` where somebody should look at what was noted; IDA has none of this number."""
@@ -41,46 +50,27 @@ AT = {name: number for number, name in enumerate(STATE)}
 
 @dataclass(frozen=True)
 class Shape:
-    """How many there are of each, and where the slopes are.
+    """How many there are of each.
 
     Attributes
     ----------
     coordinates, speeds, size
         The length of q, of u, and of y.
-    conditions
-        The number of conditions.
-    places
-        Row and column of each slope.
+    conditions, slopes, products
+        The number of conditions, of their slopes that are not always zero, and of products of two of these.
     """
 
     coordinates: int
     speeds: int
     size: int
     conditions: int
-    places: tuple[tuple[int, int], ...]
+    slopes: int
+    products: int
 
     @property
     def note(self) -> int:
         """The length of a note: time, y, y'."""
         return 1 + 2 * self.size
-
-    @cached_property
-    def lists(self) -> dict[str, NDArray[np.int64]]:
-        """Row and column of each slope, which two are multiplied, and where in the lower half of ``G G^T``."""
-        by_column: dict[int, list[tuple[int, int]]] = {}
-        for entry, (row, column) in enumerate(self.places):
-            by_column.setdefault(column, []).append((row, entry))
-        products = [
-            (e, f, i * self.conditions + j)
-            for column in by_column.values()
-            for i, e in column
-            for j, f in column
-            if i >= j
-        ]
-        # There may be none, where no constraint depends on a coordinate.
-        entries = np.array(self.places, dtype=np.int64).reshape(-1, 2).T
-        pairs = np.array(products, dtype=np.int64).reshape(-1, 3).T
-        return dict(zip(LISTS[1:], map(np.ascontiguousarray, (*entries, *pairs)), strict=True))
 
 
 def write_routines(shape: Shape) -> list[Routine]:
@@ -130,7 +120,7 @@ def _measure_slopes(r: Routine, data: dict[str, Value], shape: Shape) -> None:
     """Write how much each condition changes, and ``G G^T``."""
     slopes, changes, rows, matrix = (data[name] for name in ("slopes", "changes", "rows", "matrix"))
     r.clear(changes, changes.at(shape.conditions))
-    with r.count(len(shape.places)) as e:
+    with r.count(shape.slopes) as e:
         row, column = (data[name].read(e, INTEGER) for name in ("row", "column"))
         slope = slopes[e] * data["sizes"][column]
         slopes[e] = slope
@@ -138,7 +128,7 @@ def _measure_slopes(r: Routine, data: dict[str, Value], shape: Shape) -> None:
     with r.count(shape.conditions) as i:
         rows[i] = r.most(changes[i], rows[i])
     r.clear(matrix, matrix.at(shape.conditions**2))
-    with r.count(len(shape.lists["product"])) as p:
+    with r.count(shape.products) as p:
         one, other, target = (data[name].read(p, INTEGER) for name in ("one", "other", "product"))
         matrix[target] = matrix[target] + slopes[one] * slopes[other]
 

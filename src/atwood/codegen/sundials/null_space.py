@@ -130,7 +130,7 @@ def null_space_source(layout: SundialsLayout, shape: NullSpaceShape, sparse: boo
     sparse
         Whether IDA's matrix is sparse.
     """
-    files = ("codegen/sundials/ida_routines.py", "codegen/sundials/layout.py")
+    files = ("codegen/sundials/ida_routines.py",)
     return RoutineSource("codegen.sundials.null_space", files, (layout, shape, sparse))
 
 
