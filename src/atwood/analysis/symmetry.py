@@ -10,6 +10,7 @@ everywhere. The symmetry may be an unstable one: then the least push in space le
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -19,6 +20,9 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
+from atwood.numerics.newton import Missing, newton
+from atwood.numerics.rank import decompose, null_space
+from atwood.numerics.solutions import least_norm
 from atwood.simulation.initialization.start import Start, find_start
 
 __all__ = ["Symmetry", "find_symmetries"]
@@ -29,6 +33,9 @@ _START = 1e-11
 
 _NEAR = 1e-12
 """The same at other places, where constraints and accelerations are solved for."""
+
+_PLACED = 1e-10
+"""The same for a place that is all but found, and which further steps take no nearer."""
 
 _SAMPLES, _SAMPLES_WITH_SWITCHES = 6, 24
 _REACHES = (0.6, 0.2, 0.05)
@@ -125,11 +132,10 @@ def _candidates(scene: LooseScene, space: str) -> Iterator[Symmetry]:
     elif np.max(np.abs(turns), initial=0.0) > _START:
         tried = _directions(turns)[:1]
     else:
-        _, sizes, directions = np.linalg.svd(shifts)
-        rank = int(np.sum(sizes > _START * sizes[0]))
+        found = decompose(shifts, np.full(len(shifts), _START))
         apart = (now.places - now.places[:1]) / length
-        across = [np.cross(directions[0], one) for one in apart]
-        tried = [*_AXES[[1, 0, 2]], *across] if rank == 1 else [directions[2]] if rank == 2 else []
+        across = [np.cross(found.right[0], one) for one in apart]
+        tried = [*_AXES[[1, 0, 2]], *across] if found.rank == 1 else [found.right[2]] if found.rank == 2 else []
     for one in tried:
         size = float(np.linalg.norm(one))
         if size > 1e-6:
@@ -166,7 +172,7 @@ def _rounded(direction: FloatArray) -> FloatArray:
 
 def _outward(one: Symmetry) -> tuple[FloatArray, FloatArray]:
     """Return the directions, as rows, along which no point may move, and about which nothing may turn."""
-    across = np.linalg.svd(one.direction[None])[2][1:]
+    across = null_space(one.direction[None]).T
     return (one.direction[None], across) if one.space == "plane" else (across, _AXES)
 
 
@@ -215,23 +221,22 @@ def _place(scene: LooseScene, one: Symmetry, t: float, first: Bodies, random: np
     """Return a place near the start that motion parallel to the plane leads to; None if none is found."""
     still = np.zeros(len(scene.sizes))
     now, bodies = scene.at(t, scene.start.coordinates, still)
-    free = _null_space(np.concatenate([now.jacobian[scene.holonomic], _slopes(one, bodies)]) * scene.sizes)
+    free = null_space(np.concatenate([now.jacobian[scene.holonomic], _slopes(one, bodies)]) * scene.sizes)
+    moved = partial(scene.kinematic_map.moved, t)
+
+    def look(q: FloatArray) -> Missing:
+        now, bodies = scene.at(t, q, still)
+        misses = np.concatenate([now.value[scene.holonomic], _misses(one, bodies, first)])
+        slopes = np.concatenate([now.jacobian[scene.holonomic], _slopes(one, bodies)])
+        shifts = bodies.by_place.shape[0] * len(_outward(one)[0])
+        return Missing(misses, scene.row_units(t, q, slopes * scene.sizes, shifts), lambda: slopes)
+
     for reach in _REACHES:
         step = reach * scene.sizes * (free @ random.uniform(-1.0, 1.0, free.shape[1]))
-        q = scene.kinematic_map.moved(t, scene.start.coordinates, step)
-        last = np.inf
-        for _ in range(20):
-            now, bodies = scene.at(t, q, still)
-            misses = np.concatenate([now.value[scene.holonomic], _misses(one, bodies, first)])
-            slopes = np.concatenate([now.jacobian[scene.holonomic], _slopes(one, bodies)]) * scene.sizes
-            rows = scene.row_units(t, q, slopes, bodies.by_place.shape[0] * len(_outward(one)[0]))
-            miss = float(np.max(np.abs(misses / rows), initial=0.0))
-            if miss < 1e-12 or (miss < 1e-10 and miss > 0.5 * last):
-                return q
-            last = miss
-            q = scene.kinematic_map.moved(
-                t, q, -scene.sizes * np.linalg.lstsq(slopes / rows[:, None], misses / rows, rcond=1e-9)[0]
-            )
+        q = moved(scene.start.coordinates, step)
+        q, left = newton(look, moved, q, scene.sizes, steps=20, met=_PLACED, exact=_NEAR)
+        if left.miss < _PLACED:
+            return q
     return None
 
 
@@ -245,12 +250,12 @@ def _speeds(
         [now.explicit_rate, (bodies.velocities @ points.T).ravel(), (bodies.spins @ axes.T).ravel()]
     )
     slopes = np.concatenate([now.jacobian, _slopes(one, bodies)]) * scene.sizes
-    u = np.linalg.lstsq(slopes, -explicit_rate, rcond=1e-10)[0]
+    u = least_norm(slopes, -explicit_rate)
     if np.max(np.abs(slopes @ u + explicit_rate), initial=0.0) > _NEAR * max(
         float(np.max(np.abs(explicit_rate), initial=0.0)), 1e-300
     ):
         return None
-    free = _null_space(slopes)
+    free = null_space(slopes)
     found: FloatArray = scene.sizes * (u + pace * (free @ random.uniform(-1.0, 1.0, free.shape[1])))
     return found
 
@@ -276,12 +281,3 @@ def _misses(one: Symmetry, bodies: Bodies, first: Bodies) -> FloatArray:
     seen = np.einsum("bki,bij->bkj", in_body, bodies.axes)
     turned = np.sum(np.cross(np.broadcast_to(kept, seen.shape), seen), axis=1) / (1.0 if len(kept) == 1 else 2.0)
     return np.concatenate([away.ravel(), (turned @ axes.T).ravel()])
-
-
-def _null_space(matrix: FloatArray) -> FloatArray:
-    """Return an orthonormal basis, as columns, of what a matrix takes to zero."""
-    if not len(matrix):
-        return np.eye(matrix.shape[1])
-    _, sizes, directions = np.linalg.svd(matrix)
-    rank = int(np.sum(sizes > 1e-9 * max(float(sizes[0]), 1e-300)))
-    return directions[rank:].T

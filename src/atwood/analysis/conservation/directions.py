@@ -8,6 +8,8 @@ import numpy as np
 
 from atwood.analysis.conservation.invariance import readable_basis
 from atwood.arrays import FloatArray
+from atwood.numerics.rank import null_space, span
+from atwood.numerics.solutions import least_norm
 
 __all__ = ["axis_name", "axis_text", "planar_point", "rotations_of", "straight_of"]
 
@@ -28,9 +30,7 @@ def straight_of(kept: FloatArray, count: int) -> FloatArray:
     turning = kept[count:]
     if not turning.size:
         return readable_basis(kept[:count])
-    _, sizes, directions = np.linalg.svd(turning, full_matrices=True)
-    rank = int(np.sum(sizes > _NOTHING * max(float(np.max(np.abs(kept))), 1e-300)))
-    moved = kept[:count] @ directions[rank:].T
+    moved = kept[:count] @ null_space(turning, _NOTHING * float(np.max(np.abs(kept))))
     return readable_basis(moved) if moved.shape[1] else moved
 
 
@@ -49,13 +49,12 @@ def rotations_of(kept: FloatArray, count: int, straight: FloatArray) -> Iterator
     turning = kept[count:]
     if not turning.size:
         return
-    vectors, sizes, _ = np.linalg.svd(turning, full_matrices=False)
-    rank = int(np.sum(sizes > _NOTHING * max(float(np.max(np.abs(kept))), 1e-300)))
-    if not rank:
+    axes = span(turning, _NOTHING * float(np.max(np.abs(kept))))
+    if not axes.shape[1]:
         return
     flat = np.linalg.qr(straight)[0] if straight.shape[1] else straight
-    for axis in readable_basis(vectors[:, :rank]).T:
-        weights = np.linalg.lstsq(turning, axis, rcond=_NOTHING)[0]
+    for axis in readable_basis(axes).T:
+        weights = least_norm(turning, axis, errors=_NOTHING)
         about = kept[:count] @ weights
         about = about - flat @ (flat.T @ about)
         size = float(np.max(np.abs(kept[:count] @ np.diag(weights)), initial=0.0))

@@ -19,6 +19,7 @@ from atwood.expr.core.analysis import dependents, live
 from atwood.forms.assembly import Assembly
 from atwood.forms.program import state_groups
 from atwood.mechanics.dynamics.equations import Equations
+from atwood.numerics.solutions import least_norm
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 
 __all__ = ["Features"]
@@ -132,7 +133,7 @@ class Features:
             if not (np.all(np.isfinite(matrix)) and np.all(np.isfinite(missing))):
                 break
             rows = np.maximum(np.max(np.abs(matrix), axis=1), 1e-300)
-            step = np.linalg.lstsq(matrix / rows[:, None], missing / rows, rcond=1e-9)[0] * scales
+            step = least_norm(matrix / rows[:, None], missing / rows) * scales
             if not np.all(np.isfinite(step)) or np.max(np.abs(step) / scales) > 1e12:
                 break
             t, q = t + float(step[-1]), self._map.moved(t, q, step[:-1])

@@ -29,6 +29,7 @@ from atwood.expr import Expression, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass, replace
 from atwood.mechanics.outputs.observables import add_up
+from atwood.numerics.solutions import least_norm
 from atwood.simulation.dynamics.orientation_coordinates import COORDINATE_SWITCH
 from atwood.simulation.events.modes import find_event_functions
 
@@ -326,7 +327,7 @@ class _Search:
         columns = np.stack(self._columns, axis=1)
         scales = np.linalg.norm(columns, axis=0)
         scales[scales == 0.0] = 1.0
-        weights = np.linalg.lstsq(columns / scales, centred, rcond=1e-10)[0]
+        weights = least_norm(columns / scales, centred)
         if (
             float(np.linalg.norm(columns / scales @ weights - centred)) > 1e-8 * size
             or len(columns) <= columns.shape[1]

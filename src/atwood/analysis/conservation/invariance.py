@@ -9,11 +9,9 @@ import numpy as np
 
 from atwood.analysis.conservation.states import KEPT, State
 from atwood.arrays import FloatArray
+from atwood.numerics.rank import null_space, span
 
 __all__ = ["KEPT", "about_center", "conserved_directions", "is_constant", "is_kept", "readable_basis"]
-
-_RANK = 1e-8
-"""Relative to the largest singular value: what counts as zero among rates of a family."""
 
 _ROUND = 1e-8
 """Components of directions this near to zero or one are these."""
@@ -51,17 +49,15 @@ def conserved_directions(states: Sequence[State], numbers: Sequence[int], units:
     terms = np.array([one.terms[own] for one in states]) / units
     rates = np.where(np.abs(rates) > KEPT * terms, rates, 0.0)
     rows = np.max(terms, axis=1, initial=0.0)
-    kept = _null_space(rates[rows > 0.0] / rows[rows > 0.0, None])
+    kept = null_space(rates[rows > 0.0] / rows[rows > 0.0, None], np.full(int(np.sum(rows > 0.0)), KEPT))
     values = np.array([one.values[own] for one in states]) / units
     size = float(np.max(np.abs(values), initial=0.0)) or 1.0
     centred = (values - values.mean(axis=0)) / size @ kept
     centred[np.abs(centred) < KEPT] = 0.0
-    silent = kept @ _null_space(centred)
+    silent = kept @ null_space(centred, np.full(len(centred), KEPT))
     # What is constant whatever happens is taken away from the rest, along the units that they are compared in.
     rest = kept - silent @ (silent.T @ kept)
-    vectors, sizes, _ = np.linalg.svd(rest, full_matrices=False)
-    found = vectors[:, sizes > 0.5]
-    return np.asarray(found / units[:, None])
+    return np.asarray(span(rest, 0.5) / units[:, None])  # of a projection singular values are one or nothing
 
 
 def about_center(
@@ -102,15 +98,6 @@ def about_center(
     return found, matrix
 
 
-def _null_space(matrix: FloatArray) -> FloatArray:
-    """Return an orthonormal basis, as columns, of what a matrix takes to zero."""
-    if not matrix.size or not np.any(matrix):
-        return np.eye(matrix.shape[1])
-    _, sizes, directions = np.linalg.svd(matrix, full_matrices=True)
-    rank = int(np.sum(sizes > _RANK * sizes[0]))
-    return np.asarray(directions[rank:].T)
-
-
 def readable_basis(columns: FloatArray) -> FloatArray:
     """Return a basis of the same space of vectors with as many zeros and ones as there can be.
 
@@ -143,7 +130,7 @@ def _row_echelon(rows: FloatArray) -> FloatArray:
         if row == len(rows):
             break
         pivot = row + int(np.argmax(np.abs(rows[row:, column])))
-        if abs(rows[pivot, column]) <= _RANK * float(np.max(np.abs(rows), initial=0.0)):
+        if abs(rows[pivot, column]) <= _ROUND * float(np.max(np.abs(rows), initial=0.0)):
             continue
         rows[[row, pivot]] = rows[[pivot, row]]
         rows[row] /= rows[row, column]

@@ -19,6 +19,7 @@ from atwood.arrays import FloatArray
 from atwood.expr import Expression, count_operations, jvp, substitute
 from atwood.late import dataclass
 from atwood.mechanics.outputs.observables import add_up
+from atwood.numerics.solutions import least_norm, least_squares
 from atwood.simulation.dynamics.scales import motion_scales, scene_length
 
 __all__ = ["Generator", "Prover"]
@@ -157,7 +158,7 @@ class Prover:
             own = list(orientation.coordinates)
             basis = [np.array([_in_body(list(one.q[own]), axis) for axis in _AXES]).T for one in states]
             values = np.concatenate([one[list(orientation.speeds)] for one in moved])
-            weights = np.linalg.lstsq(np.concatenate(basis), values, rcond=None)[0]
+            weights = least_squares(np.concatenate(basis), values)
             if np.max(np.abs(np.concatenate(basis) @ weights - values)) > _FITTED * largest:
                 return None
             axis = [_share(w) for w in weights]
@@ -173,7 +174,7 @@ def _fit(rows: FloatArray, values: FloatArray, symbols: Sequence[Expression], si
     """Return values as a combination of symbols; None if they are none to so small a share of a size."""
     scales = np.max(np.abs(rows), axis=0)
     scales = np.where(scales > 0.0, scales, 1.0)
-    weights = np.linalg.lstsq(rows / scales, values, rcond=1e-12)[0] / scales
+    weights = least_norm(rows / scales, values) / scales
     if np.max(np.abs(rows @ weights - values), initial=0.0) > _FITTED * size:
         return None
     weights = np.where(np.abs(weights) * scales > _FITTED * size, weights, 0.0)

@@ -12,6 +12,8 @@ import numpy as np
 
 from atwood.analysis.flow.field import VariationalEquations
 from atwood.arrays import FloatArray
+from atwood.numerics.rank import null_space
+from atwood.numerics.solutions import least_norm
 
 __all__ = ["log_volumes"]
 
@@ -43,14 +45,13 @@ def _free_deviations(equations: VariationalEquations, sizes: FloatArray) -> tupl
     basis = np.broadcast_to(np.diag(sizes), mass.shape)
     if rows:
         scaled = jacobian * sizes
-        _, _, vectors = np.linalg.svd(scaled / np.linalg.norm(scaled, axis=2, keepdims=True))
-        basis = np.swapaxes(vectors[:, rows:], 1, 2) * sizes[:, None]
+        basis = null_space(scaled / np.linalg.norm(scaled, axis=2, keepdims=True), rank=rows) * sizes[:, None]
     triangle = np.linalg.cholesky(np.swapaxes(basis, 1, 2) @ mass @ basis)
     across = np.linalg.solve(triangle, np.swapaxes(basis, 1, 2))
     into, back = np.zeros((count, 2 * n, 2 * free)), np.zeros((count, 2 * free, 2 * n))
     for one, other in ((slice(n), slice(free)), (slice(n, None), slice(free, None))):
         into[:, one, other], back[:, other, one] = np.swapaxes(across, 1, 2), across @ mass
     if rows:
-        follow = np.linalg.pinv(equations.rate_by_speed * sizes) @ equations.rate_by_displacement
+        follow = least_norm(equations.rate_by_speed * sizes, equations.rate_by_displacement)
         into[:, n:, :free] = -(follow * sizes[:, None]) @ into[:, :n, :free]
     return into, back

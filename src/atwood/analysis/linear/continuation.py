@@ -14,6 +14,8 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.late import dataclass
+from atwood.numerics.newton import Missing, largest, newton
+from atwood.numerics.rank import decompose
 
 __all__ = ["Curve", "Problem", "branch_directions", "follow"]
 
@@ -23,12 +25,20 @@ _FIRST, _LARGEST, _SMALLEST = 1e-2, 5e-2, 1e-7
 
 _MOST_STEPS = 2000
 
-_MET = 1e-11
+_MET, _NEARLY = 1e-11, 1e-9
+"""What a solution is met to, and what is one where rounding leaves no more."""
+
+_FAR = 0.5
+"""A step of Newton's method that is longer leads to another branch."""
 
 _STEPS = 12
 
 _ASIDE = 1e-3
 """How far from a branch point a branch that crosses is looked for."""
+
+
+class _Nowhere(ArithmeticError):
+    """There are no residuals at a point, or it is too far away."""
 
 
 class Residual(NamedTuple):
@@ -130,8 +140,7 @@ def branch_directions(problem: Problem, x: FloatArray, p: float) -> list[tuple[F
     residual = problem.at(x, p, None)
     if residual is None:
         return found
-    _, _, directions = np.linalg.svd(residual.by_x)
-    along = np.append(directions[-1], 0.0)
+    along = np.append(decompose(residual.by_x).right[-1], 0.0)
     for sign in (1.0, -1.0):
         start = np.append(x, p) + sign * _ASIDE * along
         solved = _corrected(problem, start, sign * along)
@@ -150,8 +159,7 @@ def _point(problem: Problem, x: FloatArray, p: float, direction: FloatArray) -> 
     if residual is None:
         return None
     matrix = np.hstack([residual.by_x, residual.by_p[:, None]])
-    _, _, directions = np.linalg.svd(matrix)
-    tangent = directions[-1]
+    tangent = decompose(matrix).right[-1]
     tangent = tangent if float(tangent @ direction) >= 0.0 else -tangent
     sign, size = np.linalg.slogdet(np.vstack([_even(matrix), tangent]))
     return _Point(x, p, tangent, float(sign * np.exp(size / (len(x) + 1))))
@@ -169,26 +177,29 @@ def _step(problem: Problem, now: _Point, length: float) -> _Point | None:
 
 def _corrected(problem: Problem, guess: FloatArray, across: FloatArray) -> FloatArray | None:
     """Return the solution in the plane through a guess across a direction; None if Newton's method finds none."""
-    whole = guess.copy()
-    last, by_p = np.inf, None
-    for _ in range(_STEPS):
+    by_p: FloatArray | None = None
+
+    def look(whole: FloatArray) -> Missing:
+        nonlocal by_p
         residual = problem.at(whole[:-1], float(whole[-1]), by_p)
         if residual is None:
-            return None
+            raise _Nowhere
         by_p = residual.by_p  # which changes little over a step
         matrix = np.vstack([np.hstack([residual.by_x, residual.by_p[:, None]]), across])
         rows = np.max(np.abs(matrix), axis=1)
         rows[rows == 0.0] = 1.0
-        right = np.append(residual.value, across @ (whole - guess)) / rows
-        missed = float(np.max(np.abs(right)))
-        if missed <= _MET and missed >= 0.3 * last:
-            return whole
-        last = missed
-        step = np.linalg.lstsq(matrix / rows[:, None], -right, rcond=1e-13)[0]
-        if float(np.max(np.abs(step))) > 0.5:
-            return None
-        whole = whole + step
-    return whole if last <= 1e-9 else None
+        return Missing(np.append(residual.value, across @ (whole - guess)), rows, lambda: matrix)
+
+    def moved(whole: FloatArray, step: FloatArray) -> FloatArray:
+        if largest(step) > _FAR:
+            raise _Nowhere
+        return whole + step
+
+    try:
+        found, left = newton(look, moved, guess, np.ones(len(guess)), steps=_STEPS, met=_MET)
+    except _Nowhere:
+        return None
+    return found if left.miss <= _NEARLY else None
 
 
 def _located(

@@ -17,6 +17,7 @@ from numpy.polynomial import Chebyshev, Polynomial
 
 from atwood.analysis.linear.rest import Rest, RestSearch
 from atwood.arrays import FloatArray
+from atwood.numerics.rank import decompose, rank
 
 __all__ = ["Degenerate", "follow_null_space"]
 
@@ -112,7 +113,7 @@ def follow_null_space(search: RestSearch, rest: Rest) -> Degenerate:
     """
     n = len(rest.minimal.displacements)
     if not n or n != len(rest.minimal.speeds) or rest.slopes.shape != (n, n):
-        flat = n - int(np.linalg.matrix_rank(rest.slopes, _SOFT * search.slope)) if n else 0
+        flat = n - rank(rest.slopes, _SOFT * search.slope) if n else 0
         return Degenerate(rest, flat, "")
     field = _Field(search, rest)
     count = field.null.shape[1]
@@ -124,17 +125,16 @@ def follow_null_space(search: RestSearch, rest: Rest) -> Degenerate:
     forces = np.array([one[1] for _, one in there if one is not None])
     if not len(forces):  # at a pole of angles
         return Degenerate(rest, 0, "")
-    _, sizes, axes = np.linalg.svd(forces)
-    rank = int(np.sum(sizes > 10.0 * _ROUND * field.size * _REACHES[1]))
+    felt = decompose(forces, 10.0 * _ROUND * field.size * _REACHES[1])
     family = 0
-    for axis in axes[rank:]:  # along these no force ever acts; where nothing moves, coordinates are singular
+    for axis in felt.null_space.T:  # along these no force ever acts; where nothing moves, coordinates are singular
         aside = field.at(_REACHES[0] * axis)
         family += aside is None or not search.alike(aside[0], rest.q)
-    if not rank:
+    if not felt.rank:
         return Degenerate(rest, family, "")
     falls = "undecided" if _has_gyroscopic(search, rest) or not field.is_potential else "unstable"
-    if rank == 1:
-        moved, order, sign, beside = _root(field, axes[0])
+    if felt.rank == 1:
+        moved, order, sign, beside = _root(field, felt.right[0])
         if order <= 1:
             return Degenerate(moved, family, "undecided" if order < 0 else "", beside)
         verdict = ("stable" if field.is_potential else "undecided") if order % 2 and sign < 0.0 else falls
@@ -142,7 +142,7 @@ def follow_null_space(search: RestSearch, rest: Rest) -> Degenerate:
         moved, outward = rest, np.array([ray @ one[1] for ray, one in _signed(there)])
         largest = float(np.max(np.abs(forces)))
         verdict = falls if np.max(outward) > _CLEAR * largest else "undecided"
-        if np.max(outward) < -_CLEAR * largest and field.is_potential and rank == count:
+        if np.max(outward) < -_CLEAR * largest and field.is_potential and felt.rank == count:
             verdict = "stable"
     return Degenerate(moved, family, falls if field.rises and verdict != "undecided" else verdict)
 

@@ -10,6 +10,7 @@ from atwood.arrays import FloatArray
 from atwood.expr import Expression, jvp
 from atwood.forms.places import to_maximal
 from atwood.late import dataclass
+from atwood.numerics.solutions import least_squares
 
 __all__ = ["Image", "image_of", "pulled_back"]
 
@@ -137,4 +138,4 @@ def pulled_back(image: Image, accelerations: FloatArray) -> FloatArray:
     columns = image.state.shape[1]
     own, by_own = accelerations[:, :columns], accelerations[:, columns:]
     right = (image.acceleration - own) / image.sizes[:, None]
-    return np.asarray(np.linalg.lstsq(by_own / image.sizes[:, None], right, rcond=None)[0])
+    return least_squares(by_own / image.sizes[:, None], right)

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from atwood.analysis.linear.spectrum import find_spectrum
+from atwood.analysis.linear.spectrum import find_spectrum, rounding
 from atwood.analysis.linear.state_space import StateSpace
 from atwood.analysis.linear.variations import Flow
 from atwood.arrays import ComplexArray, FloatArray
 from atwood.late import dataclass
+from atwood.numerics.rank import null_space
 
 __all__ = ["ModeValues", "find_modes"]
 
@@ -105,7 +106,8 @@ def _undamped(flow: Flow, space: StateSpace) -> ModeValues | None:
 
 def _damped(space: StateSpace, n: int) -> ModeValues:
     minimal = space.minimal
-    spectrum = find_spectrum(space.matrix[:, : minimal.states], space.error[:, : minimal.states], space.sizes)
+    matrix, error = space.matrix[:, : minimal.states], space.error[:, : minimal.states]
+    spectrum = find_spectrum(matrix, error, space.sizes)
     size = float(np.max(np.abs(spectrum.others), initial=0.0))
     upper = [k for k, value in enumerate(spectrum.others) if value.imag >= -1e-9 * size]
     values = spectrum.others[upper]
@@ -115,8 +117,7 @@ def _damped(space: StateSpace, n: int) -> ModeValues:
     # A coordinate that nothing depends on, with its speed: one mode with a double zero.
     zeros = (spectrum.zeros + 1) // 2
     free = np.zeros((len(shapes), zeros), dtype=complex)
-    _, sizes, directions = np.linalg.svd(space.matrix[:, : minimal.states])
-    null = directions[int(np.sum(sizes > 1e-10 * max(float(np.max(sizes, initial=0.0)), 1e-300))) :].T
+    null = null_space(matrix, rounding(matrix, error))
     count = min(zeros, null.shape[1])
     free[:, :count] = minimal.shift[:, :n] @ null[:n, :count]
     values = np.concatenate([np.zeros(zeros, dtype=complex), values])

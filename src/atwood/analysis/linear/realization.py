@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from atwood.arrays import ComplexArray, FloatArray
+from atwood.numerics.rank import decompose, rank, span
 
 __all__ = ["Matrices", "frequency_response", "minimal_realization", "static_gain", "transmission_zeros"]
 
@@ -13,7 +14,7 @@ Matrices = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 """A, B, C, D."""
 
 _LOST = 1e-10
-"""Relative to the largest: singular values below it belong to directions that are not reached."""
+"""How far matrices of a model, which come without errors, may be off, relative to what is in them."""
 
 
 def minimal_realization(model: Matrices) -> Matrices:
@@ -48,8 +49,7 @@ def _reached(a: FloatArray, b: FloatArray) -> FloatArray:
         left = new - basis @ (basis.T @ new)
         columns = np.linalg.norm(new, axis=0)
         left = left / np.where(columns > 0.0, columns, 1.0)
-        vectors, sizes, _ = np.linalg.svd(left, full_matrices=False)
-        found = vectors[:, sizes > _LOST]
+        found = span(left, _LOST)
         if not found.shape[1]:
             break
         found = np.linalg.qr(found - basis @ (basis.T @ found))[0]
@@ -67,19 +67,17 @@ def transmission_zeros(model: Matrices) -> ComplexArray:
     """
     a, b, c, d = minimal_realization(model)
     while len(a):
-        vectors, sizes, _ = np.linalg.svd(d)
-        rank = int(np.sum(sizes > _LOST * max(float(np.linalg.norm(d, 2)), float(np.linalg.norm(c)), 1e-300)))
-        if rank == len(d):
+        at_once = decompose(d, _LOST * max(float(np.linalg.norm(d, 2)), float(np.linalg.norm(c))))
+        if at_once.rank == len(d):
             return np.asarray(np.linalg.eigvals(a - b @ np.linalg.solve(d, c)), dtype=complex)
         # Outputs that no input reaches at once hold C x = 0: what stays on it is a smaller model (Silverman).
-        c, d = vectors.T @ c, vectors.T @ d
-        held = c[rank:]
-        _, own, directions = np.linalg.svd(held)
-        count = int(np.sum(own > _LOST * max(float(np.linalg.norm(c)), 1e-300)))
-        if count < len(held):
+        c, d = at_once.left.T @ c, at_once.left.T @ d
+        held = decompose(c[at_once.rank :], _LOST * float(np.linalg.norm(c)))
+        if held.rank < len(d) - at_once.rank:
             return np.zeros(0, dtype=complex)  # outputs depend on each other: every number would be a zero
-        stay, leave = directions[count:].T, directions[:count].T
-        c, d = np.vstack([c[:rank] @ stay, leave.T @ a @ stay]), np.vstack([d[:rank], leave.T @ b])
+        stay, leave = held.null_space, held.row_space
+        c = np.vstack([c[: at_once.rank] @ stay, leave.T @ a @ stay])
+        d = np.vstack([d[: at_once.rank], leave.T @ b])
         a, b = stay.T @ a @ stay, stay.T @ b
     return np.zeros(0, dtype=complex)
 
@@ -89,8 +87,7 @@ def static_gain(model: Matrices) -> FloatArray | None:
     a, b, c, d = minimal_realization(model)
     if not len(a):
         return d
-    sizes = np.linalg.svd(a, compute_uv=False)
-    if sizes[-1] <= _LOST * sizes[0]:
+    if rank(a, _LOST * float(np.linalg.norm(a, 2))) < len(a):
         return None
     return np.asarray(d - c @ np.linalg.solve(a, b))
 

@@ -19,6 +19,8 @@ from atwood.errors import AtwoodError
 from atwood.forms.places import to_maximal
 from atwood.late import dataclass
 from atwood.numerics.matrices import to_array
+from atwood.numerics.rank import null_space
+from atwood.numerics.solutions import least_norm
 from atwood.simulation.dynamics.balance import Balance, balance_of
 
 __all__ = ["Rest", "RestSearch", "difference", "slopes_at", "wrapped"]
@@ -39,7 +41,7 @@ _NEAR = 1e-7
 """Relative to the scene's sizes: how near the root is by a last step of Newton's method."""
 
 _FLAT = 1e-9
-"""Relative: along directions with smaller singular values of the stiffness Newton's method does not step."""
+"""Relative to stiffness elsewhere: how far that at a place may be off."""
 
 _EVEN, _SLOW = 0.05, (0.3, 0.95)
 """Steps that become shorter by the same share, to so much of it, are a root of higher order: the rest of them is taken
@@ -184,7 +186,7 @@ class RestSearch:
                 break
             down = _falling(now) if falls else None
             if down is None:
-                down = np.asarray(-np.linalg.lstsq(now.slopes, now.accelerations, rcond=_FLAT)[0], dtype=float)
+                down = -least_norm(now.slopes, now.accelerations)
             step = down
             length = float(np.max(np.abs(step), initial=0.0))
             waiting = 0 if best is None or now.push < 0.9 * best.push else waiting + 1
@@ -266,9 +268,7 @@ class RestSearch:
             own = list(now.minimal.displacements)
             scaled = apart[own] / self.scene.displacement_sizes[own]
             mass, stiffness = self.stiffness(now)
-            _, sizes, directions = np.linalg.svd(stiffness)
-            stiff = _FLAT * self.slope * float(np.max(np.abs(mass), initial=1e-300))
-            flat = directions[int(np.sum(sizes > stiff)) :]
+            flat = null_space(stiffness, _FLAT * self.slope * float(np.max(np.abs(mass), initial=1e-300))).T
             step = flat.T @ (flat @ scaled)
             way = float(np.linalg.norm(scaled))
             if now is one and len(flat) and float(np.max(np.abs(step))) < _TURNED * way:

@@ -11,8 +11,10 @@ import numpy as np
 
 from atwood.arrays import ComplexArray, FloatArray
 from atwood.late import dataclass
+from atwood.numerics.rank import decompose, null_space
+from atwood.numerics.solutions import least_squares
 
-__all__ = ["Spectrum", "find_spectrum"]
+__all__ = ["Spectrum", "find_spectrum", "rounding"]
 
 
 _ROUNDING = 1e-14
@@ -65,13 +67,16 @@ def find_spectrum(matrix: FloatArray, error: FloatArray, sizes: FloatArray) -> S
     certain = np.where(np.abs(matrix) > error, matrix, 0.0)
     scale = sizes * _scale(certain * sizes / sizes[:, None])
     balanced = certain * scale[None, :] / scale[:, None]
-    bound = _ROUNDING * float(np.linalg.norm(balanced, 2))
-    bound = max(bound, float(np.linalg.norm(error * scale[None, :] / scale[:, None])))
-    zeros, basis, left = _split(balanced, bound)
+    zeros, basis, left = _split(balanced, rounding(balanced, error * scale[None, :] / scale[:, None]))
     values, own = np.linalg.eig(left)
     chosen = np.lexsort((-values.imag, -values.real))
     vectors = _lifted(balanced, basis, values[chosen], own[:, chosen])
     return Spectrum(zeros, values[chosen], scale[:, None] * vectors)
+
+
+def rounding(matrix: FloatArray, error: FloatArray) -> float:
+    """Return how far a matrix may be off: its entries, and its decomposition."""
+    return max(_ROUNDING * float(np.linalg.norm(matrix, 2)), float(np.linalg.norm(error)))
 
 
 def _scale(matrix: FloatArray) -> FloatArray:
@@ -94,13 +99,12 @@ def _split(matrix: FloatArray, bound: float) -> tuple[int, FloatArray, FloatArra
     """Return how many eigenvalues are zero, a basis of what is left, and the matrix on it."""
     basis, left, zeros = np.eye(len(matrix)), matrix, 0
     while len(left):
-        _, sizes, directions = np.linalg.svd(left)
-        rank = int(np.sum(sizes > bound))
-        if rank == len(left):
+        found = decompose(left, bound)
+        if found.rank == len(left):
             break
-        zeros += len(left) - rank
+        zeros += len(left) - found.rank
         # On the quotient by what goes to zero: the rest of an orthonormal basis.
-        keep = directions[:rank].T
+        keep = found.row_space
         basis, left = basis @ keep, keep.T @ left @ keep
     return zeros, basis, left
 
@@ -108,12 +112,12 @@ def _split(matrix: FloatArray, bound: float) -> tuple[int, FloatArray, FloatArra
 def _lifted(matrix: FloatArray, basis: FloatArray, values: ComplexArray, own: ComplexArray) -> ComplexArray:
     """Return eigenvectors of the whole matrix from those on the quotient."""
     found = np.empty((len(matrix), len(values)), dtype=complex)
-    rest = np.linalg.svd(basis.T)[2][basis.shape[1] :].T if len(values) else np.zeros((len(matrix), 0))
+    rest = null_space(basis.T, rank=basis.shape[1]) if len(values) else np.zeros((len(matrix), 0))
     for k, value in enumerate(values):
         # (A - lambda) v = 0 with v = basis y + what was split off; A is not singular there at lambda != 0.
         v = basis @ own[:, k]
         if rest.shape[1]:
             shifted = matrix - value * np.eye(len(matrix))
-            v = v - rest @ np.linalg.lstsq(shifted @ rest, shifted @ v, rcond=None)[0]
+            v = v - rest @ least_squares(shifted @ rest, shifted @ v)
         found[:, k] = v / np.linalg.norm(v)
     return found

@@ -17,6 +17,8 @@ from atwood.analysis.linear.variations import Flow, LinearScene
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.late import dataclass
+from atwood.numerics.rank import null_space
+from atwood.numerics.solutions import least_norm
 
 __all__ = ["Steady", "find_steady", "pace_of", "still"]
 
@@ -113,7 +115,7 @@ def find_steady(scene: LinearScene, flow: Flow, kept: Sequence[int]) -> Steady:
         # Time goes on by itself: the symmetry shifts it at rate one, or nothing depends on it.
         rows = np.concatenate([values / sizes[:, None], timely[None, :] / pace])
         right = np.concatenate([goal, [1.0]])
-        terms = np.linalg.lstsq(rows, right, rcond=1e-10)[0]
+        terms = least_norm(rows, right)
         missed = np.abs(rows @ terms - right)
         if np.all(missed <= _STEADY * (1.0 + np.abs(rows) @ np.abs(terms))):
             weights = combinations @ terms
@@ -190,9 +192,7 @@ def _symmetric(fields: Sequence[_Field], states: Sequence[Flow], sizes: FloatArr
     found = found[row_sizes > 0.0] / row_sizes[row_sizes > 0.0, None]
     if not len(found):
         return np.diag(1.0 / large)
-    _, values, directions = np.linalg.svd(found, full_matrices=True)
-    rank = int(np.sum(values > _KEPT * values[0]))
-    return np.asarray((directions[rank:] / large).T)
+    return np.asarray(null_space(found, np.full(len(found), _KEPT)) / large[:, None])
 
 
 # -- candidates ------------------------------------------------------------------------------------------------------

@@ -18,6 +18,7 @@ from atwood.model.compose.composite import Model
 from atwood.model.local.flatten import FlatScene
 from atwood.model.local.parameters import variation_names
 from atwood.numerics.matrices import to_array
+from atwood.numerics.rank import decompose, lost_rank
 from atwood.pipeline import assemble, assemble_flat
 from atwood.result.result import Result
 from atwood.simulation.dynamics.balance import balance_of
@@ -25,7 +26,6 @@ from atwood.simulation.dynamics.orientation_coordinates import to_regular
 from atwood.simulation.dynamics.redundancy import RankFinding
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.initialization.targets import find_level
-from atwood.tolerances import tolerances
 
 __all__ = [
     "AT",
@@ -228,9 +228,9 @@ def _refuse_singular(linear: LinearScene, finding: RankFinding, t: float, q: Flo
         for law, row in zip(laws, rows, strict=True):  # components of one vector are measured by the largest of them
             largest[law] = max(largest.get(law, 1e-300), float(np.max(np.abs(row))))
         rows = rows / np.array([largest[law] for law in laws])[:, None]
-        vectors, sizes, _ = np.linalg.svd(rows)
-        if sizes[-1] < tolerances.SINGULAR:
-            lost = [finding.kept[int(np.argmax(np.abs(vectors[:, -1])))]]
+        found = decompose(rows)
+        if lost_rank(found.values, 1.0):
+            lost = [finding.kept[int(np.argmax(np.abs(found.left[:, -1])))]]
     if lost:
         labels = [constraints[i].label for i in lost]
         raise StartError(
