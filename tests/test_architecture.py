@@ -108,3 +108,16 @@ def test_functions_are_short() -> None:
 def test_rooms_are_small() -> None:
     rooms = Counter(str(Path(name).parent) for name in SOURCES if Path(name).name != "__init__.py")
     assert not {room for room, files in rooms.items() if files > MOST_FILES}
+
+
+def test_ranks_and_least_norm_solutions_are_decided_in_one_room() -> None:
+    """Who cuts singular values by a number of his own decides a rank that nobody compares with the others."""
+    own = {
+        name
+        for name, text in SOURCES.items()
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.Call)
+        and getattr(node.func, "attr", getattr(node.func, "id", "")) in {"svd", "matrix_rank", "lstsq", "pinv"}
+    }
+    decided = {name for name in own if Path(name).parts[0] not in ("numerics", "plotting")}  # drawing decides nothing
+    assert not decided, f"use atwood.numerics: {sorted(decided)}"

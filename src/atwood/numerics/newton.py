@@ -26,7 +26,10 @@ _MUCH = 0.5
 """A step that leaves more than this share of what was missing is rounding if that had met its tolerance."""
 
 _SHORT = 1e-9
-"""In units of the scales: a shorter step is not shortened any more."""
+"""In units of the scales: a shorter step is not halved."""
+
+_NO_WAY = 1e-11
+"""In units of the scales: where a step halved to this is still no nearer, none is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +128,7 @@ def newton(
             step = step * (longest / far) if far > longest else step
             if not halvings:
                 break
-            trial, there, left = _nearer(look, moved, place, step, now, far, halvings, refused)
+            trial, there, left = _nearer(look, moved, place, step, now, min(far, longest), halvings, refused)
             if left < _MUCH * miss:
                 break
         if halvings:
@@ -150,8 +153,11 @@ def _nearer(
     halvings: int,
     refused: tuple[type[Exception], ...],
 ) -> tuple[Any, Missing, float]:
-    """Return where a step leads, halved until less is missing in today's units, what is missing there, and how much."""
-    trial, there, left = place, now, inf
+    """Return where a step leads, halved until less is missing in today's units, what is missing there, and how much.
+
+    It is infinitely much if no step leads nearer.
+    """
+    trial, there, left, is_short = place, now, inf, far < _SHORT
     for _ in range(halvings):
         try:
             trial = moved(place, -step)
@@ -159,7 +165,7 @@ def _nearer(
             left = largest(there.value / now.units)
         except refused:
             left = inf
-        if left < now.miss or far < _SHORT:
+        if left < now.miss or is_short:
             break
-        step = 0.5 * step
-    return trial, there, left
+        step, far = 0.5 * step, 0.5 * far
+    return trial, there, inf if left >= now.miss and far < _NO_WAY else left

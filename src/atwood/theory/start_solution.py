@@ -19,13 +19,16 @@ from atwood.forms.program import state_groups
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
+from atwood.numerics.newton import Missing, newton
 from atwood.pipeline import SCENE, assembly_of
 from atwood.showing import fitted
 
 __all__ = ["StartSolution", "solve_start"]
 
-_STEPS = 60
+_STEPS, _HALVINGS = 60, 40
 _MET = 1e-11
+"""Relative to the terms of a condition: how well it is met; ten times as much where rounding leaves no better."""
+
 _DIFFERENCE = 1e-6
 
 
@@ -87,20 +90,33 @@ def solve_start(scene: Model | Assembly, *, unknowns: Sequence[str], conditions:
         )
     problem = _Problem(first, tuple(unknowns), tuple(conditions))
     wanted = np.array([problem.read(path, value) for path, value in conditions.items()])
-    x = problem.begin()
-    now = problem.assembly(x)
-    missed = problem.values(now) - wanted
-    for _ in range(_STEPS):
-        slopes = problem.slopes(x)
+
+    def look(x: FloatArray) -> Missing:
+        missed, slopes = problem.values(problem.assembly(x)) - wanted, problem.slopes(x)
         sizes = np.abs(wanted) + np.abs(slopes) @ np.abs(x)
-        if np.all(np.abs(missed) <= _MET * sizes):
-            found = dict(zip(unknowns, (float(one) for one in x), strict=True))
-            return StartSolution(found, now)
-        scale = np.where(x == 0.0, 1.0, np.abs(x))
-        sizes = np.where(sizes == 0.0, 1.0, sizes)
-        step = -scale * np.linalg.lstsq(slopes * scale / sizes[:, None], missed / sizes, rcond=1e-12)[0]
-        x, now, missed = _stepped(problem, x, step, wanted, missed, sizes)
-    raise _unsolved(problem, missed)
+        return Missing(missed, np.where(sizes == 0.0, 1.0, sizes), lambda: slopes)
+
+    x = problem.begin()
+    scales = np.where(x == 0.0, 1.0, np.abs(x))
+    x, left = newton(
+        look,
+        np.add,
+        x,
+        scales,
+        steps=_STEPS,
+        met=10.0 * _MET,
+        exact=_MET,
+        halvings=_HALVINGS,
+        refused=(AtwoodError,),
+    )
+    if left.miss <= 10.0 * _MET:
+        return StartSolution(dict(zip(unknowns, x.tolist(), strict=True)), problem.assembly(x))
+    worst = int(np.argmax(np.abs(left.value)))
+    raise SolveError(
+        f"no values near by make the scene start so: {problem.paths[worst]} is missed by {abs(left.value[worst]):.3g}",
+        where=first.flat.name,
+        advice="Begin with other values of the unknowns, or let others be found.",
+    )
 
 
 class _Problem:
@@ -208,30 +224,3 @@ def _expression(assembly: Assembly, motion: Dynamics, path: str) -> Expression:
     if depends_on(value, [one.symbol for one in assembly.reactions]):
         raise UsageError("it depends on reactions", where=path, advice="Ask for a place, a speed or an acceleration.")
     return value
-
-
-def _stepped(
-    problem: _Problem, x: FloatArray, step: FloatArray, wanted: FloatArray, missed: FloatArray, sizes: FloatArray
-) -> tuple[FloatArray, Assembly, FloatArray]:
-    """Return where a step leads, shortened until less is missed and the values are admissible."""
-    before, share = float(np.max(np.abs(missed / sizes))), 1.0
-    for _ in range(40):
-        try:
-            now = problem.assembly(x + share * step)
-            left = problem.values(now) - wanted
-        except AtwoodError:
-            left = np.full(len(missed), np.inf)
-        after = float(np.max(np.abs(left / sizes)))
-        if after < before or (share == 1.0 and after <= 10.0 * _MET):
-            return x + share * step, now, left
-        share *= 0.5
-    raise _unsolved(problem, missed)
-
-
-def _unsolved(problem: _Problem, missed: FloatArray) -> SolveError:
-    worst = problem.paths[int(np.argmax(np.abs(missed)))]
-    return SolveError(
-        f"no values near by make the scene start so: {worst} is missed by {float(np.max(np.abs(missed))):.3g}",
-        where=problem.first.flat.name,
-        advice="Begin with other values of the unknowns, or let others be found.",
-    )

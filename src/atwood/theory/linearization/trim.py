@@ -7,12 +7,15 @@ from dataclasses import field
 
 import numpy as np
 
+from atwood.analysis.linear.minimal import Minimal
 from atwood.analysis.linear.rest import slopes_at
 from atwood.arguments import TEXT, each, takes
+from atwood.arrays import FloatArray
 from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
+from atwood.numerics.newton import Missing, largest, newton
 from atwood.pipeline import SCENE
 from atwood.showing import fitted
 from atwood.simulation.dynamics.balance import balance_of
@@ -28,8 +31,9 @@ from atwood.theory.linearization.operating_point import (
 __all__ = ["Trim", "trim"]
 
 
-_STEPS = 50
+_STEPS, _FAR = 50, 0.5
 _MET = 1e-11
+"""Relative to what displacements of the scene's size change: accelerations that are none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,45 +95,74 @@ def trim(scene: Model | Assembly, *, at: At = None, inputs: Sequence[str] = (), 
         If there is no such input or coordinate.
     """
     point = find_operating_point(scene, at, inputs)
-    linear, found = point.scene, {one.path: 0.0 for one in point.inputs}
-    numbers = _free_numbers(point, free)
-    balance = balance_of(point.assembly, "reduced")
-    columns = _value_columns(point)
-    for _ in range(_STEPS):
-        current = linear.with_inputs({name: found[path] for path, names in columns.items() for name in names})
-        flow = current.flow(point.t, point.q, point.u, point.kept)
-        minimal, a, slopes = slopes_at(current, flow, point.kept)
-        own = linear.sizes[list(minimal.speeds)]
-        by = flow.acceleration[list(minimal.speeds), len(flow.field) + 1 :] / own[:, None]
-        gains = (
-            np.stack([sum((by[:, k] for k in _numbers_of(point, path)), np.zeros(len(own))) for path in found], axis=1)
-            if found
-            else np.zeros((len(own), 0))
-        )
-        chosen = [i for i, k in enumerate(minimal.displacements) if k in numbers]
-        matrix = np.hstack([gains, slopes[:, chosen]])
-        size = float(np.max(np.abs(slopes), initial=0.0)) + float(np.max(np.abs(a), initial=0.0)) or 1.0
-        if float(np.max(np.abs(a), initial=0.0)) <= _MET * size:
-            return Trim(found, values_at(point), point.assembly.flat.name, point)
-        scale = np.max(np.abs(matrix), axis=0, initial=0.0)
-        scale[scale == 0.0] = 1.0
-        step = -np.linalg.lstsq(matrix / scale, a, rcond=1e-10)[0] / scale
-        moved = np.zeros(len(linear.tangents))
-        by_angle = step[len(found) :]
-        by_angle = by_angle * min(1.0, 0.5 / max(float(np.max(np.abs(by_angle), initial=0.0)), 1e-300))
-        for i, value in zip(chosen, by_angle, strict=True):
-            k = minimal.displacements[i]
-            moved += minimal.shift[:, i] * value * linear.displacement_sizes[k]
-        for path, value in zip(found, step, strict=False):
-            found[path] += float(value)
-        q, u = balance.project(point.t, linear.tangents.moved(point.q, moved), point.u, linear.sizes)
-        point = moved_to(point, q, u)
-    left = linear.equations.speed_names[minimal.speeds[int(np.argmax(np.abs(a)))]].name
+    first = _trial(point, {one.path: 0.0 for one in point.inputs}, _free_numbers(point, free))
+    found, left = newton(lambda one: one.missing, _moved, first, np.ones(1), steps=_STEPS, exact=_MET)
+    if left.miss <= _MET:
+        return Trim(found.values, values_at(found.point), point.assembly.flat.name, found.point)
+    name = point.scene.equations.speed_names[found.minimal.speeds[int(np.argmax(np.abs(left.value)))]].name
     raise SolveError(
-        f"no values of these inputs and coordinates hold the state: {left} goes on changing",
+        f"no values of these inputs and coordinates hold the state: {name} goes on changing",
         where=point.assembly.flat.name,
         advice="Let more inputs or coordinates be chosen, or ask for another state.",
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """A state with values of the inputs, and the accelerations there.
+
+    Attributes
+    ----------
+    point, values, free
+        The state, the values, and the numbers of coordinates that may move.
+    minimal, chosen
+        Independent coordinates, and which of them are free.
+    scale
+        How much accelerations change with each value and each free coordinate.
+    missing
+        The accelerations.
+    """
+
+    point: OperatingPoint
+    values: Mapping[str, float]
+    free: set[int]
+    minimal: Minimal
+    chosen: list[int]
+    scale: FloatArray
+    missing: Missing
+
+
+def _trial(point: OperatingPoint, values: Mapping[str, float], free: set[int]) -> _Trial:
+    linear = point.scene
+    columns = _value_columns(point)
+    current = linear.with_inputs({name: values[path] for path, names in columns.items() for name in names})
+    flow = current.flow(point.t, point.q, point.u, point.kept)
+    minimal, a, slopes = slopes_at(current, flow, point.kept)
+    own = linear.sizes[list(minimal.speeds)]
+    by = flow.acceleration[list(minimal.speeds), len(flow.field) + 1 :] / own[:, None]
+    gains = [sum((by[:, k] for k in _numbers_of(point, path)), np.zeros(len(own))) for path in values]
+    chosen = [i for i, k in enumerate(minimal.displacements) if k in free]
+    matrix = np.column_stack([*gains, slopes[:, chosen]])
+    size = largest(slopes) + largest(a) or 1.0
+    scale = np.max(np.abs(matrix), axis=0, initial=0.0)
+    scale[scale == 0.0] = 1.0
+    missing = Missing(a, np.full(len(a), size), lambda: matrix / scale, np.ones(len(a)))
+    return _Trial(point, values, free, minimal, chosen, scale, missing)
+
+
+def _moved(one: _Trial, by: FloatArray) -> _Trial:
+    """Return the trial with other values and coordinates; no coordinate moves by more than half a radian."""
+    point, linear, step = one.point, one.point.scene, by / one.scale
+    values = {path: old + float(value) for (path, old), value in zip(one.values.items(), step, strict=False)}
+    turned = step[len(values) :]
+    turned = turned * min(1.0, _FAR / max(largest(turned), 1e-300))
+    moved = np.zeros(len(linear.tangents))
+    for i, value in zip(one.chosen, turned, strict=True):
+        moved += one.minimal.shift[:, i] * value * linear.displacement_sizes[one.minimal.displacements[i]]
+    q, u = balance_of(point.assembly, "reduced").project(
+        point.t, linear.tangents.moved(point.q, moved), point.u, linear.sizes
+    )
+    return _trial(moved_to(point, q, u), values, one.free)
 
 
 def _numbers_of(point: OperatingPoint, path: str) -> list[int]:
