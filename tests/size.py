@@ -23,6 +23,7 @@ _NO_CODE = {
     tokenize.ENDMARKER,
 }
 _LLVM = ("getelementptr", "define ", " phi ", "fadd ", "load double", "load ptr", "br i1", "br label")
+SOLVERS = ("ida", "ida-sundae", "explicit", "tsitouras", "taylor", "gauss", "composition")
 _ALGEBRA = {"svd", "matrix_rank", "lstsq", "pinv"}
 
 
@@ -37,6 +38,7 @@ class Size:
     exported: int = 0
     llvm: int = 0
     algebra: int = 0
+    solvers: int = 0
 
     def __add__(self, other: Size) -> Size:
         return Size(*(a + b for a, b in zip(vars(self).values(), vars(other).values(), strict=True)))
@@ -63,6 +65,11 @@ def strings(tree: ast.AST) -> Iterator[str]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in said:
             yield node.value
+
+
+def names_solver(tree: ast.AST) -> bool:
+    """Tell whether a string of a source is the name of a solver, or has one in quotes."""
+    return any(one == name or f"'{name}'" in one for one in strings(tree) for name in SOLVERS)
 
 
 def size(path: Path) -> Size:
@@ -95,6 +102,7 @@ def size(path: Path) -> Size:
         exported=exported,
         llvm=int(any(word in one for one in strings(tree) for word in _LLVM)),
         algebra=int(bool(called & _ALGEBRA)),
+        solvers=int(names_solver(tree)),
     )
 
 
@@ -112,12 +120,11 @@ def main() -> None:
     """Print the table."""
     rooms = by_room()
     total = sum(rooms.values(), Size())
-    print(f"{'room':14}{'code':>8}{'lines':>8}{'files':>7}{'names':>7}{'inner imports':>15}{'LLVM':>11}{'svd':>9}")
+    heads = {"inner imports": "inner_imports", "LLVM": "llvm", "svd": "algebra", "solvers": "solvers"}
+    names = {"code": "code", "lines": "lines", "files": "files", "names": "exported", **heads}
+    print(f"{'room':14}" + "".join(f"{head:>{max(8, len(head) + 2)}}" for head in names))
     for room, one in [*sorted(rooms.items(), key=lambda pair: -pair[1].code), ("all", total)]:
-        numbers = (
-            f"{one.code:8}{one.lines:8}{one.files:7}{one.exported:7}{one.inner_imports:15}{one.llvm:11}{one.algebra:9}"
-        )
-        print(f"{room:14}{numbers}")
+        print(f"{room:14}" + "".join(f"{getattr(one, name):{max(8, len(head) + 2)}}" for head, name in names.items()))
 
 
 if __name__ == "__main__":

@@ -10,6 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from atwood.integrators.methods import METHODS
+
+from .size import SOLVERS, names_solver
+
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE = ROOT / "src" / "atwood"
 
@@ -70,7 +74,6 @@ MOST_FILES = 20
 
 LONG_FILES = {
     "forms/accelerations.py",
-    "integrators/explicit_session.py",
     "integrators/ida/native.py",
     "simulation/run/segment.py",
 }
@@ -121,3 +124,10 @@ def test_ranks_and_least_norm_solutions_are_decided_in_one_room() -> None:
     }
     decided = {name for name in own if Path(name).parts[0] not in ("numerics", "plotting")}  # drawing decides nothing
     assert not decided, f"use atwood.numerics: {sorted(decided)}"
+
+
+def test_solvers_are_named_in_their_records_alone() -> None:
+    """Whoever else needs to know one of a method asks its record."""
+    named = {name for name, text in SOURCES.items() if names_solver(ast.parse(text))}
+    assert {name for name in named if not name.startswith("integrators/methods/")} == set()
+    assert set(SOLVERS) == set(METHODS)

@@ -20,7 +20,6 @@ from atwood.integrators.ida import native as ida_native, sundae as ida_sundae
 from atwood.integrators.protocol import (
     Budget,
     ImplicitProblem,
-    OpenSession,
     SolverOptions,
     Statistics,
     Status,
@@ -30,7 +29,7 @@ from atwood.integrators.protocol import (
 TIGHT = SolverOptions(relative_tolerance=1e-9, absolute_tolerances=1e-11)
 LOOSE = SolverOptions(relative_tolerance=1e-5, absolute_tolerances=1e-7)
 
-DRIVERS: dict[str, OpenSession] = {"scikit-sundae": ida_sundae.open_session, "native": ida_native.open_session}
+DRIVERS: dict[str, Any] = {"scikit-sundae": ida_sundae.open_session, "native": ida_native.open_session}
 open_session = DRIVERS["scikit-sundae"]
 
 

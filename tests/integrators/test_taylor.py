@@ -25,11 +25,12 @@ from atwood.integrators.taylor.problem import (
     logarithm,
     power_of_two,
 )
-from atwood.integrators.taylor.reference import ReferenceStepper
 from atwood.pipeline import assemble
 from atwood.simulation.problem.taylor_scene import recurrences
 from atwood_library import Force, Ground, PointMass, Slider, Spring
 from atwood_library.scenes import SCENES, Atwood, Chain, DoublePendulum
+
+from .taylor_reference import ReferenceStepper
 
 Kind = Literal["compiled", "reference"]
 Scalars = Sequence[Any]

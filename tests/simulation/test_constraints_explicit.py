@@ -12,8 +12,10 @@ from numpy.testing import assert_allclose
 
 from atwood import Scene, UsageError, assemble, simulate
 from atwood.arrays import FloatArray
+from atwood.integrators.embedded.native import CompiledStepper
 from atwood.integrators.explicit_problem import ExplicitProblem
-from atwood.integrators.explicit_session import open_explicit
+from atwood.integrators.explicit_session import ExplicitSession
+from atwood.integrators.methods.dormand_prince import TABLEAU
 from atwood.integrators.protocol import SolverOptions
 from atwood.simulation.initialization.start import find_start, own_state
 from atwood.simulation.problem.constrained_scene import constrained_problem
@@ -37,6 +39,7 @@ from atwood_library.scenes import (
 
 from ..helpers.mechanisms import parallel_four_bar
 from ..helpers.runs import FORMS
+from ..integrators.embedded_reference import ReferenceStepper
 from ..scenes.test_turned_mechanisms import BASES, stands_on
 from .test_not_compilable import Odd, Plain, looped
 
@@ -82,7 +85,7 @@ def test_the_order_is_eight(name: str, t_end: float, few: int, many: int) -> Non
 
     def after(steps: int) -> FloatArray:
         options = SolverOptions(0.5, 1e6, first_step=t_end / steps, max_step=t_end / steps, horizon=t_end)
-        return open_explicit(problem, options, 0.0, y).advance(t_end).y
+        return ExplicitSession(problem, options, CompiledStepper(problem, options, TABLEAU), 0.0, y).advance(t_end).y
 
     exact = after(1000)
     errors = [float(np.max(np.abs(after(steps) - exact))) for steps in (few, many)]
@@ -94,8 +97,8 @@ def test_compiled_steps_are_those_of_the_reference(form: str) -> None:
     plan, problem, y = opened(moving_bricard(), form)
     options = SolverOptions(1e-9, absolute(plan, 1e-9), horizon=1.0)
     ends = []
-    for stepper in ("reference", "compiled"):
-        session = open_explicit(problem, options, 0.0, y, stepper=stepper)  # type: ignore[arg-type]
+    for kind in (ReferenceStepper, CompiledStepper):
+        session = ExplicitSession(problem, options, kind(problem, options, TABLEAU), 0.0, y)
         ends.append((session.advance(1.0), session.statistics.steps))
     (one, taken), (other, also) = ends
     assert taken == also
@@ -109,7 +112,7 @@ def test_steps_end_on_the_constraints_and_the_dense_output_meets_them(name: str)
     plan, problem, y = opened(make(), form)
     tolerance = 1e-7
     options = SolverOptions(tolerance, absolute(plan, tolerance), horizon=1.0)
-    session = open_explicit(problem, options, 0.0, y)
+    session = ExplicitSession(problem, options, CompiledStepper(problem, options, TABLEAU), 0.0, y)
     on_the_way = []
     for t in np.linspace(0.0, 1.0, 30)[1:]:
         state = session.advance(float(t)).y

@@ -13,7 +13,7 @@ from tests.calls import calls
 from atwood import Result, Scene, assemble, clock as clock_module, simulate, sweep
 from atwood.clock import Clock, TimeIsUp, check_time, more_time, time_left, within_time
 from atwood.errors import ResultError
-from atwood.integrators import explicit_session
+from atwood.integrators import explicit_session, session
 from atwood.integrators.ida import native as ida_native
 from atwood.integrators.protocol import Budget, Status, StepResult
 from atwood.simulation.initialization import massless as massless_directions
@@ -34,7 +34,7 @@ def looks(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         count[0] += 1
         return float(count[0])
 
-    for module in (clock_module, ida_native, explicit_session):
+    for module in (clock_module, ida_native, explicit_session, session):
         monkeypatch.setattr(module, "time", SimpleNamespace(perf_counter=perf_counter))
     return count
 
@@ -169,7 +169,7 @@ def test_larger_tolerances_are_tried_from_the_start_where_a_run_has_not_come_far
         ends = t + (1e-8 if request.options.relative_tolerance < 5e-12 else 0.05)
         return SimpleNamespace(advance=lambda end: StepResult(ends, y, yp, Status.FAILED))
 
-    monkeypatch.setattr(run_tolerances, "open_implicit_session", opened)
+    monkeypatch.setattr(run_tolerances, "open_session", opened)
     flat = SimpleNamespace(flat=SimpleNamespace(name="scene"))
     y = np.zeros(1)
     options = RunOptions(t_end=1.0, relative_tolerance=1e-13)

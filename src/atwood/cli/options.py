@@ -8,6 +8,8 @@ from typing import Any, TypeVar
 
 import click
 
+from atwood.integrators.methods import AUTO, METHODS
+
 __all__ = [
     "DIRECTORY",
     "FILE",
@@ -35,7 +37,7 @@ ORIENTATION = click.option(
 
 FORM = click.Choice(["reduced", "dae"])
 LEVEL = click.Choice(["ggl", "index1", "index1-projected"])
-SOLVER = click.Choice(["auto", "ida", "ida-sundae", "explicit", "taylor", "gauss", "composition"])
+SOLVER = click.Choice([AUTO, *METHODS])
 FILE = click.Path(dir_okay=False, path_type=Path)
 DIRECTORY = click.Path(file_okay=False, path_type=Path)
 

@@ -5,14 +5,15 @@ from __future__ import annotations
 import functools
 import threading
 from collections.abc import Callable
-from typing import TypeVar
+from typing import ParamSpec, TypeVar
 
 __all__ = ["once"]
 
+P = ParamSpec("P")
 T = TypeVar("T")
 
 
-def once(make: Callable[[], T]) -> Callable[[], T]:
+def once(make: Callable[P, T]) -> Callable[P, T]:
     """Return a function that makes something at its first call, and returns the same ever after.
 
     Unlike `functools.cache` it makes it once even if several threads ask at the same time: code of which there are two,
@@ -21,16 +22,16 @@ def once(make: Callable[[], T]) -> Callable[[], T]:
     Parameters
     ----------
     make
-        Makes it.
+        Makes it, from what can be a key.
     """
-    lock, made = threading.RLock(), list[T]()
+    lock, made = threading.RLock(), dict[tuple[object, ...], T]()
 
     @functools.wraps(make)
-    def found() -> T:
-        if not made:
+    def found(*given: P.args, **named: P.kwargs) -> T:
+        if given not in made:
             with lock:
-                if not made:
-                    made.append(make())
-        return made[0]
+                if given not in made:
+                    made[given] = make(*given, **named)
+        return made[given]
 
     return found

@@ -23,6 +23,7 @@ from atwood.forms.kept import Key
 from atwood.forms.lagrangian import Lagrangian, lagrangian_along_speeds
 from atwood.forms.loops.closed_form import ClosedForm, in_terms_of_independent
 from atwood.forms.program import rates_are_speeds
+from atwood.integrators.methods import EXPLICIT, IDA, advise
 from atwood.late import dataclass
 from atwood.topology.spanning_forest import Coordinate
 
@@ -160,7 +161,7 @@ def _separate(assembly: Assembly) -> SeparablePrograms | None:
 def _refuse(assembly: Assembly, found: Lagrangian, loops_are_solved: bool = False) -> None:
     """Refuse a scene that is no Hamiltonian system."""
     equations, name = assembly.reduced, assembly.flat.name
-    advice = "Use the solver 'explicit' or 'ida'."
+    advice = advise(EXPLICIT, IDA)
     if equations.solved_speeds or any(not one.holonomic for one in equations.constraints):
         raise UnsupportedError("it rolls, and its flow is not canonical", where=name, advice=advice)
     if equations.constraints and not loops_are_solved:
@@ -218,13 +219,13 @@ def _make_closed(assembly: Assembly, form: ClosedForm) -> CanonicalPrograms:
     _refuse(assembly, found, loops_are_solved=True)
     if not form.loops.rates_are_speeds:
         what = "its loops leave orientations free"
-        raise UnsupportedError(what, where=assembly.flat.name, advice="Use the solver 'explicit' or 'ida'.")
+        raise UnsupportedError(what, where=assembly.flat.name, advice=advise(EXPLICIT, IDA))
     q, u = found.coordinates, found.velocities
     dependent = [one for values in (q, u) for i, one in enumerate(values) if i not in free]
     (lagrangian,) = in_terms_of_independent(form, _in_pieces(assembly, found.lagrangian))
     if depends_on(lagrangian, dependent):
         what = "an energy reads an angle of its loops otherwise than by sine and cosine"
-        raise UnsupportedError(what, where=assembly.flat.name, advice="Use the solver 'explicit' or 'ida'.")
+        raise UnsupportedError(what, where=assembly.flat.name, advice=advise(EXPLICIT, IDA))
     own = tuple(u[i] for i in free)
     terms = _Terms(
         found.time,
@@ -252,7 +253,7 @@ def _hamilton(found: _Terms, name: str, parameters: tuple[Expression, ...]) -> C
         raise UnsupportedError(
             "it has no inertia, so that momenta do not determine velocities and there is no Hamiltonian",
             where=idle[0],
-            advice="Use the solver 'explicit' or 'ida'.",
+            advice=advise(EXPLICIT, IDA),
         )
     moving = any(depends_on(one, u) for one in entries.values())
     wanted = p if plain else vjp(rates, p, u)

@@ -6,10 +6,9 @@ output times, events and limits, is the session's, which is the same for all ste
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from enum import IntEnum
-from math import sqrt
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -21,7 +20,6 @@ from atwood.late import dataclass
 
 __all__ = [
     "CALM",
-    "EDGE",
     "LOOSEST",
     "MET",
     "STEPS",
@@ -29,21 +27,12 @@ __all__ = [
     "CompiledEvents",
     "CompiledRates",
     "Counts",
-    "EventStepper",
     "ExplicitProblem",
-    "HeedingStepper",
     "Outcome",
-    "RenewedStepper",
     "Stepper",
-    "WatchedStepper",
     "absolute_tolerances",
-    "first_step",
     "no_interpolation",
-    "sample_one_by_one",
 ]
-
-EDGE = 6.1
-"""Where the method stops being stable: the largest product of a step and a rate of decay."""
 
 MET = 1e-8
 """A step of Newton's method that moves nothing by more of its size leaves misses of the square of that: rounding."""
@@ -195,108 +184,78 @@ class Counts:
     stiff: int = 0
 
 
-@runtime_checkable
-class EventStepper(Protocol):
-    """What a stepper has in addition if it looks for events by itself."""
+class Stepper(ABC):
+    """Takes the steps of an explicit method; one that can do more than these says so by its answers."""
 
-    def watch(self, events: CompiledEvents) -> None:
-        """Let `run` and `sample` come back with `Outcome.NOTICED` after a step in which an event may have happened."""
-        ...
-
-    def expect(self, signs: FloatArray) -> None:
-        """Say which sign each event has; where it is zero, every step is noticed."""
-        ...
-
-    def begin_of_step(self) -> float:
-        """Return the time at the begin of the last step."""
-        ...
-
-
-@runtime_checkable
-class HeedingStepper(Protocol):
-    """What a stepper has in addition if it can come back as soon as the problem seems stiff."""
-
-    def heed_stiffness(self) -> None:
-        """Let `run` and `sample` come back with `Outcome.NOTICED` whenever the problem seems stiff."""
-        ...
-
-
-@runtime_checkable
-class WatchedStepper(Protocol):
-    """What a stepper has in addition if it can let the motion be looked at on its way."""
-
-    def look_out(self, lookout: Lookout) -> None:
-        """Let the motion be looked at, and come back with `Outcome.NOTICED` where something is seen."""
-        ...
-
-    def has_seen(self) -> bool:
-        """Return whether something was seen since this was last asked."""
-        ...
-
-
-@runtime_checkable
-class LimitedStepper(Protocol):
-    """What a stepper has in addition if the length of its steps can be limited on the way."""
-
-    def limit_steps(self, longest: float) -> None:
-        """Take no longer steps from now on than this, nor than the options allow."""
-        ...
-
-
-@runtime_checkable
-class RenewedStepper(Protocol):
-    """What a stepper has in addition if it can make one run after another."""
-
-    def renew(self, horizon: float, absolute: FloatArray | None = None) -> None:
-        """Count from zero again, for a run of another typical length, s, and perhaps with other tolerances."""
-        ...
-
-
-class Stepper(Protocol):
-    """Takes the steps of an explicit method."""
-
+    @abstractmethod
     def start(self, t: float, y: FloatArray) -> bool:
         """Start anew from a state; return whether it has finite rates."""
-        ...
 
+    @abstractmethod
     def run(self, t_stop: float, steps: int) -> Outcome:
         """Take steps until one ends at or after a time, but no more than so many."""
-        ...
 
+    @abstractmethod
     def state(self) -> State:
         """Return time, values and rates at the end of the last step, which the caller may keep."""
-        ...
 
+    @abstractmethod
     def interpolate(self, t: float) -> State:
         """Return the state at a time within the last step."""
-        ...
+
+    @property
+    @abstractmethod
+    def counts(self) -> Counts:
+        """What it has done so far, over all starts."""
 
     def sample(self, times: FloatArray, steps: int) -> tuple[FloatArray, FloatArray, Outcome]:
         """Take steps, and return values and rates at as many of the times, one row each, as were reached."""
-        ...
+        last = self.counts.steps + steps
+        size = len(self.state()[1])
+        y, yp = np.empty((2, len(times), size))
+        for filled, t in enumerate(times):
+            outcome = self.run(float(t), last - self.counts.steps)
+            if outcome is not Outcome.REACHED:
+                return y[:filled], yp[:filled], outcome
+            _, y[filled], yp[filled] = self.interpolate(float(t))
+        return y, yp, Outcome.REACHED
 
-    @property
-    def counts(self) -> Counts:
-        """What it has done so far, over all starts."""
-        ...
+    def watch(self, events: CompiledEvents) -> bool:
+        """Come back with `Outcome.NOTICED` after a step in which an event may have happened; return whether it can."""
+        return False
+
+    def expect(self, signs: FloatArray) -> None:
+        """Learn which sign each event has; where it is zero, every step is noticed."""
+        return
+
+    def begin_of_step(self) -> float:
+        """Return the time at the begin of the last step."""
+        raise NotImplementedError
+
+    def heed_stiffness(self) -> None:
+        """Come back with `Outcome.NOTICED` whenever the problem seems stiff, where that can be told."""
+        return
+
+    def look_out(self, lookout: Lookout) -> bool:
+        """Let the motion be looked at, and come back where something is seen; return whether it can."""
+        return False
+
+    def has_seen(self) -> bool:
+        """Return whether something was seen since this was last asked."""
+        return False
+
+    def limit_steps(self, longest: float) -> None:
+        """Take no longer steps from now on than this, nor than the options allow, where they can be limited."""
+        return
+
+    def renew(self, horizon: float, absolute: FloatArray | None = None) -> None:
+        """Count from zero again, for a run of another typical length, s, and perhaps with other tolerances."""
+        raise UsageError("only compiled steps can be begun again")
 
 
 def no_interpolation(t: float) -> KernelEvaluationError:
     """Return the error of a step within which there is no value."""
     return KernelEvaluationError(f"the right-hand side has no value within a step, at t = {t:.9g}")
-
-
-def sample_one_by_one(stepper: Stepper, times: FloatArray, steps: int) -> tuple[FloatArray, FloatArray, Outcome]:
-    """Take steps to one time after another; see `Stepper.sample`."""
-    last = stepper.counts.steps + steps
-    size = len(stepper.state()[1])
-    y, yp = np.empty((2, len(times), size))
-    for filled, t in enumerate(times):
-        outcome = stepper.run(float(t), last - stepper.counts.steps)
-        if outcome is not Outcome.REACHED:
-            return y[:filled], yp[:filled], outcome
-        _, y[filled], yp[filled] = stepper.interpolate(float(t))
-    return y, yp, Outcome.REACHED
 
 
 LOOSEST = 1e-3
@@ -315,48 +274,3 @@ def absolute_tolerances(options: SolverOptions, size: int) -> FloatArray:
         return np.maximum(given if given.shape == (size,) else np.broadcast_to(given, (size,)), _TINY)
     except ValueError:
         raise UsageError(f"give one absolute tolerance, or one for each of the {size} unknowns") from None
-
-
-def first_step(
-    rates: Callable[[float, FloatArray], FloatArray],
-    options: SolverOptions,
-    absolute: FloatArray,
-    t: float,
-    y: FloatArray,
-    yp: FloatArray,
-    order: int,
-) -> float:
-    """Return a first step from the size of the first two derivatives.
-
-    Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, section II.4.
-
-    Parameters
-    ----------
-    rates
-        The right-hand side.
-    options, absolute
-        The accuracy that is asked for.
-    t, y, yp
-        The start.
-    order
-        The order of the method.
-    """
-    longest = min(options.horizon, options.max_step or np.inf)
-    if options.first_step is not None:
-        return min(options.first_step, options.max_step or np.inf)
-    weights = 1.0 / (absolute + options.relative_tolerance * np.abs(y))
-
-    def size(values: FloatArray) -> float:
-        scaled = values * weights
-        return sqrt(float(scaled.dot(scaled)) / len(scaled))
-
-    with np.errstate(all="ignore"):
-        d0, d1 = size(y), size(yp)
-        h0 = 1e-6 if not (d0 >= 1e-5 and d1 >= 1e-5 and np.isfinite(d0 / d1)) else 0.01 * d0 / d1
-        h0 = min(h0, longest)
-        d2 = size(rates(t + h0, y + h0 * yp) - yp) / h0
-    if not np.isfinite(d2):
-        return h0
-    steepest = max(d1, d2)
-    h1 = max(1e-6, 1e-3 * h0) if steepest <= 1e-15 else float((0.01 / steepest) ** (1.0 / order))
-    return min(100.0 * h0, h1, longest)

@@ -8,37 +8,27 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from functools import cache
 from math import inf, isfinite
-from typing import Literal, Protocol, cast, runtime_checkable
+from typing import cast
 
 import numpy as np
 
 from atwood.errors import KernelEvaluationError, StartError, UsageError
 from atwood.integrators.compiled_functions import Lookout
-from atwood.integrators.event_location import ROUNDING, EventLocator, Root, State
-from atwood.integrators.explicit_problem import (
-    EventStepper,
-    ExplicitProblem,
-    HeedingStepper,
-    LimitedStepper,
-    Outcome,
-    RenewedStepper,
-    Stepper,
-    WatchedStepper,
-)
+from atwood.integrators.event_location import ROUNDING, EventLocator, Root
+from atwood.integrators.explicit_problem import ExplicitProblem, Outcome, Stepper
 from atwood.integrators.protocol import (
     Budget,
     FloatArray,
     ImplicitProblem,
-    Session,
     SolverOptions,
     Statistics,
     Status,
     StepResult,
 )
+from atwood.integrators.session import Session, copied
 
-__all__ = ["ExplicitSession", "SamplingSession", "open_explicit"]
+__all__ = ["ExplicitSession", "Leave"]
 
 FIRST_CHUNK, LARGEST_CHUNK = 4000, 100_000
 """So many steps are taken before limits are looked at: at first, for one unknown, and at most."""
@@ -53,17 +43,8 @@ _STALLED = 50
 Leave = Callable[[float, FloatArray], bool]
 
 
-def open_explicit(
-    problem: ExplicitProblem,
-    options: SolverOptions,
-    t: float,
-    y: FloatArray,
-    budget: Budget | None = None,
-    stepper: Literal["auto", "compiled", "reference"] = "auto",
-    leave: Leave | None = None,
-    end: float = inf,
-) -> ExplicitSession:
-    """Start a run with the explicit method of order 8(5,3).
+class ExplicitSession(Session):
+    """A run in progress.
 
     Parameters
     ----------
@@ -72,55 +53,17 @@ def open_explicit(
     options
         Accuracy; `max_order` and `linear_solver` mean nothing here, and a first step that is estimated from
         derivatives is bounded by the horizon itself.
+    stepper
+        What takes the steps.
     t, y
         Start values.
     budget
         Limits of the session.
-    stepper
-        What takes the steps; ``"auto"`` takes compiled steps where the problem has compiled rates.
     leave
         Asked, with time and values, whenever stability has kept steps short for a while, whether to leave the rest to
         an implicit method: the run then ends there with `Status.STIFF`.
     end
         The last time that will be asked for; events behind it are not looked for.
-    """
-    if stepper == "compiled" or (stepper == "auto" and problem.compiled is not None):
-        from atwood.integrators.dop853.native import CompiledStepper
-
-        return ExplicitSession(problem, options, CompiledStepper(problem, options), t, y, budget, leave, end)
-    from atwood.integrators.dop853.reference import ReferenceStepper
-
-    return ExplicitSession(problem, options, ReferenceStepper(problem, options), t, y, budget, leave, end)
-
-
-@runtime_checkable
-class SamplingSession(Session, Protocol):
-    """A session that goes through many output times at once, and finds rates by itself."""
-
-    def reinitialize(self, t: float, y: FloatArray, yp: FloatArray | None = None) -> None:
-        """Go on from another state; its rates follow from it."""
-        ...
-
-    def sample(self, times: FloatArray) -> tuple[FloatArray, FloatArray, StepResult]:
-        """Go on as far as nothing stops it; return values and rates at the times that were reached, and how it ended.
-
-        Parameters
-        ----------
-        times
-            Rising, the first not before the time at which the last advance ended.
-        """
-        ...
-
-
-class ExplicitSession:
-    """A run in progress; see `~atwood.integrators.protocol.Session`.
-
-    Parameters
-    ----------
-    problem, options, t, y, budget, leave, end
-        As in `open_explicit`.
-    stepper
-        What takes the steps.
     """
 
     def __init__(
@@ -138,11 +81,12 @@ class ExplicitSession:
         self._stepper = stepper
         self._problem = problem
         self._watch(options.horizon)
-        self._notices = self._event_stepper(problem, stepper)
-        if leave is not None and _has(type(stepper), HeedingStepper):
-            cast("HeedingStepper", stepper).heed_stiffness()
+        events = None if problem.compiled_events is None else problem.compiled_events()
+        self._notices = events is not None and stepper.watch(events)  # whether the stepper looks for events by itself
+        if leave is not None:
+            stepper.heed_stiffness()
         self._no_events = (0,) * problem.event_count
-        self._watched: WatchedStepper | None = None
+        self._is_watched = False
         self._chunk = max(1, FIRST_CHUNK // problem.size)
         self._begin(t, y, budget, leave, end)
 
@@ -180,37 +124,20 @@ class ExplicitSession:
         Parameters
         ----------
         t, y, budget, leave, end
-            As in `open_explicit`.
+            As of a new session.
         horizon
             A typical length of the run, s.
         absolute
             Absolute tolerances; as before if not given.
         """
-        if not _has(type(self._stepper), RenewedStepper):
-            raise UsageError("only compiled steps can be begun again")
-        cast("RenewedStepper", self._stepper).renew(horizon, absolute)
+        self._stepper.renew(horizon, absolute)
         self._watch(horizon)
         self._begin(t, y, budget, leave, end)
 
     def look_out(self, lookout: Lookout) -> bool:
         """Let the motion be looked at, and end with `Status.NOTICED` where something is seen; return whether it can."""
-        if not _has(type(self._stepper), WatchedStepper):
-            return False
-        self._watched = cast("WatchedStepper", self._stepper)
-        self._watched.look_out(lookout)
-        return True
-
-    @staticmethod
-    def _event_stepper(problem: ExplicitProblem, stepper: Stepper) -> EventStepper | None:
-        """Let the stepper look for events by itself, if it can."""
-        if problem.compiled_events is None or not _has(type(stepper), EventStepper):
-            return None
-        events = problem.compiled_events()
-        if events is None:
-            return None
-        found = cast("EventStepper", stepper)
-        found.watch(events)
-        return found
+        self._is_watched = self._stepper.look_out(lookout)
+        return self._is_watched
 
     @property
     def statistics(self) -> Statistics:
@@ -228,24 +155,13 @@ class ExplicitSession:
         )
 
     @property
-    def handed_on(self) -> tuple[int, ...]:
-        """What a start from here is to know of the events; see `EventLocator.handed_on`."""
-        return () if self._locator is None else self._locator.handed_on(self._here[0], self._root)
-
-    @property
-    def here(self) -> StepResult:
-        """The state that was handed out last."""
-        return StepResult(*_copied(self._here), Status.REACHED, self._no_events)
-
-    @property
     def seems_stiff(self) -> bool:
         """Whether stability, and not accuracy, has kept steps short: an implicit method would take far fewer."""
         return self._stepper.counts.stiff > 0
 
     def limit_steps(self, longest: float) -> None:
-        """Take no longer steps from now on than this, nor than the options allow, if the stepper can be told so."""
-        if _has(type(self._stepper), LimitedStepper):
-            cast("LimitedStepper", self._stepper).limit_steps(longest)
+        """Take no longer steps from now on than this, nor than the options allow, where they can be limited."""
+        self._stepper.limit_steps(longest)
 
     def reinitialize(self, t: float, y: FloatArray, yp: FloatArray | None = None) -> None:
         """Go on from another state; its rates follow from it."""
@@ -310,19 +226,15 @@ class ExplicitSession:
             raise UsageError(f"cannot sample from t = {self._here[0]:.9g} at these times: they must rise from there")
         values, rates = np.empty((len(times), self._size)), np.empty((len(times), self._size))
         filled, stopped = 0, None
-        looks_itself = self._locator is None or self._notices is not None
+        looks_itself = self._locator is None or self._notices
         if looks_itself and self.budget.poll is None and not self._broken:
             filled, stopped = self._sample_quickly(times, values, rates)
-        if stopped is not None:
-            return values[:filled], rates[:filled], stopped
-        step_result = StepResult(*_copied(self._here), Status.REACHED, self._no_events)
-        while filled < len(times):
-            step_result = self.advance(float(times[filled]))
-            if step_result.status is not Status.REACHED:
-                break
-            values[filled], rates[filled] = step_result.y, step_result.yp
-            filled += 1
-        return values[:filled], rates[:filled], step_result
+        if stopped is not None or filled == len(times):
+            return values[:filled], rates[:filled], stopped or self.here
+        y, yp, step_result = super().sample(times[filled:])
+        reached = filled + len(y)
+        values[filled:reached], rates[filled:reached] = y, yp
+        return values[:reached], rates[:reached], step_result
 
     def _sample_quickly(
         self, times: FloatArray, values: FloatArray, rates: FloatArray
@@ -340,7 +252,7 @@ class ExplicitSession:
         try:
             while filled < len(times) and self._find_root() is None:
                 is_ahead = times[-1] > self._newest[0]
-                if is_ahead and self._exceeded() is not None:
+                if is_ahead and self._limit() is not None:
                     break
                 if is_ahead and self._locator is not None and self._locator.is_settling:
                     outcome = self._take(float(times[-1]), 1)
@@ -385,18 +297,18 @@ class ExplicitSession:
         return outcome
 
     def _tell_signs(self) -> None:
-        if self._notices is not None and self._locator is not None:
-            self._notices.expect(self._locator.signs)
+        if self._notices and self._locator is not None:
+            self._stepper.expect(self._locator.signs)
 
     def _arrive(self, outcome: Outcome) -> None:
         """Take up where the stepper came to, and up to where nothing has happened for certain."""
         before = self._newest[0]
         self._newest = self._stepper.state()
-        self._sees = self._sees or (self._watched is not None and self._watched.has_seen())
+        self._sees = self._sees or (self._is_watched and self._stepper.has_seen())
         if self._locator is None:
             self._searched = self._newest[0]
-        elif self._notices is not None and self._newest[0] > before and not self._locator.is_settling:
-            last = self._newest[0] if outcome is not Outcome.NOTICED else self._notices.begin_of_step()
+        elif self._notices and self._newest[0] > before and not self._locator.is_settling:
+            last = self._newest[0] if outcome is not Outcome.NOTICED else self._stepper.begin_of_step()
             self._searched = max(self._searched, last)
 
     def _run(self, t_out: float) -> StepResult:
@@ -407,16 +319,16 @@ class ExplicitSession:
             if root is not None and root.state[0] <= t_out:
                 self._root = None
                 self._here = root.state
-                return StepResult(*_copied(root.state), Status.EVENT, root.events)
+                return StepResult(*copied(root.state), Status.EVENT, root.events)
             if self._sees:
                 self._sees = False
                 self._here = self._newest if t_out >= self._newest[0] else self._stepper.interpolate(t_out)
-                return StepResult(*_copied(self._here), Status.NOTICED, self._no_events)
+                return StepResult(*copied(self._here), Status.NOTICED, self._no_events)
             if t_out <= self._newest[0]:
                 self._here = self._newest if t_out == self._newest[0] else self._stepper.interpolate(t_out)
-                return StepResult(*_copied(self._here), Status.REACHED, self._no_events)
+                return StepResult(*copied(self._here), Status.REACHED, self._no_events)
             self._here = self._newest
-            limit = self._exceeded()
+            limit = self._limit()
             if limit is not None:
                 return limit
             failure = self._step(t_out)
@@ -435,7 +347,7 @@ class ExplicitSession:
     def _allowed(self) -> int:
         """Return how many steps may be taken before the next look at limits and events."""
         locator = self._locator
-        if self.budget.poll is not None or (locator is not None and (self._notices is None or locator.is_settling)):
+        if self.budget.poll is not None or (locator is not None and (not self._notices or locator.is_settling)):
             return 1
         if self.budget.max_steps is None:
             return self._chunk
@@ -477,31 +389,8 @@ class ExplicitSession:
             self._is_left = self._leave(*self._newest[:2])
         return self._is_left
 
-    def _exceeded(self) -> StepResult | None:
-        budget, t = self.budget, self._here[0]
+    def _limit(self) -> StepResult | None:
+        """Return the end of a run that is to be left to an implicit method, or has used up a limit."""
         if self._leave is not None and self._leaves():
             return self._stopped(Status.STIFF, "steps are kept short by stability alone")
-        if budget.poll is not None:
-            budget.poll(t)
-        steps = self._stepper.counts.steps
-        if budget.max_steps is not None and steps >= budget.max_steps:
-            return self._stopped(Status.STEP_LIMIT, f"the limit of {budget.max_steps} steps was used up")
-        if budget.wall_seconds is not None and time.perf_counter() - self._opened >= budget.wall_seconds:
-            return self._stopped(Status.TIME_LIMIT, f"the limit of {budget.wall_seconds:g} s was used up")
-        return None
-
-    def _stopped(self, status: Status, reason: str) -> StepResult:
-        message = f"{reason} (at t = {self._here[0]:.9g})"
-        return StepResult(*_copied(self._here), status, self._no_events, message)
-
-
-@cache
-def _has(kind: type, more: type) -> bool:
-    """Return whether a kind of stepper has what a protocol says; to ask that takes longer than a step."""
-    return issubclass(kind, more)
-
-
-def _copied(state: State) -> State:
-    """Return a state whose arrays the caller may keep and change."""
-    t, y, yp = state
-    return t, y.copy(), yp.copy()
+        return self._exceeded(self._stepper.counts.steps)

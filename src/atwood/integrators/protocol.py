@@ -1,18 +1,15 @@
 """What a solver driver is given, and what it gives back.
 
 A driver integrates ``F(t, y, y') = 0`` from consistent start values.  This module holds only the words that all
-drivers share: the problem, the options, the limits, and the answer of one advance.  A driver itself is a function
-with the signature of `OpenSession`.
-
-The state of a run lives in the session.  `Session.advance` goes to exactly the time asked for, or stops earlier
-for a reason that its status names; in every case it hands back a state that is part of the solution.
+drivers share: the problem, the options, the limits, and the answer of one advance; a run in progress is a
+`~atwood.integrators.session.Session`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from enum import Enum
-from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, runtime_checkable
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -33,9 +30,6 @@ __all__ = [
     "ImplicitProblem",
     "IndexArray",
     "LinearSolver",
-    "OpenSession",
-    "ReadingSession",
-    "Session",
     "SolverOptions",
     "Statistics",
     "Status",
@@ -297,73 +291,6 @@ class Statistics:
             mine, theirs = getattr(self, name), getattr(other, name)
             sums[name] = None if mine is None or theirs is None else mine + theirs
         return Statistics(**sums)
-
-
-class Session(Protocol):
-    """A run in progress."""
-
-    def advance(self, t_out: float) -> StepResult:
-        """Go on to exactly a time, or stop earlier at an event, a limit or a failure.
-
-        Parameters
-        ----------
-        t_out
-            Not before the time at which the last advance ended.
-        """
-        ...
-
-    def reinitialize(self, t: float, y: FloatArray, yp: FloatArray) -> None:
-        """Go on from another consistent state, after an event, a change of mode, or a projection.
-
-        An event that the session has just reported at this time, and whose value is still about zero, does not
-        happen again.
-        """
-        ...
-
-    @property
-    def statistics(self) -> Statistics:
-        """What the session has cost so far, over all its restarts."""
-        ...
-
-
-@runtime_checkable
-class ReadingSession(Session, Protocol):
-    """A run in progress that reads what it knows already without being sent on."""
-
-    def read_on(self, times: Sequence[float], first: int, past: int) -> FloatArray:
-        """Return the solution at times that lie within the last step, as far as nothing can stop the run before them.
-
-        It is what single advances would give, without their looks at what cannot have changed.
-
-        Parameters
-        ----------
-        times
-            Rising.
-        first, past
-            Which of them: from the first number to before the second.
-
-        Returns
-        -------
-        ndarray
-            Of shape (times, unknowns): the values at as many of them as could be read, perhaps none.
-        """
-        ...
-
-
-class OpenSession(Protocol):
-    """The signature of a driver."""
-
-    def __call__(
-        self,
-        problem: ImplicitProblem,
-        options: SolverOptions,
-        t: float,
-        y: FloatArray,
-        yp: FloatArray,
-        budget: Budget | None = None,
-    ) -> Session:
-        """Start a run from consistent values."""
-        ...
 
 
 def choose_linear_solver(problem: ImplicitProblem, options: SolverOptions, has_fixed: bool = False) -> LinearSolver:

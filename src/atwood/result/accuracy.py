@@ -10,9 +10,9 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.forms.assembly import Assembly
+from atwood.integrators.methods import METHODS
 from atwood.late import dataclass
 from atwood.result.witness import needed_error
-from atwood.simulation.problem.options import SOLVERS
 from atwood.simulation.run.made import Run
 
 __all__ = ["Accuracy", "compared_paths", "difference", "estimate_accuracy"]
@@ -174,7 +174,7 @@ def estimate_accuracy(first: Run, second: Run, time: FloatArray, error: Callable
         beyond = np.flatnonzero(~(found <= limit))
         late = min(late, int(beyond[0]) if len(beyond) else late)
     until = float(time[late - 1]) if late else float(time[0])
-    form, solver = second.assembly.form, SOLVERS[second.solver]
+    form, solver = second.assembly.form, METHODS[second.solver].title
     how = f"a second solution, {form} form, {solver}, rtol {rtol:.1g}"
     needed = needed_error(second, _DOUBT * rtol)
     if needed > _DOUBT * rtol and needed > min(worst, needed_error(first, _DOUBT * rtol)):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from atwood.errors import SolveError
+from atwood.integrators.methods import METHODS
 from atwood.late import replace
 from atwood.result.result import Result
 from atwood.result.second_run import longest_step
@@ -12,9 +13,6 @@ from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.made import Run
 
 __all__ = ["accurate_run"]
-
-_FIRST, _FIRST_BY_IDA = 0.3, 0.01
-"""The first tolerance, relative to the error that was asked for: errors of IDA add up more than those of others."""
 
 _SHARE = 0.3
 """The next tolerance aims at so much of what was asked for, as if errors were proportional to it."""
@@ -40,7 +38,7 @@ def accurate_run(
     accuracy
         The limit: of positions relative to the extent of the scene, and of angles, rad.
     solver
-        What solves the scene at first, a key of `SOLVERS`.
+        What solves the scene at first, a key of `METHODS`.
 
     Returns
     -------
@@ -48,7 +46,7 @@ def accurate_run(
         The run with the loosest of the tolerances that were tried which meets it, else the most accurate one; the
         second solution; and, where the limit is not met, what was reached and until when, in words.
     """
-    rtol = min(1e-2, accuracy * (_FIRST_BY_IDA if solver.startswith("ida") else _FIRST))
+    rtol = min(1e-2, accuracy * METHODS[solver].first_share)
     best: Result | None = None
     failure = ""
     for _ in range(_RUNS):

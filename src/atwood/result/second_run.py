@@ -16,9 +16,10 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.forms.shared import Shared
+from atwood.integrators.methods import AUTO, METHODS
 from atwood.late import replace
 from atwood.simulation.events.sampling import refuse_updates
-from atwood.simulation.problem.options import LEAST, RunOptions
+from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.made import Run
 from atwood.simulation.run.run import run
 
@@ -29,9 +30,6 @@ __all__ = ["TIGHTER", "longest_step", "second_run"]
 
 TIGHTER = 30.0
 """The tolerance of the second solution is so many times less: two steps of ten cost too much, one tells too little."""
-
-_LEAST = {"ida": 1e-13, "ida-sundae": 1e-13}
-"""Tolerances below this a method cannot be asked for; else the least that there is."""
 
 _STEPS = 97.0
 """The least number of steps of a second solution; it divides no usual number of outputs."""
@@ -88,7 +86,7 @@ def second_run(first: Run, times: FloatArray, accuracy: Callable[[Run], Accuracy
 
 def _attempts(first: Run, times: FloatArray) -> Iterator[tuple[Assembly, list[RunOptions]]]:
     """Yield in which coordinates to solve a scene once more, and with which steps, the best way first."""
-    options, solver = first.options, first.solver
+    options, method = first.options, METHODS[first.solver]
     seconds = max(_SECONDS, _PATIENCE * first.statistics.seconds)
     base = replace(
         options,
@@ -98,12 +96,12 @@ def _attempts(first: Run, times: FloatArray) -> Iterator[tuple[Assembly, list[Ru
         max_steps=None,
         order=None,
         step=None,
-        solver="auto",
+        solver=AUTO,
         absolute_tolerance=None,
         max_seconds=seconds if options.max_seconds is None else max(options.max_seconds, seconds),
     )
-    rtol = 1e-11 if solver == "gauss" else options.relative_tolerance
-    tighter = replace(base, relative_tolerance=max(rtol / TIGHTER, _LEAST.get(solver, LEAST)))
+    rtol = method.judged_tolerance or options.relative_tolerance
+    tighter = replace(base, relative_tolerance=max(rtol / TIGHTER, method.least_tolerance))
     ways = [replace(tighter, max_step=longest_step(first, shorter)) for shorter in _SHORTER]
     if first.assembly.form == "dae":
         yield _reduced(first.assembly), ways

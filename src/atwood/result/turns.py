@@ -23,11 +23,8 @@ __all__ = ["TurnCounter"]
 _CHANGE = 1.0
 """rad: rates may change so much times the distance of samples, or an angle is not continued by them."""
 
-_UNSEEN = {"ida": 100.0, "ida-sundae": 100.0, "explicit": 5.0, "taylor": 1.5, "gauss": 10.0, "composition": 10.0}
-"""With more steps from sample to sample, rates at samples say little of those in between."""
-
 _FIRST = 4
-"""Then there are so many times the samples, to begin with."""
+"""Where rates at samples say little of those in between, there are so many times the samples, to begin with."""
 
 _MOST = 2_000_000
 """More samples than these are not taken."""
@@ -77,7 +74,7 @@ class TurnCounter:
             return unwrap(values, start)
         spans = np.diff(time)
         longest = float(np.max(spans, initial=0.0))
-        often = max(_UNSEEN[one.solver] for one in self._run.choices)
+        often = max(one.method.steps_unseen for one in self._run.choices)
         factor = max(_parts_of(raw[rate], longest), _FIRST if self._run.statistics.steps > often * len(time) else 1)
         while factor > 1:
             finer = self._finely(factor, time)

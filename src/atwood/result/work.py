@@ -40,12 +40,6 @@ _CLEAR, _PART = 0.01, 0.1
 _SUSPECT = 100.0
 """So many tolerances of drift, where samples may be too few to see what the power does, are looked at more closely."""
 
-_NODES = {"ida": 3, "ida-sundae": 3, "explicit": 7, "taylor": 12, "gauss": 6, "composition": 6}
-"""Points of Gauss and Legendre in a step, by the order of what makes the step."""
-
-_SEEN = {"ida": 2.0, "ida-sundae": 2.0, "explicit": 0.3, "taylor": 0.1, "gauss": 0.5, "composition": 0.5}
-"""So many steps from sample to sample leave nothing unseen between the two."""
-
 
 def integral_of_samples(t: FloatArray, values: FloatArray) -> tuple[FloatArray, float]:
     """Return the integral from the first sample on, of a spline of order up to eight, and its estimated error.
@@ -161,9 +155,9 @@ def _balanced(run: Run, pieces: Sequence[Piece], shown: NDArray[np.bool_]) -> En
     if all(one.power is None for one in pieces):
         return ledger
     unsure = ledger.uncertainty - 2.0 * max(one.rounding for one in pieces)
-    rtol, solvers = run.options.relative_tolerance, [one.solver for one in run.choices]
+    rtol, methods = run.options.relative_tolerance, [one.method for one in run.choices]
     hidden = unsure > max(_CLEAR * rtol, _PART * ledger.max_drift) * ledger.exchanged
-    few = run.statistics.steps > min(_SEEN[one] for one in solvers) * sum(len(one.time) for one in pieces)
+    few = run.statistics.steps > min(one.steps_seen for one in methods) * sum(len(one.time) for one in pieces)
     if not (hidden or (few and ledger.max_drift > _SUSPECT * rtol)):
         return ledger
     limit = run.options.max_seconds
@@ -215,7 +209,7 @@ class StepSamples:
 
 def nodes_in_steps(run: Run) -> int:
     """Return in how many points powers are integrated in a step of a run."""
-    return max(_NODES[one.solver] for one in run.choices)
+    return max(one.method.nodes_in_step for one in run.choices)
 
 
 def samples_in_steps(run: Run, times: Sequence[FloatArray], count: int) -> list[StepSamples] | None:

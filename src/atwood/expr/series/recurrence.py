@@ -112,7 +112,6 @@ class Recurrence:
             raise UnsupportedError(
                 f"the function {node.payload.name} has no Taylor series here: the expressions do not look into it",
                 where=self.name,
-                advice="Use the solver 'explicit' or 'ida'.",
             )
         if all(self.of(argument) is None for argument in node.arguments):
             return None
@@ -219,7 +218,6 @@ class Recurrence:
                 raise UnsupportedError(
                     f"{what} switches with the motion, and has no Taylor series there",
                     where=path,
-                    advice="Use the solver 'explicit' or 'ida'.",
                 )
 
     def inverse_matrix(self, size: int, entries: tuple[Expression, ...]) -> list[list[Expression]]:

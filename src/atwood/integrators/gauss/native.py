@@ -6,22 +6,22 @@ import ctypes
 import warnings
 from collections.abc import Callable
 from ctypes import c_double, c_int, c_int64, c_void_p
-from typing import Protocol
 
 import numpy as np
 
 from atwood.codegen.llvm.build import Built, build_code, default_options
 from atwood.codegen.llvm.module import CodeOptions, Part
-from atwood.errors import KernelEvaluationError, SolveError, UnsupportedError
+from atwood.errors import KernelEvaluationError, SolveError
 from atwood.expr import Program
 from atwood.integrators.compiled_functions import StepGuard
 from atwood.integrators.event_location import State
-from atwood.integrators.explicit_problem import CompiledRates, Counts, Outcome
+from atwood.integrators.explicit_problem import CompiledRates, Counts, Outcome, Stepper
+from atwood.integrators.gauss.hamiltonian import CompiledMethod
 from atwood.integrators.gauss.layout import COUNTS, NUMBERS, POINTERS, Layout
 from atwood.integrators.gauss.steps import FUNCTIONS, gauss_source
-from atwood.integrators.protocol import FloatArray
+from atwood.integrators.protocol import FloatArray, SolverOptions
 
-__all__ = ["CompiledGauss", "CompiledMethod", "GaussStepper", "bind_functions"]
+__all__ = ["CompiledGauss", "GaussStepper", "bind_functions"]
 
 _UNLIMITED = 2**62
 _CALM, _SHORTEST = 8, 1e-12
@@ -46,18 +46,6 @@ def bind_functions(built: Built) -> dict[str, Callable[..., int]]:
     return {name: ctypes.CFUNCTYPE(c_int, *shape)(addresses[name]) for name, shape in _SHAPES.items()}
 
 
-class CompiledMethod(Protocol):
-    """A method with fixed steps, for any parameter values and any step."""
-
-    order: int
-    layout: Layout
-    functions: dict[str, Callable[..., int]]
-
-    def memory(self, parameter_values: FloatArray) -> tuple[FloatArray, tuple[object, ...]]:
-        """Return the array of a session, and what it leads to."""
-        ...
-
-
 class CompiledGauss:
     """Hamilton's equations with the steps of a method, for any parameter values and any step.
 
@@ -69,20 +57,9 @@ class CompiledGauss:
         How many speeds there are.
     order
         Of the method, one of `atwood.integrators.gauss.tableau.ORDERS`.
-
-    Raises
-    ------
-    UnsupportedError
-        If the equations call functions in Python.
     """
 
     def __init__(self, equations: Program, speeds: int, order: int) -> None:
-        if any(node.operation == "external" for node in equations.nodes):
-            raise UnsupportedError(
-                "its laws call functions in Python, which the methods of Gauss cannot",
-                where=equations.name,
-                advice="Use the solver 'ida'.",
-            )
         n = len(equations.inputs[1].symbols)
         self.order = order
         self.layout = Layout(n, speeds, order // 2, len(equations.outputs) > 2, len(equations.inputs) > 3)
@@ -108,7 +85,7 @@ _LARGE = 3_000
 """Equations of more nodes are compiled with less effort."""
 
 
-class GaussStepper:
+class GaussStepper(Stepper):
     """Takes the steps of a method of Gauss or a composition, all equally long; outputs are steps of their own.
 
     The state that it is given and gives is (q, u); what it integrates is (q, p).
@@ -170,6 +147,14 @@ class GaussStepper:
     def step(self) -> float:
         """The step, s."""
         return float(self._numbers[_STEP])
+
+    def choose_step(self, t: float, y: FloatArray, end: float, options: SolverOptions) -> None:
+        """Find a step that is accurate enough from a start, and let steps be shorter than it where they need to be."""
+        absolute = np.broadcast_to(np.asarray(options.absolute_tolerances, dtype=float), y.shape)
+        longest = self.find_step(t, y, end, absolute, options.relative_tolerance)
+        if options.max_step is not None and options.max_step < longest:
+            self.take_step(options.max_step)
+        self.vary_step()
 
     def take_step(self, step: float) -> None:
         """Take steps of another length from the next start on."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import time
 from bisect import bisect_left, bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from math import inf
 
@@ -26,7 +26,7 @@ from atwood.integrators.ida.library import available, library, why_not
 from atwood.integrators.ida.memory import ONE_STEP, ROOT_RETURN, STOPPED_BY_WEIGHTS, TO_TIME, TOO_MUCH_WORK, Counts
 from atwood.integrators.ida.pace import FIRST_CHUNK, Pace, first_chunk
 from atwood.integrators.ida.setup import IdaTuning, prepare
-from atwood.integrators.ida.states import checked_state, copied, is_finite
+from atwood.integrators.ida.states import checked_state, is_finite
 from atwood.integrators.ida.sundae import REASONS, SHORTER, TOO_LONG
 from atwood.integrators.protocol import (
     Budget,
@@ -38,6 +38,7 @@ from atwood.integrators.protocol import (
     StepResult,
     choose_linear_solver,
 )
+from atwood.integrators.session import Session, copied
 from atwood.interrupts import InterruptLater
 from atwood.late import replace
 
@@ -49,8 +50,8 @@ NO_EVENT_VALUE = -10
 EVENT_REASONS = {NO_EVENT_VALUE: "an event function has no value"}
 
 
-class NativeSession:
-    """A run in progress; see `~atwood.integrators.protocol.Session`.
+class NativeSession(Session):
+    """A run in progress.
 
     Its memory is freed by `close`, at the end of a ``with`` block, or when nobody refers to it any more.
 
@@ -66,18 +67,11 @@ class NativeSession:
         Limits of the session.
     tuning
         What only this driver can set.
-    lookout
-        What looks at the motion; see `NativeSession.looks_out`.
 
     Raises
     ------
     ~atwood.integrators.ida.library.SundialsMissing
         If the libraries cannot be used; `available` tells beforehand.
-
-    Attributes
-    ----------
-    looks_out
-        Whether the lookout is used: not where single steps are taken.
     """
 
     def __init__(
@@ -89,7 +83,6 @@ class NativeSession:
         yp: FloatArray,
         budget: Budget | None = None,
         tuning: IdaTuning | None = None,
-        lookout: Lookout | None = None,
     ) -> None:
         self.budget = budget or Budget()
         self._opened = 0.0  # when it first went on
@@ -109,13 +102,11 @@ class NativeSession:
         # Whether IDA itself can tell in which steps something happens.
         self._finds_events = self._native is not None and self._native.events != 0
         self._by_steps = self.budget.poll is not None or (self._locator is not None and not self._finds_events)
-        self.looks_out = lookout is not None and not self._by_steps
-        self._look_out = None if lookout is None or self._by_steps else self._memory.look_out(lookout)
-        self._fill = None if lookout is None or self._by_steps else self._memory.fill(lookout)
-        self._goes_on = self._fill is not None and self._locator is None and not self._record.calls_python
-        self._noticed_flag = None if lookout is None else lookout.noticed
-        self._paused_flag = 0 if lookout is None else lookout.paused
-        self._due = lookout.due if lookout is not None and self.looks_out else lambda: inf
+        self._look_out: Callable[..., tuple[int, float]] | None = None
+        self._fill: Callable[..., tuple[int, float, int]] | None = None
+        self._noticed_flag: int | None = None
+        self._paused_flag, self._goes_on = 0, False
+        self._due: Callable[[], float] = lambda: inf
         self._no_events = (0,) * problem.event_count
         self._earlier = Statistics(error_test_failures=0, convergence_failures=0)
         self._starts = 0
@@ -149,10 +140,14 @@ class NativeSession:
             seconds=self._seconds,
         )
 
-    @property
-    def handed_on(self) -> tuple[int, ...]:
-        """What a start from here is to know of the events; see `EventLocator.handed_on`."""
-        return () if self._locator is None else self._locator.handed_on(self._here[0], self._root)
+    def look_out(self, lookout: Lookout) -> bool:
+        """Let IDA look at the motion on its way; it cannot where single steps are taken."""
+        if self._by_steps:
+            return False
+        self._look_out, self._fill = self._memory.look_out(lookout), self._memory.fill(lookout)
+        self._goes_on = self._locator is None and not self._record.calls_python
+        self._noticed_flag, self._paused_flag, self._due = lookout.noticed, lookout.paused, lookout.due
+        return True
 
     @property
     def counts(self) -> Counts:
@@ -160,7 +155,7 @@ class NativeSession:
         self._check_open()
         return self._memory.counts()
 
-    def reinitialize(self, t: float, y: FloatArray, yp: FloatArray) -> None:
+    def reinitialize(self, t: float, y: FloatArray, yp: FloatArray | None = None) -> None:
         """Go on from another consistent state, after an event, a change of mode, or a projection."""
         self._check_open()
         self._restart(checked_state(self._problem.size, t, y, yp))
@@ -264,7 +259,7 @@ class NativeSession:
                 return self._arrive(t_out)
             if by_steps:
                 self._here = self._end_of_step()
-            limit = self._exceeded()
+            limit = self._exceeded(self._steps())
             if limit is not None:
                 return limit
             failure = self._step() if by_steps or self._is_first else self._stride(t_out)
@@ -302,7 +297,7 @@ class NativeSession:
         return self._newest
 
     def read_on(self, times: Sequence[float], first: int, past: int) -> FloatArray:
-        """See `~atwood.integrators.protocol.ReadingSession`."""
+        """Read, or let IDA itself go on and fill a table where nothing is to be looked for."""
         self._check_open()
         if past <= first or self._stale or self._pending is not None:
             return np.empty((0, self._problem.size))
@@ -370,16 +365,6 @@ class NativeSession:
 
     def _steps(self) -> int:
         return self._earlier.steps + self._memory.steps()
-
-    def _exceeded(self) -> StepResult | None:
-        budget = self.budget
-        if budget.poll is not None:
-            budget.poll(self._here[0])
-        if budget.max_steps is not None and self._steps() >= budget.max_steps:
-            return self._stopped(Status.STEP_LIMIT, f"the limit of {budget.max_steps} steps was used up")
-        if budget.wall_seconds is not None and time.perf_counter() - self._opened >= budget.wall_seconds:
-            return self._stopped(Status.TIME_LIMIT, f"the limit of {budget.wall_seconds:g} s was used up")
-        return None
 
     def _step(self) -> StepResult | None:
         """Take one internal step, and return an answer only if that failed."""
@@ -527,11 +512,10 @@ class NativeSession:
 
     def _stopped(self, status: Status, reason: str, since: float = inf) -> StepResult:
         """Return where the run ended, with a complaint that came after the last good step, or since a time."""
-        t, record = self._here[0], self._record
-        message, equation = f"{reason} (at t = {t:.9g})", None
-        if status is Status.FAILED and record.complaint and record.time >= min(t, since):
-            message, equation = f"{message}; {record.complaint}", record.equation
-        return StepResult(*copied(self._here), status, self._no_events, message, equation)
+        ended, record = super()._stopped(status, reason), self._record
+        if status is not Status.FAILED or not record.complaint or record.time < min(ended.t, since):
+            return ended
+        return replace(ended, message=f"{ended.message}; {record.complaint}", equation=record.equation)
 
 
 open_session = NativeSession

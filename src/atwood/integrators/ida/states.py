@@ -1,4 +1,4 @@
-"""Small things that the native driver does with states."""
+"""Checks of states of a run with IDA."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from atwood.errors import StartError, UsageError
 from atwood.integrators.event_location import State
 from atwood.integrators.protocol import FloatArray
 
-__all__ = ["checked_state", "copied", "is_finite"]
+__all__ = ["checked_state", "is_finite"]
 
 
 _FEW = 64
 """So many numbers are added up before NumPy has begun."""
 
 
-def checked_state(size: int, t: float, y: FloatArray, yp: FloatArray) -> State:
+def checked_state(size: int, t: float, y: FloatArray, yp: FloatArray | None) -> State:
     """Return a state to start from, with its own arrays.
 
     Parameters
@@ -41,9 +41,3 @@ def is_finite(y: FloatArray, yp: FloatArray) -> bool:
     if y.size <= _FEW and isfinite(sum(y.tolist()) + sum(yp.tolist())):
         return True
     return bool(np.isfinite(y).all() and np.isfinite(yp).all())
-
-
-def copied(state: State) -> State:
-    """Return a state whose arrays the caller may keep and change."""
-    t, y, yp = state
-    return t, y.copy(), yp.copy()

@@ -24,9 +24,10 @@ from typing import Any
 
 import numpy as np
 
-from atwood.errors import KernelEvaluationError, StartError, UsageError
+from atwood.errors import KernelEvaluationError, UsageError
 from atwood.integrators.event_location import ROUNDING, EventLocator, Root, State
 from atwood.integrators.ida.quiet import without_solver_messages
+from atwood.integrators.ida.states import checked_state
 from atwood.integrators.protocol import (
     Budget,
     FloatArray,
@@ -38,6 +39,7 @@ from atwood.integrators.protocol import (
     StepResult,
     choose_linear_solver,
 )
+from atwood.integrators.session import Session, copied
 from atwood.late import dataclass, replace
 
 __all__ = ["SundaeSession", "open_session"]
@@ -90,8 +92,8 @@ class _Record:
         self.complaint, self.equation = "", None
 
 
-class SundaeSession:
-    """A run in progress; see `~atwood.integrators.protocol.Session`.
+class SundaeSession(Session):
+    """A run in progress.
 
     Parameters
     ----------
@@ -128,7 +130,7 @@ class SundaeSession:
         self._steps = 0
         self._starts = 0
         self._seconds = 0.0
-        self._set_start(t, y, yp)
+        self.reinitialize(t, y, yp)
 
     @property
     def statistics(self) -> Statistics:
@@ -144,14 +146,9 @@ class SundaeSession:
             seconds=self._seconds,
         )
 
-    @property
-    def handed_on(self) -> tuple[int, ...]:
-        """What a start from here is to know of the events; see `EventLocator.handed_on`."""
-        return () if self._locator is None else self._locator.handed_on(self._here[0], self._root)
-
-    def reinitialize(self, t: float, y: FloatArray, yp: FloatArray) -> None:
+    def reinitialize(self, t: float, y: FloatArray, yp: FloatArray | None = None) -> None:
         """Go on from another consistent state, after an event, a change of mode, or a projection."""
-        self._set_start(t, y, yp)
+        self._restart(checked_state(self._size, t, y, yp))
 
     def advance(self, t_out: float) -> StepResult:
         """Go on to exactly a time, or stop earlier at an event, a limit or a failure.
@@ -185,15 +182,6 @@ class SundaeSession:
         finally:
             self._seconds += time.perf_counter() - began
 
-    def _set_start(self, t: float, y: FloatArray, yp: FloatArray) -> None:
-        state = (float(t), np.array(y, dtype=np.float64), np.array(yp, dtype=np.float64))
-        for part in state[1:]:
-            if part.shape != (self._size,):
-                raise UsageError(f"the state has {self._size} unknowns, but was given values of shape {part.shape}")
-        if not (isfinite(t) and np.isfinite(state[1]).all() and np.isfinite(state[2]).all()):
-            raise StartError(f"the start values at t = {t} are not all finite numbers")
-        self._restart(state)
-
     def _restart(self, state: State) -> None:
         if self._begins is not None:
             self._begins(*state)
@@ -217,9 +205,9 @@ class SundaeSession:
                 return self._deliver(root)
             if t_out <= self._newest[0]:
                 self._here = self._interpolate(t_out)
-                return StepResult(*_copied(self._here), Status.REACHED, self._no_events)
+                return StepResult(*copied(self._here), Status.REACHED, self._no_events)
             self._here = self._newest
-            limit = self._exceeded()
+            limit = self._exceeded(self._steps)
             if limit is not None:
                 return limit
             failure = self._step()
@@ -237,7 +225,7 @@ class SundaeSession:
     def _deliver(self, root: Root) -> StepResult:
         self._root = None
         self._here = root.state
-        return StepResult(*_copied(root.state), Status.EVENT, root.events)
+        return StepResult(*copied(root.state), Status.EVENT, root.events)
 
     def _interpolate(self, t: float) -> State:
         if t == self._newest[0]:
@@ -247,16 +235,6 @@ class SundaeSession:
             raise KernelEvaluationError(f"no interpolated value at t = {t:.9g} (IDA flag {result.status})")
         self._behind = True
         return t, result.y, result.yp
-
-    def _exceeded(self) -> StepResult | None:
-        budget, t = self.budget, self._here[0]
-        if budget.poll is not None:
-            budget.poll(t)
-        if budget.max_steps is not None and self._steps >= budget.max_steps:
-            return self._stopped(Status.STEP_LIMIT, f"the limit of {budget.max_steps} steps was used up")
-        if budget.wall_seconds is not None and time.perf_counter() - self._opened >= budget.wall_seconds:
-            return self._stopped(Status.TIME_LIMIT, f"the limit of {budget.wall_seconds:g} s was used up")
-        return None
 
     def _step(self) -> StepResult | None:
         """Take one internal step, and return an answer only if that failed."""
@@ -291,17 +269,10 @@ class SundaeSession:
         return None
 
     def _stopped(self, status: Status, reason: str) -> StepResult:
-        t = self._here[0]
-        message, equation = f"{reason} (at t = {t:.9g})", None
-        if status is Status.FAILED and self._record.complaint:
-            message, equation = f"{message}; {self._record.complaint}", self._record.equation
-        return StepResult(*_copied(self._here), status, self._no_events, message, equation)
-
-
-def _copied(state: State) -> State:
-    """Return a state whose arrays the caller may keep and change."""
-    t, y, yp = state
-    return t, y.copy(), yp.copy()
+        ended, record = super()._stopped(status, reason), self._record
+        if status is not Status.FAILED or not record.complaint:
+            return ended
+        return replace(ended, message=f"{ended.message}; {record.complaint}", equation=record.equation)
 
 
 def _create_solver(problem: ImplicitProblem, options: SolverOptions, record: _Record) -> Any:

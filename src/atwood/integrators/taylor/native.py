@@ -7,24 +7,24 @@ its recurrences, as two compiled programs.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
-from ctypes import c_double, c_int, c_int64, c_void_p
+from ctypes import c_void_p
 from itertools import accumulate
 from math import inf, log2
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from atwood.codegen.llvm.build import Built, build_code, default_options
-from atwood.codegen.llvm.module import CodeOptions, Part
+from atwood.codegen.llvm.build import build_code, default_options
+from atwood.codegen.llvm.module import Part
 from atwood.codegen.once import once
 from atwood.codegen.routines.source import RoutineSource
 from atwood.errors import UsageError
 from atwood.expr.series.taylor import TaylorPrograms
 from atwood.integrators.compiled_functions import StepGuard
-from atwood.integrators.event_location import State
-from atwood.integrators.explicit_problem import Counts, Outcome, absolute_tolerances, no_interpolation
+from atwood.integrators.explicit_problem import absolute_tolerances
+from atwood.integrators.native_stepper import NativeStepper, Routines, routines_of
 from atwood.integrators.protocol import FloatArray, SolverOptions
 from atwood.integrators.taylor.memory import (
     COUNTS,
@@ -37,15 +37,13 @@ from atwood.integrators.taylor.memory import (
     positions,
 )
 from atwood.integrators.taylor.problem import DEFECT, FLOOR, TaylorProblem, choose_order, share_of_radius
-from atwood.late import names_of, replace
+from atwood.late import replace
 
 if TYPE_CHECKING:
     from atwood.integrators.ensemble.batch import BatchPlaces
 
 __all__ = ["CompiledRecurrences", "CompiledStepper"]
 
-_UNLIMITED = 2**62
-_NO_VALUE = 3
 _PACKED = (0, 1, 2)
 """The groups of results of the program of an order whose rows lie in blocks: left, right and squares."""
 
@@ -146,8 +144,8 @@ class _Layout:
         self.is_own = np.array([name not in given for name in POINTERS], dtype=np.int64)
 
 
-class CompiledStepper:
-    """The state of a run; see `~atwood.integrators.explicit_problem.Stepper`.
+class CompiledStepper(NativeStepper):
+    """The state of a run with Taylor series.
 
     Parameters
     ----------
@@ -161,6 +159,9 @@ class CompiledStepper:
         What judges steps besides their error.
     """
 
+    _number = MappingProxyType({name: place for place, name in enumerate(NUMBERS)})
+    _count = MappingProxyType({name: place for place, name in enumerate(COUNTS)})
+
     def __init__(
         self,
         problem: TaylorProblem,
@@ -168,8 +169,6 @@ class CompiledStepper:
         order: int | None = None,
         guard: StepGuard | None = None,
     ) -> None:
-        if problem.compiled is None:
-            raise UsageError("there is no machine code of these recurrences")
         recurrences, derived = problem.compiled()
         self._size, self._options = recurrences.size, options
         self._keep = recurrences, derived
@@ -185,7 +184,7 @@ class CompiledStepper:
         allowed = DEFECT * options.relative_tolerance + FLOOR
         limits = allowed, options.max_step or inf, options.horizon, problem.reach
         self._numbers[_FIRST:] = options.first_step or 0.0, 0.0, problem.stop_time, share, *limits
-        self._run, self._interpolate, self._sample, self._begin = _functions()
+        self._routines = _routines()
 
     def _lay_out(self, recurrences: CompiledRecurrences, derived: FloatArray, guard: StepGuard | None) -> None:
         """Find a place for everything, in one piece of memory that begins with a cache line."""
@@ -199,6 +198,7 @@ class CompiledStepper:
         self._numbers = memory[at["numbers"] : at["numbers"] + len(NUMBERS)]
         self._counts = whole[at["counts"] : at["counts"] + len(COUNTS)]
         self._arrays = memory[at["arrays"] : at["arrays"] + ROWS["all"] * layout.padded].reshape(-1, layout.padded)
+        self._ends = self._arrays[ROWS["y"], :n], self._arrays[ROWS["rates"], :n]
         self._values = memory[at["values"] : at["values"] + 2 * n].reshape(2, n)
         whole[at["tables"] : at["tables"] + len(layout.tables)] = layout.tables + base
         pointers = whole[at["pointers"] : at["pointers"] + len(POINTERS)]
@@ -216,62 +216,11 @@ class CompiledStepper:
 
         What this session knows of parameters is written over by a run that has others.
         """
-        from atwood.integrators.ensemble.batch import BatchPlaces
-
-        begin, sample = (_code().code.addresses[name] for name in ("begin", "sample"))
-        limit, steps, filled = (self._counts[COUNTS.index(name) :].ctypes.data for name in ("limit", "steps", "filled"))
-        floors = self._arrays[ROWS["floors"]].ctypes.data
-        places = begin, sample, self._session, limit, steps, filled, floors, _COUNTED
-        return BatchPlaces(*places, self._parameters, 1.0 / self._options.relative_tolerance, self)
-
-    @property
-    def counts(self) -> Counts:
-        """What it has done so far, over all starts."""
-        return Counts(*self._counts[_STEPS : _STEPS + _COUNTED].tolist())
-
-    def start(self, t: float, y: FloatArray) -> bool:
-        """Start anew from a state; return whether it has finite rates."""
-        self._values[0] = y
-        return bool(self._begin(self._session, t, self._outputs[0]) == 0)
-
-    def state(self) -> State:
-        """Return time, values and rates at the end of the last step."""
-        n, arrays = self._size, self._arrays
-        return float(self._numbers[_T]), arrays[ROWS["y"], :n].copy(), arrays[ROWS["rates"], :n].copy()
-
-    def run(self, t_stop: float, steps: int) -> Outcome:
-        """Take steps until one ends at or after a time, but no more than so many."""
-        self._set("stop", t_stop)
-        self._set_count("limit", int(self._counts[_STEPS]) + min(steps, _UNLIMITED))
-        return Outcome(self._run(self._session))
-
-    def interpolate(self, t: float) -> State:
-        """Return the state at a time within the last step."""
-        if self._interpolate(self._session, t, *self._outputs) or not np.isfinite(self._values).all():
-            raise no_interpolation(t)
-        return t, self._values[0].copy(), self._values[1].copy()
-
-    def sample(self, times: FloatArray, steps: int) -> tuple[FloatArray, FloatArray, Outcome]:
-        """Take steps, and return values and rates at as many of the times, one row each, as were reached."""
-        times = np.ascontiguousarray(times, dtype=np.float64)
-        y, yp = np.empty((2, len(times), self._size))
-        self._set_count("limit", int(self._counts[_STEPS]) + min(steps, _UNLIMITED))
-        tables = (array.ctypes.data for array in (y, yp))
-        outcome = self._sample(self._session, times.ctypes.data, len(times), *tables)
-        filled = int(self._counts[COUNTS.index("filled")])
-        if outcome == _NO_VALUE:
-            raise no_interpolation(float(times[filled]))
-        return y[:filled], yp[:filled], Outcome(outcome)
-
-    def _set(self, name: str, value: float) -> None:
-        self._numbers[NUMBERS.index(name)] = value
-
-    def _set_count(self, name: str, value: int) -> None:
-        self._counts[COUNTS.index(name)] = value
+        factor = 1.0 / self._options.relative_tolerance
+        return self._places(self._arrays[ROWS["floors"]], factor, self._parameters)
 
 
-_COUNTED = len(names_of(Counts))
-_T, _FIRST, _STEPS = NUMBERS.index("t"), NUMBERS.index("first"), COUNTS.index("steps")
+_FIRST = NUMBERS.index("first")
 
 
 _ROUTINES = RoutineSource(
@@ -286,20 +235,6 @@ _ROUTINES = RoutineSource(
 
 
 @once
-def _code() -> Built:
-    """Return the code of the steps."""
-    exports = ("run", "interpolate", "sample", "begin")
-    return build_code([], CodeOptions(level=2), exports=exports, routines=_ROUTINES)
-
-
-@once
-def _functions() -> tuple[Callable[..., int], ...]:
-    """Return the functions `run`, `interpolate`, `sample` and `begin`."""
-    addresses = _code().code.addresses
-    shapes = {
-        "run": (c_void_p,),
-        "interpolate": (c_void_p, c_double, c_void_p, c_void_p),
-        "sample": (c_void_p, c_void_p, c_int64, c_void_p, c_void_p),
-        "begin": (c_void_p, c_double, c_void_p),
-    }
-    return tuple(ctypes.CFUNCTYPE(c_int, *shape)(addresses[name]) for name, shape in shapes.items())
+def _routines() -> Routines:
+    """Return the routines of the method."""
+    return routines_of(_ROUTINES)

@@ -17,11 +17,11 @@ from collections.abc import Callable
 from math import ceil, exp, frexp, inf, ldexp, log
 from typing import TYPE_CHECKING
 
-from atwood.expr.series.taylor import TaylorPrograms
 from atwood.integrators.protocol import FloatArray, SolverOptions
 from atwood.late import dataclass
 
 if TYPE_CHECKING:
+    from atwood.expr.series.taylor import TaylorPrograms
     from atwood.integrators.taylor.native import CompiledRecurrences
 
 __all__ = [
@@ -87,20 +87,20 @@ class TaylorProblem:
         The recurrences, of which `atwood.integrators.taylor.memory.LANES` convolutions are worked out at a time.
     parameters
         The values of the parameters of the program of order zero.
+    compiled
+        ``compiled()``: the recurrences as machine code, and what depends on their parameters alone.
     stop_time
         No step goes beyond this time: what acts may change there.
     reach
         No step changes an unknown by more than so many times its size: where events are looked for, a step must not be
         so long that one comes and goes within it.
-    compiled
-        ``compiled()``: the recurrences as machine code, and what depends on their parameters alone.
     """
 
     programs: TaylorPrograms
     parameters: FloatArray
+    compiled: Callable[[], tuple[CompiledRecurrences, FloatArray]]
     stop_time: float = inf
     reach: float = inf
-    compiled: Callable[[], tuple[CompiledRecurrences, FloatArray]] | None = None
 
 
 def choose_order(options: SolverOptions) -> int:

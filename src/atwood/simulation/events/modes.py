@@ -237,10 +237,8 @@ class EventProbe:
             program = self.program()
             if program is None or any(node.operation == "external" for node in program.nodes):
                 return None
-            try:
-                from atwood.codegen.sundials.events import compile_events
-            except ImportError:  # no compiler
-                return None
+            from atwood.codegen.sundials.events import compile_events
+
             return compile_events(program, for_ida)
 
         return self.assembly.shared.get(_EVENT_CODE, make, for_ida, *self.key)

@@ -24,8 +24,8 @@ from atwood.arguments import (
 )
 from atwood.errors import AtwoodError, UsageError
 from atwood.forms.dae import LEVELS
+from atwood.integrators.methods import AUTO, GAUSS, METHODS
 from atwood.model.values.units import parse_quantity, parse_unit
-from atwood.simulation.problem.options import FIXED_STEPS, SOLVERS
 from atwood.tolerances import tolerances
 from atwood.topology.orientation_coordinates import ORIENTATIONS
 
@@ -110,7 +110,7 @@ def _times(value: Any) -> Any:
 FORM = one_of(FORMS)
 LEVEL = one_of(LEVELS)
 ORIENTATION = one_of(ORIENTATIONS)
-SOLVER = one_of(("auto", *SOLVERS))
+SOLVER = one_of((AUTO, *METHODS))
 NAME = optional(TEXT)
 ACCURACY = optional(number("an error between 1e-15 and 0.1, such as 1e-8", least=1e-15, most=0.1))
 T_END = optional(Kind(f"seconds, at most {_LONGEST:g}, or text such as '2 min'", _time))
@@ -124,7 +124,7 @@ LIMITS = {
     "max_steps": optional(whole("a whole number of steps, at least 1", 1, 10**18)),
     "max_seconds": optional(number("a number of seconds above 0", above=0.0)),
 }
-_ORDERS = (2, 4, 6, 8, 10, 12)
+_ORDERS = GAUSS.orders
 
 
 def _order(value: Any) -> int:
@@ -158,13 +158,14 @@ def refuse_idle_settings(solver: str, order: int | None, step: float | None, fir
     UsageError
         If it is so.
     """
+    equal = [one.key for one in METHODS.values() if one.has_equal_steps]
     for name, value in (("order", order), ("step", step)):
-        if value is not None and solver not in FIXED_STEPS:
+        if value is not None and solver not in equal:
             raise UsageError(
-                f"{name}={value!r} is for the solvers 'gauss' and 'composition'; {solver!r} chooses its own",
-                advice="Give solver='gauss', or rtol for the accuracy.",
+                f"{name}={value!r} is for the solvers {' and '.join(map(repr, equal))}; {solver!r} chooses its own",
+                advice=f"Give solver={equal[0]!r}, or rtol for the accuracy.",
             )
-    if first_step is not None and solver in FIXED_STEPS:
+    if first_step is not None and solver in equal:
         raise UsageError(f"all steps of {solver!r} are equal", where="first_step", advice="Give step.")
 
 

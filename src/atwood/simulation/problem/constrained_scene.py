@@ -25,7 +25,7 @@ from atwood.simulation.problem.problem import Plan
 from atwood.topology.groups import connected_groups
 
 if TYPE_CHECKING:
-    from atwood.integrators.dop853.constrained import CompiledConstraints
+    from atwood.integrators.embedded.constrained import CompiledConstraints
 
 __all__ = ["constrained_problem"]
 
@@ -147,8 +147,6 @@ def _code(program: ConstrainedProgram) -> CompiledConstraints | None:
     """Return the machine code; None where there is none."""
     if any(node.operation == "external" for node in (*program.accelerations.nodes, *program.projection.nodes)):
         return None
-    try:
-        from atwood.integrators.dop853.constrained import CompiledConstraints
-    except ImportError:  # no compiler: steps in Python
-        return None
+    from atwood.integrators.embedded.constrained import CompiledConstraints
+
     return CompiledConstraints(program.accelerations, program.projection)

@@ -14,7 +14,7 @@ from atwood.integrators.explicit_problem import CompiledRates, ExplicitProblem
 from atwood.integrators.protocol import FloatArray, Values
 
 if TYPE_CHECKING:
-    from atwood.integrators.dop853.native import CompiledAccelerations, OwnRates
+    from atwood.integrators.embedded.native import CompiledAccelerations, OwnRates
 
 __all__ = ["compiled_rates", "explicit_problem", "explicit_problem_of", "first_order", "own_rates"]
 
@@ -96,7 +96,7 @@ def first_order(kernel: BoundKernel, coordinates: int) -> Callable[[float, Float
 
 def compiled_rates(assembly: Assembly, found: AccelerationProgram) -> CompiledAccelerations:
     """Return the accelerations of a scene as machine code, for any parameter values."""
-    from atwood.integrators.dop853.native import CompiledAccelerations
+    from atwood.integrators.embedded.native import CompiledAccelerations
 
     return assembly.shared.get(_COMPILED, lambda: CompiledAccelerations(found.program), found)
 
@@ -128,10 +128,6 @@ def own_rates(assembly: Assembly) -> tuple[CompiledAccelerations, OwnRates] | No
 
 
 def _compiles(assembly: Assembly, found: AccelerationProgram) -> bool:
-    """Return whether accelerations can be machine code."""
-    try:
-        from atwood.integrators.dop853 import native as explicit_native  # noqa: F401
-    except ImportError:  # no compiler: steps in Python
-        return False
+    """Return whether accelerations can be machine code: they call nothing in Python."""
     nodes = found.program.nodes
     return not assembly.shared.get(_EXTERNAL, lambda: any(node.operation == "external" for node in nodes), found)

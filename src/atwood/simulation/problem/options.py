@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
+from atwood.integrators.methods import AUTO, METHODS
 from atwood.late import dataclass
 from atwood.simulation.problem.conditions import Condition
 from atwood.tolerances import tolerances
@@ -18,20 +19,7 @@ from atwood.tolerances import tolerances
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
 
-__all__ = ["FIXED_STEPS", "LEAST", "SOLVERS", "RunOptions", "Samples", "how_solved", "sample_times", "sizes_of"]
-
-
-SOLVERS = {
-    "ida": "SUNDIALS IDA",
-    "ida-sundae": "SUNDIALS IDA through scikit-sundae",
-    "explicit": "Dormand-Prince 8(5,3)",
-    "taylor": "Taylor series",
-    "gauss": "Gauss, symplectic",
-    "composition": "composition, symplectic",
-}
-"""What can solve a scene, and what it is called."""
-
-_WORDS = {"ida": "IDA", "ida-sundae": "IDA", "taylor": "Taylor series"}
+__all__ = ["RunOptions", "Samples", "how_solved", "sample_times", "sizes_of"]
 
 
 def how_solved(form: str, level: str, solvers: Iterable[str]) -> str:
@@ -44,20 +32,17 @@ def how_solved(form: str, level: str, solvers: Iterable[str]) -> str:
     form, level
         Of the assembly.
     solvers
-        Keys of `SOLVERS`, or their values, in the order in which they took turns.
+        Keys of methods, or their titles, in the order in which they took turns.
     """
-    keys = {name: key for key, name in SOLVERS.items()}
-    found = []
-    for one in dict.fromkeys(_WORDS.get(keys.get(each, each), keys.get(each, each)) for each in solvers):
-        found.append(f"{form} ({level}), {one}" if level and one == "IDA" else f"{form}, {one}")
+    titles = {one.title: one for one in METHODS.values()}
+    methods = [METHODS.get(each) or titles[each] for each in solvers]
+    found = {
+        f"{form} ({level}), {one.word or one.key}"
+        if level and one.is_implicit
+        else f"{form}, {one.word or one.key}": None
+        for one in methods
+    }
     return ", then ".join(found) or form
-
-
-LEAST = 1e-15
-"""The least relative tolerance: a few times the relative error of one operation."""
-
-FIXED_STEPS = ("gauss", "composition")
-"""Those whose steps are equal, which take an order and a step."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +70,7 @@ class RunOptions:
     samples
         A run is sampled at least so often, for work and for angles that count turns, whatever is shown of it.
     solver
-        A key of `SOLVERS`, or ``"auto"``; see `atwood.simulation.run.choice`.
+        A key of `~atwood.integrators.methods.METHODS`, or ``"auto"``; see `atwood.simulation.run.choice`.
     structure
         Whether it may be that nothing can move.
     on_step
@@ -109,7 +94,7 @@ class RunOptions:
     progress: Callable[[float], object] | None = None
     max_order: int = 5
     max_step: float | None = None
-    solver: str = "auto"
+    solver: str = AUTO
     samples: int = 400
     structure: bool = False
     on_step: Callable[[float], object] | None = None

@@ -18,6 +18,7 @@ from atwood.forms.dae import keep_constraints
 from atwood.forms.kept import Key
 from atwood.forms.program import FormProgram
 from atwood.integrators.compiled_functions import NativeCallbacks
+from atwood.integrators.methods import Method
 from atwood.integrators.protocol import ImplicitProblem, LinearSolver
 from atwood.late import dataclass, replace
 from atwood.numerics.matrices import to_array
@@ -210,9 +211,9 @@ class Plan:
             seen, self._seen = self._seen, None
             self.review_partitioning(*seen)
 
-    def poll(self, solver: str) -> Callable[[float], None] | None:
+    def poll(self, method: Method) -> Callable[[float], None] | None:
         """Return what a driver calls between two steps; compiled functions tell by themselves when it is time to."""
-        in_python = solver == "ida-sundae" or (solver == "ida" and bool(self.not_compilable))
+        in_python = method.is_implicit and (method.is_interpreted or bool(self.not_compilable))
         return self.between_steps if self.dependent_speeds and in_python else None
 
     def problem(

@@ -21,12 +21,7 @@ from atwood.simulation.problem.curved_laws import find_curved, find_external, is
 if TYPE_CHECKING:
     from atwood.forms.loops.closed_form import ClosedForm
 
-__all__ = ["REACHES", "step_guard"]
-
-REACHES = {"explicit": 8.0, "taylor": 2.0, "ida": 2.0, "ida-sundae": 2.0, "gauss": 8.0, "composition": 6.0}
-"""How far a curved function may change in a step, in units of its own scale: as far as the slopes that a method takes
-show. Of a Taylor series that is so in each half of a step, of IDA at the end of a step alone. A composition's parts are
-longer than those of a method of Gauss."""
+__all__ = ["step_guard"]
 
 _SHORTEST = 1e-13
 """Relative to the run: steps that are no longer are taken as they are, and what lasts no longer is a moment."""
@@ -52,7 +47,7 @@ def step_guard(
     span
         The times of the run, s.
     reach
-        How far a function may change in a step; see `REACHES`.
+        How far a function may change in a step; see `~atwood.integrators.methods.Method`.
     closed
         Its closed loops, solved by formulas, with the values of their parameters; None where all coordinates are
         integrated.
@@ -126,11 +121,9 @@ def _by_bounds(
         reactions = equations.read.values()
         return watched_program(assembly.flat.name, curved, groups, parameters, angles, known, reactions)
 
+    from atwood.codegen.llvm.step_guard import GuardCode, compile_guard
+
     shared = assembly.shared
-    try:
-        from atwood.codegen.llvm.step_guard import GuardCode, compile_guard
-    except ImportError:  # no compiler
-        return None
     with shared.lock:
         program = shared.get(_PROGRAM, make, assembly.form, form, is_estimated)
     code = shared.get(_CODE, lambda: compile_guard(program), program)

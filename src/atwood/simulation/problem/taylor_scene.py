@@ -1,29 +1,28 @@
-"""From an assembled scene to a run with the Taylor-series method."""
+"""Taylor recurrences of an assembled scene."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cache
 from math import inf
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from atwood.errors import UsageError
+from atwood.errors import UnsupportedError, UsageError
 from atwood.expr import Expression, live, substitute
 from atwood.expr.series.taylor import TaylorPrograms, taylor_programs
 from atwood.forms.accelerations import AccelerationProgram, accelerations_of
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
-from atwood.integrators.explicit_problem import ExplicitProblem, Stepper
-from atwood.integrators.explicit_session import ExplicitSession
-from atwood.integrators.protocol import Budget, FloatArray, SolverOptions
+from atwood.integrators.methods import EXPLICIT, IDA, advise
+from atwood.integrators.protocol import FloatArray
 from atwood.integrators.taylor.problem import REACH, TaylorProblem
 
 if TYPE_CHECKING:
     from atwood.integrators.taylor.native import CompiledRecurrences
 
-__all__ = ["open_taylor", "recurrences", "recurrences_of", "taylor_problem"]
+__all__ = ["recurrences", "recurrences_of", "taylor_problem"]
 
 _BRANCHES: Key[bool] = Key("whether a branch could be without a value")
 _RECURRENCES: Key[TaylorPrograms] = Key("recurrences")
@@ -47,7 +46,7 @@ def recurrences(assembly: Assembly) -> TaylorPrograms:
         raise UsageError(
             "the Taylor-series method needs a scene without closed loops in which something can move",
             where=assembly.flat.name,
-            advice="Use the solver 'ida'.",
+            advice=advise(IDA),
         )
     return recurrences_of(assembly, found)
 
@@ -85,7 +84,11 @@ def _make(found: AccelerationProgram, chosen: Mapping[Expression, float]) -> Tay
     (time,), q, u = (group.symbols for group in program.inputs)
     results = substitute(program.results, chosen)
     rates = u if len(program.outputs) == 1 else ()  # else the program gives them
-    return taylor_programs(program.name, time, [*q, *u], [*rates, *results], program.parameters, _LANES)
+    try:
+        return taylor_programs(program.name, time, [*q, *u], [*rates, *results], program.parameters, _LANES)
+    except UnsupportedError as error:
+        error.advice = advise(EXPLICIT, IDA)
+        raise
 
 
 def taylor_problem(
@@ -121,54 +124,14 @@ def taylor_problem(
 
 def _compiled(
     assembly: Assembly, programs: TaylorPrograms, values: FloatArray
-) -> Callable[[], tuple[CompiledRecurrences, FloatArray]] | None:
-    """Return what gives the machine code, made when it is first asked for; None if there is no compiler."""
-    try:
-        from atwood.integrators.taylor.native import CompiledRecurrences
-    except ImportError:
-        return None
+) -> Callable[[], tuple[CompiledRecurrences, FloatArray]]:
+    """Return what gives the machine code, made when it is first asked for."""
 
     @cache
     def bound() -> tuple[CompiledRecurrences, FloatArray]:
+        from atwood.integrators.taylor.native import CompiledRecurrences
+
         code = assembly.shared.get(_COMPILED, lambda: CompiledRecurrences(programs), programs)
         return code, code.bind(values)
 
     return bound
-
-
-def open_taylor(
-    problem: ExplicitProblem,
-    series: TaylorProblem,
-    options: SolverOptions,
-    t: float,
-    y: FloatArray,
-    budget: Budget | None = None,
-    stepper: Literal["auto", "compiled", "reference"] = "auto",
-) -> ExplicitSession:
-    """Start a run with the Taylor-series method.
-
-    Parameters
-    ----------
-    problem
-        The equations, of which the number of unknowns and the events are read.
-    series
-        Their recurrences.
-    options
-        Accuracy; `max_order` and `linear_solver` mean nothing here.
-    t, y
-        Start values.
-    budget
-        Limits of the session.
-    stepper
-        What takes the steps; ``"auto"`` takes compiled steps where they can be had.
-    """
-    takes: Stepper
-    if stepper == "compiled" or (stepper == "auto" and series.compiled is not None):
-        from atwood.integrators.taylor.native import CompiledStepper
-
-        takes = CompiledStepper(series, options, guard=problem.guard)
-    else:
-        from atwood.integrators.taylor.reference import ReferenceStepper
-
-        takes = ReferenceStepper(series, options, guard=problem.guard)
-    return ExplicitSession(problem, options, takes, t, y, budget)

@@ -17,10 +17,11 @@ from atwood.errors import AtwoodError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.integrators.explicit_problem import ExplicitProblem
+from atwood.integrators.methods import AUTO, EXPLICIT, IDA, IDA_SUNDAE, METHODS, TAYLOR, Method, advise
 from atwood.integrators.protocol import FloatArray
 from atwood.late import dataclass
 from atwood.simulation.problem.explicit_scene import explicit_problem, explicit_problem_of
-from atwood.simulation.problem.options import SOLVERS, RunOptions
+from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.run.stiffness import Stiffness, can_be_stiff, find_stiffness, present_time
 
@@ -61,7 +62,7 @@ class Choice:
     time
         From when on, s.
     solver
-        A key of `SOLVERS`.
+        A key of `~atwood.integrators.methods.METHODS`.
     reason
         Why, in words.
     keeps_constraints
@@ -74,9 +75,14 @@ class Choice:
     keeps_constraints: bool = False
 
     @property
+    def method(self) -> Method:
+        """The method."""
+        return METHODS[self.solver]
+
+    @property
     def name(self) -> str:
         """The name of the solver."""
-        return SOLVERS[self.solver]
+        return self.method.title
 
     def is_like(self, other: Choice) -> bool:
         """Return whether another choice is of the same solver for the same equations."""
@@ -89,33 +95,33 @@ def check_solver(asked: str) -> None:
     Parameters
     ----------
     asked
-        ``"auto"`` or a key of `SOLVERS`.
+        What was asked for, as in `~atwood.integrators.methods.METHODS`.
 
     Raises
     ------
     UsageError
-        If there is no such solver, or ``"ida"`` was asked for and its libraries cannot be found.
+        If there is no such solver, or IDA was asked for and its libraries cannot be found.
     """
-    if asked not in ("auto", *SOLVERS):
-        raise UsageError(f"there is no solver {asked!r}", advice=suggestion(asked, ("auto", *SOLVERS)))
-    if asked == "ida":
+    if asked not in (AUTO, *METHODS):
+        raise UsageError(f"there is no solver {asked!r}", advice=suggestion(asked, (AUTO, *METHODS)))
+    if asked == IDA.key:
         from atwood.integrators.ida.library import available, why_not
 
         if not available():
-            raise UsageError(f"IDA cannot be driven directly: {why_not()}", advice="Use the solver 'ida-sundae'.")
+            raise UsageError(f"IDA cannot be driven directly: {why_not()}", advice=advise(IDA_SUNDAE))
 
 
 def implicit_solver() -> str:
-    """Return how IDA is driven: ``"ida"``, directly, or ``"ida-sundae"`` where its libraries cannot be found.
+    """Return how IDA is driven, by its key: directly, or through scikit-sundae where its libraries cannot be found.
 
     The second is said in a warning.
     """
     from atwood.integrators.ida.library import available, why_not
 
     if available():
-        return "ida"
+        return IDA.key
     warnings.warn(f"running through scikit-sundae, which is slower: {why_not()}", stacklevel=2)
-    return "ida-sundae"
+    return IDA_SUNDAE.key
 
 
 def choose(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArray) -> Choice:
@@ -130,7 +136,7 @@ def choose(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArr
     t, q, u
         The state from which it goes on.
     """
-    if options.solver != "auto":
+    if options.solver != AUTO:
         return Choice(t, options.solver, ASKED)
     assembly = plan.assembly
     if not len(q):
@@ -144,11 +150,11 @@ def choose(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArr
         return Choice(t, implicit_solver(), f"it is stiff: {_in_words(found)}")
     if found is None and options.relative_tolerance <= VERY_ACCURATE and _has_series(assembly):
         reason = f"no constraints are left among its coordinates, nothing dies away, and {VERY_ACCURATE:g} or better"
-        return Choice(t, "taylor", f"{reason} is asked for")
+        return Choice(t, TAYLOR.key, f"{reason} is asked for")
     if found is None and plan.balance.kinematic_map.has_singular_coordinates and _has_series(assembly):
         reason = "its orientations are in three coordinates, which are singular somewhere: series err least near there"
-        return Choice(t, "taylor", reason)
-    return Choice(t, "explicit", "its coordinates are independent, and the problem is not stiff")
+        return Choice(t, TAYLOR.key, reason)
+    return Choice(t, EXPLICIT.key, "its coordinates are independent, and the problem is not stiff")
 
 
 def _choose_for_loops(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArray) -> Choice:
@@ -166,8 +172,8 @@ def _choose_for_loops(plan: Plan, options: RunOptions, t: float, q: FloatArray, 
     how = f"formulas solve its closed loops, in terms of {free}"
     # One angle is too few unknowns for error estimates of Runge-Kutta steps: series err a tenth as much, in less time.
     if found is None and _has_closed_series(plan, options, solved):
-        return Choice(t, "taylor", f"{how}, and nothing dies away")
-    return Choice(t, "explicit", f"{how}, and the problem is not stiff")
+        return Choice(t, TAYLOR.key, f"{how}, and nothing dies away")
+    return Choice(t, EXPLICIT.key, f"{how}, and the problem is not stiff")
 
 
 def _choose_on_constraints(
@@ -191,7 +197,7 @@ def _choose_on_constraints(
     found = stiffness_of(plan, options, t, q, u)
     if found is not None and found.is_stiff:
         return Choice(t, implicit_solver(), f"it is stiff: {_in_words(found)}")
-    return Choice(t, "explicit", f"{reason}, on which steps end, and the problem is not stiff", True)
+    return Choice(t, EXPLICIT.key, f"{reason}, on which steps end, and the problem is not stiff", True)
 
 
 def _has_closed_series(plan: Plan, options: RunOptions, solved: Solved) -> bool:

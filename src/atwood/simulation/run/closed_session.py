@@ -16,12 +16,13 @@ from atwood.errors import UsageError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, substitute
 from atwood.forms.kept import Key
 from atwood.integrators.explicit_problem import LOOSEST, CompiledEvents, ExplicitProblem
-from atwood.integrators.explicit_session import ExplicitSession, Leave
+from atwood.integrators.explicit_session import Leave
+from atwood.integrators.methods import Method, Task
 from atwood.integrators.protocol import Budget, SolverOptions, Statistics, Status, StepResult
+from atwood.integrators.session import Session
 from atwood.late import replace
 from atwood.simulation.problem.closed_loops import Solved, levels, on_branch, solve_at
 from atwood.simulation.problem.explicit_scene import explicit_problem_of
-from atwood.simulation.problem.options import FIXED_STEPS
 
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventCode
@@ -44,37 +45,39 @@ _FIRST = 0.05
 """The first step after a change of coordinates, as a share of that."""
 
 
-class ClosedLoopSession:
-    """A run in progress; see `~atwood.integrators.explicit_session.ExplicitSession`.
+class ClosedLoopSession(Session):
+    """A run in progress, of the independent coordinates of closed loops.
 
     Parameters
     ----------
     request
         What is to be solved.
-    solver
-        ``"explicit"``, ``"taylor"`` or ``"gauss"``.
+    method
+        An explicit method.
     t, y
         Start values of all coordinates and speeds.
     solved
         The loops on the branch of the start.
     leave
-        See `atwood.integrators.explicit_session.open_explicit`.
+        See `~atwood.integrators.explicit_session.ExplicitSession`.
     give_up
         Called with the time and the state where a dead centre of every choice comes near; the session then ends with
         `Status.STIFF`.
     """
 
+    solves_loops = True
+
     def __init__(
         self,
         request: SolverRequest,
-        solver: str,
+        method: Method,
         t: float,
         y: FloatArray,
         solved: Solved,
         leave: Leave | None,
         give_up: Callable[[float, FloatArray], None] | None,
     ) -> None:
-        self._request, self._solver, self._leave, self._give_up = request, solver, leave, give_up
+        self._request, self._method, self._leave, self._give_up = request, method, leave, give_up
         self._before = Statistics(error_test_failures=0, convergence_failures=0)
         self._solved = solved
         self._count = len(request.probe.directions)
@@ -85,6 +88,12 @@ class ClosedLoopSession:
     def statistics(self) -> Statistics:
         """What the session has cost so far, over all its choices."""
         return self._before + self._session.statistics
+
+    @property
+    def here(self) -> StepResult:
+        """The state that was handed out last."""
+        here = self._session.here
+        return replace(here, y=self._solved.state(here.t, here.y), events=here.events[: self._count])
 
     @property
     def handed_on(self) -> tuple[int, ...]:
@@ -184,7 +193,7 @@ class ClosedLoopSession:
 
     # -- sessions -------------------------------------------------------------------------------------------------
 
-    def _open(self, t: float, y: FloatArray) -> ExplicitSession:
+    def _open(self, t: float, y: FloatArray) -> Session:
         request, solved, probe = self._request, self._solved, self._request.probe
         found, assembly = solved.form.accelerations, solved.assembly
         margins, counted = self._watched(solved)
@@ -199,7 +208,7 @@ class ClosedLoopSession:
         ends = (*range(first, first + margins), *range(first + 2 * margins, len(directions)))
         own = self.handed_on if self._before.steps else probe.handed
         signs = (*own, *(0 for _ in directions[first:])) if own else ()
-        guard = request.guard(self._solver, (solved.form, solved.values))
+        guard = request.guard(self._method, (solved.form, solved.values))
         problem = replace(problem, event_rough=(*probe.rough, *ends), event_signs=signs, guard=guard)
         self._events = None
         if directions and problem.compiled is not None:
@@ -208,27 +217,17 @@ class ClosedLoopSession:
         longest = np.inf if solved.is_clear else self._longest_step(solved, t, y)
         if self._before.steps and np.isfinite(longest):  # steps grow by themselves from one that is surely short
             settings = replace(settings, first_step=min(_FIRST * longest, settings.horizon))
-        if self._solver == "taylor":
-            from atwood.simulation.problem.taylor_scene import open_taylor, taylor_problem
-
-            series = taylor_problem(assembly, request.end, bool(directions), found, solved.values)
-            return open_taylor(problem, series, settings, t, y, budget)
-        if self._solver in FIXED_STEPS:
-            from atwood.simulation.problem.gauss_scene import GaussSettings, open_gauss
-
-            asked, sizes = request.options, solved.reduced(request.plan.tolerances(1.0, request.options.nominal))
-            steps = GaussSettings(self._solver, asked.order, asked.step, request.end, sizes)
-            return open_gauss(assembly, problem, settings, steps, t, y, budget, solved)
-        from atwood.integrators.explicit_session import open_explicit
+        from atwood.simulation.run.session import equations_of
 
         given = self._leave
 
         def leave(t: float, y: FloatArray) -> bool:
             return given is not None and given(t, self._solved.state(t, y))
 
-        session = open_explicit(
-            problem, settings, t, y, budget, leave=None if given is None else leave, end=request.end
-        )
+        asked = None if given is None else leave
+        equations = equations_of(request, problem, (t, y), solved)
+        task = Task(settings, t, y, budget=budget, end=request.end, leave=asked, explicit=problem, **equations)
+        session = self._method.open(task)
         if np.isfinite(longest):
             session.limit_steps(longest)
         return session
@@ -310,8 +309,6 @@ def _event_code(request: SolverRequest, solved: Solved) -> tuple[Program, EventC
     program = Program(f"{watched.name} and events", groups, watched.parameters, (OutputGroup("events", values),))
     if any(node.operation == "external" for node in program.nodes):
         return None
-    try:
-        from atwood.codegen.sundials.events import compile_events
-    except ImportError:  # no compiler
-        return None
+    from atwood.codegen.sundials.events import compile_events
+
     return program, compile_events(program, for_ida=False)

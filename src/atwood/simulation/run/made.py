@@ -87,7 +87,7 @@ class Run:
 
     @property
     def solver(self) -> str:
-        """What solved it, at last: a key of `SOLVERS`; empty where it ended before one was chosen."""
+        """What solved it, at last: a key of `METHODS`; empty where it ended before one was chosen."""
         return self.choices[-1].solver if self.choices else ""
 
     @property

@@ -5,15 +5,15 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cache
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from atwood.clock import TimeIsUp, more_time, time_left
 from atwood.errors import AtwoodError, SolveError, StartError
-from atwood.integrators.explicit_session import ExplicitSession, SamplingSession
-from atwood.integrators.protocol import Budget, FloatArray, ReadingSession, Session, Statistics, Status, StepResult
+from atwood.integrators.methods import AUTO, Method
+from atwood.integrators.protocol import Budget, FloatArray, Statistics, Status, StepResult
+from atwood.integrators.session import Session
 from atwood.late import replace
 from atwood.simulation.dynamics.numerical_failure import is_numerical, numerical_failure
 from atwood.simulation.dynamics.orientation_coordinates import (
@@ -29,7 +29,7 @@ from atwood.simulation.problem.projection import project_safely
 from atwood.simulation.run.choice import dead_centre, stiffness_of, turned_stiff
 from atwood.simulation.run.outcome import Outcome, Segment
 from atwood.simulation.run.record import Recorder
-from atwood.simulation.run.session import SolverRequest, open_explicit_session, open_implicit_session
+from atwood.simulation.run.session import SolverRequest, open_session
 from atwood.simulation.run.tolerances import too_tight
 
 if TYPE_CHECKING:
@@ -81,20 +81,15 @@ def _first_state(segment: Segment, t: float, q: FloatArray, u: FloatArray) -> tu
     """Return the start of a segment for a solver; explicit methods work out the rates themselves."""
     if not len(q):
         return np.zeros(0), np.zeros(0)
-    if segment.choice.solver.startswith("ida"):
+    method = segment.choice.method
+    if method.is_implicit:
         segment.plan.keep_better(t, q)
-    return _state_for(segment.choice.solver, segment.plan, t, q, u)
+    return _state_for(method, segment.plan, t, q, u)
 
 
-def _state_for(solver: str, plan: Plan, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return a state for a solver: with multipliers and rates for IDA alone."""
-    return pack_state(plan, t, q, u) if solver.startswith("ida") else (np.concatenate([q, u]), np.zeros(0))
-
-
-@cache
-def _fills_tables(kind: type) -> bool:
-    """Return whether sessions of a kind are `SamplingSession`; to ask that of each takes longer than a session."""
-    return hasattr(kind, "sample")
+def _state_for(method: Method, plan: Plan, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a state for a method: with multipliers and rates for implicit ones alone."""
+    return pack_state(plan, t, q, u) if method.is_implicit else (np.concatenate([q, u]), np.zeros(0))
 
 
 class _Runner:
@@ -110,14 +105,19 @@ class _Runner:
         self.opened: StepResult | None = None
         self.noted: list[EventRecord] = []
 
+    @property
+    def method(self) -> Method:
+        """What solves it at present."""
+        return self.choices[-1].method
+
     def run(self, t: float, y: FloatArray, yp: FloatArray) -> Outcome:
         """Go from sample to sample; change the solver where the scene turns out stiff."""
         self.began, done = t, 0
         try:
             session = self._open(t, y, yp)
             while True:
-                if _fills_tables(type(session)) and (self.monitor is None or self.monitor.next == np.inf):
-                    done, step_result = self._sample_watched(cast("SamplingSession", session), done)
+                if not self.method.is_implicit and (self.monitor is None or self.monitor.next == np.inf):
+                    done, step_result = self._sample_watched(session, done)
                     session = self.session or session
                 else:
                     done, step_result = self._advance(session, done)
@@ -170,7 +170,7 @@ class _Runner:
 
     def _handed_on(self) -> tuple[int, ...]:
         """Return what a start from here is to know of the events."""
-        return cast("tuple[int, ...]", getattr(self.session, "handed_on", ()))
+        return () if self.session is None else self.session.handed_on
 
     def _cost(self) -> Statistics:
         cost = self.before if self.session is None else self.before + self.session.statistics
@@ -237,7 +237,7 @@ class _Runner:
             tight = (
                 None
                 if stuck or self.request is None
-                else too_tight(self.request, self.choices[-1].solver, step_result, self.opened)
+                else too_tight(self.request, self.method, step_result, self.opened)
             )
             from atwood.simulation.run.stuck import explain_stuck
 
@@ -260,37 +260,31 @@ class _Runner:
             Budget(
                 max_steps=None if options.max_steps is None else max(0, options.max_steps - spent.steps),
                 wall_seconds=None if options.max_seconds is None else max(0.0, time_left()),
-                poll=_both(segment.plan.poll(choice.solver), options.on_step),
+                poll=_both(segment.plan.poll(choice.method), options.on_step),
             ),
             segment.kept,
         )
-        if choice.solver.startswith("ida"):
-            from atwood.simulation.singular.monitor import singularity_monitor_of
-
-            here = StepResult(t, y, yp, Status.REACHED)
-            self.request, self.opened = request, here
-            self.monitor = singularity_monitor_of(segment.plan, options.relative_tolerance, segment.end, here)
-            self.session = open_implicit_session(request, choice.solver, t, y, yp, self.monitor)
-        else:
-            leave = self._is_stiff if options.solver == "auto" else None
-            try:
-                self.session = open_explicit_session(
-                    request, choice.solver, t, y, leave, self._give_up, choice.keeps_constraints
-                )
-            except StartError:
+        if choice.method.is_implicit:
+            self.request, self.opened = request, StepResult(t, y, yp, Status.REACHED)
+        leave = self._is_stiff if options.solver == AUTO else None
+        try:
+            self.session = open_session(
+                request, choice.method, t, y, yp, leave, self._give_up, choice.keeps_constraints
+            )
+        except StartError:
+            if not choice.method.is_implicit:
                 pack_state(segment.plan, t, *segment.plan.program.split(y))  # says what has no value, if it can
-                raise
-            self._watch(self.session)
+            raise
+        self._watch(self.session)
         return self.session
 
     def _watch(self, session: Session) -> None:
-        """Look out for singular positions where an explicit method goes on with constraints."""
-        self.monitor = None
-        if not (isinstance(session, ExplicitSession) and self.segment.plan.balance.constraints):
+        """Look out for singular positions where constraints stay."""
+        self.monitor, segment = None, self.segment
+        if session.solves_loops or not (self.method.is_implicit or segment.plan.balance.constraints):
             return
         from atwood.simulation.singular.monitor import singularity_monitor_of
 
-        segment = self.segment
         monitor = singularity_monitor_of(segment.plan, segment.options.relative_tolerance, segment.end, session.here)
         self.monitor = monitor
         if monitor is not None and not (monitor.lookout is not None and session.look_out(monitor.lookout)):
@@ -317,7 +311,7 @@ class _Runner:
         plan = self.segment.plan
         return step_result.t, *pack_state(plan, step_result.t, *plan.program.split(step_result.y))
 
-    def _sample(self, session: SamplingSession, done: int) -> tuple[int, StepResult | None]:
+    def _sample(self, session: Session, done: int) -> tuple[int, StepResult | None]:
         """Let an explicit method fill tables; return how many samples are done, and why it stopped early."""
         segment, progress = self.segment, self.segment.options.progress
         kinematic_map = segment.plan.balance.kinematic_map
@@ -340,7 +334,7 @@ class _Runner:
                 progress(float(times[-1]))
         return done, None
 
-    def _sample_watched(self, session: SamplingSession, done: int) -> tuple[int, StepResult | None]:
+    def _sample_watched(self, session: Session, done: int) -> tuple[int, StepResult | None]:
         """Let an explicit method fill tables, with looks at the motion where constraints stay."""
         while True:
             crossing = None if self.monitor is None else self.monitor.ahead_of_start()
@@ -352,7 +346,6 @@ class _Runner:
             monitor = self.monitor
             if monitor is None:
                 return done, step_result
-            assert isinstance(session, ExplicitSession)
             here, at_end = step_result or session.here, step_result is None
             noticed = here.status is Status.NOTICED
             turned = self._turned(here) if noticed else None
@@ -365,11 +358,11 @@ class _Runner:
                 continue
             self._note_crossings(monitor)
             if turned is not None:
-                session = cast("SamplingSession", self._keep(turned, here))
+                session = self._keep(turned, here)
             elif not noticed:
                 return done, step_result
 
-    def _sample_until(self, session: SamplingSession, done: int, crossing: SingularCrossing) -> None:
+    def _sample_until(self, session: Session, done: int, crossing: SingularCrossing) -> None:
         """Take outputs up to where a path begins: the last step may have been looked at beyond those that are taken."""
         assert crossing.path is not None
         samples = self.segment.samples
@@ -396,7 +389,7 @@ class _Runner:
         samples = segment.samples
         times, shown, extra = (x.tolist() for x in (samples.times, samples.shown, samples.between))
         plan, told = segment.plan, -np.inf
-        reads, repairs = hasattr(type(session), "read_on"), self._repairs  # protocols are slow to ask
+        repairs = self._repairs
         while done < len(times):
             moment, monitor = times[done], self.monitor
             look = np.inf if monitor is None else monitor.next
@@ -436,8 +429,8 @@ class _Runner:
                     plan.review_partitioning(step_result.t, step_result.y[: plan.program.coordinates])
                 if repairs:
                     self._repair(session, step_result)
-            if reads and self._reads_on():  # up to the last, at which a monitor looks
-                rows = cast("ReadingSession", session).read_on(times, done, len(times) - 1)
+            if self._reads_on():  # up to the last, at which a monitor looks
+                rows = session.read_on(times, done, len(times) - 1)
                 recorder.take_all(times[done : done + len(rows)], rows, shown[done : done + len(rows)])
                 done += len(rows)
             if progress is not None:
@@ -478,18 +471,14 @@ class _Runner:
             plan.review_partitioning(path.end, q)
             session.reinitialize(path.end, *self._packed(path.end, q, u))
             assert self.monitor is not None
-            if isinstance(session, ExplicitSession):
-                behind = session.here
-            else:
-                behind = StepResult(path.end, *self._packed(path.end, q, u), Status.REACHED)
-            self.monitor.restart(behind, is_behind=True)
+            self.monitor.restart(session.here, is_behind=True)
         return done, None
 
     def _repartitioned(self, session: Session, step_result: StepResult) -> bool:
         """After a failure, go on with other dependent coordinates if those were a poor choice."""
         plan = self.segment.plan
         q, u = (part.copy() for part in plan.program.split(step_result.y))
-        if not self.choices[-1].solver.startswith("ida") or not plan.review_partitioning(step_result.t, q):
+        if not self.method.is_implicit or not plan.review_partitioning(step_result.t, q):
             return False
         q, u = plan.balance.project(step_result.t, q, u, plan.sizes)
         session.reinitialize(step_result.t, *pack_state(plan, step_result.t, q, u))
@@ -515,7 +504,7 @@ class _Runner:
 
     def _packed(self, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return a state for the present solver."""
-        return _state_for(self.choices[-1].solver, self.segment.plan, t, q, u)
+        return _state_for(self.method, self.segment.plan, t, q, u)
 
     def _repair(self, session: Session, step_result: StepResult) -> None:
         """Go on from the recorded state where the solver's own has strayed.

@@ -4,29 +4,32 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from atwood.errors import UsageError
 from atwood.integrators.compiled_functions import GuardedResidual, NativeCallbacks, StepGuard
-from atwood.integrators.explicit_problem import LOOSEST, CompiledEvents, ExplicitProblem
+from atwood.integrators.explicit_problem import CompiledEvents, ExplicitProblem
 from atwood.integrators.explicit_session import ExplicitSession, Leave
-from atwood.integrators.protocol import Budget, FloatArray, ImplicitProblem, LinearSolver, Session, SolverOptions
+from atwood.integrators.methods import EXPLICIT, IDA, LEAST, Method, Task, advise
+from atwood.integrators.protocol import Budget, FloatArray, ImplicitProblem, LinearSolver, SolverOptions
+from atwood.integrators.session import Session
 from atwood.late import dataclass, replace
 from atwood.simulation.dynamics.orientation_coordinates import longest_step
 from atwood.simulation.events.modes import EventProbe
-from atwood.simulation.problem.options import FIXED_STEPS, LEAST, SOLVERS, RunOptions
+from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.problem.problem import Plan
-from atwood.simulation.problem.step_guard import REACHES, step_guard
+from atwood.simulation.problem.step_guard import step_guard
 
 if TYPE_CHECKING:
     from atwood.forms.loops.closed_form import ClosedForm
-    from atwood.integrators.dop853.native import CompiledAccelerations, OwnRates
-    from atwood.simulation.run.closed_session import ClosedLoopSession
-    from atwood.simulation.singular.monitor import SingularityMonitor
+    from atwood.integrators.embedded.native import CompiledAccelerations, OwnRates
+    from atwood.integrators.gauss.hamiltonian import Hamiltonian
+    from atwood.integrators.taylor.problem import TaylorProblem
+    from atwood.simulation.problem.closed_loops import Solved
 
-__all__ = ["KeptSession", "SolverRequest", "open_explicit_session", "open_implicit_session"]
+__all__ = ["KeptSession", "SolverRequest", "equations_of", "open_session"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,11 +57,11 @@ class SolverRequest:
     budget: Budget
     kept: KeptSession
 
-    def guard(self, solver: str, closed: tuple[ClosedForm, FloatArray] | None = None) -> StepGuard | None:
+    def guard(self, method: Method, closed: tuple[ClosedForm, FloatArray] | None = None) -> StepGuard | None:
         """Return what judges the steps of a method besides their error; see `step_guard`."""
-        options, reach, is_estimated = self.options, REACHES[solver], solver not in FIXED_STEPS
+        options, reach, is_estimated = self.options, method.reach, not method.has_equal_steps
         if not is_estimated and options.step is None:
-            reach *= options.relative_tolerance ** (1.0 / (1 + (options.order or 8)))
+            reach *= options.relative_tolerance ** (1.0 / (1 + (options.order or method.default_order)))
         span = self.plan.assembly.flat.t_start, options.t_end
         return step_guard(self.plan.assembly, span, reach, closed, is_estimated)
 
@@ -82,44 +85,65 @@ class SolverRequest:
         )
 
 
-def open_implicit_session(
+def open_session(
     request: SolverRequest,
-    solver: str,
+    method: Method,
     t: float,
     y: FloatArray,
     yp: FloatArray,
-    monitor: SingularityMonitor | None = None,
+    leave: Leave | None = None,
+    give_up: Callable[[float, FloatArray], None] | None = None,
+    keeps_constraints: bool = False,
 ) -> Session:
-    """Start IDA, driven directly or through scikit-sundae.
+    """Start a method.
 
     Parameters
     ----------
     request
         What is to be solved.
-    solver
-        ``"ida"`` or ``"ida-sundae"``.
+    method
+        The method.
     t, y, yp
-        Consistent start values.
-    monitor
-        What looks out for singular positions; a session looks itself, if it can.
+        Consistent start values; explicit methods find the rates by themselves.
+    leave
+        See `~atwood.integrators.explicit_session.ExplicitSession`.
+    give_up
+        See `~atwood.simulation.run.closed_session.ClosedLoopSession`.
+    keeps_constraints
+        See `~atwood.simulation.run.choice.Choice`.
+
+    Raises
+    ------
+    UsageError
+        If the scene is not one for the method.
     """
-    plan, probe, settings = request.plan, request.probe, request.settings(t)
-    if solver == "ida":
-        problem = _guarded(_with_events(_implicit_problem(request), probe), request, solver)
-        from atwood.integrators.ida import native as ida_native
+    plan = request.plan
+    if method.is_implicit:
+        return method.open(_implicit_task(request, method, t, y, yp))
+    if plan.balance.constraints and not keeps_constraints:
+        from atwood.simulation.problem.closed_loops import solve_at
+        from atwood.simulation.run.closed_session import ClosedLoopSession
 
-        tuning = ida_native.IdaTuning(angle_like=plan.angles, stop_time=request.end)
-        lookout = None if monitor is None else monitor.lookout
-        session = ida_native.open_session(problem, settings, t, y, yp, request.budget, tuning, lookout)
-        if monitor is not None and not session.looks_out:
-            monitor.look_in_python()
-        return session
-    if monitor is not None:
-        monitor.look_in_python()
-    from atwood.integrators.ida.sundae import open_session
+        solved = solve_at(plan, t, *plan.program.split(y))
+        if solved is not None:
+            return ClosedLoopSession(request, method, t, y, solved, leave, give_up)
+    if method.keeps_constraints and (plan.balance.constraints or plan.assembly.form == "dae"):
+        session = method.open(_constrained_task(request, method, t, y, leave))
+    else:
+        session = _open_tree(request, method, t, y, leave)
+    session.limit_steps(longest_step(plan.assembly.own_equations, plan.program.split(y)[1]))
+    return session
 
-    problem = _guarded(_implicit_problem(request), request, solver)
-    return open_session(problem, settings, t, y, yp, request.budget)
+
+def _implicit_task(request: SolverRequest, method: Method, t: float, y: FloatArray, yp: FloatArray) -> Task:
+    """Return a task with multipliers and rates among the unknowns."""
+
+    def implicit(finds_events: bool) -> ImplicitProblem:
+        problem = _implicit_problem(request)
+        return _guarded(_with_events(problem, request.probe) if finds_events else problem, request, method)
+
+    settings, angles = request.settings(t, method.loosest_tolerance), request.plan.angles
+    return Task(settings, t, y, yp, request.budget, request.end, implicit=implicit, angles=angles)
 
 
 def _implicit_problem(request: SolverRequest) -> ImplicitProblem:
@@ -128,9 +152,9 @@ def _implicit_problem(request: SolverRequest) -> ImplicitProblem:
     return replace(problem, event_rough=probe.rough, event_signs=probe.handed)
 
 
-def _guarded(problem: ImplicitProblem, request: SolverRequest, solver: str) -> ImplicitProblem:
+def _guarded(problem: ImplicitProblem, request: SolverRequest, method: Method) -> ImplicitProblem:
     """Return a problem whose residual judges steps, if laws could slip through them."""
-    guard, make = request.guard(solver), problem.native
+    guard, make = request.guard(method), problem.native
     if guard is None:
         return problem
     size = request.plan.program.coordinates + request.plan.program.speeds
@@ -204,130 +228,103 @@ class KeptSession:
     opened_with: tuple[object, ...] = ()
 
     def begin_again(
-        self, request: SolverRequest, t: float, y: FloatArray, leave: Leave | None
+        self, request: SolverRequest, method: Method, t: float, y: FloatArray, leave: Leave | None
     ) -> ExplicitSession | None:
         """Return the session at the start of another segment; None where it was opened for something else."""
         session, code, rates = self.session, self.code, self.rates
         if session is None or code is None or rates is None or request.probe.event_functions:
             return None
-        if not all(one is other for one, other in zip(self.opened_with, _opened_with(request, leave), strict=True)):
+        if not all(
+            one is other for one, other in zip(self.opened_with, _opened_with(request, method, leave), strict=True)
+        ):
             return None
         code.fill(rates, request.plan.assembly.parameter_values)
         session.begin_again(t, y, request.horizon(t), request.budget, leave, request.end)
         return session
 
 
-def _opened_with(request: SolverRequest, leave: Leave | None) -> tuple[object, ...]:
+def _opened_with(request: SolverRequest, method: Method, leave: Leave | None) -> tuple[object, ...]:
     plan = request.plan
-    return plan.assembly.shared, plan.program, request.options, plan.scales, plan.sizes, leave is None
+    return method, plan.assembly.shared, plan.program, request.options, plan.scales, plan.sizes, leave is None
 
 
-def open_explicit_session(
+def _open_tree(request: SolverRequest, method: Method, t: float, y: FloatArray, leave: Leave | None) -> Session:
+    """Start a method on independent coordinates, and keep its session if that can be begun again."""
+    from atwood.simulation.problem.explicit_scene import own_rates
+
+    kept, plan = request.kept, request.plan
+    session = kept.begin_again(request, method, t, y, leave)
+    if session is not None:
+        return session
+    problem, assembly = _explicit_problem(request, method), plan.assembly
+    can_be_kept = method.tableau is not None and problem.events is None and problem.guard is None
+    own = own_rates(assembly) if can_be_kept else None
+    if own is not None:
+        rates = own[1].rates
+        problem = replace(problem, compiled=lambda: rates)
+    equations = equations_of(request, problem, (t, y))
+    settings = request.settings(t, method.loosest_tolerance)
+    task = Task(settings, t, y, budget=request.budget, end=request.end, leave=leave, explicit=problem, **equations)
+    opened = method.open(task)
+    if own is not None:
+        assert isinstance(opened, ExplicitSession)
+        kept.session, (kept.code, kept.rates) = opened, own
+        kept.opened_with = _opened_with(request, method, leave)
+    return opened
+
+
+def equations_of(
     request: SolverRequest,
-    solver: str,
-    t: float,
-    y: FloatArray,
-    leave: Leave | None = None,
-    give_up: Callable[[float, FloatArray], None] | None = None,
-    keeps_constraints: bool = False,
-) -> ExplicitSession | ClosedLoopSession:
-    """Start an explicit method.
+    problem: ExplicitProblem,
+    start: tuple[float, FloatArray],
+    solved: Solved | None = None,
+) -> dict[str, Callable[[], Any]]:
+    """Return the equations of a task as series and as Hamilton's, made where a method asks for them.
 
     Parameters
     ----------
     request
         What is to be solved.
-    solver
-        A key of `SOLVERS`.
-    t, y
-        Start values.
-    leave
-        See `atwood.integrators.explicit_session.open_explicit`.
-    give_up
-        See `atwood.simulation.run.closed_session.ClosedLoopSession`.
-    keeps_constraints
-        See `atwood.simulation.run.choice.Choice`.
-
-    Raises
-    ------
-    UsageError
-        If the scene is not one for explicit methods.
+    problem
+        The equations for explicit methods, with what is watched.
+    start
+        Time and values.
+    solved
+        Closed loops, solved by formulas; values are then those of independent coordinates.
     """
-    if request.plan.balance.constraints and not keeps_constraints:
-        from atwood.simulation.problem.closed_loops import solve_at
-        from atwood.simulation.run.closed_session import ClosedLoopSession
+    assembly, options = request.plan.assembly, request.options
+    found = () if solved is None else (solved.form.accelerations, solved.values)
 
-        solved = solve_at(request.plan, t, *request.plan.program.split(y))
-        if solved is not None:
-            return ClosedLoopSession(request, solver, t, y, solved, leave, give_up)
-    if solver == "explicit" and (request.plan.balance.constraints or request.plan.assembly.form == "dae"):
-        return _open_constrained(request, t, y, leave)
-    if solver == "taylor":
-        return _open_taylor(request, t, y)
-    if solver in FIXED_STEPS:
-        return _open_fixed(request, solver, t, y)
-    session = request.kept.begin_again(request, t, y, leave)
-    if session is None:
-        session = _open_steps(request, t, y, leave)
-    equations, program = request.plan.assembly.own_equations, request.plan.program
-    session.limit_steps(longest_step(equations, program.split(y)[1]))
-    return session
+    def series() -> TaylorProblem:
+        from atwood.simulation.problem.taylor_scene import taylor_problem
+
+        return taylor_problem(assembly, request.end, problem.event_count > 0, *found)
+
+    def canonical() -> Hamiltonian:
+        from atwood.simulation.problem.gauss_scene import hamiltonian
+
+        sizes = request.plan.tolerances(1.0, options.nominal)
+        sizes = sizes if solved is None else solved.reduced(sizes)
+        return hamiltonian(assembly, problem, start, sizes, (options.order, options.step), solved)
+
+    return {"series": series, "hamiltonian": canonical}
 
 
-def _open_steps(request: SolverRequest, t: float, y: FloatArray, leave: Leave | None) -> ExplicitSession:
-    """Start the method of order 8(5,3), and keep its session if that can be begun again."""
-    from atwood.integrators.explicit_session import open_explicit
-    from atwood.simulation.problem.explicit_scene import own_rates
-
-    problem, kept, assembly = _explicit_problem(request, "explicit"), request.kept, request.plan.assembly
-    own = None if problem.events is not None or problem.guard is not None else own_rates(assembly)
-    if own is None:
-        return open_explicit(problem, request.settings(t, LOOSEST), t, y, request.budget, leave=leave, end=request.end)
-    code, rates = own
-    problem = replace(problem, compiled=lambda: rates.rates)
-    session = open_explicit(problem, request.settings(t, LOOSEST), t, y, request.budget, leave=leave, end=request.end)
-    kept.session, kept.code, kept.rates = session, code, rates
-    kept.opened_with = _opened_with(request, leave)
-    return session
-
-
-def _open_constrained(request: SolverRequest, t: float, y: FloatArray, leave: Leave | None) -> ExplicitSession:
-    """Start the method of order 8(5,3) with steps that end on the constraints."""
-    from atwood.integrators.explicit_session import open_explicit
+def _constrained_task(request: SolverRequest, method: Method, t: float, y: FloatArray, leave: Leave | None) -> Task:
+    """Return a task with steps that end on the constraints."""
     from atwood.simulation.problem.constrained_scene import constrained_problem
 
     plan, probe = request.plan, request.probe
     plan.keep_better(t, plan.program.split(y)[0])
     problem = constrained_problem(plan, t, y, probe.function(), probe.directions)
-    settings = request.settings(t, LOOSEST)
+    settings = request.settings(t, method.loosest_tolerance)
     absolute = np.asarray(settings.absolute_tolerances)[: len(y)]
     settings = replace(settings, absolute_tolerances=absolute)
-    problem = _watched(request, problem, "explicit")
-    session = open_explicit(problem, settings, t, y, request.budget, leave=leave, end=request.end)
-    session.limit_steps(longest_step(plan.assembly.own_equations, plan.program.split(y)[1]))
-    return session
+    explicit = _watched(request, problem, method)
+    return Task(settings, t, y, budget=request.budget, end=request.end, leave=leave, explicit=explicit)
 
 
-def _open_taylor(request: SolverRequest, t: float, y: FloatArray) -> ExplicitSession:
-    from atwood.simulation.problem.taylor_scene import open_taylor, taylor_problem
-
-    problem = _explicit_problem(request, "taylor")
-    series = taylor_problem(request.plan.assembly, request.end, has_events=bool(request.probe.directions))
-    return open_taylor(problem, series, request.settings(t, LOOSEST), t, y, request.budget)
-
-
-def _open_fixed(request: SolverRequest, solver: str, t: float, y: FloatArray) -> ExplicitSession:
-    from atwood.simulation.problem.gauss_scene import GaussSettings, open_gauss
-
-    options = request.options
-    settings = GaussSettings(
-        solver, options.order, options.step, request.end, request.plan.tolerances(1.0, request.options.nominal)
-    )
-    problem = _explicit_problem(request, solver)
-    return open_gauss(request.plan.assembly, problem, request.settings(t), settings, t, y, request.budget)
-
-
-def _explicit_problem(request: SolverRequest, solver: str) -> ExplicitProblem:
+def _explicit_problem(request: SolverRequest, method: Method) -> ExplicitProblem:
     """Return the equations for an explicit method, with what is watched."""
     from atwood.simulation.problem.explicit_scene import explicit_problem
 
@@ -335,18 +332,18 @@ def _explicit_problem(request: SolverRequest, solver: str) -> ExplicitProblem:
     problem = explicit_problem(assembly, probe.function(), probe.directions) if assembly.form == "reduced" else None
     if problem is None:
         raise UsageError(
-            f"this method ({SOLVERS[solver]}) needs the reduced form of a scene without closed loops, or "
+            f"this method ({method.title}) needs the reduced form of a scene without closed loops, or "
             "with such as formulas solve",
             where=assembly.flat.name,
-            advice="Use the solver 'explicit' or 'ida'.",
+            advice=advise(EXPLICIT, IDA),
         )
-    return _watched(request, problem, solver)
+    return _watched(request, problem, method)
 
 
-def _watched(request: SolverRequest, problem: ExplicitProblem, solver: str) -> ExplicitProblem:
+def _watched(request: SolverRequest, problem: ExplicitProblem, method: Method) -> ExplicitProblem:
     """Return a problem with what judges its steps, whose events are machine code too, if they can be."""
     probe = request.probe
-    problem = replace(problem, event_rough=probe.rough, event_signs=probe.handed, guard=request.guard(solver))
+    problem = replace(problem, event_rough=probe.rough, event_signs=probe.handed, guard=request.guard(method))
     found = None if problem.events is None else probe.compiled(for_ida=False)
     if found is None:
         return problem

@@ -9,6 +9,7 @@ from atwood.arrays import FloatArray
 from atwood.forms.assembly import Assembly
 from atwood.forms.shared import Shared
 from atwood.forms.sides.taken_out import in_pieces
+from atwood.integrators.methods import AUTO, METHODS
 from atwood.late import replace
 from atwood.simulation.events.sides import find_sides, layers, plain_sides
 from atwood.simulation.problem.options import RunOptions
@@ -41,7 +42,9 @@ class SidesOfRun:
 
     def __init__(self, options: RunOptions) -> None:
         self._options = options
-        self._layered = options.solver in ("auto", "ida", "ida-sundae")  # others would take many steps for each layer
+        self._layered = (
+            options.solver == AUTO or METHODS[options.solver].is_implicit
+        )  # others would take many steps for each layer
         self._handed: dict[Shared, dict[int, float]] = {}
         self._changed: tuple[int, ...] = ()
         self._begins_at_switch = False

@@ -7,12 +7,13 @@ from collections.abc import Callable
 
 from atwood.errors import AtwoodError, SolveError
 from atwood.forms.assembly import Assembly
+from atwood.integrators.methods import LEAST, Method
 from atwood.integrators.protocol import Budget, Status, StepResult
 from atwood.late import replace
 from atwood.simulation.events.sampling import remembering
-from atwood.simulation.problem.options import LEAST, RunOptions
+from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.made import Run
-from atwood.simulation.run.session import SolverRequest, open_implicit_session
+from atwood.simulation.run.session import SolverRequest, open_session
 
 __all__ = ["allowed", "raised_where_too_tight", "too_tight"]
 
@@ -49,7 +50,7 @@ def allowed(options: RunOptions) -> RunOptions:
 
 
 def too_tight(
-    request: SolverRequest, solver: str, failed: StepResult, opened: StepResult | None = None
+    request: SolverRequest, method: Method, failed: StepResult, opened: StepResult | None = None
 ) -> SolveError | None:
     """Return the error of a run that failed since its tolerance is below what rounding allows; None if it is not.
 
@@ -58,8 +59,8 @@ def too_tight(
 
     Parameters
     ----------
-    request, solver
-        What was to be solved, and by which kind of IDA.
+    request, method
+        What was to be solved, and by which implicit method.
     failed
         How it ended.
     opened
@@ -74,7 +75,7 @@ def too_tight(
     for factor in (10.0, 100.0, 1000.0):
         looser = replace(request, options=replace(options, relative_tolerance=factor * asked), budget=Budget(_TRIAL))
         try:
-            found = open_implicit_session(looser, solver, here.t, here.y, here.yp).advance(request.end)
+            found = open_session(looser, method, here.t, here.y, here.yp).advance(request.end)
         except AtwoodError:
             continue
         share = _FAR if found.status is Status.FAILED else _ENOUGH

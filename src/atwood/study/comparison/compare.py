@@ -14,6 +14,7 @@ from atwood.arguments import each, instance, takes, whole
 from atwood.errors import AtwoodError
 from atwood.forms.canonical import is_canonical
 from atwood.forms.dae import LEVELS
+from atwood.integrators.methods import EXPLICIT, GAUSS, METHODS
 from atwood.integrators.protocol import Statistics
 from atwood.late import replace
 from atwood.model.compose.composite import Model
@@ -22,7 +23,6 @@ from atwood.pipeline import assemble_flat
 from atwood.progress import told
 from atwood.result.result import Result
 from atwood.simulation.problem.arguments import FORM, FORMS, LEVEL, LIMITS, NAME, PROGRESS, RTOL, T_END, check_span
-from atwood.simulation.problem.options import SOLVERS
 from atwood.simulation.run.choice import implicit_solver
 from atwood.study.comparison.environment import environment
 from atwood.study.comparison.found import Comparison, ComparisonRow
@@ -120,7 +120,7 @@ def compare(
             results: list[Result | None] = []
             first = len(rows)
             for rtol in sorted(rtols, reverse=True):
-                row = ComparisonRow(form, level, SOLVERS[solver], rtol)
+                row = ComparisonRow(form, level, METHODS[solver].title, rtol)
                 watch(f"{row.label} at rtol {rtol:g}", len(rows) + 2, total)
                 row, result = _measure(assembled, row, solver, reference, limits)
                 rows.append(row)
@@ -178,14 +178,14 @@ def _kinds(assembled: Assembled, forms: Sequence[str], levels: Sequence[str]) ->
     if "reduced" in forms:
         yield "reduced", "", shared
         if assembly.reduced.coordinates:
-            yield "reduced", "", "explicit"
+            yield "reduced", "", EXPLICIT.key
         if is_canonical(assembly):
-            yield "reduced", "", "gauss"
+            yield "reduced", "", GAUSS.key
     if "dae" in forms:
         has_constraints = bool(assembly.maximal.constraints)
         yield from (("dae", level, shared) for level in (levels if has_constraints else levels[:1]))
         if has_constraints:  # levels say how constraints enter the residual, which explicit steps do not have
-            yield "dae", "", "explicit"
+            yield "dae", "", EXPLICIT.key
 
 
 def _measure(

@@ -15,6 +15,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.forms.canonical import is_canonical
+from atwood.integrators.methods import EXPLICIT, GAUSS, IDA, TAYLOR
 from atwood.late import dataclass, replace
 from atwood.model.compose.composite import Model
 from atwood.pipeline import assemble, simulate
@@ -36,12 +37,12 @@ _CONSERVED = 1e-9
 """Of the energy that is exchanged: with more work than this the energy is not conserved."""
 
 _METHODS = (
-    ("reduced", "gauss", 1e-8),
-    ("reduced", "taylor", 1e-8),
-    ("reduced", "taylor", 1e-15),
-    ("reduced", "explicit", 1e-8),
-    ("reduced", "ida", 1e-8),
-    ("dae", "ida", 1e-8),
+    ("reduced", GAUSS.key, 1e-8),
+    ("reduced", TAYLOR.key, 1e-8),
+    ("reduced", TAYLOR.key, 1e-15),
+    ("reduced", EXPLICIT.key, 1e-8),
+    ("reduced", IDA.key, 1e-8),
+    ("dae", IDA.key, 1e-8),
 )
 
 
@@ -233,7 +234,7 @@ def compare_long(
     windows = [np.linspace(max(0.0, mark - 1.0), mark, _WINDOW) for mark in marks]
     times = begin + length * np.unique(np.concatenate([[0.0], *windows]))
     monitor, rows = conserved(assembly), list[LongRow]()
-    methods = [one for one in _METHODS if one[1] != "gauss" or is_canonical(assembly)]
+    methods = [one for one in _METHODS if one[1] != GAUSS.key or is_canonical(assembly)]
     with told(progress, assembly.flat.name, lambda what, done, of: (done / of, what)) as called:
         for number_done, (form, solver, rtol) in enumerate(methods):
             row = LongRow(form, solver, rtol)

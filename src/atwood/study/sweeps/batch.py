@@ -17,13 +17,14 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.forms.sides.taken_out import has_sides
 from atwood.integrators.ensemble.batch import BatchPlaces
+from atwood.integrators.methods import AUTO, METHODS
 from atwood.late import dataclass
 from atwood.simulation.events.modes import find_event_functions
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.curved_laws import find_curved
 from atwood.study.sweeps.batch_values import ParameterRows, StartRows, read_starts
 from atwood.study.sweeps.modes import find_mode
-from atwood.study.sweeps.motions import METHODS, Way, find_way, open_places
+from atwood.study.sweeps.motions import Way, find_way, open_places
 from atwood.study.sweeps.readout import read_quantities, reads
 from atwood.study.sweeps.runs import Records, SweepRequest, shared_work
 from atwood.study.sweeps.sizes import absolute_tolerances, are_stiff, have_inertia, time_scales
@@ -39,7 +40,7 @@ _PIECE, _NUMBERS = 2_000, 2_000_000
 def why_not_batched(request: SweepRequest) -> str:
     """Return why a sweep's runs must be made one by one, in words; empty if they can be made many at a time."""
     assembly, options = request.assembly, request.options
-    if options.solver not in ("auto", *METHODS):
+    if options.solver != AUTO and METHODS[options.solver].batch is None:
         return f"the solver {options.solver!r} was asked for"
     varies = any(not axis.is_start for axis in request.cases.axes) or bool(assembly.mechanism.constants)
     if varies and find_curved(assembly):
@@ -127,7 +128,7 @@ class _Batches:
 
     def __init__(self, request: SweepRequest, records: Records, way: Way) -> None:
         self.request, self.records = request, records
-        self.motion, self.solver, self.values = way.motion, way.solver, way.values
+        self.motion, self.method, self.values = way.motion, way.method, way.values
         self.starts, self.rows = StartRows(request), ParameterRows(request)
         symbols = [one.symbol for one in request.assembly.reactions]
         self.needs_reactions = reads(request.assembly, request.paths, symbols)
@@ -150,14 +151,14 @@ class _Batches:
                 return 0
         counts = batch.counts
         good = (batch.codes == 0) & np.all(np.isfinite(batch.values), axis=(1, 2))
-        if options.solver == "auto":
+        if options.solver == AUTO:
             good &= counts[:, 4] == 0  # what has turned out stiff is made by itself, and may change its solver
         return self._record(ready, batch.values, counts[:, 0], good, batch.seconds)
 
     def _places(self) -> BatchPlaces:
         """Return where this thread's session is."""
         if not hasattr(self._own, "places"):
-            self._own.places = open_places(self.motion, self.solver, self.request.options, self.values)
+            self._own.places = open_places(self.motion, self.method, self.request.options, self.values)
         found: BatchPlaces = self._own.places
         return found
 

@@ -14,9 +14,10 @@ from atwood.expr import Program
 from atwood.forms.assembly import Assembly
 from atwood.forms.shared import decisions_of
 from atwood.forms.sides.taken_out import has_sides
-from atwood.integrators.dop853.native import CompiledAccelerations, OwnRates
-from atwood.integrators.explicit_problem import LOOSEST, CompiledEvents
-from atwood.integrators.explicit_session import ExplicitSession, open_explicit
+from atwood.integrators.embedded.native import CompiledAccelerations, OwnRates
+from atwood.integrators.explicit_problem import CompiledEvents
+from atwood.integrators.explicit_session import ExplicitSession
+from atwood.integrators.methods import Method, Task
 from atwood.integrators.protocol import Budget, SolverOptions, Statistics, Status, StepResult
 from atwood.late import dataclass, replace
 from atwood.mechanics.outputs.event_functions import EventFunction
@@ -26,7 +27,7 @@ from atwood.simulation.events.margins import without_margin
 from atwood.simulation.events.modes import MARGIN, EventProbe, EventRecord, margins_at_start
 from atwood.simulation.problem.explicit_scene import explicit_problem_of, own_rates
 from atwood.simulation.problem.preparation import make_plan
-from atwood.simulation.problem.step_guard import REACHES, step_guard
+from atwood.simulation.problem.step_guard import step_guard
 from atwood.simulation.run.choice import choose
 from atwood.study.sweeps.motions import OpenTree
 from atwood.study.sweeps.runs import SweepRequest
@@ -207,15 +208,15 @@ def find_mode(
     t, q, u, length = at
     try:
         plan = make_plan(assembly, t, q, u, length, options.t_end - base.flat.t_start)
-        chosen = choose(plan, options, t, q, u).solver
+        chosen = choose(plan, options, t, q, u).method
         probe = EventProbe(plan, t, q, u, options.relative_tolerance)
     except AtwoodError:
         return None, "the first run cannot start"
     functions = probe.event_functions
     if plan.relative_share < 1.0:
         return None, "bodies float far from the origin"
-    if chosen != "explicit":
-        return None, f"the solver is {chosen!r}, and events are watched"
+    if chosen.tableau is None:
+        return None, f"the solver is {chosen.key!r}, and events are watched"
     if any(one.target == COORDINATE_SWITCH for one in functions):
         return None, "its orientations change their coordinates on the way"
     names = [one.name for one in base.parameters]
@@ -226,7 +227,7 @@ def find_mode(
     found, data = own_rates(assembly), probe.compiled(for_ida=False)
     if found is None or (functions and data is None):
         return None, "it calls functions in Python"
-    session = _opened(assembly, found[1], functions, data, request, (t, np.concatenate([q, u])))
+    session = _opened(assembly, chosen, found[1], functions, data, request, (t, np.concatenate([q, u])))
     code = None if data is None else probe.code(for_ida=False)
     program = probe.program() if functions else None
     return SweepMode(OpenTree(assembly), functions, session, *found, code, data, program, columns), ""
@@ -234,6 +235,7 @@ def find_mode(
 
 def _opened(
     assembly: Assembly,
+    method: Method,
     rates: OwnRates,
     functions: tuple[EventFunction, ...],
     data: EventData | None,
@@ -246,11 +248,13 @@ def _opened(
     events = None if data is None else data.function()
     program = OpenTree(assembly).program
     problem = explicit_problem_of(assembly, program, assembly.parameter_values, events, directions)
-    guard = step_guard(assembly, (assembly.flat.t_start, options.t_end), REACHES["explicit"])
+    guard = step_guard(assembly, (assembly.flat.t_start, options.t_end), method.reach)
     problem = replace(problem, compiled=lambda: rates.rates, guard=guard)
     if data is not None:
         compiled = CompiledEvents(data.explicit, data.address, data.count, data.restart, data)
         problem = replace(problem, compiled_events=lambda: compiled)
-    relative = min(options.relative_tolerance, LOOSEST)
+    relative = min(options.relative_tolerance, method.loosest_tolerance)
     settings = SolverOptions(relative, 1.0, max_step=options.max_step, horizon=options.t_end - start[0])
-    return open_explicit(problem, settings, *start, end=options.t_end)
+    session = method.open(Task(settings, *start, end=options.t_end, explicit=problem))
+    assert isinstance(session, ExplicitSession)
+    return session

@@ -16,7 +16,7 @@ from atwood.errors import AtwoodError
 from atwood.forms.accelerations import AccelerationProgram, accelerations_of
 from atwood.forms.assembly import Assembly
 from atwood.integrators.ensemble.batch import BatchPlaces
-from atwood.integrators.explicit_problem import LOOSEST
+from atwood.integrators.methods import Method, Task
 from atwood.integrators.protocol import SolverOptions
 from atwood.late import dataclass, replace
 from atwood.simulation.dynamics.columns import masses_at
@@ -27,14 +27,12 @@ from atwood.simulation.problem.closed_loops_many import ManyBranches
 from atwood.simulation.problem.explicit_scene import compiled_rates, explicit_problem, explicit_problem_of
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.problem.preparation import make_plan
-from atwood.simulation.problem.step_guard import REACHES, step_guard
+from atwood.simulation.problem.step_guard import step_guard
+from atwood.simulation.problem.taylor_scene import taylor_problem
 from atwood.simulation.run.choice import choose
 from atwood.study.sweeps.runs import SweepRequest
 
-__all__ = ["METHODS", "ClosedLoops", "Motion", "OpenTree", "Way", "find_way", "open_places"]
-
-METHODS = ("explicit", "taylor")
-"""Methods with a session that many runs can be made with in one call."""
+__all__ = ["ClosedLoops", "Motion", "OpenTree", "Way", "find_way", "open_places"]
 
 
 class Motion(Protocol):
@@ -212,14 +210,14 @@ class Way:
     ----------
     motion
         What is integrated.
-    solver
-        The method, one of `METHODS`.
+    method
+        A method with which many runs can be made in one call.
     values
         Parameters of the first run.
     """
 
     motion: Motion
-    solver: str
+    method: Method
     values: FloatArray
 
 
@@ -230,14 +228,14 @@ def find_way(request: SweepRequest) -> tuple[Way | None, str]:
         start = find_start(assembly)
         q, u = start.coordinates, start.speeds
         plan = make_plan(assembly, start.time, q, u, start.length, options.t_end - start.time)
-        chosen = choose(plan, options, start.time, q, u).solver
+        chosen = choose(plan, options, start.time, q, u).method
     except AtwoodError:
         return None, "the first run cannot start"
     if plan.relative_share < 1.0:
         return None, "bodies float far from the origin"
-    if chosen not in METHODS:
+    if chosen.batch is None:
         is_closed = bool(plan.balance.constraints)
-        return None, "no formulas solve its closed loops" if is_closed else f"the solver is {chosen!r}"
+        return None, "no formulas solve its closed loops" if is_closed else f"the solver is {chosen.key!r}"
     motion: Motion = OpenTree(assembly)
     if plan.balance.constraints:
         solved = solve_at(plan, start.time, q, u)
@@ -254,41 +252,39 @@ def find_way(request: SweepRequest) -> tuple[Way | None, str]:
     return Way(motion, chosen, values), ""
 
 
-def open_places(motion: Motion, solver: str, options: RunOptions, values: FloatArray) -> BatchPlaces:
+def open_places(motion: Motion, method: Method, options: RunOptions, values: FloatArray) -> BatchPlaces:
     """Open a session of a method, for one thread, and return where a batch finds what it needs of it.
 
     Parameters
     ----------
     motion
         What is integrated.
-    solver
-        ``"explicit"`` or ``"taylor"``.
+    method
+        The method.
     options
         What was asked for.
     values
         Parameters of one run.
     """
     assembly = motion.assembly
-    relative = min(options.relative_tolerance, LOOSEST)
+    relative = min(options.relative_tolerance, method.loosest_tolerance)
     span = options.t_end - assembly.flat.t_start
     settings = SolverOptions(relative, 1.0, max_step=options.max_step, horizon=span)
     form = (motion.solved.form, values) if isinstance(motion, ClosedLoops) else None
-    guard = step_guard(assembly, (assembly.flat.t_start, options.t_end), REACHES[solver], form)
-    if solver == "taylor":
-        from atwood.integrators.taylor.native import CompiledStepper as CompiledSeries
-        from atwood.simulation.problem.taylor_scene import taylor_problem
-
-        series = taylor_problem(assembly, options.t_end, False, motion.program, values)
-        return CompiledSeries(series, settings, guard=guard).batch_places()
-    from atwood.integrators.dop853.native import CompiledStepper
-
-    code = compiled_rates(assembly, motion.program)
+    guard = step_guard(assembly, (assembly.flat.t_start, options.t_end), method.reach, form)
+    code, problem = compiled_rates(assembly, motion.program), explicit_problem_of(assembly, motion.program, values)
     own = code.open()
     code.fill(own, values)
-    problem = explicit_problem_of(assembly, motion.program, values)
-    problem = replace(problem, compiled=lambda: own.rates, guard=guard)
-    places = CompiledStepper(problem, settings).batch_places()
-    return replace(places, parameters=(own.prologue, own.derived, own.scratch))
+    task = Task(
+        settings,
+        assembly.flat.t_start,
+        values,
+        explicit=replace(problem, compiled=lambda: own.rates, guard=guard),
+        series=lambda: taylor_problem(assembly, options.t_end, False, motion.program, values),
+    )
+    assert method.batch is not None
+    places = method.batch(task)
+    return replace(places, parameters=(own.prologue, own.derived, own.scratch)) if method.tableau else places
 
 
 def _bound(assembly: Assembly, values: FloatArray | None) -> FloatArray:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.forms.assembly import Assembly
 from atwood.integrators.explicit_problem import LOOSEST
+from atwood.integrators.methods import AUTO
 from atwood.simulation.initialization.many import size_rows
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.stiffness import can_be_stiff, find_stiff_rows
@@ -119,7 +120,7 @@ def are_stiff(
         What was asked for.
     """
     assembly = motion.assembly
-    if not len(t) or options.solver != "auto" or not can_be_stiff(assembly):
+    if not len(t) or options.solver != AUTO or not can_be_stiff(assembly):
         return np.zeros(len(t), dtype=np.bool_)
     program = motion.program.program
     kernel = assembly.compiled(program, vectorized=True).bind(assembly.parameter_values if values is None else values.T)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
+from atwood.integrators.methods import AUTO
 from atwood.integrators.protocol import Budget, Status
 from atwood.late import dataclass
 from atwood.mechanics.outputs.event_functions import UPDATE, EventFunction
@@ -170,7 +171,7 @@ class _Piece:
             y, result, cost = mode.run(state.t, state.y, values, shift, absolute, budget, left, end)
         except AtwoodError:  # said by the run by itself
             return None
-        if mode.session.seems_stiff and request.options.solver == "auto":  # it may change its solver
+        if mode.session.seems_stiff and request.options.solver == AUTO:  # it may change its solver
             return None
         state.steps += cost.steps
         self.seconds += cost.seconds

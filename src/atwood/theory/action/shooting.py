@@ -8,7 +8,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, StartError, UnsupportedError
 from atwood.forms.assembly import Assembly
 from atwood.forms.program import rates_are_speeds
-from atwood.integrators.explicit_session import open_explicit
+from atwood.integrators.methods import EXPLICIT, Task
 from atwood.integrators.protocol import SolverOptions, Status
 from atwood.simulation.problem.explicit_scene import explicit_problem
 from atwood.simulation.problem.preparation import make_plan
@@ -76,7 +76,7 @@ class Shooter:
         self.sizes, self.time = plan.coordinate_sizes, plan.scales.time
         both = np.concatenate([self.sizes, self.sizes / self.time])
         options = SolverOptions(_RELATIVE, _ABSOLUTE * both, horizon=end - begin)
-        self._session = open_explicit(problem, options, begin, np.concatenate([place, still]), end=end)
+        self._session = EXPLICIT.open(Task(options, begin, np.concatenate([place, still]), end=end, explicit=problem))
 
     def at(self, velocity: FloatArray, times: FloatArray) -> FloatArray:
         """Return coordinates and velocities at times, a row each; nan from where there are none."""

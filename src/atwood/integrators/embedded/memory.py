@@ -1,4 +1,4 @@
-"""Memory of a session of the explicit method: what routines and Python agree on."""
+"""Memory of a session of an embedded pair: what routines and Python agree on."""
 
 from __future__ import annotations
 
@@ -6,24 +6,12 @@ from collections.abc import Mapping
 
 from atwood.codegen.routines.kinds import ADDRESS, CODE, INTEGER, NUMBER, Kind, Lanes
 from atwood.codegen.routines.language import Record, Routine, Value
+from atwood.integrators.embedded.tableau import Tableau
 
-__all__ = ["COUNTS", "LANES", "NUMBERS", "POINTERS", "ROWS", "Memory", "open_routine"]
+__all__ = ["COUNTS", "LANES", "NUMBERS", "POINTERS", "Memory", "open_routine"]
 
 LANES = 4
 """How many unknowns a loop works on at a time; rows are padded to a multiple of it with finite numbers."""
-
-ROWS = {
-    "slope": 0,
-    "end slope": 12,
-    "y": 16,
-    "y_old": 17,
-    "trial": 18,
-    "absolute": 19,
-    "dense": 20,
-    "last": 27,
-    "all": 28,
-}
-"""Rows of the table of arrays. `last` is the value at which the slope before that of the end was taken."""
 
 NUMBERS = ("t", "t_old", "h", "next", "stop", "relative", "longest", "horizon", "first", "looked", "likeness", "tried")
 COUNTS = (
@@ -67,8 +55,8 @@ POINTERS = (
 class Memory:
     """The memory of a session within a routine."""
 
-    def __init__(self, session: Value) -> None:
-        self.session = session
+    def __init__(self, session: Value, pair: Tableau) -> None:
+        self.session, self.pair = session, pair
         self.at = Record(session, dict.fromkeys(POINTERS, ADDRESS))
         self.numbers = Record(self.at.numbers, dict.fromkeys(NUMBERS, NUMBER))
         self.counts = Record(self.at.counts, dict.fromkeys(COUNTS, INTEGER))
@@ -77,7 +65,7 @@ class Memory:
 
     def row(self, row: int | str) -> Value:
         """Return the address of a row of the table of arrays."""
-        return self.arrays.at(self.padded * (ROWS[row] if isinstance(row, str) else row))
+        return self.arrays.at(self.padded * (self.pair.rows[row] if isinstance(row, str) else row))
 
     def lanes(self, row: Value, j: Value) -> Value:
         """Return the lanes of a row from an unknown on."""
@@ -85,8 +73,8 @@ class Memory:
 
 
 def open_routine(
-    name: str, more: Mapping[str, Kind] | None = None, result: Kind = CODE, exported: bool = False
+    pair: Tableau, name: str, more: Mapping[str, Kind] | None = None, result: Kind = CODE, exported: bool = False
 ) -> tuple[Routine, Memory, list[Value]]:
     """Return a new routine of a session, its memory, and its further arguments."""
     routine = Routine(name, {"session": ADDRESS, **(more or {})}, result, exported)
-    return routine, Memory(routine.arguments[0]), routine.arguments[1:]
+    return routine, Memory(routine.arguments[0], pair), routine.arguments[1:]

@@ -24,7 +24,7 @@ def rates_source(coordinates: int, speeds: int, given: bool, projects: bool = Fa
         Whether the program ``nearer`` takes a step onto the constraints.
     """
     files = ("integrators/explicit_problem.py",)
-    return RoutineSource("integrators.dop853.rates", files, (coordinates, speeds, given, projects))
+    return RoutineSource("integrators.embedded.rates", files, (coordinates, speeds, given, projects))
 
 
 def write_routines(coordinates: int, speeds: int, given: bool, projects: bool) -> list[Routine]:

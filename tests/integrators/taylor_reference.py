@@ -20,9 +20,9 @@ from atwood.integrators.event_location import State
 from atwood.integrators.explicit_problem import (
     Counts,
     Outcome,
+    Stepper,
     absolute_tolerances,
     no_interpolation,
-    sample_one_by_one,
 )
 from atwood.integrators.protocol import FloatArray, SolverOptions
 from atwood.integrators.taylor.problem import (
@@ -40,10 +40,8 @@ from atwood.integrators.taylor.problem import (
     share_of_radius,
 )
 
-__all__ = ["ReferenceStepper"]
 
-
-class ReferenceStepper:
+class ReferenceStepper(Stepper):
     """The state of a run; see `~atwood.integrators.explicit_problem.Stepper`.
 
     Parameters
@@ -130,10 +128,6 @@ class ReferenceStepper:
         if found is None or not np.isfinite(y).all():
             raise no_interpolation(t)
         return t, y, found[0]
-
-    def sample(self, times: FloatArray, steps: int) -> tuple[FloatArray, FloatArray, Outcome]:
-        """Take steps, and return values and rates at as many of the times, one row each, as were reached."""
-        return sample_one_by_one(self, times, steps)
 
     # -- one step -------------------------------------------------------------------------------------------------
 

@@ -1,27 +1,46 @@
-"""Steps of the explicit method of order 8(5,3), for any number of unknowns and any right-hand side.
+"""Steps of an embedded pair, for any number of unknowns and any right-hand side.
 
-The routines take the steps of `atwood.integrators.dop853.reference`.  All that they know of a problem comes in through
-addresses, so that they are compiled once and kept.
+E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Equations I, 2nd edition, Springer 1993: the
+choice of steps in section II.4, the error of two estimates in section II.10.  All that the routines know of a problem
+comes in through addresses, so that they are compiled once and kept.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from math import inf
+from math import inf, prod
 
 from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, INTEGER, NUMBER, Lanes
 from atwood.codegen.routines.language import Routine, Value
-from atwood.integrators.dop853.dense_output import END, slopes, weighted, write_dense_output
-from atwood.integrators.dop853.memory import LANES, Memory, open_routine
-from atwood.integrators.dop853.reference import APART, GROWTH, RETREAT, SAFETY, SHRINKAGE
-from atwood.integrators.dop853.tableau import ERROR_3, ERROR_5, STAGES
-from atwood.integrators.explicit_problem import CALM, EDGE, STIFF
+from atwood.integrators.embedded.dense_output import slopes, weighted, write_dense_output
+from atwood.integrators.embedded.memory import LANES, Memory, open_routine
+from atwood.integrators.embedded.tableau import Tableau
+from atwood.integrators.explicit_problem import CALM, STIFF
 from atwood.integrators.output_times import SAMPLE_ARGUMENTS, write_sample
 
-__all__ = ["write_routines"]
+__all__ = ["APART", "GROWTH", "RETREAT", "SAFETY", "SHRINKAGE", "write_routines"]
+
+SAFETY = 0.9
+GROWTH, SHRINKAGE = 6.0, 3.0
+"""A step is at most so many times longer or shorter than the one before."""
+
+APART = 0.01
+"""The square of the estimate of fifth order is not taken to be larger by its likeness than this times the third's.
+
+The error is the product of two embedded estimates. Each has its zeros along a motion: where that of fifth order comes
+near to one, a step that errs by ten tolerances looks good, above all with few unknowns and where steps are tried again
+until one looks good. But the ratio of both, which grows as the square of the step, changes slowly from step to step. So
+the estimate is taken to be no smaller than the ratio in the step before makes it.
+"""
+
+RETREAT = 0.25
+"""The share of a step that is tried where a step had no finite value."""
 
 _STRETCH = 1.5
 """The end of a step takes the place of a look that was wanted before, if that makes the way to it longer by no more."""
+
+_DIGITS = 8
+"""Binary digits to which the inverse of an order is known: roots are right to some percent."""
 
 _PATIENCE = 32
 """After so many steps without a look the motion is looked at, however little it has moved: perhaps what keeps steps
@@ -32,14 +51,14 @@ _REACHED, _USED_UP, _TOO_SMALL, _NO_VALUE, _NO_RATES, _NOTICED = range(6)
 and that is heeded, or in which something was seen by what watches the motion."""
 
 
-def _stage(stage: int) -> Routine:
+def _stage(pair: Tableau, stage: int) -> Routine:
     """Write the values at which a slope is taken, or the new values."""
-    r, m, (h,) = open_routine(f"stage{stage}", {"h": NUMBER})
-    base, trial, last = m.row("y_old" if stage > END else "y"), m.row("trial"), m.row("last")
+    r, m, (h,) = open_routine(pair, f"stage{stage}", {"h": NUMBER})
+    base, trial, last = m.row("y_old" if stage > pair.end else "y"), m.row("trial"), m.row("last")
     with r.count(m.padded, step=LANES) as j:
-        value = m.lanes(base, j) + weighted(m, STAGES[stage - 1], j) * h
+        value = m.lanes(base, j) + weighted(m, pair.stages[stage - 1], j) * h
         trial[j] = value
-        if stage == 11:
+        if stage == pair.end - 1:
             last[j] = value
     r.give(0)
     return r
@@ -89,14 +108,27 @@ def _distance(r: Routine, m: Memory, a: int | str, b: int | str) -> Value:
     return _sum(r, m, square)
 
 
-def _evaluate() -> Routine:
+def _evaluate(pair: Tableau) -> Routine:
     """Take a slope from a row to a row, and count it; what the right-hand side returned."""
-    r, m, (t, source, target) = open_routine("evaluate", {"t": NUMBER, "source": ADDRESS, "target": ADDRESS})
+    r, m, (t, source, target) = open_routine(pair, "evaluate", {"t": NUMBER, "source": ADDRESS, "target": ADDRESS})
     code = r.call(m.at.function, t, source, target, m.at.data)
     m.counts.evaluations = m.counts.evaluations + 1
     m.counts.undefined = m.counts.undefined + (code != 0).integer()
     r.give(code)
     return r
+
+
+def _root(r: Routine, a: Value, order: int) -> Value:
+    """Return the root of an order, by square roots: one for each binary digit of its inverse, eight at most."""
+    share, found = 1.0 / order, list[Value]()
+    for _ in range(_DIGITS):
+        a, share = r.sqrt(a), 2.0 * share
+        if share >= 1.0:
+            found.append(a)
+            share -= 1.0
+        if not share:
+            break
+    return prod(found[1:], start=found[0])
 
 
 def _first_step(r: Routine, m: Memory, t: Value) -> None:
@@ -107,42 +139,42 @@ def _first_step(r: Routine, m: Memory, t: Value) -> None:
     with r.when(given > 0.0):
         m.numbers.next = r.least(given, longest)
         r.give(_REACHED)
-    y, trial, end, probe = m.row("y"), m.row("trial"), m.row(END), m.row(1)
-    d0, d1 = _size(r, m, "y"), _size(r, m, END)
+    y, trial, end, probe = m.row("y"), m.row("trial"), m.row("end slope"), m.row(1)
+    d0, d1 = _size(r, m, "y"), _size(r, m, "end slope")
     usual = (d0 >= 1e-5) & (d1 >= 1e-5) & (d0 / d1 < inf)
     h0 = r.least(r.choose(usual, d0 * 0.01 / d1, 1e-6), bound)
     m.numbers.next = h0
     with r.count(m.padded, step=LANES) as j:
         trial[j] = m.lanes(y, j) + m.lanes(end, j) * h0
     code = r.call("evaluate", m.session, t + h0, trial, probe)
-    d2 = _size(r, m, 1, END) / h0
+    d2 = _size(r, m, 1, "end slope") / h0
     with r.when((code == 0) & (d2 < inf)):
         steepest = r.most(d2, d1)
-        root = r.sqrt(r.sqrt(r.sqrt(0.01 / steepest)))
+        root = _root(r, 0.01 / steepest, m.pair.order)
         h1 = r.choose(steepest <= 1e-15, r.most(h0 * 1e-3, 1e-6), root)
         m.numbers.next = r.least(r.least(h0 * 100.0, h1), bound)
 
 
-def _begin() -> Routine:
+def _begin(pair: Tableau) -> Routine:
     """Start anew from a state."""
-    r, m, (t, start) = open_routine("begin", {"t": NUMBER, "start": ADDRESS}, exported=True)
+    r, m, (t, start) = open_routine(pair, "begin", {"t": NUMBER, "start": ADDRESS}, exported=True)
     m.numbers.t, m.numbers.t_old, m.numbers.looked, m.numbers.likeness = t, t, t, 0.0
     m.counts.edgy, m.counts.calm, m.counts.looks = 0, 0, m.counts.steps
     r.copy(m.row("y"), start, m.size)
     r.copy(m.row("y_old"), start, m.size)
-    with r.when(r.call("evaluate", m.session, t, m.row("y"), m.row(END)) != 0):
+    with r.when(r.call("evaluate", m.session, t, m.row("y"), m.row("end slope")) != 0):
         r.give(_NO_RATES)
     _first_step(r, m, t)
     r.give(_REACHED)
     return r
 
 
-def _look() -> Routine:
+def _look(pair: Tableau) -> Routine:
     """Tell whether an event may have happened in the last step."""
-    r, m, (t,) = open_routine("look", {"t": NUMBER})
+    r, m, (t,) = open_routine(pair, "look", {"t": NUMBER})
     count, values, signs = m.counts.event_count, m.at.values, m.at.signs
     with r.when(count > 0):
-        code = r.call(m.at.events, t, m.row("y"), m.row(END), values, m.at.events_data)
+        code = r.call(m.at.events, t, m.row("y"), m.row("end slope"), values, m.at.events_data)
         with r.when(code != 0):
             r.give(1)
         with r.count(count) as i, r.when(~(values[i] * signs[i] > 0.0)):
@@ -151,20 +183,20 @@ def _look() -> Routine:
     return r
 
 
-def _watched() -> Routine:
+def _watched(pair: Tableau) -> Routine:
     """Look at the motion in the last step at the times that what watches it wants; 1 where something is seen.
 
     The end of a step is looked at instead where it is not much later: its state is there already.  It is looked at,
     too, after many steps that were not.  What is seen stays in `seen` until somebody asks; the looks that are then left
     in the step are taken when the steps go on.
     """
-    r, m, (t_new,) = open_routine("watched", {"t_new": NUMBER})
+    r, m, (t_new,) = open_routine(pair, "watched", {"t_new": NUMBER})
     watch, t, steps = m.at.watch, m.numbers.t_old, m.counts.steps
     with r.when(r.is_null(watch)):
         r.give(0)
     with r.when(~(t < t_new)):
         r.give(0)
-    y, end, trial, last = m.row("y"), m.row(END), m.row("trial"), m.row("last")
+    y, end, trial, last = m.row("y"), m.row("end slope"), m.row("trial"), m.row("last")
     with r.forever():
         due = m.at.due[0]
         is_within = due <= t_new
@@ -188,13 +220,13 @@ def _watched() -> Routine:
     return r
 
 
-def _held() -> Routine:
+def _held(pair: Tableau) -> Routine:
     """Take the values at the end of a step onto the constraints; 0, or another number where that fails.
 
     It comes before the last slope is taken, so that the next step begins with the slope of the state that is kept, and
     the dense output meets the constraints at both ends.
     """
-    r, m, (t,) = open_routine("held", {"t": NUMBER})
+    r, m, (t,) = open_routine(pair, "held", {"t": NUMBER})
     project = m.at.project
     with r.when(r.is_null(project)):
         r.give(0)
@@ -202,25 +234,29 @@ def _held() -> Routine:
     return r
 
 
-def _guarded() -> Routine:
+def _guarded(pair: Tableau) -> Routine:
     """Ask what judges steps about one that is good enough otherwise; 0 where it is good."""
-    r, m, (t, t_new) = open_routine("guarded", {"t": NUMBER, "t_new": NUMBER})
+    r, m, (t, t_new) = open_routine(pair, "guarded", {"t": NUMBER, "t_new": NUMBER})
     guard = m.at.guard
     with r.when(r.is_null(guard)):
         r.give(0)
-    ends = (t, m.row("y"), m.row(0), t_new, m.row("trial"), m.row(END))
+    ends = (t, m.row("y"), m.row(0), t_new, m.row("trial"), m.row("end slope"))
     r.give(r.call(guard, *ends, m.at.guard_data))
     return r
 
 
-def _error() -> Routine:
-    """Return the error of a step in units of what is allowed (Hairer, Norsett and Wanner, section II.10).
+def _error(pair: Tableau) -> Routine:
+    """Return the error of a step in units of what is allowed.
 
-    Where the estimate of fifth order comes near to one of its zeros, the ratio of both estimates in the step before
-    tells how large it is; that of this step is kept as `tried`.
+    Of two estimates it is made as in Hairer, Norsett and Wanner, section II.10. Where that of fifth order comes near to
+    one of its zeros, the ratio of both in the step before tells how large it is; that of this step is kept as `tried`.
     """
-    r, m, (h,) = open_routine("error", {"h": NUMBER}, result=NUMBER)
-    own, third = _squares(r, m, ERROR_5), _squares(r, m, ERROR_3)
+    r, m, (h,) = open_routine(pair, "error", {"h": NUMBER}, result=NUMBER)
+    own = _squares(r, m, pair.errors[0])
+    if len(pair.errors) == 1:
+        r.give(h * r.sqrt(own / m.size.number()))
+        return r
+    third = _squares(r, m, pair.errors[1])
     h4 = h * h * (h * h)
     before = third * r.least(h4 * m.numbers.likeness, APART)
     fifth, spread = r.choose(own < before, before, own), h4 * third
@@ -231,11 +267,11 @@ def _error() -> Routine:
     return r
 
 
-def _stability() -> Routine:
+def _stability(pair: Tableau) -> Routine:
     """Count steps at the edge of stability; 1 where the problem has just turned out stiff."""
-    r, m, (h,) = open_routine("stability", {"h": NUMBER})
-    turned, apart = _distance(r, m, END, 11), _distance(r, m, "trial", "last")
-    is_edgy = (h * r.sqrt(turned / apart) > EDGE) & (apart > 0.0)
+    r, m, (h,) = open_routine(pair, "stability", {"h": NUMBER})
+    turned, apart = _distance(r, m, "end slope", pair.end - 1), _distance(r, m, "trial", "last")
+    is_edgy = (h * r.sqrt(turned / apart) > pair.edge) & (apart > 0.0)
     edgy = r.choose(is_edgy, m.counts.edgy + 1, m.counts.edgy)
     calm = r.choose(is_edgy, 0, m.counts.calm + 1, INTEGER)
     found = is_edgy & (edgy == STIFF)
@@ -245,9 +281,9 @@ def _stability() -> Routine:
     return r
 
 
-def _attempt() -> Routine:
+def _attempt(pair: Tableau) -> Routine:
     """Try steps until one is good enough, and keep it; `_TOO_SMALL` where none is."""
-    r, m, () = open_routine("attempt")
+    r, m, () = open_routine(pair, "attempt")
     t, h, shortened = m.numbers.t, r.variable(m.numbers.next), r.variable(False, BOOLEAN)
     least, longest = r.size(t) * (10.0 * 2.0**-52), m.numbers.longest
     with r.forever() as attempts:
@@ -261,21 +297,28 @@ def _attempt() -> Routine:
             m.counts.failures = m.counts.failures + 1
             r.repeat(attempts)
 
-        slopes(r, m, range(1, END), t, step, retreat)
-        r.call(f"stage{END}", m.session, step)
+        slopes(r, m, range(1, pair.end), t, step, retreat)
+        r.call(f"stage{pair.end}", m.session, step)
+        t_new = t + step
+
+        def arrive() -> None:
+            with r.when(r.call("held", m.session, t_new) != 0):
+                retreat()
+            with r.when(r.call("evaluate", m.session, t_new, m.row("trial"), m.row("end slope")) != 0):
+                retreat()
+
+        if pair.judges_end:
+            arrive()
         error = r.call("error", m.session, step, result=NUMBER)
-        factor = r.sqrt(r.sqrt(r.sqrt(error))) / SAFETY
+        factor = _root(r, error, pair.order) / SAFETY
         with r.when(~(error <= 1.0)):
             with r.when(~(error < inf)):
                 retreat()
             h.now, shortened.now = step * (1.0 / r.least(factor, SHRINKAGE)), True
             m.counts.failures = m.counts.failures + 1
             r.repeat(attempts)
-        t_new = t + step
-        with r.when(r.call("held", m.session, t_new) != 0):
-            retreat()
-        with r.when(r.call("evaluate", m.session, t_new, m.row("trial"), m.row(END)) != 0):
-            retreat()
+        if not pair.judges_end:
+            arrive()
         with r.when(r.call("guarded", m.session, t, t_new) != 0):
             retreat()
         within = r.least(r.choose(factor < 1.0 / GROWTH, 1.0 / GROWTH, factor), SHRINKAGE)
@@ -288,9 +331,9 @@ def _attempt() -> Routine:
     return r
 
 
-def _run() -> Routine:
+def _run(pair: Tableau) -> Routine:
     """Take steps until one ends at or after the time to stop at."""
-    r, m, () = open_routine("run", exported=True)
+    r, m, () = open_routine(pair, "run", exported=True)
     with r.forever():
         t = m.numbers.t
         with r.when(t >= m.numbers.stop):
@@ -299,7 +342,7 @@ def _run() -> Routine:
             r.give(_USED_UP)
         with r.when(r.call("watched", m.session, t) != 0):
             r.give(_NOTICED)
-        begin, end = m.row(0), m.row(END)
+        begin, end = m.row(0), m.row("end slope")
         r.copy(begin, end, m.padded)
         m.counts.is_dense = 0
         with r.when(r.call("attempt", m.session) != 0):
@@ -316,18 +359,19 @@ def _run() -> Routine:
     return r
 
 
-def _sample() -> Routine:
+def _sample(pair: Tableau) -> Routine:
     """Go through output times and fill a table; it ends as `run` does."""
-    r, m, _ = open_routine("sample", SAMPLE_ARGUMENTS, exported=True)
+    r, m, _ = open_routine(pair, "sample", SAMPLE_ARGUMENTS, exported=True)
     return write_sample(r, m.numbers, m.counts, m.size)
 
 
-def write_routines() -> list[Routine]:
-    """Return the routines of the method.
+def write_routines(pair: Tableau) -> list[Routine]:
+    """Return the routines of a pair.
 
     They take a pointer to the pointers of a session; numbers and counts are behind two of these
-    (`atwood.integrators.dop853.memory`).
+    (`atwood.integrators.embedded.memory`).
     """
-    ends = [_begin(), _run(), _sample()]
-    inner = [_evaluate(), _attempt(), _error(), _stability(), _held(), _guarded(), _look(), _watched()]
-    return [*ends, *inner, *map(_stage, range(1, 16)), *write_dense_output()]
+    ends = (_begin, _run, _sample)
+    inner = (_evaluate, _attempt, _error, _stability, _held, _guarded, _look, _watched)
+    stages = [_stage(pair, stage) for stage in range(1, len(pair.nodes))]
+    return [*(write(pair) for write in (*ends, *inner)), *stages, *write_dense_output(pair)]

@@ -1,4 +1,4 @@
-"""Slopes within a step of the method of order 8(5,3), and its dense output.
+"""Slopes within a step of an embedded pair, and its dense output.
 
 Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, section II.6.
 """
@@ -9,18 +9,15 @@ from collections.abc import Callable, Iterable, Mapping
 
 from atwood.codegen.routines.kinds import ADDRESS, CODE, NUMBER
 from atwood.codegen.routines.language import Routine, Value
-from atwood.integrators.dop853.memory import LANES, Memory, open_routine
-from atwood.integrators.dop853.tableau import DENSE, NODES
+from atwood.integrators.embedded.memory import LANES, Memory, open_routine
+from atwood.integrators.embedded.tableau import Tableau
 
-__all__ = ["END", "slopes", "weighted", "write_dense_output"]
-
-END = 12
-"""The slope at the end of a step, with which the next one begins."""
+__all__ = ["slopes", "weighted", "write_dense_output"]
 
 
-def write_dense_output() -> list[Routine]:
+def write_dense_output(pair: Tableau) -> list[Routine]:
     """Write the routines that read a solution within the last step."""
-    return [_interpolate(), _densify(), _polynomial(), _slope()]
+    return [_interpolate(pair), _densify(pair), _polynomial(pair), _slope(pair)]
 
 
 def weighted(m: Memory, weights: Mapping[int, float], j: Value) -> Value:
@@ -36,24 +33,24 @@ def slopes(r: Routine, m: Memory, stages: Iterable[int], t: Value, h: Value, fai
     """Take the slopes of stages one after the other."""
     for stage in stages:
         r.call(f"stage{stage}", m.session, h)
-        code = r.call("evaluate", m.session, t + h * NODES[stage], m.row("trial"), m.row(stage))
+        code = r.call("evaluate", m.session, t + h * m.pair.nodes[stage], m.row("trial"), m.row(stage))
         with r.when(code != 0):
             failed()
 
 
-def _densify() -> Routine:
+def _densify(pair: Tableau) -> Routine:
     """Make the dense output of the last step, unless it is there; 1 where there is none."""
-    r, m, () = open_routine("densify")
+    r, m, () = open_routine(pair, "densify")
     with r.when(m.counts.is_dense != 0):
         r.give(0)
     h, dense = m.numbers.h, m.row("dense")
-    slopes(r, m, (13, 14, 15), m.numbers.t_old, h, lambda: r.give(1))
-    y, y_old, begin, end = m.row("y"), m.row("y_old"), m.row(0), m.row(END)
+    slopes(r, m, range(pair.end + 1, len(pair.nodes)), m.numbers.t_old, h, lambda: r.give(1))
+    y, y_old, begin, end = m.row("y"), m.row("y_old"), m.row(0), m.row("end slope")
     with r.count(m.padded, step=LANES) as j:
         step = m.lanes(y, j) - m.lanes(y_old, j)
         rise, fall = m.lanes(begin, j) * h, m.lanes(end, j) * h
         rows = [step, rise - step, (step + step) - (rise + fall)]
-        rows += [weighted(m, weights, j) * h for weights in DENSE]
+        rows += [weighted(m, weights, j) * h for weights in pair.dense]
         for number, row in enumerate(rows):
             dense[j + m.padded * number] = row
     m.counts.is_dense = 1
@@ -61,26 +58,26 @@ def _densify() -> Routine:
     return r
 
 
-def _polynomial() -> Routine:
+def _polynomial(pair: Tableau) -> Routine:
     """Write the dense output at a share of the last step to `trial`."""
-    r, m, (x,) = open_routine("polynomial", {"x": NUMBER})
-    rows = [m.row("dense").at(m.padded * k) for k in range(7)]
+    r, m, (x,) = open_routine(pair, "polynomial", {"x": NUMBER})
+    rows = [m.row("dense").at(m.padded * k) for k in range(pair.terms)]
     below, trial, rest = [m.row("y_old"), *rows[:-1]], m.row("trial"), 1.0 - x
     with r.count(m.padded, step=LANES) as j:
         value = m.lanes(rows[-1], j)
-        for power, row in enumerate(reversed(below)):
-            value = value * (rest if power % 2 else x) + m.lanes(row, j)
+        for power in reversed(range(pair.terms)):
+            value = value * (rest if power % 2 else x) + m.lanes(below[power], j)
         trial[j] = value
     r.give(0)
     return r
 
 
-def _slope() -> Routine:
+def _slope(pair: Tableau) -> Routine:
     """Write the slope of the cubic through both ends of the last step, at a share of it, to `last`."""
-    r, m, (x,) = open_routine("slope", {"x": NUMBER})
+    r, m, (x,) = open_routine(pair, "slope", {"x": NUMBER})
     rest = 1.0 - x
     both, begin, end = x * rest * 6.0 / m.numbers.h, rest * (1.0 - x * 3.0), x * (x * 3.0 - 2.0)
-    y, y_old, first, second, last = m.row("y"), m.row("y_old"), m.row(0), m.row(END), m.row("last")
+    y, y_old, first, second, last = m.row("y"), m.row("y_old"), m.row(0), m.row("end slope"), m.row("last")
     with r.count(m.padded, step=LANES) as j:
         step = m.lanes(y, j) - m.lanes(y_old, j)
         last[j] = step * both + m.lanes(first, j) * begin + m.lanes(second, j) * end
@@ -88,13 +85,13 @@ def _slope() -> Routine:
     return r
 
 
-def _interpolate() -> Routine:
+def _interpolate(pair: Tableau) -> Routine:
     """Write values and rates at a time within the last step."""
     arguments = {"time": NUMBER, "y_out": ADDRESS, "yp_out": ADDRESS}
-    r, m, (time, y_out, yp_out) = open_routine("interpolate", arguments, exported=True)
+    r, m, (time, y_out, yp_out) = open_routine(pair, "interpolate", arguments, exported=True)
     with r.when(time == m.numbers.t):
         r.copy(y_out, m.row("y"), m.size)
-        r.copy(yp_out, m.row(END), m.size)
+        r.copy(yp_out, m.row("end slope"), m.size)
         r.give(0)
     with r.when(r.call("densify", m.session) != 0):
         r.give(3)

@@ -1,4 +1,4 @@
-"""Dormand and Prince's explicit method of order 8(5,3), in Python and NumPy: the reference for the compiled one.
+"""Embedded pairs in Python and NumPy: the reference for the compiled ones.
 
 E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Equations I, 2nd edition, Springer 1993: the
 method and its error estimate in section II.10, the dense output of order 7 in sections II.6 and II.10, the choice of
@@ -7,55 +7,79 @@ steps in section II.4.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from math import inf, isfinite, sqrt
 
 import numpy as np
 
 from atwood.errors import KernelEvaluationError
-from atwood.integrators.dop853.tableau import DENSE, ERROR_3, ERROR_5, NODES, STAGES
+from atwood.integrators.embedded.steps import APART, GROWTH, RETREAT, SAFETY, SHRINKAGE
+from atwood.integrators.embedded.tableau import Tableau
 from atwood.integrators.event_location import ROUNDING, State
 from atwood.integrators.explicit_problem import (
     CALM,
-    EDGE,
     STIFF,
     Counts,
     ExplicitProblem,
     Outcome,
+    Stepper,
     absolute_tolerances,
-    first_step,
     no_interpolation,
-    sample_one_by_one,
 )
 from atwood.integrators.protocol import FloatArray, SolverOptions
 
-__all__ = ["APART", "GROWTH", "ORDER", "RETREAT", "SAFETY", "SHRINKAGE", "ReferenceStepper", "estimate"]
 
-ORDER = 8
-SAFETY = 0.9
-GROWTH, SHRINKAGE = 6.0, 3.0
-"""A step is at most so many times longer or shorter than the one before."""
+def matrix(rows: Sequence[Mapping[int, float]], width: int) -> FloatArray:
+    """Return rows of weights as a matrix."""
+    found = np.zeros((len(rows), width))
+    for row, weights in zip(found, rows, strict=True):
+        row[list(weights)] = list(weights.values())
+    return found
 
-APART = 0.01
-"""The square of the estimate of fifth order is not taken to be larger by its likeness than this times the third's.
 
-The error is the product of two embedded estimates. Each has its zeros along a motion: where that of fifth order comes
-near to one, a step that errs by ten tolerances looks good, above all with few unknowns and where steps are tried again
-until one looks good. But the ratio of both, which grows as the square of the step, changes slowly from step to step. So
-the estimate is taken to be no smaller than the ratio in the step before makes it.
-"""
+def first_step(
+    rates: Callable[[float, FloatArray], FloatArray],
+    options: SolverOptions,
+    absolute: FloatArray,
+    t: float,
+    y: FloatArray,
+    yp: FloatArray,
+    order: int,
+) -> float:
+    """Return a first step from the size of the first two derivatives.
 
-RETREAT = 0.25
-"""The share of a step that is tried where a step had no finite value."""
+    Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, section II.4.
 
-_WEIGHTS = np.zeros((16, 16))
-for _row, _weights in enumerate(STAGES, 1):
-    _WEIGHTS[_row, list(_weights)] = list(_weights.values())
-_LAST = np.zeros((4, 16))
-for _row, _weights in enumerate(DENSE):
-    _LAST[_row, list(_weights)] = list(_weights.values())
-_ERRORS = np.zeros((2, 12))
-for _row, _weights in enumerate((ERROR_5, ERROR_3)):
-    _ERRORS[_row, list(_weights)] = list(_weights.values())
+    Parameters
+    ----------
+    rates
+        The right-hand side.
+    options, absolute
+        The accuracy that is asked for.
+    t, y, yp
+        The start.
+    order
+        The order of the method.
+    """
+    longest = min(options.horizon, options.max_step or np.inf)
+    if options.first_step is not None:
+        return min(options.first_step, options.max_step or np.inf)
+    weights = 1.0 / (absolute + options.relative_tolerance * np.abs(y))
+
+    def size(values: FloatArray) -> float:
+        scaled = values * weights
+        return sqrt(float(scaled.dot(scaled)) / len(scaled))
+
+    with np.errstate(all="ignore"):
+        d0, d1 = size(y), size(yp)
+        h0 = 1e-6 if not (d0 >= 1e-5 and d1 >= 1e-5 and np.isfinite(d0 / d1)) else 0.01 * d0 / d1
+        h0 = min(h0, longest)
+        d2 = size(rates(t + h0, y + h0 * yp) - yp) / h0
+    if not np.isfinite(d2):
+        return h0
+    steepest = max(d1, d2)
+    h1 = max(1e-6, 1e-3 * h0) if steepest <= 1e-15 else float((0.01 / steepest) ** (1.0 / order))
+    return min(100.0 * h0, h1, longest)
 
 
 def estimate(h: float, fifth: float, third: float, size: int) -> float:
@@ -74,8 +98,8 @@ def estimate(h: float, fifth: float, third: float, size: int) -> float:
     return h * fifth / sqrt(both * size) if both > 0.0 else (0.0 if both == 0.0 else both)
 
 
-class ReferenceStepper:
-    """The state of a run; see `~atwood.integrators.explicit_problem.Stepper`.
+class ReferenceStepper(Stepper):
+    """The state of a run; see `atwood.integrators.explicit_problem.Stepper`.
 
     Parameters
     ----------
@@ -83,15 +107,21 @@ class ReferenceStepper:
         The equations.
     options
         The accuracy.
+    pair
+        The method.
     """
 
-    def __init__(self, problem: ExplicitProblem, options: SolverOptions) -> None:
+    def __init__(self, problem: ExplicitProblem, options: SolverOptions, pair: Tableau) -> None:
+        stages = len(pair.nodes)
+        self._pair, self._end = pair, pair.end
+        self._weights, self._dense = matrix(({}, *pair.stages), stages), matrix(pair.dense, stages)
+        self._errors = matrix(pair.errors, pair.end + 1)
         self._rates, self._size, self._options = problem.rates, problem.size, options
         self._project, self._guard = problem.project, problem.guard
         self._absolute = absolute_tolerances(options, problem.size)
         self._longest = options.max_step or inf
         self._counts = Counts()
-        self._slopes = np.zeros((16, problem.size))
+        self._slopes = np.zeros((stages, problem.size))
         self._t = self._t_old = self._h = self._next = 0.0
         self._y = self._y_old = np.zeros(problem.size)
         self._polynomial: FloatArray | None = None
@@ -119,15 +149,15 @@ class ReferenceStepper:
         self._h = self._likeness = 0.0
         self._y = self._y_old = y.copy()
         slope = self._slope(t, self._y)
-        self._slopes[12] = slope
+        self._slopes[self._end] = slope
         if not np.isfinite(slope).all():
             return False
-        self._next = first_step(self._slope, self._options, self._absolute, t, self._y, slope, ORDER)
+        self._next = first_step(self._slope, self._options, self._absolute, t, self._y, slope, self._pair.order)
         return True
 
     def state(self) -> State:
         """Return time, values and rates at the end of the last step."""
-        return self._t, self._y.copy(), self._slopes[12].copy()
+        return self._t, self._y.copy(), self._slopes[self._end].copy()
 
     def run(self, t_stop: float, steps: int) -> Outcome:
         """Take steps until one ends at or after a time, but no more than so many."""
@@ -152,17 +182,13 @@ class ReferenceStepper:
                 self._polynomial = self._interpolant()
             x = (t - self._t_old) / self._h
             y = np.zeros(self._size)
-            for power, row in enumerate(self._polynomial[::-1]):
-                y = (y + row) * (x if power % 2 == 0 else 1.0 - x)
+            for power in reversed(range(len(self._polynomial))):
+                y = (y + self._polynomial[power]) * (1.0 - x if power % 2 else x)
             y += self._y_old
             slope = self._slope(t, y)
         if not (np.isfinite(y).all() and np.isfinite(slope).all()):
             raise no_interpolation(t)
         return t, y, slope
-
-    def sample(self, times: FloatArray, steps: int) -> tuple[FloatArray, FloatArray, Outcome]:
-        """Take steps, and return values and rates at as many of the times, one row each, as were reached."""
-        return sample_one_by_one(self, times, steps)
 
     def _slope(self, t: float, y: FloatArray) -> FloatArray:
         self._counts.evaluations += 1
@@ -176,28 +202,28 @@ class ReferenceStepper:
 
     def _step(self) -> bool:
         """Take one step that is good enough; return False if no step that moves the time is."""
-        k, t, y = self._slopes, self._t, self._y
-        k[0] = k[12]
+        k, t, y, end = self._slopes, self._t, self._y, self._end
+        k[0] = k[end]
         self._polynomial = None
         h, rejected = self._next, False
         while True:
             h = min(h, self._longest)
             if not 0.1 * h > ROUNDING * abs(t) or h < 1e-300:
-                k[12] = k[0]
+                k[end] = k[0]
                 return False
             error, new = self._attempt(h)
             if error <= 1.0:
-                new = self._held(t + h, new)
-                slope = self._slope(t + h, new)
+                new = new if self._pair.judges_end else self._held(t + h, new)
+                slope = k[end].copy() if self._pair.judges_end else self._slope(t + h, new)
                 if np.isfinite(slope).all() and self._passes(t + h, new, slope):
                     break
                 error = np.nan
-            h *= 1.0 / min(SHRINKAGE, _root(error) / SAFETY) if isfinite(error) else RETREAT
+            h *= 1.0 / min(SHRINKAGE, self._root(error) / SAFETY) if isfinite(error) else RETREAT
             rejected = True
             self._counts.failures += 1
-        k[12], self._likeness = slope, self._tried
+        k[end], self._likeness = slope, self._tried
         self._watch_stability(h, new)
-        following = h / min(max(_root(error) / SAFETY, 1.0 / GROWTH), SHRINKAGE)
+        following = h / min(max(self._root(error) / SAFETY, 1.0 / GROWTH), SHRINKAGE)
         self._next = min(h, following) if rejected else following
         self._t_old, self._t, self._h = t, t + h, h
         self._y_old, self._y = y, new
@@ -219,24 +245,31 @@ class ReferenceStepper:
 
     def _attempt(self, h: float) -> tuple[float, FloatArray]:
         """Try a step; return its error in units of what is allowed, nan where it has no value, and the new values."""
-        k, t, y = self._slopes, self._t, self._y
-        for stage in range(1, 12):
-            self._last = y + h * (_WEIGHTS[stage, :stage] @ k[:stage])
-            k[stage] = self._slope(t + NODES[stage] * h, self._last)
+        k, t, y, end = self._slopes, self._t, self._y, self._end
+        for stage in range(1, end):
+            self._last = y + h * (self._weights[stage, :stage] @ k[:stage])
+            k[stage] = self._slope(t + self._pair.nodes[stage] * h, self._last)
             if not np.isfinite(k[stage]).all():
                 return np.nan, y
-        new = y + h * (_WEIGHTS[12, :12] @ k[:12])
+        new = y + h * (self._weights[end, :end] @ k[:end])
+        if self._pair.judges_end:
+            new = self._held(t + h, new)
+            k[end] = self._slope(t + h, new)
         scale = self._absolute + self._options.relative_tolerance * np.maximum(np.abs(y), np.abs(new))
-        fifth, third = np.sum((_ERRORS @ k[:12] / scale) ** 2, axis=1)
+        slopes = k[: end + 1] if self._pair.judges_end else np.vstack([k[:end], np.zeros_like(y)])
+        squares = np.sum((self._errors @ slopes / scale) ** 2, axis=1)
+        if len(squares) == 1:
+            return h * sqrt(float(squares[0]) / self._size), new
+        fifth, third = squares
         likely = max(fifth, third * min(h**4 * self._likeness, APART))
         self._tried = fifth / (third * h**4) if third * h**4 > 0.0 else 0.0
         return estimate(h, float(likely), float(third), self._size), new
 
     def _watch_stability(self, h: float, new: FloatArray) -> None:
         """Estimate the fastest decay from two slopes at the end of a step, and count steps at the edge of stability."""
-        slopes, values = self._slopes[12] - self._slopes[11], new - self._last
+        slopes, values = self._slopes[self._end] - self._slopes[self._end - 1], new - self._last
         apart = float(values.dot(values))
-        if apart > 0.0 and h * sqrt(float(slopes.dot(slopes)) / apart) > EDGE:
+        if apart > 0.0 and h * sqrt(float(slopes.dot(slopes)) / apart) > self._pair.edge:
             self._edgy, self._calm = self._edgy + 1, 0
             if self._edgy == STIFF:
                 self._counts.stiff += 1
@@ -248,15 +281,15 @@ class ReferenceStepper:
 
     def _interpolant(self) -> FloatArray:
         """Return the coefficients of the dense output of the last step."""
-        k, h = self._slopes, self._h
-        for stage in range(13, 16):
-            y = self._y_old + h * (_WEIGHTS[stage, :stage] @ k[:stage])
-            k[stage] = self._slope(self._t_old + NODES[stage] * h, y)
+        k, h, end = self._slopes, self._h, self._end
+        for stage in range(end + 1, len(k)):
+            y = self._y_old + h * (self._weights[stage, :stage] @ k[:stage])
+            k[stage] = self._slope(self._t_old + self._pair.nodes[stage] * h, y)
         step = self._y - self._y_old
-        first = np.array([step, h * k[0] - step, 2.0 * step - h * (k[0] + k[12])])
-        return np.concatenate([first, h * (_LAST @ k)])
+        first = np.array([step, h * k[0] - step, 2.0 * step - h * (k[0] + k[end])])
+        return np.concatenate([first, h * (self._dense @ k)])
 
-
-def _root(error: float) -> float:
-    """Return the eighth root."""
-    return sqrt(sqrt(sqrt(error)))
+    def _root(self, error: float) -> float:
+        """Return the root of the method's order, whose inverse the compiled steps know to eight binary digits."""
+        share = int(256 / self._pair.order) / 256
+        return float(error**share)

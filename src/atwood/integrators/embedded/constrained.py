@@ -13,7 +13,7 @@ from atwood.codegen.llvm.build import build_code, default_options
 from atwood.codegen.llvm.module import Part
 from atwood.errors import UnsupportedError
 from atwood.expr.core.program import Program
-from atwood.integrators.dop853.rates import rates_source
+from atwood.integrators.embedded.rates import rates_source
 from atwood.integrators.explicit_problem import CompiledRates
 
 __all__ = ["CompiledConstraints"]

@@ -1,43 +1,42 @@
-"""The explicit method of order 8(5,3) as machine code: no Python runs between outputs.
+"""Embedded pairs as machine code: no Python runs between outputs.
 
-The code of the steps is the same for all problems and comes from the cache after the first time.  What a problem adds
-is the compiled right-hand side, which is made here from a program of accelerations.
+The code of the steps is the same for all problems of a pair and comes from the cache after the first time.  What a
+problem adds is the compiled right-hand side, which is made here from a program of accelerations.
 """
 
 from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from ctypes import c_double, c_int, c_int64, c_void_p
+from ctypes import c_double, c_int, c_void_p
 from functools import cache
 from itertools import accumulate
 from math import inf
-from typing import TYPE_CHECKING
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from atwood.codegen.llvm.build import Built, build_code, default_options
-from atwood.codegen.llvm.module import CodeOptions, Part
+from atwood.codegen.llvm.build import build_code, default_options
+from atwood.codegen.llvm.module import Part
 from atwood.codegen.once import once
 from atwood.codegen.routines.source import RoutineSource
 from atwood.errors import KernelEvaluationError, UnsupportedError, UsageError
 from atwood.expr import Program
 from atwood.integrators.compiled_functions import Lookout
-from atwood.integrators.dop853.memory import COUNTS, LANES, NUMBERS, POINTERS, ROWS
-from atwood.integrators.dop853.rates import rates_source
-from atwood.integrators.event_location import State
+from atwood.integrators.embedded.memory import COUNTS, LANES, NUMBERS, POINTERS
+from atwood.integrators.embedded.rates import rates_source
+from atwood.integrators.embedded.tableau import Tableau
 from atwood.integrators.explicit_problem import (
     CompiledEvents,
     CompiledRates,
-    Counts,
     ExplicitProblem,
-    Outcome,
     absolute_tolerances,
-    no_interpolation,
 )
+from atwood.integrators.native_stepper import COUNTED, NativeStepper, Routines, routines_of
 from atwood.integrators.protocol import FloatArray, SolverOptions
-from atwood.late import dataclass, names_of
+from atwood.late import dataclass
 
 if TYPE_CHECKING:
     from atwood.integrators.ensemble.batch import BatchPlaces
@@ -45,8 +44,8 @@ if TYPE_CHECKING:
 __all__ = ["CompiledAccelerations", "CompiledStepper", "OwnRates"]
 
 _RATES = ctypes.CFUNCTYPE(c_int, c_double, c_void_p, c_void_p, c_void_p)
-_UNLIMITED = 2**62
-_NO_VALUE = 3
+_PROJECTION = ctypes.CFUNCTYPE(c_int, c_double, c_void_p, c_void_p)
+_GUARDS = ctypes.CFUNCTYPE(c_int, *[c_double, c_void_p, c_void_p] * 2, c_void_p)
 
 
 class CompiledAccelerations:
@@ -133,27 +132,34 @@ class OwnRates:
     scratch: int
 
 
-class CompiledStepper:
-    """The state of a run; see `~atwood.integrators.explicit_problem.Stepper`.
+class CompiledStepper(NativeStepper):
+    """The state of a run with an embedded pair.
 
     Parameters
     ----------
     problem
-        The equations.  Where it has no compiled rates, the steps call Python for each of its rates.
+        The equations.  Where these have no compiled functions, the steps call those in Python.
     options
         The accuracy.
+    pair
+        The method.
     """
 
-    def __init__(self, problem: ExplicitProblem, options: SolverOptions) -> None:
-        self._size, self._options = problem.size, options
+    _number = MappingProxyType({name: place for place, name in enumerate(NUMBERS)})
+    _count = MappingProxyType({name: place for place, name in enumerate(COUNTS)})
+
+    def __init__(self, problem: ExplicitProblem, options: SolverOptions, pair: Tableau) -> None:
+        self._size, self._options, self._pair, self._rows = problem.size, options, pair, pair.rows
         self._failure: BaseException | None = None
+        self._functions: list[object] = []
         self.interrupted = False
-        self._calls_python = problem.compiled is None
         self._restart: Callable[[float], None] | None = None
+        guard = problem.guard
+        self._calls_python = problem.compiled is None or (guard is not None and not guard.function)
         rates = self._in_python(problem) if problem.compiled is None else problem.compiled()
         self._keep = rates.keep
         n, absolute = problem.size, absolute_tolerances(options, problem.size)
-        padded, ends = _layout(n)
+        padded, ends = _layout(n, self._rows["all"])
         # All memory is one piece, since looking up an address takes longer than a step.
         self._memory = memory = np.zeros(ends[-1])
         base = memory.ctypes.data
@@ -161,53 +167,46 @@ class CompiledStepper:
         self._numbers = memory[ends[0] : ends[1]]
         whole = memory.view(np.int64)
         self._counts, self._pointers = whole[ends[1] : ends[2]], whole[ends[2] : ends[3]]
-        self._y, self._yp = memory[ends[3] : ends[4]], memory[ends[4] :]
-        arrays[ROWS["absolute"]] = 1.0
-        arrays[ROWS["absolute"], :n] = absolute
+        self._values = memory[ends[3] :].reshape(2, n)
+        self._ends = arrays[self._rows["y"], :n], arrays[self._rows["end slope"], :n]
+        arrays[self._rows["absolute"]] = 1.0
+        arrays[self._rows["absolute"], :n] = absolute
         self._counts[:2] = n, padded
         longest = options.max_step or inf
         # From the relative tolerance on, numbers are those of the options.
         self._numbers[_R : _FIRST + 1] = options.relative_tolerance, longest, options.horizon, options.first_step or 0.0
         self._pointers[:5] = rates.function, rates.data, base + 8 * ends[0], base + 8 * ends[1], base
         self._pointers[_PROJECT : _PROJECT + 2] = rates.project, rates.project_data
-        if problem.guard is not None:
-            self._keep = (self._keep, problem.guard)
-            self._pointers[_GUARD : _GUARD + 2] = problem.guard.function, problem.guard.data
+        if guard is not None:
+            function = guard.function or self._called(_GUARDS, guard.passes, (1, 2, 4, 5))
+            self._keep = (self._keep, guard)
+            self._pointers[_GUARD : _GUARD + 2] = function, guard.data
         self._session = base + 8 * ends[2]
-        self._places = base + 8 * ends[3], base + 8 * ends[4]
-        self._run, self._interpolate, self._sample, self._begin = functions()
+        self._outputs = base + 8 * ends[3], base + 8 * ends[4]
+        self._routines = _routines(pair)
 
     def batch_places(self) -> BatchPlaces:
         """Return the addresses with which many runs can be made in one call."""
-        from atwood.integrators.ensemble.batch import BatchPlaces
+        return self._places(self._arrays[self._rows["absolute"]])
 
-        begin, sample = (_code().code.addresses[name] for name in ("begin", "sample"))
-        limit, steps, filled = (self._counts[k:].ctypes.data for k in (_LIMIT, _STEPS, _FILLED))
-        tolerance = self._arrays[ROWS["absolute"]].ctypes.data
-        places = begin, sample, self._session, limit, steps, filled, tolerance, _COUNTED
-        return BatchPlaces(*places, keep=self)
-
-    @property
-    def counts(self) -> Counts:
-        """What it has done so far, over all starts."""
-        return Counts(*self._counts[_STEPS : _STEPS + _COUNTED].tolist())
-
-    def watch(self, events: CompiledEvents) -> None:
-        """Let `run` and `sample` come back with `Outcome.NOTICED` after a step in which an event may have happened."""
+    def watch(self, events: CompiledEvents) -> bool:
+        """Come back with `Outcome.NOTICED` after a step in which an event may have happened."""
         self._values, self._signs = np.zeros((2, events.count))
         self._keep, self._restart = (self._keep, events), events.restart
         places = (array.ctypes.data for array in (self._values, self._signs))
         self._pointers[5:9] = events.function, events.data, *places
         self._counts[_EVENTS] = events.count
+        return True
 
     def expect(self, signs: FloatArray) -> None:
         """Say which sign each event has; where it is zero, every step is noticed."""
         self._signs[:] = signs
 
-    def look_out(self, lookout: Lookout) -> None:
+    def look_out(self, lookout: Lookout) -> bool:
         """Let the motion be looked at, and come back with `Outcome.NOTICED` where something is seen."""
         self._keep = (self._keep, lookout)
         self._pointers[_WATCH : _WATCH + 3] = lookout.look, lookout.data, lookout.due_at
+        return True
 
     def has_seen(self) -> bool:
         """Return whether something was seen since this was last asked."""
@@ -225,8 +224,8 @@ class CompiledStepper:
     def renew(self, horizon: float, absolute: FloatArray | None = None) -> None:
         """Count from zero again, for a run of another typical length, s, and perhaps with other tolerances."""
         if absolute is not None:
-            self._arrays[ROWS["absolute"], : self._size] = np.maximum(absolute, np.finfo(float).tiny)
-        self._counts[_STEPS : _STEPS + _COUNTED] = 0
+            self._arrays[self._rows["absolute"], : self._size] = np.maximum(absolute, np.finfo(float).tiny)
+        self._counts[_STEPS : _STEPS + COUNTED] = 0
         self._numbers[_HORIZON] = horizon
         self._numbers[_LONGEST] = self._options.max_step or inf
 
@@ -236,39 +235,9 @@ class CompiledStepper:
 
     def start(self, t: float, y: FloatArray) -> bool:
         """Start anew from a state; return whether it has finite rates."""
-        self._y[:] = y
         if self._restart is not None:
             self._restart(t)
-        return self._call(self._begin, t, self._places[0]) == 0
-
-    def state(self) -> State:
-        """Return time, values and rates at the end of the last step."""
-        n = self._size
-        return float(self._numbers[_T]), self._arrays[ROWS["y"], :n].copy(), self._arrays[12, :n].copy()
-
-    def run(self, t_stop: float, steps: int) -> Outcome:
-        """Take steps until one ends at or after a time, but no more than so many."""
-        self._numbers[_STOP] = t_stop
-        self._counts[_LIMIT] = self._counts[_STEPS] + min(steps, _UNLIMITED)
-        return Outcome(self._call(self._run))
-
-    def interpolate(self, t: float) -> State:
-        """Return the state at a time within the last step."""
-        if self._call(self._interpolate, t, *self._places) or not np.isfinite(self._y).all():
-            raise no_interpolation(t)
-        return t, self._y.copy(), self._yp.copy()
-
-    def sample(self, times: FloatArray, steps: int) -> tuple[FloatArray, FloatArray, Outcome]:
-        """Take steps, and return values and rates at as many of the times, one row each, as were reached."""
-        times = np.ascontiguousarray(times, dtype=np.float64)
-        y, yp = np.empty((2, len(times), self._size))
-        self._counts[_LIMIT] = self._counts[_STEPS] + min(steps, _UNLIMITED)
-        tables = (array.ctypes.data for array in (y, yp))
-        outcome = self._call(self._sample, times.ctypes.data, len(times), *tables)
-        filled = int(self._counts[_FILLED])
-        if outcome == _NO_VALUE:
-            raise no_interpolation(float(times[filled]))
-        return y[:filled], yp[:filled], Outcome(outcome)
+        return super().start(t, y)
 
     def _call(self, function: Callable[..., int], *arguments: float) -> int:
         """Call a function of the steps and return its code, or raise what Python functions raised in it."""
@@ -287,71 +256,77 @@ class CompiledStepper:
         return code
 
     def _in_python(self, problem: ExplicitProblem) -> CompiledRates:
-        """Return rates that call Python."""
-        size = problem.size
+        """Return rates and projection that call Python."""
+        rates = self._called(_RATES, problem.rates, (1,), 2)
+        project = 0 if problem.project is None else self._called(_PROJECTION, problem.project, (1,), 1)
+        return CompiledRates(rates, project=project, keep=self._functions)
 
-        def rates(t: float, y: int, yp: int, data: int) -> int:
+    def _called(
+        self, kind: Callable[..., Any], function: Callable[..., Any], arrays: tuple[int, ...], target: int | None = None
+    ) -> int:
+        """Return the address of a function in C that calls one in Python.
+
+        Parameters
+        ----------
+        kind
+            The type of the function in C.
+        function
+            The function, which takes the arguments but the last, and the target unless it is read too.
+        arrays
+            Which of them are arrays.
+        target
+            Which takes up the values; without one they are a judgement, whose no is a failure.
+        """
+        size = self._size
+        count = max(arrays) + 1
+
+        def array(place: int) -> FloatArray:
+            return np.ctypeslib.as_array(ctypes.cast(place, ctypes.POINTER(c_double)), (size,))
+
+        def call(*given: Any) -> int:
             if self._failure is not None or self.interrupted:
                 return 1
             try:
-                found = np.ctypeslib.as_array(ctypes.cast(yp, ctypes.POINTER(c_double)), (size,))
-                found[:] = problem.rates(t, np.ctypeslib.as_array(ctypes.cast(y, ctypes.POINTER(c_double)), (size,)))
+                found = function(*(array(one) if k in arrays else one for k, one in enumerate(given[:count])))
+                if target is None:
+                    return 0 if found else 1
+                values = array(given[target])
+                values[:] = found
             except (KernelEvaluationError, ArithmeticError):
                 return 1
             except BaseException as error:
                 self._failure = error
                 return 1
-            return 0 if np.isfinite(found).all() else 1
+            return 0 if np.isfinite(values).all() else 1
 
-        function = _RATES(rates)
-        return CompiledRates(ctypes.cast(function, c_void_p).value or 0, 0, function)
-
-
-_COUNTED = len(names_of(Counts))
+        made = kind(call)
+        self._functions.append(made)
+        return ctypes.cast(made, c_void_p).value or 0
 
 
 @cache
-def _layout(size: int) -> tuple[int, tuple[int, ...]]:
+def _layout(size: int, rows: int) -> tuple[int, tuple[int, ...]]:
     """Return how long rows are, and where each array of a session ends, for so many unknowns."""
     padded = -(-size // LANES) * LANES
-    lengths = ROWS["all"] * padded, len(NUMBERS), len(COUNTS), len(POINTERS), size, size
+    lengths = rows * padded, len(NUMBERS), len(COUNTS), len(POINTERS), size, size
     return padded, tuple(accumulate(lengths))
 
 
-_T, _STOP, _R, _LONGEST, _HORIZON, _FIRST = map(NUMBERS.index, ("t", "stop", "relative", "longest", "horizon", "first"))
+_R, _LONGEST, _HORIZON, _FIRST = map(NUMBERS.index, ("relative", "longest", "horizon", "first"))
 _T_OLD = NUMBERS.index("t_old")
-_LIMIT, _STEPS, _FILLED = map(COUNTS.index, ("limit", "steps", "filled"))
+_STEPS = COUNTS.index("steps")
 _EVENTS, _HEEDS, _SEEN = map(COUNTS.index, ("event_count", "heeds", "seen"))
 _PROJECT, _WATCH, _GUARD = map(POINTERS.index, ("project", "watch", "guard"))
 
 
-_ROUTINES = RoutineSource(
-    "integrators.dop853.steps",
-    (
-        "integrators/dop853/dense_output.py",
-        "integrators/dop853/memory.py",
-        "integrators/dop853/reference.py",
-        "integrators/dop853/tableau.py",
-        "integrators/explicit_problem.py",
-        "integrators/output_times.py",
-    ),
+_FILES = (
+    *(f"integrators/embedded/{name}.py" for name in ("dense_output", "memory", "tableau")),
+    "integrators/explicit_problem.py",
+    "integrators/output_times.py",
 )
 
 
 @once
-def _code() -> Built:
-    """Return the code of the steps."""
-    return build_code([], CodeOptions(level=2), exports=("run", "interpolate", "sample", "begin"), routines=_ROUTINES)
-
-
-@once
-def functions() -> tuple[Callable[..., int], ...]:
-    """Return the functions `run`, `interpolate`, `sample` and `begin`."""
-    addresses = _code().code.addresses
-    shapes = {
-        "run": (c_void_p,),
-        "interpolate": (c_void_p, c_double, c_void_p, c_void_p),
-        "sample": (c_void_p, c_void_p, c_int64, c_void_p, c_void_p),
-        "begin": (c_void_p, c_double, c_void_p),
-    }
-    return tuple(ctypes.CFUNCTYPE(c_int, *shape)(addresses[name]) for name, shape in shapes.items())
+def _routines(pair: Tableau) -> Routines:
+    """Return the routines of a pair."""
+    return routines_of(RoutineSource("integrators.embedded.steps", _FILES, (pair,)))

@@ -1,0 +1,51 @@
+"""SUNDIALS IDA: backward differentiation of variable order, driven directly or through scikit-sundae."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from atwood.integrators.methods.record import Method, Task
+
+if TYPE_CHECKING:
+    from atwood.integrators.session import Session
+
+__all__ = ["IDA", "IDA_SUNDAE"]
+
+
+def _open_native(task: Task) -> Session:
+    from atwood.integrators.ida.native import IdaTuning, NativeSession
+
+    assert task.implicit is not None
+    assert task.yp is not None
+    tuning = IdaTuning(angle_like=task.angles, stop_time=task.end)
+    return NativeSession(task.implicit(True), task.settings, task.t, task.y, task.yp, task.budget, tuning)
+
+
+def _open_sundae(task: Task) -> Session:
+    from atwood.integrators.ida.sundae import SundaeSession
+
+    assert task.implicit is not None
+    assert task.yp is not None
+    return SundaeSession(task.implicit(False), task.settings, task.t, task.y, task.yp, task.budget)
+
+
+_ida: Any = partial(
+    Method,
+    citation="A. C. Hindmarsh et al., SUNDIALS: Suite of nonlinear and differential/algebraic equation solvers, ACM "
+    "Transactions on Mathematical Software 31 (2005) 363-396",
+    kind="implicit",
+    orders=(1, 2, 3, 4, 5),
+    keeps_constraints=True,
+    word="IDA",
+    nodes_in_step=3,
+    reach=2.0,
+    steps_seen=2.0,
+    steps_unseen=100.0,
+    least_tolerance=1e-13,
+    loosest_tolerance=1.0,
+    first_share=0.01,
+)
+
+IDA: Method = _ida("ida", "SUNDIALS IDA", open=_open_native)
+IDA_SUNDAE: Method = _ida("ida-sundae", "SUNDIALS IDA through scikit-sundae", open=_open_sundae, is_interpreted=True)

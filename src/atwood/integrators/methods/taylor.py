@@ -1,0 +1,48 @@
+"""Taylor series whose order follows the tolerance."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from atwood.integrators.methods.record import Method, Task
+
+if TYPE_CHECKING:
+    from atwood.integrators.ensemble.batch import BatchPlaces
+    from atwood.integrators.explicit_session import ExplicitSession
+    from atwood.integrators.taylor.native import CompiledStepper
+
+__all__ = ["TAYLOR"]
+
+
+def _stepper(task: Task) -> CompiledStepper:
+    from atwood.integrators.taylor.native import CompiledStepper
+
+    assert task.series is not None
+    return CompiledStepper(task.series(), task.settings, guard=task.problem.guard)
+
+
+def _open(task: Task) -> ExplicitSession:
+    from atwood.integrators.explicit_session import ExplicitSession
+
+    return ExplicitSession(task.problem, task.settings, _stepper(task), task.t, task.y, task.budget)
+
+
+def _batch(task: Task) -> BatchPlaces:
+    return _stepper(task).batch_places()
+
+
+TAYLOR = Method(
+    key="taylor",
+    title="Taylor series",
+    citation="A. Jorba, M. Zou, A software package for the numerical integration of ODEs by means of high-order Taylor "
+    "methods, Experimental Mathematics 14 (2005) 99-117",
+    kind="series",
+    orders=tuple(range(5, 29)),
+    open=_open,
+    batch=_batch,
+    word="Taylor series",
+    nodes_in_step=12,
+    reach=2.0,
+    steps_seen=0.1,
+    steps_unseen=1.5,
+)

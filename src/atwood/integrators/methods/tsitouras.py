@@ -1,0 +1,75 @@
+"""Tsitouras' explicit pair of order 5(4), whose last slope begins the next step.
+
+Source: C. Tsitouras, Runge-Kutta pairs of order 5(4) satisfying only the first column simplifying assumption, Computers
+and Mathematics with Applications 62 (2011) 770-775, with the dense output of order 4 that is given there.  Where only a
+few digits are asked for, its six slopes a step cost less than twelve; the tests check the conditions of order.
+"""
+
+from __future__ import annotations
+
+from atwood.integrators.embedded.tableau import Tableau
+from atwood.integrators.methods.record import explicit_pair
+
+__all__ = ["TSITOURAS"]
+
+TABLEAU = Tableau(
+    order=5,
+    dense_order=4,
+    end=6,
+    edge=3.5,
+    nodes=(0.0, 0.161, 0.327, 0.9, 0.9800255409045097, 1.0, 1.0),
+    stages=(
+        {0: 0.161},
+        {0: -0.008480655492356989, 1: 0.335480655492357},
+        {0: 2.8971530571054935, 1: -6.359448489975075, 2: 4.3622954328695815},
+        {0: 5.325864828439257, 1: -11.748883564062828, 2: 7.4955393428898365, 3: -0.09249506636175525},
+        {
+            0: 5.86145544294642,
+            1: -12.92096931784711,
+            2: 8.159367898576159,
+            3: -0.071584973281401,
+            4: -0.028269050394068383,
+        },
+        {
+            0: 0.09646076681806523,
+            1: 0.01,
+            2: 0.4798896504144996,
+            3: 1.379008574103742,
+            4: -3.290069515436081,
+            5: 2.324710524099774,
+        },
+    ),
+    errors=(
+        {
+            0: -0.00178001105222577714,
+            1: -0.0008164344596567469,
+            2: 0.007880878010261995,
+            3: -0.1447110071732629,
+            4: 0.5823571654525552,
+            5: -0.45808210592918697,
+            6: 1.0 / 66.0,
+        },
+    ),
+    dense=(
+        {
+            0: -1.0530884977290216,
+            1: 0.1017,
+            2: 2.490627285651252793,
+            3: -16.54810288924490272,
+            4: 47.37952196281928122,
+            5: -34.87065786149660974,
+            6: 2.5,
+        },
+    ),
+)
+
+TSITOURAS = explicit_pair(
+    "tsitouras",
+    "Tsitouras 5(4)",
+    "C. Tsitouras, Computers and Mathematics with Applications 62 (2011) 770-775",
+    TABLEAU,
+    nodes_in_step=5,
+    reach=8.0,
+    steps_seen=0.5,
+    steps_unseen=10.0,
+)
