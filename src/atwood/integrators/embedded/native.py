@@ -191,9 +191,9 @@ class CompiledStepper(NativeStepper):
 
     def watch(self, events: CompiledEvents) -> bool:
         """Come back with `Outcome.NOTICED` after a step in which an event may have happened."""
-        self._values, self._signs = np.zeros((2, events.count))
+        self._events, self._signs = np.zeros((2, events.count))
         self._keep, self._restart = (self._keep, events), events.restart
-        places = (array.ctypes.data for array in (self._values, self._signs))
+        places = (array.ctypes.data for array in (self._events, self._signs))
         self._pointers[5:9] = events.function, events.data, *places
         self._counts[_EVENTS] = events.count
         return True

@@ -225,8 +225,18 @@ class ClosedLoopSession(Session):
             return given is not None and given(t, self._solved.state(t, y))
 
         asked = None if given is None else leave
-        equations = equations_of(request, problem, (t, y), solved)
-        task = Task(settings, t, y, budget=budget, end=request.end, leave=asked, explicit=problem, **equations)
+        series, canonical = equations_of(request, problem, (t, y), solved)
+        task = Task(
+            settings,
+            t,
+            y,
+            budget=budget,
+            end=request.end,
+            leave=asked,
+            explicit=problem,
+            series=series,
+            hamiltonian=canonical,
+        )
         session = self._method.open(task)
         if np.isfinite(longest):
             session.limit_steps(longest)

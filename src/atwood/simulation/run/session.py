@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -262,9 +262,19 @@ def _open_tree(request: SolverRequest, method: Method, t: float, y: FloatArray, 
     if own is not None:
         rates = own[1].rates
         problem = replace(problem, compiled=lambda: rates)
-    equations = equations_of(request, problem, (t, y))
+    series, canonical = equations_of(request, problem, (t, y))
     settings = request.settings(t, method.loosest_tolerance)
-    task = Task(settings, t, y, budget=request.budget, end=request.end, leave=leave, explicit=problem, **equations)
+    task = Task(
+        settings,
+        t,
+        y,
+        budget=request.budget,
+        end=request.end,
+        leave=leave,
+        explicit=problem,
+        series=series,
+        hamiltonian=canonical,
+    )
     opened = method.open(task)
     if own is not None:
         assert isinstance(opened, ExplicitSession)
@@ -278,7 +288,7 @@ def equations_of(
     problem: ExplicitProblem,
     start: tuple[float, FloatArray],
     solved: Solved | None = None,
-) -> dict[str, Callable[[], Any]]:
+) -> tuple[Callable[[], TaylorProblem], Callable[[], Hamiltonian]]:
     """Return the equations of a task as series and as Hamilton's, made where a method asks for them.
 
     Parameters
@@ -307,7 +317,7 @@ def equations_of(
         sizes = sizes if solved is None else solved.reduced(sizes)
         return hamiltonian(assembly, problem, start, sizes, (options.order, options.step), solved)
 
-    return {"series": series, "hamiltonian": canonical}
+    return series, canonical
 
 
 def _constrained_task(request: SolverRequest, method: Method, t: float, y: FloatArray, leave: Leave | None) -> Task:
