@@ -24,15 +24,14 @@ from atwood.numerics.newton import Missing, newton
 from atwood.numerics.rank import decompose, null_space
 from atwood.numerics.solutions import least_norm
 from atwood.simulation.initialization.start import Start, find_start
+from atwood.tolerances import tolerances
 
 __all__ = ["Symmetry", "find_symmetries"]
 
 
-_START = 1e-11
-"""Relative to the scene's sizes: what leads out of the plane at the start by less than this is rounding."""
-
 _NEAR = 1e-12
-"""The same at other places, where constraints and accelerations are solved for."""
+"""Relative to the scene's sizes: what leads out of the plane by less at places near by, where accelerations are solved
+for, is rounding; at the start it is `tolerances.MET`."""
 
 _PLACED = 1e-10
 """The same for a place that is all but found, and which further steps take no nearer."""
@@ -126,13 +125,13 @@ def _candidates(scene: LooseScene, space: str) -> Iterator[Symmetry]:
     shifts = np.concatenate([now.velocities / pace, later.velocities / pace**2]) / length
     turns = np.concatenate([now.spins / pace, later.spins / pace**2])
     if space == "line":
-        if np.max(np.abs(turns), initial=0.0) > _START:
+        if np.max(np.abs(turns), initial=0.0) > tolerances.MET:
             return
         tried = _directions(shifts)[:1]
-    elif np.max(np.abs(turns), initial=0.0) > _START:
+    elif np.max(np.abs(turns), initial=0.0) > tolerances.MET:
         tried = _directions(turns)[:1]
     else:
-        found = decompose(shifts, np.full(len(shifts), _START))
+        found = decompose(shifts, np.full(len(shifts), tolerances.MET))
         apart = (now.places - now.places[:1]) / length
         across = [np.cross(found.right[0], one) for one in apart]
         tried = [*_AXES[[1, 0, 2]], *across] if found.rank == 1 else [found.right[2]] if found.rank == 2 else []
@@ -140,7 +139,7 @@ def _candidates(scene: LooseScene, space: str) -> Iterator[Symmetry]:
         size = float(np.linalg.norm(one))
         if size > 1e-6:
             symmetry = Symmetry("line" if space == "line" else "plane", _rounded(one / size))
-            if not _leads_out(symmetry, shifts, turns, _START):
+            if not _leads_out(symmetry, shifts, turns, tolerances.MET):
                 yield symmetry
 
 
@@ -163,7 +162,7 @@ def _rounded(direction: FloatArray) -> FloatArray:
     """Return a unit vector, its largest component positive; along an axis of the world if it is but for rounding."""
     direction = direction * np.sign(direction[int(np.argmax(np.abs(direction)))])
     for unit in _AXES:
-        if np.linalg.norm(direction - unit) < 10.0 * _START:
+        if np.linalg.norm(direction - unit) < 10.0 * tolerances.MET:
             return unit
     direction = np.where(np.abs(direction) < 1e-12, 0.0, direction)
     found: FloatArray = direction / np.linalg.norm(direction)

@@ -24,6 +24,7 @@ from atwood.model.values.vector import Vector
 __all__ = ["wrong_on_expressions"]
 
 TOLERANCE = 1e-5
+"""Relative: differences on numbers are good to some 1e-9, and mistakes of laws are far larger."""
 
 
 def wrong_on_expressions(trial: Trial, mode: str) -> Iterator[Finding | None]:

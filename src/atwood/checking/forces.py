@@ -20,6 +20,7 @@ from atwood.model.values.vector import Vector, cross
 __all__ = ["Wrench", "energy_forces", "in_motion", "load_forces", "ways", "wrong_forces"]
 
 TOLERANCE = 1e-5
+"""Relative: differences of energies are good to some 1e-9, and mistakes of laws are far larger."""
 
 Wrench = NDArray[np.float64]
 """Force and torque on each connector along its ways to move, one after another."""

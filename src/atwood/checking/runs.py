@@ -19,6 +19,7 @@ from atwood.result.result import Result
 __all__ = ["wrong_runs"]
 
 TOLERANCE = 1e-4
+"""Relative: runs at 1e-9 of both forms differ by less, also where what is on the bench is nearly unstable."""
 LENGTH_OF_RUN = 0.05
 """In seconds, with speeds of about a length, or a radian, a second."""
 

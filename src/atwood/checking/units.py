@@ -32,6 +32,7 @@ BASES: tuple[Exponents, ...] = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0,
 SCALES = (2.3, 1.7, 0.6, 1.4)
 """How many new units a kilogramme, a metre, a second and an ampere are."""
 TOLERANCE = 1e-7
+"""Relative: other units round a law by some 1e-12, and a wrong unit changes it by more than the units differ."""
 
 Values = list[tuple[float, Exponents]]
 """Numbers, with the unit that they are said to be in."""

@@ -22,14 +22,16 @@ from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.numerics.newton import Missing, newton
 from atwood.pipeline import SCENE, assembly_of
 from atwood.showing import fitted
+from atwood.tolerances import tolerances
 
 __all__ = ["StartSolution", "solve_start"]
 
 _STEPS, _HALVINGS = 60, 40
-_MET = 1e-11
-"""Relative to the terms of a condition: how well it is met; ten times as much where rounding leaves no better."""
+_NEARLY = 10.0
+"""Times `tolerances.MET`, relative to the terms of a condition: what counts as met where rounding leaves no better."""
 
 _DIFFERENCE = 1e-6
+"""Relative: by so much unknowns are moved for central differences, which only the number of steps depends on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,12 +106,12 @@ def solve_start(scene: Model | Assembly, *, unknowns: Sequence[str], conditions:
         x,
         scales,
         steps=_STEPS,
-        met=10.0 * _MET,
-        exact=_MET,
+        met=_NEARLY * tolerances.MET,
+        exact=tolerances.MET,
         halvings=_HALVINGS,
         refused=(AtwoodError,),
     )
-    if left.miss <= 10.0 * _MET:
+    if left.miss <= _NEARLY * tolerances.MET:
         return StartSolution(dict(zip(unknowns, x.tolist(), strict=True)), problem.assembly(x))
     worst = int(np.argmax(np.abs(left.value)))
     raise SolveError(

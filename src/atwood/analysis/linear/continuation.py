@@ -16,6 +16,7 @@ from atwood.arrays import FloatArray
 from atwood.late import dataclass
 from atwood.numerics.newton import Missing, largest, newton
 from atwood.numerics.rank import decompose
+from atwood.tolerances import tolerances
 
 __all__ = ["Curve", "Problem", "branch_directions", "follow"]
 
@@ -25,8 +26,8 @@ _FIRST, _LARGEST, _SMALLEST = 1e-2, 5e-2, 1e-7
 
 _MOST_STEPS = 2000
 
-_MET, _NEARLY = 1e-11, 1e-9
-"""What a solution is met to, and what is one where rounding leaves no more."""
+_NEARLY = 100.0
+"""Times `tolerances.MET`: what is a solution where rounding leaves no better."""
 
 _FAR = 0.5
 """A step of Newton's method that is longer leads to another branch."""
@@ -196,10 +197,10 @@ def _corrected(problem: Problem, guess: FloatArray, across: FloatArray) -> Float
         return whole + step
 
     try:
-        found, left = newton(look, moved, guess, np.ones(len(guess)), steps=_STEPS, met=_MET)
+        found, left = newton(look, moved, guess, np.ones(len(guess)), steps=_STEPS, met=tolerances.MET)
     except _Nowhere:
         return None
-    return found if left.miss <= _NEARLY else None
+    return found if left.miss <= _NEARLY * tolerances.MET else None
 
 
 def _located(

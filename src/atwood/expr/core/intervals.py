@@ -22,6 +22,7 @@ Bounds = tuple[FloatArray, FloatArray]
 """Lower and upper bounds."""
 
 _ROUND, _TINY = 2.0**-51, 1e-300
+"""By twice what an operation may round bounds are moved outwards, and by what numbers without full digits may."""
 
 
 def bounds(outputs: Sequence[Expression], values: Mapping[Expression, Bounds]) -> list[Bounds]:

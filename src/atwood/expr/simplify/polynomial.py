@@ -32,6 +32,7 @@ Wave: TypeAlias = tuple[int, ...]
 ONE: Monomial = ()
 
 _CANCELLED = 4e-15
+"""Relative to the terms: a sum that is less is what some ten roundings of the machine left of zero."""
 
 
 class TooLargeError(Exception):

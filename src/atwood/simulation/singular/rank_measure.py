@@ -181,6 +181,7 @@ def _root(series: FloatArray, below: float, above: float) -> float:
 
 
 _ROOT_STEPS, _ROOTED = 60, 1e-15
+"""So many steps of false position at most, and how long the last interval is: rounding of numbers of size one."""
 
 
 def _clenshaw(coefficients: list[float], x: float) -> float:

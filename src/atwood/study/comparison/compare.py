@@ -38,6 +38,7 @@ from atwood.study.comparison.reference import (
 __all__ = ["compare"]
 
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
+"""Relative tolerances at which solvers are compared unless others are given: from a look at a motion to a reference."""
 
 
 @takes(

@@ -40,6 +40,7 @@ _ENOUGH, _KNOWN = 128, 1e-6
 """Points from which on it is looked whether more make it worse, and the least accuracy of what is given."""
 
 _QUADRATIC = 1e-9
+"""Relative: a polynomial of second degree through three momenta agrees so well with the energy at a fourth."""
 
 _ROUNDING = 64.0 * float(np.finfo(float).eps)
 """Of the terms of a discriminant: what is less is zero."""

@@ -27,13 +27,13 @@ from atwood.theory.linearization.operating_point import (
     moved_to,
     values_at,
 )
+from atwood.tolerances import tolerances
 
 __all__ = ["Trim", "trim"]
 
 
 _STEPS, _FAR = 50, 0.5
-_MET = 1e-11
-"""Relative to what displacements of the scene's size change: accelerations that are none."""
+"""So many steps at most, each of which turns nothing by more, rad."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,8 +96,8 @@ def trim(scene: Model | Assembly, *, at: At = None, inputs: Sequence[str] = (), 
     """
     point = find_operating_point(scene, at, inputs)
     first = _trial(point, {one.path: 0.0 for one in point.inputs}, _free_numbers(point, free))
-    found, left = newton(lambda one: one.missing, _moved, first, np.ones(1), steps=_STEPS, exact=_MET)
-    if left.miss <= _MET:
+    found, left = newton(lambda one: one.missing, _moved, first, np.ones(1), steps=_STEPS, exact=tolerances.MET)
+    if left.miss <= tolerances.MET:
         return Trim(found.values, values_at(found.point), point.assembly.flat.name, found.point)
     name = point.scene.equations.speed_names[found.minimal.speeds[int(np.argmax(np.abs(left.value)))]].name
     raise SolveError(
