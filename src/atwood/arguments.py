@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from atwood.errors import AtwoodError, UsageError, near_matches, suggestion
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -31,11 +31,13 @@ __all__ = [
     "FLAG",
     "MAPPING",
     "NAME",
+    "PATHS",
     "TEXT",
     "Kind",
     "Refused",
     "check",
     "check_fields",
+    "command",
     "each",
     "either",
     "instance",
@@ -67,10 +69,25 @@ class Kind:
         In words that go on "Give ...".
     read
         Returns a value in its own type, or raises any error for one that will not do.
+    word
+        How a command line writes it, such as ``PATH=VALUE``; empty where no text says it.
+    typed
+        Reads what was typed on a command line; `read` gets what it returns.
+    words
+        All that it may be, where these are a few words.
+    is_many
+        Whether it is given once for each of several values.
+    of_scene
+        What an assembly gives for it, where it is no text.
     """
 
     what: str
     read: Callable[[Any], Any]
+    word: str = ""
+    typed: Callable[[str], Any] = str
+    words: tuple[str, ...] = ()
+    is_many: bool = False
+    of_scene: Callable[[Any], Any] | None = None
 
 
 def takes(error: type[AtwoodError] = UsageError, /, **kinds: Kind) -> Callable[[_F], _F]:
@@ -118,9 +135,21 @@ def takes(error: type[AtwoodError] = UsageError, /, **kinds: Kind) -> Callable[[
                 given[name] = check(kinds[name], value, name, where, error)
             return function(*args, **given)
 
+        checked.kinds = kinds  # type: ignore[attr-defined]  # read by the command line
         return checked  # type: ignore[return-value]
 
     return decorate
+
+
+def command(name: str) -> Callable[[_F], _F]:
+    """Say how the command of a function is called, where it is not called as the function.
+
+    Parameters
+    ----------
+    name
+        The command, which is found where this is written.
+    """
+    return lambda function: function
 
 
 def takes_names(target: _T) -> _T:
@@ -153,26 +182,7 @@ def _takes_fields(cls: Any) -> Any:
 
 
 def check(kind: Kind, value: Any, name: str, where: str = "", error: type[AtwoodError] = UsageError) -> Any:
-    """Return an argument in its own type, or refuse it.
-
-    Parameters
-    ----------
-    kind
-        What it may be.
-    value
-        What was given.
-    name
-        Name of the argument.
-    where
-        Name of the function, or path of the part.
-    error
-        Class of the error.
-
-    Raises
-    ------
-    AtwoodError
-        If it will not do; the error names the argument and says what would.
-    """
+    """Return an argument in its own type, or refuse it with its name and that of the function or part."""
     try:
         return kind.read(value)
     except AtwoodError:  # the value itself says more
@@ -214,17 +224,7 @@ def number(
     least: float = -math.inf,
     most: float = math.inf,
 ) -> Kind:
-    """Return the kind of finite real numbers between bounds, which become floats.
-
-    Parameters
-    ----------
-    what
-        In words.
-    above, below
-        Bounds that it must not reach.
-    least, most
-        Bounds that it may reach.
-    """
+    """Return the kind of finite real numbers between bounds, of which it may reach the last two; they become floats."""
 
     def read(value: Any) -> float:
         found = value if type(value) is float else real(value)
@@ -232,7 +232,7 @@ def number(
             raise Refused
         return found
 
-    return Kind(what, read)
+    return Kind(what, read, "NUMBER", float)
 
 
 def real(value: Any) -> float:
@@ -253,7 +253,7 @@ def whole(what: str, least: int, most: int | None = None) -> Kind:
             raise Refused
         return found
 
-    return Kind(what, read)
+    return Kind(what, read, "INTEGER", lambda text: read(float(text)))
 
 
 def one_of(words: Iterable[str]) -> Kind:
@@ -268,7 +268,7 @@ def one_of(words: Iterable[str]) -> Kind:
             raise Refused(close if close.startswith("Did you") else "")
         return value
 
-    return Kind(f"one of {', '.join(map(repr, known))}", read)
+    return Kind(f"one of {', '.join(map(repr, known))}", read, "NAME", words=known)
 
 
 def instance(what: str, *classes: type) -> Kind:
@@ -285,7 +285,7 @@ def instance(what: str, *classes: type) -> Kind:
 
 def optional(kind: Kind) -> Kind:
     """Return the kind that None is of, too."""
-    return Kind(f"{kind.what}, or None", lambda value: None if value is None else kind.read(value))
+    return replace(kind, what=f"{kind.what}, or None", read=lambda value: None if value is None else kind.read(value))
 
 
 def either(*kinds: Kind) -> Kind:
@@ -299,23 +299,11 @@ def either(*kinds: Kind) -> Kind:
                 continue
         return kinds[-1].read(value)
 
-    return Kind(" or ".join(kind.what for kind in kinds), read)
+    return replace(kinds[0], what=" or ".join(kind.what for kind in kinds), read=read)
 
 
 def each(kind: Kind, what: str, least: int = 0, single: bool = True) -> Kind:
-    """Return the kind of several values of a kind, which become a tuple.
-
-    Parameters
-    ----------
-    kind
-        What each may be.
-    what
-        In words.
-    least
-        The least number of them.
-    single
-        Whether one text may stand for a list of one.
-    """
+    """Return the kind of several values of a kind, which become a tuple; a single text may stand for a list of one."""
 
     def read(value: Any) -> tuple[Any, ...]:
         if isinstance(value, (bytes, bytearray)) or (isinstance(value, str) and not single):
@@ -325,7 +313,7 @@ def each(kind: Kind, what: str, least: int = 0, single: bool = True) -> Kind:
             raise Refused
         return found
 
-    return Kind(what, read)
+    return replace(kind, what=what, read=read, is_many=True)
 
 
 def _array(value: Any) -> Any:
@@ -387,11 +375,12 @@ ANYTHING = Kind("anything", lambda value: value)
 """For what the function itself looks at."""
 
 ARRAY = Kind("a finite number, or an array of them", _array)
-TEXT = Kind("text", _text)
-NAME = Kind("a name, as text", _not_blank)
-DOC = Kind("one line of meaning", _not_blank)
-FILE = Kind("the path of a file, as text or a Path", _file)
+TEXT = Kind("text", _text, "TEXT")
+NAME = Kind("a name, as text", _not_blank, "NAME")
+DOC = Kind("one line of meaning", _not_blank, "TEXT")
+FILE = Kind("the path of a file, as text or a Path", _file, "FILE", _file)
 CALLBACK = Kind("a function", _callback)
-FLAG = Kind("True or False", _flag)
+FLAG = Kind("True or False", _flag, "FLAG")
 MAPPING = Kind("a dictionary", _mapping)
-BY_PATH = Kind("a dictionary by path, such as {'rod.length': 1.0}", _by_path)
+PATHS = each(replace(TEXT, word="PATH"), "paths, as a list of texts")
+BY_PATH = Kind("a dictionary by path, such as {'rod.length': 1.0}", _by_path, "PATH=VALUE", is_many=True)

@@ -91,15 +91,16 @@ def assemble(
     scene
         The scene, or a model to be simulated with the usual settings.
     form
-        ``"reduced"``: constraints are eliminated, the unknowns are generalized coordinates. ``"dae"``: constraints
-        stay, with Lagrange multipliers.
+        Whether constraints are eliminated, so that the unknowns are generalized coordinates (``"reduced"``), or stay,
+        with Lagrange multipliers (``"dae"``).
     level
-        Of the dae form: ``"ggl"``, ``"index1-projected"`` or ``"index1"``. The reduced form has no levels.
+        Level of the constraints of the dae form: ``"ggl"``, ``"index1-projected"`` or ``"index1"``. The reduced form
+        has no levels.
     orientation
-        In which coordinates the reduced form has orientations in space: ``"quaternion"``, or Euler angles
-        such as ``"euler-zyz"``, in any of the twelve conventions, as turns about axes of the frame that the turns
-        before have made. Euler angles are switched along a run before they become singular. The speeds are the angular
-        velocity in the axes of the body in both.
+        Coordinates of orientations in space in the reduced form: ``"quaternion"``, or Euler angles such as
+        ``"euler-zyz"``. There are all twelve conventions, as turns about axes of the frame that the turns before have
+        made. Euler angles are switched along a run before they become singular. The speeds are the angular velocity in
+        the axes of the body in both.
     name
         What to call the scene.
 
@@ -240,9 +241,9 @@ def simulate(
     rtol
         Relative tolerance of the solver.
     atol
-        Absolute tolerance of the solver, as a share of the scene's own sizes: `atol` times the extent of the scene for
-        lengths, `atol` rad for angles, and these divided by the scene's time scale for speeds. So it depends on no
-        unit. The same number as `rtol` if not given.
+        Absolute tolerance of the solver, as a share of the scene's own sizes; the same number as `rtol` if not given.
+        It is `atol` times the extent of the scene for lengths, `atol` rad for angles, and these divided by the scene's
+        time scale for speeds. So it depends on no unit.
     outputs
         Number of output times, evenly spread over the run, or the times themselves, s. Results have just the times
         that are given and were reached, and the last state where none was; with a number of times they also have the
@@ -255,6 +256,7 @@ def simulate(
         The largest step, and the first one at the start and after each event, s, which is worked out if not given: a
         shorter one helps where forces set in far faster than they act at the start.
     solver
+        Method: IDA, a Runge-Kutta method, Taylor series, or a symplectic one; ``"auto"`` chooses one that suits. It is
         ``"ida"``: SUNDIALS IDA with the equations as machine code. ``"ida-sundae"``: the same method through
         scikit-sundae with the equations as Python, the reference. ``"explicit"``: a Runge-Kutta method of order 8(5,3),
         on constraints too. ``"tsitouras"``: one of order 5(4), which takes fewer slopes where few digits are asked for.

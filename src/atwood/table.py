@@ -86,9 +86,10 @@ class Table:
         if not rows:
             return []
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        for k, one in enumerate(self.columns):
-            if one.align == "~":
-                widths[k] = min(widths[k], max(_NARROWEST, width - sum(widths[:k]) - len(_GAP) * k))
+        wrapped = [k for k, one in enumerate(self.columns) if one.align == "~"]
+        for number, k in enumerate(wrapped):
+            room = width - sum(widths[:k]) - len(_GAP) * k
+            widths[k] = min(widths[k], max(_NARROWEST, room // (len(wrapped) - number)))
         return [line for row in rows for line in self._placed(row, widths)]
 
     def _placed(self, row: Sequence[str], widths: Sequence[int]) -> list[str]:

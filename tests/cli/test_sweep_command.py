@@ -8,9 +8,9 @@ import pytest
 from click.testing import CliRunner, Result
 
 from atwood.cli import main
-from atwood.cli.sweeping import read_values
 from atwood.errors import UsageError
 from atwood.pipeline import simulate
+from atwood.ranges import values_of
 from atwood_library.scenes import DoublePendulum
 
 FILE = Path(__file__).with_name("scenes_for_tests.py")
@@ -35,13 +35,13 @@ def run(*arguments: str) -> Result:
     ],
 )
 def test_values(text: str, values: list[object]) -> None:
-    assert read_values(text, "--vary") == values
+    assert values_of(text) == values
 
 
 @pytest.mark.parametrize("text", ["1:2", "1:2:0", "a:2:3", "1:2:3:4", "1,,2", "1:2:-3"])
 def test_values_that_say_nothing(text: str) -> None:
     with pytest.raises(UsageError):
-        read_values(text, "--vary")
+        values_of(text)
 
 
 def scene_file(folder: Path) -> str:

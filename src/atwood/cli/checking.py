@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from atwood.arguments import FLAG
+from atwood.cli.command import Request, command
 from atwood.cli.errors import FAILED
 from atwood.cli.output import print_json, writer
 from atwood.cli.parts import library_parts, looks_like_a_part
@@ -19,25 +21,25 @@ from atwood.table import table
 if TYPE_CHECKING:
     from atwood.checking import CheckReport
 
-__all__ = ["check_components"]
+__all__ = ["COMMAND", "check_components"]
 
 
-def check_components(target: str, as_json: bool, run: bool) -> None:
-    """Check components and show what was found; leaves with exit code 1 if something is wrong.
+def check_components(request: Request) -> None:
+    """Check the components of TARGET as the parts of the library are checked.
+
+    TARGET is FILE.py for all components that the file defines, FILE.py:NAME for one, or the name of a library's part.
+    Units of laws, joints against constraints, forces against energies, observables, both forms, all spaces. The exit
+    code is 1 if something is wrong.
 
     Parameters
     ----------
-    target
-        ``FILE.py`` for all components that it defines, ``FILE.py:NAME``, or the name of a part of a library.
-    as_json
-        Whether to write JSON.
     run
-        Whether to run them on a test bench as well.
+        Also run them on a test bench, in both forms: about a second each.
     """
     from atwood.checking import check
 
-    reports = [check(one, run=run) for one in _components(target)]
-    if as_json:
+    reports = [check(one, run=request.run) for one in _components(request.target)]
+    if request.as_json:
         print_json({"ok": all(one.ok for one in reports), "components": [one.to_dict() for one in reports]})
     else:
         _print(reports)
@@ -96,3 +98,5 @@ def _print(reports: Sequence[CheckReport]) -> None:
 
 
 _STYLES = {"failure": "red", "note": "dim"}
+
+COMMAND = command("check", check_components, argument="target", more={"run": (FLAG, True)})

@@ -3,56 +3,54 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING
 
+from atwood.arguments import FILE, FLAG, number, optional, whole
+from atwood.cli.command import Request, command
 from atwood.cli.output import print_json, progress_bar, warn, writer
 from atwood.cli.scenes import bundled_scenes, prepare
 from atwood.errors import AtwoodError, UsageError
-from atwood.late import dataclass
+from atwood.late import replace
+from atwood.study.comparison.compare import TOLERANCES, compare
+from atwood.study.comparison.long_runs import compare_long
 
 if TYPE_CHECKING:
     from atwood.model.compose.composite import Model
     from atwood.study import Comparison
 
-__all__ = ["CompareRequest", "compare_scene"]
+__all__ = ["COMMAND", "compare_scene"]
 
 
-@dataclass(frozen=True)
-class CompareRequest:
-    """What was asked for on the command line; see the options of `atwood compare`."""
-
-    scene: str | None
-    settings: tuple[str, ...] = ()
-    starts: tuple[str, ...] = ()
-    t_end: float | None = None
-    rtols: tuple[float, ...] = ()
-    max_seconds: float | None = None
-    plot: Path | None = None
-    save: Path | None = None
-    every: bool = False
-    html: Path | None = None
-    periods: int | None = None
-    progress: bool = True
-    as_json: bool = False
-
-
-def compare_scene(request: CompareRequest) -> None:
-    """Compare the forms of a scene, and show what came of it.
+def compare_scene(request: Request) -> None:
+    """Run SCENE in both forms, at several tolerances, against a far more accurate reference.
 
     Parameters
     ----------
-    request
-        What was asked for.
+    rtols
+        Relative tolerance.  [default: 1e-4 to 1e-10]
+    max_seconds
+        Give up a run after so many seconds.
+    plot
+        Save a work-precision diagram; the suffix says how (.png, .svg, .pdf).
+    save
+        Save all figures, and on what they were measured (.csv).
+    long
+        Compare instead how energy and what else is conserved drift over so many periods, by method.
+    all
+        Compare all scenes of the installed libraries, one after another.
+    html
+        Write a page with tables and pictures within it, and all figures as CSV, to this directory.
+    progress
+        Show progress where there is a terminal.
     """
     _check_files(request)
-    if request.every:
+    if request.all:
         _compare_all(request)
         return
     if request.scene is None:
         raise UsageError("which scene?", advice="Name one (see `atwood list`), or give --all.")
-    scene, name = prepare(request.scene, request.settings, request.starts)
-    if request.periods is not None:
+    scene, name = prepare(request.scene, request.settings, request.start_values)
+    if request.long is not None:
         _compare_long(request, scene, name)
         return
     with progress_bar(request.progress, "", _share) as progress:
@@ -73,13 +71,11 @@ def compare_scene(request: CompareRequest) -> None:
     out.files(plotted=request.plot, saved=request.save, written=request.html)
 
 
-def _compare_long(request: CompareRequest, scene: Model, name: str) -> None:
+def _compare_long(request: Request, scene: Model, name: str) -> None:
     """Compare methods over many periods."""
-    from atwood.study.comparison.long_runs import compare_long
-
     with progress_bar(request.progress, "", _share) as progress:
         limit = request.max_seconds or _LONG_RUN
-        found = compare_long(scene, periods=request.periods or 1, max_seconds=limit, name=name, progress=progress)
+        found = compare_long(scene, periods=request.long or 1, max_seconds=limit, name=name, progress=progress)
     if request.as_json:
         print_json(found.to_dict())
         return
@@ -94,25 +90,23 @@ _EACH, _TOGETHER = 10.0, 90.0
 
 
 def _compared(
-    request: CompareRequest,
+    request: Request,
     scene: Model,
     name: str,
     progress: Callable[[str, int, int], object] | None,
 ) -> Comparison:
-    from atwood.study.comparison.compare import TOLERANCES, compare
-
     return compare(
         scene,
         t_end=request.t_end,
         rtols=request.rtols or TOLERANCES,
-        max_seconds=request.max_seconds or (_EACH if request.every else None),
-        total_seconds=_TOGETHER if request.every else None,
+        max_seconds=request.max_seconds or (_EACH if request.all else None),
+        total_seconds=_TOGETHER if request.all else None,
         name=name,
         progress=progress,
     )
 
 
-def _check_files(request: CompareRequest) -> None:
+def _check_files(request: Request) -> None:
     """Refuse what contradicts, and files that could not be written, before any work is done."""
     if request.plot is not None:
         from atwood.plotting.canvas import check_picture
@@ -126,21 +120,21 @@ def _check_files(request: CompareRequest) -> None:
         from atwood.plotting.comparison_page import check_page
 
         check_page(request.html)
-    if request.periods is not None:
-        idle = {"--all": request.every, "--rtol": request.rtols, "--t-end": request.t_end}
+    if request.long is not None:
+        idle = {"--all": request.all, "--rtol": request.rtols, "--t-end": request.t_end}
         idle |= {"--plot": request.plot, "--save": request.save, "--html": request.html}
         for option in (name for name, given in idle.items() if given):
             raise UsageError("it means nothing over many periods", where=option, advice="Leave it or --long out.")
-    if not request.every:
+    if not request.all:
         return
-    changed = {"SCENE": request.scene, "--set": request.settings, "--start": request.starts}
+    changed = {"SCENE": request.scene, "--set": request.settings, "--start": request.start_values}
     for option in (name for name, given in changed.items() if given):
         raise UsageError("--all takes all scenes as they are", where=option, advice="Leave one of the two out.")
     if request.plot is not None:
         raise UsageError("--all has a picture for each scene", where="--plot", advice="Give --html DIR instead.")
 
 
-def _compare_all(request: CompareRequest) -> None:
+def _compare_all(request: Request) -> None:
     """Compare the forms of all scenes of the installed libraries, one after another."""
     from atwood.study.comparison.found import write_rows
 
@@ -187,3 +181,16 @@ def _within(
 ) -> Callable[[str, int, int], object]:
     """Return what shows the progress of one scene among all."""
     return lambda what, done, of: progress(f"{name} ({number + 1} of {count}): {what}", number * of + done, count * of)
+
+
+_MORE = {
+    "max_seconds": (optional(number("a number of seconds above 0", above=0.0)), None),
+    "plot": (FILE, None),
+    "save": (FILE, None),
+    "long": (replace(whole("a whole number of periods, 10 to 1,000,000", 10, 1_000_000), word="PERIODS"), None),
+    "all": (FLAG, False),
+    "html": (replace(FILE, word="DIRECTORY"), None),
+    "progress": (FLAG, True),
+}
+_NOT_ASKED = ("forms", "levels", "outputs", "max_seconds", "total_seconds", "name")
+COMMAND = command("compare", compare_scene, compare, is_required=False, leave=_NOT_ASKED, more=_MORE)

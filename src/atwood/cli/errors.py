@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 import warnings
 from collections.abc import Callable
 from typing import Any, ParamSpec
@@ -59,4 +60,5 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
 
 
 def _one_line(text: str) -> str:
-    return " ".join(text.split())
+    """Return a text on one line, with arguments as options: ``at=`` is ``--at``."""
+    return re.sub(r"`(\w+)=`", lambda found: f"--{found[1].replace('_', '-')}", " ".join(text.split()))

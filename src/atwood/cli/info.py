@@ -2,47 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
+from atwood.arguments import FLAG, NAME
+from atwood.cli.command import Request, command
 from atwood.cli.output import print_json, writer
+from atwood.cli.parts import is_a_part, show_part
 from atwood.cli.scenes import prepare
 
-__all__ = ["show_info"]
+__all__ = ["COMMAND", "show_info"]
 
 
-def show_info(
-    scene: str,
-    settings: Sequence[str],
-    starts: Sequence[str],
-    as_json: bool,
-    moved: bool = False,
-    orientation: str = "quaternion",
-) -> None:
-    """Show what a scene is made of.
+def show_info(request: Request) -> None:
+    """Say what SCENE is made of: bodies, joints, freedom, constraints, and what its equations cost.
+
+    With the name of a part, such as Pivot, or what textbooks or Modelica call it, such as Revolute: its connectors,
+    parameters, inputs and quantities.
 
     Parameters
     ----------
-    scene, settings, starts
-        See `atwood.cli.scenes.prepare`.
-    as_json
-        Whether to write JSON.
     moved
-        Whether to show, instead of the parameters, all that the start moved.
+        Show in full what the start moved from where it was guessed.
     orientation
-        See `atwood.assemble`.
+        Coordinates of orientations in space: quaternion, or Euler angles such as euler-zyz.
     """
+    if is_a_part(request.scene):
+        show_part(request.scene, request.as_json, bool(request.settings or request.start_values or request.moved))
+        return
     from atwood.reporting import report
     from atwood.reporting.text import described, parameters
 
-    model, name = prepare(scene, settings, starts)
-    found = report(model, name, orientation=orientation)
-    if as_json:
+    model, name = prepare(request.scene, request.settings, request.start_values)
+    found = report(model, name, orientation=request.orientation)
+    if request.as_json:
         print_json(found.to_dict())
         return
     out = writer()
     out.show(described(found))
     out.line()
-    if moved:
+    if request.moved:
         out.line((str(found.initialization), ""))
     else:
         out.show(parameters(found))
+
+
+COMMAND = command("info", show_info, more={"moved": (FLAG, False), "orientation": (NAME, "quaternion")})

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+from atwood.arguments import FLAG
+from atwood.cli.command import Request, command
 from atwood.cli.output import print_json, writer
+from atwood.cli.parts import list_parts
 from atwood.cli.scenes import bundled_scenes
 from atwood.table import facts
 
-__all__ = ["list_scenes"]
+__all__ = ["COMMAND", "list_scenes"]
 
 
-def list_scenes(as_json: bool) -> None:
-    """Show the scenes of the installed libraries.
+def list_scenes(request: Request) -> None:
+    """List the scenes of the installed libraries, or the parts that they are made of.
 
     Parameters
     ----------
-    as_json
-        Whether to write JSON.
+    parts
+        List the parts instead: bodies, joints, forces, sensors.
     """
+    if request.parts:
+        list_parts(request.as_json)
+        return
     scenes = {name: _summary(kind) for name, kind in bundled_scenes().items()}
-    if as_json:
+    if request.as_json:
         print_json({"scenes": [{"name": name, "summary": summary} for name, summary in scenes.items()]})
         return
     if not scenes:
@@ -30,3 +36,6 @@ def list_scenes(as_json: bool) -> None:
 def _summary(kind: type) -> str:
     """Return the first line of what a class says about itself."""
     return (vars(kind)["__doc__"] or "").strip().split("\n")[0]
+
+
+COMMAND = command("list", list_scenes, argument="", more={"parts": (FLAG, False)})

@@ -7,65 +7,66 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from atwood.arguments import FILE, FLAG, TEXT, one_of
+from atwood.cli.command import Request, command
 from atwood.cli.errors import INTERRUPTED
 from atwood.cli.output import print_json, progress_bar, warn
-from atwood.cli.scenes import check_applies, pairs, prepare
+from atwood.cli.scenes import check_applies, prepare
 from atwood.errors import AtwoodError, UsageError
-from atwood.late import dataclass
+from atwood.late import replace
+from atwood.pipeline import assemble, simulate
 from atwood.stages import watching
-from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
     from atwood.result.result import Result
 
-__all__ = ["RunRequest", "run_scene"]
+__all__ = ["COMMAND", "degrees_of_freedom", "multiplier_labels", "run_data", "run_scene"]
+
+_OF_ASSEMBLY = ("form", "level", "orientation")
 
 
-@dataclass(frozen=True)
-class RunRequest:
-    """What was asked for on the command line; see the options of `atwood run`."""
-
-    scene: str
-    settings: tuple[str, ...] = ()
-    starts: tuple[str, ...] = ()
-    form: str = "reduced"
-    level: str = "ggl"
-    orientation: str = "quaternion"
-    t_end: float | None = None
-    rtol: float = tolerances.RTOL
-    atol: float | None = None
-    solver: str = "auto"
-    outputs: int = 201
-    max_steps: int | None = None
-    max_seconds: float | None = None
-    max_step: float | None = None
-    first_step: float | None = None
-    order: str | None = None
-    step: float | None = None
-    structure: bool = False
-    until: tuple[str, ...] = ()
-    record: tuple[str, ...] = ()
-    conserved: bool = False
-    energy: str = "total"
-    accuracy: float | None = None
-    nominal: tuple[str, ...] = ()
-    plot: Path | None = None
-    draw: Path | None = None
-    view: str | None = None
-    save: Path | None = None
-    timings: bool = False
-    progress: bool = True
-    as_json: bool = False
-
-
-def run_scene(request: RunRequest) -> None:
-    """Run a scene, and show, save, plot and draw what came of it.
+def run_scene(request: Request) -> None:
+    """Simulate SCENE, and show where it ends and how accurate that is.
 
     Parameters
     ----------
-    request
-        What was asked for.
+    max_steps
+        Stop after so many steps.
+    max_seconds
+        Stop after so many seconds.
+    max_step
+        The largest step, s.
+    first_step
+        The first step, s.
+    order
+        Order of gauss and composition.
+    step
+        Step of gauss and composition, s.
+    structure
+        Nothing needs to move: it is a truss.
+    until
+        Stop where a quantity passes a value, as 'rod1.angle crosses 30 deg' (or rises above, falls below).
+    record
+        Note when that happens, and go on.
+    nominal
+        Size beside which errors of a quantity are small, such as slider.displacement='1 mm'.
+    conserved
+        Show by how much what the scene conserves drifts along the run.
+    energy
+        Energy as a whole, or by component and connector: shown, with --json, in the file of --save, and as --plot.
+    timings
+        Show what each stage from the scene to the motion took.
+    plot
+        Save a plot; the suffix says how (.png, .svg, .pdf).
+    draw
+        Save a picture of the mechanism (.png, .svg, .pdf), or its motion (.gif).
+    view
+        From where a scene in space is drawn: azimuth and elevation, degrees.  [30,20]
+    save
+        Save all trajectories (.nc, .npz, .mat or .csv).
+    progress
+        Show progress where there is a terminal.
     """
     _check_files(request)
     with watching():  # from the scene on
@@ -82,13 +83,11 @@ def run_scene(request: RunRequest) -> None:
         click.get_current_context().exit(INTERRUPTED)
 
 
-def _run(request: RunRequest) -> Result:
+def _run(request: Request) -> Result:
     """Return the run of a scene; what came before an error is kept where that was asked for."""
-    scene, name = prepare(request.scene, request.settings, request.starts)
+    scene, name = prepare(request.scene, request.settings, request.start_values)
     check_applies(scene, request.form, request.level, request.orientation)
-    from atwood.pipeline import assemble, simulate
-
-    assembly = assemble(scene, form=request.form, level=request.level, orientation=request.orientation, name=name)
+    assembly = assemble(scene, name=name, **request.of(assemble))
     if request.view is not None:
         from atwood.plotting.camera import check_view
 
@@ -105,33 +104,13 @@ def _run(request: RunRequest) -> Result:
 
     try:
         with progress_bar(request.progress and t_end > t_start, name, share) as progress:
-            return simulate(
-                assembly,
-                t_end=request.t_end,
-                rtol=request.rtol,
-                atol=request.atol,
-                outputs=request.outputs,
-                max_steps=request.max_steps,
-                max_seconds=request.max_seconds,
-                max_step=request.max_step,
-                first_step=request.first_step,
-                structure=request.structure,
-                until=request.until or None,
-                record=request.record or None,
-                accuracy=request.accuracy,
-                nominal=dict(pairs(request.nominal, "--nominal")) or None,
-                monitor=monitor,
-                solver=request.solver,
-                order=None if request.order is None else int(request.order),
-                step=request.step,
-                progress=progress,
-            )
+            return simulate(assembly, **request.of(simulate, _OF_ASSEMBLY), monitor=monitor, progress=progress)
     except AtwoodError as error:
         _keep_what_came_before(error, request)
         raise
 
 
-def _keep(result: Result, request: RunRequest) -> None:
+def _keep(result: Result, request: Request) -> None:
     """Save, plot and draw a run, if that was asked for."""
     by_part = request.energy == "parts"
     if request.save is not None and by_part:
@@ -160,7 +139,7 @@ def _save_with_energies(result: Result, file: Path) -> None:
     write_trajectories(SavedResult(result.time, found, units, meanings, describe_all(result)), file)
 
 
-def _keep_what_came_before(error: AtwoodError, request: RunRequest) -> None:
+def _keep_what_came_before(error: AtwoodError, request: Request) -> None:
     """Save, plot and draw what came before an error, if that was asked for, and say so."""
     made = getattr(error, "run", None)
     files = [str(file) for file in (request.save, request.plot, request.draw) if file is not None]
@@ -177,7 +156,7 @@ def _keep_what_came_before(error: AtwoodError, request: RunRequest) -> None:
     warn(f"What came before, up to t = {result.time[-1]:.6g} s, is in {' and '.join(files)}.")
 
 
-def _check_files(request: RunRequest) -> None:
+def _check_files(request: Request) -> None:
     """Refuse files that could not be written before any work is done."""
     if request.save is not None:
         from atwood.result.files import check_target
@@ -208,7 +187,7 @@ def _draw(result: Result, file: Path, view: str | None) -> None:
         plot_mechanism(result, file, view=view)
 
 
-def run_data(result: Result, request: RunRequest) -> dict[str, Any]:
+def run_data(result: Result, request: Request) -> dict[str, Any]:
     """Return a run as plain data.
 
     Parameters
@@ -273,3 +252,16 @@ def multiplier_labels(result: Result) -> list[str]:
         return []
     constraints = assembly.own_equations.constraints
     return [constraints[i].label for i in plan.finding.kept]
+
+
+_MORE = {
+    "conserved": (FLAG, False),
+    "energy": (one_of(("total", "parts")), "total"),
+    "timings": (FLAG, False),
+    "plot": (FILE, None),
+    "draw": (FILE, None),
+    "view": (replace(TEXT, word="AZ,EL"), None),
+    "save": (FILE, None),
+    "progress": (FLAG, True),
+}
+COMMAND = command("run", run_scene, simulate, assemble, leave=("name", "samples"), more=_MORE)

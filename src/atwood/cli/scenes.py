@@ -304,28 +304,3 @@ def _line_in(error: BaseException, file: Path) -> str:
         frame.lineno for frame in traceback.extract_tb(error.__traceback__) if Path(frame.filename).resolve() == wanted
     ]
     return f"{file}:{lines[-1]}" if lines and lines[-1] is not None else str(file)
-
-
-def read_bounds(text: str, where: str) -> tuple[float | str, float | str]:
-    """Return the ends of a range: text where it has a unit, which the lower end may lack.
-
-    Parameters
-    ----------
-    text
-        ``FROM:TO``, such as ``"-90:90deg"``.
-    where
-        The path or the option that it was given for.
-    """
-    low, colon, high = text.partition(":")
-    if not colon:
-        raise UsageError(f"{text!r} is no range", where=where, advice="Write FROM:TO, such as -90deg:90deg.")
-    unit = "".join(character for character in high if character.isalpha())
-    return _bound(low, unit), _bound(high, unit)
-
-
-def _bound(text: str, unit: str) -> float | str:
-    text = text.strip()
-    try:
-        return float(text) if not unit else f"{float(text)} {unit}"
-    except ValueError:
-        return text

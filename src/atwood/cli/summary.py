@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.cli.command import Request
 from atwood.cli.output import writer
-from atwood.cli.running import RunRequest, degrees_of_freedom, multiplier_labels
+from atwood.cli.running import degrees_of_freedom, multiplier_labels
 from atwood.result.about import solver_name
 from atwood.showing import count_of
 from atwood.stages import STAGES
@@ -26,7 +27,7 @@ _NARROWEST, _WIDEST = 9, 32  # of a small picture of a curve
 _BARS = "▁▂▃▄▅▆▇█"
 
 
-def print_summary(result: Result, request: RunRequest) -> None:
+def print_summary(result: Result, request: Request) -> None:
     """Show a run.
 
     Parameters

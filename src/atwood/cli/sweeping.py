@@ -2,108 +2,76 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 import numpy as np
 
+from atwood.arguments import FILE, FLAG
+from atwood.cli.command import Request, command
 from atwood.cli.errors import INTERRUPTED
 from atwood.cli.output import print_json, progress_bar, warn, writer
 from atwood.cli.scenes import check_applies, pairs, prepare, warn_of_radians
 from atwood.errors import UsageError
-from atwood.late import dataclass, replace
+from atwood.late import replace
+from atwood.pipeline import assemble
+from atwood.study import Sweep, sweep
 from atwood.table import Table, facts, table
-from atwood.tolerances import tolerances
 
-if TYPE_CHECKING:
-    from atwood.study import Sweep
-
-__all__ = ["SweepRequest", "read_values", "sweep_scene"]
+__all__ = ["COMMAND", "sweep_scene"]
 
 _ROWS, _COLUMNS, _REASONS = 16, 8, 5
 """So many runs, quantities and reasons are shown."""
 
-_RANGE = re.compile(r"([^:]+):([^:]+):\s*(\d+)\s*([^:]*)\Z")
-_LARGEST = 10_000_000
 
-
-@dataclass(frozen=True)
-class SweepRequest:
-    """What was asked for on the command line; see the options of `atwood sweep`."""
-
-    scene: str
-    settings: tuple[str, ...] = ()
-    starts: tuple[str, ...] = ()
-    vary: tuple[str, ...] = ()
-    vary_start: tuple[str, ...] = ()
-    combine: str = "grid"
-    quantities: tuple[str, ...] = ()
-    form: str = "reduced"
-    level: str = "ggl"
-    t_end: float | None = None
-    rtol: float = tolerances.RTOL
-    accuracy: float | None = None
-    solver: str = "auto"
-    outputs: int | None = None
-    max_steps: int | None = None
-    max_seconds: float | None = None
-    threads: int | None = None
-    plot: Path | None = None
-    save: Path | None = None
-    progress: bool = True
-    as_json: bool = False
-
-
-def sweep_scene(request: SweepRequest) -> None:
-    """Sweep a scene, and show, save and plot what came of it.
+def sweep_scene(request: Request) -> None:
+    """Simulate SCENE with many parameters and starts, and show where the runs end.
 
     Parameters
     ----------
-    request
-        What was asked for.
+    vary
+        Values of a parameter: rod1.length=0.5:2:16 (from, to, how many), or mass2='1,2,5 kg'.
+    start
+        Values of a start value, such as rod1.angle=0:90:10deg.
+    combine
+        Every value with every other, or the first of each, the second of each, and so on.
+    quantities
+        What to keep, such as bob2.position.x; the coordinates if not given.
+    outputs
+        Number of output times; the end alone if not given.
+    max_steps
+        Stop a run after so many steps.
+    max_seconds
+        Stop a run after so many seconds.
+    threads
+        How many threads share the runs.  [default: all processors]
+    plot
+        Save a picture of the ends; the suffix says how (.png, .svg, .pdf).
+    save
+        Save all quantities of all runs (.nc, .npz, .mat, .csv or .json).
+    progress
+        Show progress where there is a terminal.
     """
     _check_files(request)
-    vary = {path: read_values(text, "--vary") for path, text in pairs(request.vary, "--vary")}
-    start = {path: read_values(text, "--vary-start") for path, text in pairs(request.vary_start, "--vary-start")}
-    if not vary and not start:
+    varied = {"--vary": request.vary or {}, "--vary-start": request.start or {}}
+    if not any(varied.values()):
         raise UsageError("nothing is varied", advice="Write --vary PATH=FROM:TO:COUNT or --vary-start PATH=A,B,C.")
-    scene, name = prepare(request.scene, request.settings, request.starts)
+    scene, name = prepare(request.scene, request.settings, request.start_values)
     check_applies(scene, request.form, request.level)
-    for option, texts, axes in (("--vary", request.vary, vary), ("--vary-start", request.vary_start, start)):
-        typed = dict(pairs(texts, option))
+    for option, axes in varied.items():
+        typed = dict(pairs(request.typed["start" if axes is request.start else "vary"], option))
         for path, values in axes.items():
             warn_of_radians(scene, path, values, option, typed[path])
-    from atwood.study import sweep
-
     with progress_bar(request.progress, name, lambda done, of: (done / of, f"{done}/{of}")) as progress:
-        found = sweep(
-            scene,
-            vary,
-            start=start,
-            combine=request.combine,
-            quantities=request.quantities or None,
-            t_end=request.t_end,
-            outputs=request.outputs,
-            form=request.form,
-            level=request.level,
-            rtol=request.rtol,
-            accuracy=request.accuracy,
-            solver=request.solver,
-            max_steps=request.max_steps,
-            max_seconds=request.max_seconds,
-            threads=request.threads,
-            progress=progress,
-            name=name,
-        )
+        found = sweep(scene, **request.of(sweep), progress=progress, name=name)
     if request.save is not None:
         found.save(request.save)
     if request.plot is not None:
         found.plot(file=request.plot)
     if request.as_json:
-        asked = {"set": list(request.settings), "vary": list(request.vary), "vary_start": list(request.vary_start)}
+        varied = {"vary": [*request.typed["vary"]], "vary_start": [*request.typed["start"]]}
+        asked = {"set": list(request.settings), **varied}
         print_json({**found.to_dict(), "asked": asked})
     else:
         _print(found, request)
@@ -112,54 +80,7 @@ def sweep_scene(request: SweepRequest) -> None:
         click.get_current_context().exit(INTERRUPTED)
 
 
-def read_values(text: str, option: str) -> list[Any]:
-    """Return the values that a text stands for.
-
-    Parameters
-    ----------
-    text
-        ``"0.5:2:16"``: 16 values, evenly from 0.5 to 2; ``"0:90:10deg"``: the same in a unit; ``"1,2,5 kg"``: a list,
-        in which a unit at its end holds for all numbers without one.
-    option
-        Where it was given.
-    """
-    found = _RANGE.match(text)
-    if found is not None:
-        first, last, count, unit = found.groups()
-        number = int(count)
-        if not 1 <= number <= _LARGEST:
-            raise UsageError(f"{number} is no number of values", where=option, advice="Write FROM:TO:COUNT.")
-        values = np.linspace(_number(first, text, option), _number(last, text, option), number).tolist()
-        return [f"{value!r} {unit.strip()}" for value in values] if unit.strip() else values
-    if ":" in text:
-        raise UsageError(f"{text!r} is no range", where=option, advice="Write FROM:TO:COUNT, such as 0:90:10deg.")
-    parts = [part.strip() for part in text.split(",")]
-    if not all(parts):
-        raise UsageError(f"{text!r} lacks a value", where=option, advice="Write A,B,C.")
-    tail = re.match(r"[-+.\deE]+\s*([A-Za-z%].*)\Z", parts[-1])
-    numbers = [_maybe_number(part) for part in parts]
-    if tail is None:
-        return [part if number is None else number for part, number in zip(parts, numbers, strict=True)]
-    return [part if number is None else f"{part} {tail[1]}" for part, number in zip(parts, numbers, strict=True)]
-
-
-def _maybe_number(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None
-
-
-def _number(part: str, text: str, option: str) -> float:
-    number = _maybe_number(part)
-    if number is None:
-        raise UsageError(
-            f"{part.strip()!r} in {text!r} is no number", where=option, advice="Give the unit at the end: 0:90:10deg."
-        )
-    return number
-
-
-def _check_files(request: SweepRequest) -> None:
+def _check_files(request: Request) -> None:
     """Refuse files that could not be written before any work is done."""
     if request.save is not None:
         from atwood.study.sweeps.files import check_sweep_target
@@ -174,7 +95,7 @@ def _check_files(request: SweepRequest) -> None:
 # -- what is shown -----------------------------------------------------------------------------------------------------
 
 
-def _print(found: Sweep, request: SweepRequest) -> None:
+def _print(found: Sweep, request: Request) -> None:
     out, more = writer(), len(found.paths) - _COLUMNS
     out.show(facts(_facts(found), f"{found.scene}, {found.form} form, to t = {found.time[-1]:g} s"))
     out.line()
@@ -236,3 +157,14 @@ def _text(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.6g}" if np.isfinite(value) else "-"
     return str(value)
+
+
+COMMAND = command(
+    "sweep",
+    sweep_scene,
+    sweep,
+    assemble,
+    leave=("name", "orientation"),
+    more={"plot": (FILE, None), "save": (FILE, None), "progress": (FLAG, True)},
+    names={"start": "--vary-start"},
+)

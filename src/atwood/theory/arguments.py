@@ -5,10 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from atwood.analysis.hamiltonian import Hamiltonian
-from atwood.arguments import Kind, Refused, each, optional
+from atwood.analysis.hamiltonian import Hamiltonian, read_hamiltonian
+from atwood.arguments import Kind, Refused, each, instance, optional
+from atwood.late import replace
 
-__all__ = ["BY_SYMBOL", "EXPRESSION", "EXPRESSIONS", "INVERSE", "PHASE_SPACE", "SYMBOLS", "as_expression", "as_symbol"]
+__all__ = [
+    "BY_SYMBOL",
+    "EXPRESSION",
+    "EXPRESSIONS",
+    "HAMILTONIAN",
+    "INVERSE",
+    "PHASE_SPACE",
+    "SYMBOLS",
+    "as_expression",
+    "as_symbol",
+]
 
 _LETTERS = ("beta", "gamma", "zeta", "C", "N", "O", "Q", "S")
 """Names that sympy takes for functions and classes of its own where text is read; in mechanics they are symbols."""
@@ -65,7 +76,7 @@ def _in_order(kind: Kind, what: str) -> Kind:
             raise Refused
         return several.read(value)
 
-    return Kind(what, read)
+    return replace(several, read=read)
 
 
 def _phase_space(value: Any) -> Any:
@@ -76,9 +87,22 @@ def _phase_space(value: Any) -> Any:
     return tuple(EXPRESSIONS.read(one) for one in value)
 
 
-EXPRESSION = Kind("an expression of sympy, a number, or text such as 'p**2/2'", as_expression)
+EXPRESSION = Kind("an expression of sympy, a number, or text such as 'p**2/2'", as_expression, "EXPRESSION")
 EXPRESSIONS = _in_order(EXPRESSION, "a list of expressions of sympy")
-SYMBOLS = _in_order(Kind("a symbol", as_symbol), "a list of symbols of sympy, or of their names")
-BY_SYMBOL = Kind("a dictionary by symbol, of expressions of sympy", _by_symbol)
-INVERSE = optional(Kind("a dictionary of expressions of sympy by old coordinate and momentum", _inverse))
-PHASE_SPACE = Kind("what `atwood.hamiltonian` returns, or a pair: coordinates and momenta", _phase_space)
+SYMBOLS = _in_order(Kind("a symbol", as_symbol, "SYMBOL"), "a list of symbols of sympy, or of their names")
+BY_SYMBOL = Kind("a dictionary by symbol, of expressions of sympy", _by_symbol, "SYMBOL=EXPRESSION", is_many=True)
+INVERSE = optional(
+    Kind(
+        "a dictionary of expressions of sympy by old coordinate and momentum",
+        _inverse,
+        "SYMBOL=EXPRESSION",
+        is_many=True,
+    )
+)
+HAMILTONIAN = replace(
+    instance("what `atwood.hamiltonian` returns", Hamiltonian),
+    of_scene=lambda assembly: read_hamiltonian(assembly, "symbolic"),
+)
+PHASE_SPACE = replace(
+    HAMILTONIAN, what="what `atwood.hamiltonian` returns, or a pair: coordinates and momenta", read=_phase_space
+)

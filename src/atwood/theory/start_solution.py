@@ -10,7 +10,7 @@ import numpy as np
 
 from atwood.analysis.dynamics import Dynamics
 from atwood.analysis.number_functions import Function
-from atwood.arguments import BY_PATH, TEXT, each, takes
+from atwood.arguments import BY_PATH, PATHS, takes
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, SolveError, UsageError, suggestion_in_parts
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jvp
@@ -54,7 +54,7 @@ class StartSolution:
         return fitted("\n".join([f"{self.assembly.flat.name}: start solved", *rows]))
 
 
-@takes(scene=SCENE, unknowns=each(TEXT, "paths, as a list of texts", single=True), conditions=BY_PATH)
+@takes(scene=SCENE, unknowns=PATHS, conditions=BY_PATH)
 def solve_start(scene: Model | Assembly, *, unknowns: Sequence[str], conditions: Mapping[str, Any]) -> StartSolution:
     """Find parameters, and start values, with which quantities at the start have given values.
 

@@ -113,7 +113,7 @@ ORIENTATION = one_of(ORIENTATIONS)
 SOLVER = one_of((AUTO, *METHODS))
 NAME = optional(TEXT)
 ACCURACY = optional(number("an error between 1e-15 and 0.1, such as 1e-8", least=1e-15, most=0.1))
-T_END = optional(Kind(f"seconds, at most {_LONGEST:g}, or text such as '2 min'", _time))
+T_END = optional(Kind(f"seconds, at most {_LONGEST:g}, or text such as '2 min'", _time, "TIME", _time))
 RTOL = number("a relative tolerance between 0 and 1, such as 1e-8", above=0.0, below=1.0)
 ATOL = optional(number("an absolute tolerance between 0 and 1, as a share of the scene's sizes", above=0.0, below=1.0))
 OUTPUTS = either(
@@ -135,14 +135,19 @@ def _order(value: Any) -> int:
 
 
 SAMPLES = whole(f"a whole number of samples, 1 to {_MOST:,}", 1, _MOST)
-ORDER = optional(Kind(f"one of {', '.join(map(str, _ORDERS))}", _order))
+ORDER = optional(Kind(f"one of {', '.join(map(str, _ORDERS))}", _order, "INTEGER", float, tuple(map(str, _ORDERS))))
 STRUCTURE = FLAG
 PROGRESS = optional(either(FLAG, CALLBACK))
 MONITOR = Kind("what `atwood.conserved(scene)` returns", _monitor)
-NOMINAL = optional(Kind("sizes by the path of a quantity, such as {'slider.displacement': '1 mm'}", _nominal))
+NOMINAL = optional(
+    Kind(
+        "sizes by the path of a quantity, such as {'slider.displacement': '1 mm'}", _nominal, "PATH=SIZE", is_many=True
+    )
+)
 _WATCHED = "a condition such as 'rod1.angle crosses 0', a function of quantities, or a list of these"
 _ONE = either(Kind(_WATCHED, _condition), CALLBACK)
-CONDITIONS = optional(Kind(_WATCHED, lambda value: either(CALLBACK, each(_ONE, _WATCHED)).read(value)))
+_WATCHES = either(CALLBACK, each(_ONE, _WATCHED))
+CONDITIONS = optional(Kind(_WATCHED, lambda value: _WATCHES.read(value), "CONDITION", is_many=True))
 
 
 def refuse_idle_settings(solver: str, order: int | None, step: float | None, first_step: float | None = None) -> None:

@@ -19,6 +19,7 @@ from atwood.model.compose.composite import Model
 from atwood.model.declare.quantities import PATHS
 from atwood.pipeline import SCENE, assembly_of
 from atwood.progress import told
+from atwood.ranges import values_of
 from atwood.simulation.problem.arguments import (
     ACCURACY,
     CONDITIONS,
@@ -51,10 +52,13 @@ _TRIALS = 20
 """If none of so many runs can be assembled, none is tried."""
 
 
+_VALUES = optional(replace(BY_PATH, word="PATH=VALUES", typed=values_of))
+
+
 @takes(
     scene=SCENE,
-    vary=optional(BY_PATH),
-    start=optional(BY_PATH),
+    vary=_VALUES,
+    start=_VALUES,
     combine=one_of(COMBINATIONS),
     quantities=PATHS,
     t_end=T_END,

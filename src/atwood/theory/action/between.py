@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from atwood.arguments import BY_PATH, optional, takes
+from atwood.arguments import BY_PATH, command, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, SolveError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
@@ -76,6 +76,7 @@ class JoiningMotion:
         return f"<JoiningMotion: {speeds}; S = {self.action.value:.9g} J s, {points}>"
 
 
+@command("motions")
 @takes(scene=SCENE, end=BY_PATH, t_end=T_END, start=optional(BY_PATH))
 def motions_between(
     scene: Model | Assembly,

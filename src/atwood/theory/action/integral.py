@@ -16,7 +16,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.lagrangian import lagrangian_along_speeds
 from atwood.forms.program import rates_are_speeds, state_groups
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.model.compose.composite import Model
 from atwood.pipeline import assembly_of, simulate
 from atwood.result.result import Result
@@ -28,7 +28,7 @@ from atwood.theory.action.curves import Nodes, curves_at, panels
 
 __all__ = ["Action", "Variation", "action", "action_of_run"]
 
-PATH = instance("a dictionary of functions of time by path", Mapping)
+PATH = replace(instance("a dictionary of functions of time by path", Mapping), word="PATH=EXPRESSION", is_many=True)
 
 _PROGRAM: Key[Program] = Key("action")
 _PANELS, _MODES = 64, 8

@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from typing import Any
 
 from atwood.analysis.hamiltonian import Hamiltonian
-from atwood.arguments import instance, takes
-from atwood.theory.arguments import EXPRESSION, EXPRESSIONS, PHASE_SPACE
+from atwood.arguments import command, takes
+from atwood.theory.arguments import EXPRESSION, EXPRESSIONS, HAMILTONIAN, PHASE_SPACE
 from atwood.theory.canonical.phase_space import PhaseSpace, Sympy, phase_space_of, short
 
 __all__ = ["bracket", "fundamental_brackets", "poisson_bracket", "poisson_brackets", "total_derivative"]
 
 
+@command("bracket")
 @takes(f=EXPRESSION, g=EXPRESSION, hamiltonian=PHASE_SPACE)
 def poisson_bracket(f: Any, g: Any, hamiltonian: Hamiltonian | tuple[Sequence[Sympy], Sequence[Sympy]]) -> Sympy:
     """Return the Poisson bracket ``{f, g} = sum df/dq dg/dp - df/dp dg/dq``.
@@ -39,6 +40,7 @@ def poisson_bracket(f: Any, g: Any, hamiltonian: Hamiltonian | tuple[Sequence[Sy
     return space.shown(short(bracket(space.read(f), space.read(g), space)))
 
 
+@command("brackets")
 @takes(functions=EXPRESSIONS, hamiltonian=PHASE_SPACE)
 def poisson_brackets(
     functions: Sequence[Any], hamiltonian: Hamiltonian | tuple[Sequence[Sympy], Sequence[Sympy]]
@@ -79,7 +81,7 @@ def fundamental_brackets(
     return poisson_brackets([*coordinates, *momenta], hamiltonian)
 
 
-@takes(f=EXPRESSION, hamiltonian=instance("what `atwood.hamiltonian` returns", Hamiltonian))
+@takes(f=EXPRESSION, hamiltonian=HAMILTONIAN)
 def total_derivative(f: Any, hamiltonian: Hamiltonian) -> Sympy:
     """Return the rate of a function along motions, ``df/dt = {f, H} + df/dt`` (Goldstein, equation 9.94).
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from atwood.analysis.hamiltonian import Hamiltonian
-from atwood.arguments import BY_PATH, check, takes
+from atwood.arguments import BY_PATH, check, command, takes
 from atwood.errors import UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
@@ -58,6 +58,7 @@ class PointTransformation:
         return f"<PointTransformation to {', '.join(map(str, self.coordinates))}: K = {self.hamiltonian}>"
 
 
+@command("transform")
 @takes(scene=SCENE, old=BY_PATH, coordinates=SYMBOLS)
 def point_transformation(
     scene: Model | Assembly, old: Mapping[str, Any], coordinates: Sequence[Any]

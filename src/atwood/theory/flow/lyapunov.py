@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from atwood.analysis.flow.growth import orthonormal_growth
-from atwood.arguments import check, number, optional, takes, whole
+from atwood.arguments import check, command, number, optional, takes, whole
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
@@ -88,6 +88,7 @@ class LyapunovExponents:
         return fitted(f"<LyapunovExponents of {self.scene} over {self.time[-1]:g} s: {values} 1/s>")
 
 
+@command("lyapunov")
 @takes(
     scene=SCENE,
     t_end=T_END,

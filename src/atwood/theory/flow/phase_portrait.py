@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from atwood.analysis.dynamics import Dynamics
 from atwood.analysis.flow.plane_field import Field, Window, separatrices, spaced_curves
 from atwood.analysis.linear.variations import LinearScene
-from atwood.arguments import Kind, Refused, optional, real, takes
+from atwood.arguments import Kind, Refused, command, optional, real, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
@@ -19,6 +19,7 @@ from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.pipeline import SCENE, assemble
+from atwood.ranges import range_of
 from atwood.showing import count_of, data_of, fitted
 from atwood.simulation.dynamics.scales import scene_length
 from atwood.simulation.events.modes import find_event_functions
@@ -131,9 +132,12 @@ def _read_bounds(value: Any) -> Bounds:
     return low, high
 
 
-_BOUNDS = optional(Kind("a range from low to high, such as (-3.0, 3.0) or ('-90 deg', '90 deg')", _read_bounds))
+_BOUNDS = optional(
+    Kind("a range from low to high, such as (-3.0, 3.0) or ('-90 deg', '90 deg')", _read_bounds, "FROM:TO", range_of)
+)
 
 
+@command("phase")
 @takes(scene=SCENE, coordinates=_BOUNDS, speeds=_BOUNDS)
 def phase_portrait(
     scene: Model | Assembly,
@@ -152,7 +156,7 @@ def phase_portrait(
     scene
         The scene, or an assembly of its reduced form.
     coordinates, speeds
-        What is looked at, m or rad, and these by seconds, or text with units such as ``"180 deg"``; chosen by the
+        Ranges of the coordinate and of its rate, in SI units or text with units such as ``"180 deg"``; chosen by the
         points of rest and the start if not given.
 
     Returns

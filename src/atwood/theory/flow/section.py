@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.arguments import BY_PATH, TEXT, each, optional, takes
+from atwood.arguments import BY_PATH, TEXT, command, each, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError, UsageError
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assemble, simulate
 from atwood.showing import count_of, data_of, fitted
@@ -63,11 +63,17 @@ class PoincareSection:
         return fitted(f"<PoincareSection of {self.scene}, {self.surface}: {points}, {', '.join(self.values)}>")
 
 
+_START = replace(
+    BY_PATH, word="PATH=VALUE,...", typed=lambda text: dict(one.strip().split("=", 1) for one in text.split(","))
+)
+
+
+@command("section")
 @takes(
     scene=SCENE,
     surface=TEXT,
     quantities=each(TEXT, "paths of quantities, at least one, as a list of texts", least=1),
-    starts=optional(each(BY_PATH, "start values by path, one mapping for each motion")),
+    starts=optional(each(_START, "start values by path, one mapping for each motion")),
     t_end=T_END,
     rtol=RTOL,
     solver=SOLVER,

@@ -10,17 +10,18 @@ import numpy as np
 from atwood.analysis.linear.continuation import Curve, Problem, Residual, branch_directions, follow
 from atwood.analysis.linear.rest import difference, slopes_at
 from atwood.analysis.linear.variations import LinearScene
-from atwood.arguments import BY_PATH, TEXT, Kind, Refused, optional, real, takes
+from atwood.arguments import TEXT, Kind, Refused, real, takes
 from atwood.arrays import BoolArray, FloatArray
 from atwood.errors import AtwoodError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assemble
+from atwood.ranges import range_of
 from atwood.showing import data_of
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.table import Shown, Table, table
-from atwood.theory.linearization.equilibria import equilibria
+from atwood.theory.linearization.equilibria import REGION, equilibria
 from atwood.theory.linearization.normal_modes import modes_of, values_text
 from atwood.theory.linearization.operating_point import OperatingPoint, find_operating_point, moved_to, values_at
 
@@ -127,8 +128,8 @@ def _read_span(value: Any) -> tuple[float, float]:
 @takes(
     scene=SCENE,
     path=TEXT,
-    span=Kind("the least and the largest value", _read_span),
-    region=optional(BY_PATH),
+    span=Kind("the least and the largest value", _read_span, "FROM:TO", range_of),
+    region=REGION,
 )
 def equilibrium_branches(
     scene: Model | Assembly, path: str, span: tuple[float, float], *, region: Mapping[str, Any] | None = None

@@ -19,13 +19,14 @@ from atwood.mechanics.build import extent
 from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.pipeline import SCENE
+from atwood.ranges import range_of
 from atwood.showing import count_of, data_of
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.table import Shown, Table, table
 from atwood.theory.linearization.normal_modes import NormalModes, modes_of, values_text
 from atwood.theory.linearization.operating_point import OperatingPoint, find_operating_point, moved_to, values_at
 
-__all__ = ["Equilibria", "Equilibrium", "equilibria"]
+__all__ = ["REGION", "Equilibria", "Equilibrium", "equilibria"]
 
 
 _STARTS = 32
@@ -115,7 +116,10 @@ class Equilibria(Shown, list[Equilibrium]):
     __str__ = Shown.as_text
 
 
-@takes(scene=SCENE, region=optional(BY_PATH))
+REGION = optional(replace(BY_PATH, word="PATH=FROM:TO", typed=range_of))
+
+
+@takes(scene=SCENE, region=REGION)
 def equilibria(scene: Model | Assembly, *, region: Mapping[str, Any] | None = None) -> Equilibria:
     """Find the states of rest of a scene in a region.
 

@@ -12,7 +12,7 @@ from atwood.analysis.linear.state_space import StateSpace, find_state_space
 from atwood.analysis.linear.steady import Steady, find_steady, still
 from atwood.analysis.linear.switches import refuse_switches
 from atwood.analysis.linear.variations import Flow
-from atwood.arguments import TEXT, each, takes
+from atwood.arguments import PATHS, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.expr import live
@@ -33,10 +33,8 @@ from atwood.theory.linearization.quantities import output_rows
 
 __all__ = ["linearize", "not_steady"]
 
-PATHS_GIVEN = each(TEXT, "paths, as a list of texts", single=True)
 
-
-@takes(scene=SCENE, at=AT, inputs=PATHS_GIVEN, outputs=PATHS_GIVEN, form=FORM)
+@takes(scene=SCENE, at=AT, inputs=PATHS, outputs=PATHS, form=FORM)
 def linearize(
     scene: Model | Assembly,
     *,

@@ -12,7 +12,7 @@ from atwood.analysis.linear.modes import find_modes
 from atwood.analysis.linear.state_space import find_state_space
 from atwood.analysis.linear.steady import find_steady, still
 from atwood.analysis.linear.switches import refuse_switches
-from atwood.arguments import check, number, takes, whole
+from atwood.arguments import check, command, number, takes, whole
 from atwood.arrays import ComplexArray, FloatArray
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
@@ -153,6 +153,7 @@ def _number(value: complex) -> float | list[float]:
     return value.real if value.imag == 0.0 else [value.real, value.imag]
 
 
+@command("modes")
 @takes(scene=SCENE, at=AT)
 def normal_modes(scene: Model | Assembly, *, at: At = None) -> NormalModes:
     """Find the frequencies and shapes of small oscillations.

@@ -47,13 +47,13 @@ At = Mapping[str, Any] | tuple[Result, float] | None
 
 def _read_at(value: Any) -> Any:
     if value is None or isinstance(value, Mapping):
-        return value
+        return {} if value == {"rest": "yes"} else value
     if isinstance(value, tuple) and len(value) == 2 and isinstance(value[0], Result):
         return value[0], float(value[1])
     raise Refused
 
 
-AT = Kind("values by path, or a result and a time", _read_at)
+AT = Kind("values by path, or a result and a time", _read_at, "PATH=VALUE", is_many=True)
 
 _SAME_TIME = 1e-12
 """Relative: times that differ by less are one."""

@@ -14,8 +14,10 @@ from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assemble
+from atwood.ranges import values_of
 from atwood.showing import fitted
 from atwood.theory.linearization.linearize import linearize
+from atwood.theory.linearization.operating_point import AT
 
 __all__ = ["RootLocus", "root_locus"]
 
@@ -70,9 +72,7 @@ def _read_values(value: Any) -> FloatArray:
     return found
 
 
-@takes(
-    scene=SCENE, path=TEXT, values=Kind("at least two numbers", _read_values), at=Kind("values by path", lambda v: v)
-)
+@takes(scene=SCENE, path=TEXT, values=Kind("at least two numbers", _read_values, "VALUES", values_of), at=AT)
 def root_locus(
     scene: Model | Assembly, path: str, values: Iterable[float], *, at: Mapping[str, Any] | None = None
 ) -> RootLocus:

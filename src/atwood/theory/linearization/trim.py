@@ -9,7 +9,7 @@ import numpy as np
 
 from atwood.analysis.linear.minimal import Minimal
 from atwood.analysis.linear.rest import slopes_at
-from atwood.arguments import TEXT, each, takes
+from atwood.arguments import PATHS, takes
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly
@@ -67,7 +67,7 @@ class Trim:
         return fitted(str(self))
 
 
-@takes(scene=SCENE, at=AT, inputs=each(TEXT, "paths, as a list of texts", single=True), free=each(TEXT, "paths"))
+@takes(scene=SCENE, at=AT, inputs=PATHS, free=PATHS)
 def trim(scene: Model | Assembly, *, at: At = None, inputs: Sequence[str] = (), free: Sequence[str] = ()) -> Trim:
     """Find inputs, and coordinates that are not given, with which nothing accelerates.
 

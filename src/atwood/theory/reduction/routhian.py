@@ -12,7 +12,7 @@ from atwood.analysis.equation_formulas import EquationFormulas
 from atwood.analysis.formulas import objects
 from atwood.analysis.formulas.notation import notation_of
 from atwood.analysis.formulas.tree import Sum
-from atwood.arguments import TEXT, each, optional, takes
+from atwood.arguments import PATHS, TEXT, optional, takes
 from atwood.errors import UnsupportedError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian, lagrangian_of
@@ -141,7 +141,7 @@ def _formula(written: Sum) -> Sympy:
     return objects.formula(written)
 
 
-@takes(scene=SCENE, ignorable=optional(each(TEXT, "paths, as a list of texts")), orientation=optional(TEXT))
+@takes(scene=SCENE, ignorable=optional(PATHS), orientation=optional(TEXT))
 def routhian(
     scene: Model | Assembly, ignorable: Sequence[str] | None = None, *, orientation: str | None = None
 ) -> Routhian:

@@ -1,0 +1,233 @@
+"""Commands made of functions: options, their checks and their help come from tables of kinds and from docstrings.
+
+`takes` puts a table of kinds before each public function. An option of the command line is an argument with a kind
+that text can say; its help is what the docstring says of the argument, and its default that of the function.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import re
+from collections.abc import Callable, Collection, Mapping, Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import click
+
+from atwood.arguments import TEXT, Kind, Refused
+from atwood.cli.errors import reporting_errors
+from atwood.cli.scenes import pairs
+from atwood.errors import UsageError
+
+__all__ = ["SCENE_HELP", "Request", "command", "documented", "first_sentence", "kinds_of"]
+
+SCENE_HELP = """SCENE is the name of a scene of an installed library (see `atwood list`), or FILE.py:NAME, where NAME
+is a Scene class, a scene, or a function that returns one."""
+
+_COMMON = {
+    "settings": ("--set", "Parameter, such as rod1.length='30 cm'."),
+    "start_values": ("--start", "Start value, such as rod1.angle='30 deg'; =free lets one go that the scene fixes."),
+}
+"""Options of all commands that take a scene."""
+
+
+class Request(SimpleNamespace):
+    """What was asked for on the command line, by the names of arguments."""
+
+    def __getattr__(self, name: str) -> Any:
+        raise AttributeError(name)
+
+    def of(self, function: Callable[..., Any], leave: Collection[str] = ()) -> dict[str, Any]:
+        """Return the arguments of a function that were asked for."""
+        known = vars(self)
+        leave = {*leave, "scene", "progress"}
+        return {name: known[name] for name in kinds_of(function) if name in known and name not in leave}
+
+
+def kinds_of(function: Callable[..., Any]) -> Mapping[str, Kind]:
+    """Return the table of kinds of a function."""
+    found: Mapping[str, Kind] = getattr(function, "kinds", {})
+    return found
+
+
+def command(
+    name: str,
+    run: Callable[[Request], None],
+    *functions: Callable[..., Any],
+    argument: str = "scene",
+    is_required: bool = True,
+    leave: Collection[str] = (),
+    more: Mapping[str, tuple[Kind, Any]] | None = None,
+    names: Mapping[str, str] | None = None,
+) -> click.Command:
+    """Return the command that runs with what was asked for.
+
+    Parameters
+    ----------
+    name
+        The command.
+    run
+        Gets what was asked for. Its docstring is the help of the command, and says what is not said of arguments yet.
+    *functions
+        Whose arguments are options; where they have an argument in common, the first one's table counts.
+    argument
+        ``"scene"``, with parameters and start values that can be set, or another, or empty.
+    is_required
+        Whether it must be given.
+    leave
+        Arguments that are no options.
+    more
+        Further options: their kinds and defaults.
+    names
+        Options that are not called as the arguments.
+    """
+    params: list[click.Parameter] = []
+    if argument:
+        params.append(click.Argument([argument], required=is_required))
+    for key, (option, text) in _COMMON.items() if argument == "scene" else ():
+        params.append(_Option([option, key], multiple=True, metavar="PATH=VALUE", help=f"{text} Can be repeated."))
+    json = "Write JSON, and nothing else, to standard output."
+    params.append(_Option(["--json", "as_json"], is_flag=True, help=json))
+    table: dict[str, tuple[Kind, Any]] = {}
+    for function in functions:
+        signature = inspect.signature(function).parameters
+        for key, kind in kinds_of(function).items():
+            default = signature[key].default
+            if kind.word and key not in (*leave, "scene"):
+                known = table.get(key, (kind, default))
+                table[key] = (known[0], default if known[1] is None else known[1])
+    table |= dict(more or {})
+    told = (run, *functions)
+    called_so = {key: f"--{_singular(key) if kind.is_many else key}" for key, (kind, _) in table.items()}
+    called_so |= {key: "--starts" for key, option in called_so.items() if option == "--start"} | dict(names or {})
+    params += [_option(key, kind, default, told, called_so[key]) for key, (kind, default) in table.items()]
+
+    @reporting_errors
+    def called(**typed: Any) -> None:
+        texts = {key: typed.pop(key) for key in options}
+        read = {key: _read(texts[key], kind, option) for key, (kind, option) in options.items()}
+        run(Request(**typed, **read, typed=texts))
+
+    options = {one.name: (table[one.name][0], one.opts[0]) for one in params if one.name in table}
+    text = inspect.cleandoc(run.__doc__ or "").partition("\n\nParameters\n")[0]
+    return click.Command(
+        name,
+        callback=called,
+        params=params,
+        help=re.sub("^Return ", "Show ", _plain(text)),
+        epilog=SCENE_HELP if argument == "scene" else None,
+    )
+
+
+class _Option(click.Option):
+    """An option whose help is read from docstrings when it is shown."""
+
+    told: Sequence[Callable[..., Any]] = ()
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        """Return the option as it is written, and what is said of it."""
+        if self.help is None:
+            text = next((found for one in self.told if (found := documented(one).get(self.name or ""))), "")
+            self.help = f"{first_sentence(text)} Can be repeated." if self.multiple else first_sentence(text)
+        return super().get_help_record(ctx)
+
+
+class _Typed(click.ParamType):  # type: ignore[type-arg]  # generic in the newest click alone
+    """The type of what a kind reads."""
+
+    def __init__(self, kind: Kind) -> None:
+        self.kind, self.name = kind, kind.word.lower()
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return what was typed, or refuse it."""
+        try:
+            return _typed(self.kind, value, param.opts[0] if param is not None else "")
+        except (Refused, ValueError) as error:
+            said = str(error) if isinstance(error, Refused) else ""
+            self.fail(f"{value!r} will not do. {said} Give {self.kind.what}.".replace("  ", " "), param, ctx)
+        except UsageError:
+            return value  # it is read again where errors are reported
+
+
+def _typed(kind: Kind, value: Any, where: str) -> Any:
+    """Return what a kind makes of what was typed; an error says where it was."""
+    try:
+        return kind.typed(value) if isinstance(value, str) else value
+    except UsageError as error:
+        raise UsageError(error.message, where=where, advice=error.advice) from None
+
+
+def _option(name: str, kind: Kind, default: Any, told: Sequence[Callable[..., Any]], called: str) -> click.Option:
+    """Return the option of an argument."""
+    option = called.replace("_", "-")
+    settings: dict[str, Any] = {"show_default": default not in (None, (), False, inspect.Parameter.empty)}
+    if kind.word == "FLAG":
+        declared = f"{option}/--no-{option[2:]}" if default else option
+        settings |= {"is_flag": True, "show_default": False}
+    else:
+        declared, is_short = option, len(kind.words) in range(1, _SHORT)
+        settings["metavar"] = f"[{'|'.join(kind.words)}]" if is_short else kind.word
+        settings["type"] = click.Choice(kind.words) if is_short else _Typed(TEXT if kind.is_many else kind)
+        settings["multiple"] = kind.is_many
+    if default is inspect.Parameter.empty:
+        settings["required"] = True
+    elif not kind.is_many:
+        settings["default"] = default if not kind.words or default is None else str(default)
+    made = _Option([declared, name], **settings)
+    made.told = told
+    return made
+
+
+_SHORT = 9
+"""Of so many words a list is too long to be shown with an option."""
+
+
+def _singular(name: str) -> str:
+    return re.sub("ies$", "y", name) if name.endswith("ies") else name.removesuffix("s")
+
+
+def _read(typed: Any, kind: Kind, option: str) -> Any:
+    """Return what was typed as a function takes it; nothing of what can be repeated is what is usual."""
+    if kind.is_many and "=" in kind.word and "," not in kind.word:
+        return {path: _typed(kind, text, f"{option} {path}") for path, text in pairs(typed, option)} or None
+    if kind.is_many:
+        return [_typed(kind, one, option) for one in typed] or None
+    return _typed(kind, typed, option)
+
+
+# -- what docstrings say ---------------------------------------------------------------------------------------------
+
+
+def documented(of: Any) -> dict[str, str]:
+    """Return what a docstring says of each argument, or attribute; what it says that others say is read there."""
+    lines = inspect.cleandoc(of.__doc__ or "").split("\n")
+    found: dict[str, str] = {}
+    names: list[str] = []
+    is_on = False
+    for k, line in enumerate(lines):
+        if line and k + 1 < len(lines) and set(lines[k + 1]) == {"-"}:
+            is_on, names = line in ("Parameters", "Attributes"), []
+        elif is_on and line and not line.startswith(" ") and set(line) != {"-"}:
+            names = [one.strip(" *") for one in line.split(",")]
+        elif is_on and line.strip():
+            found |= {name: f"{found.get(name, '')} {line.strip()}".strip() for name in names}
+    return {name: _followed(name, text) for name, text in found.items()}
+
+
+def _followed(name: str, text: str) -> str:
+    """Return what is said of an argument elsewhere, where a docstring points there."""
+    pointed = re.match(r"(?:See|As for) `(?:atwood\.)?(\w+)`", text)
+    if not pointed:
+        return text
+    other = getattr(importlib.import_module("atwood"), pointed[1], None)
+    return documented(other).get(name, text)
+
+
+def first_sentence(text: str) -> str:
+    """Return the first sentence of a docstring, without marks of code."""
+    return _plain(re.split(r"(?<=\.)\s+(?=[A-Z])", text, maxsplit=1)[0])
+
+
+def _plain(text: str) -> str:
+    return re.sub(r"``([^`]*)``", lambda found: found[1].strip('"'), text).replace("`", "")

@@ -1,0 +1,286 @@
+"""Commands of theory: a scene in, and what a function of theory says of it out, as tables, text, JSON or a picture."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import math
+from collections.abc import Callable, Iterator, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import click
+
+import atwood
+from atwood.analysis.hamiltonian import read_hamiltonian
+from atwood.arguments import FILE, FLAG, TEXT, Kind
+from atwood.cli.command import Request, command, documented, first_sentence, kinds_of
+from atwood.cli.output import print_json, warn, writer
+from atwood.cli.scenes import pairs, prepare, warn_of_radians
+from atwood.errors import AtwoodError, UsageError
+from atwood.forms.assembly import Assembly
+from atwood.late import replace
+from atwood.pipeline import assemble
+from atwood.plotting.canvas import check_picture
+from atwood.ranges import range_of
+from atwood.showing import plain
+from atwood.table import Shown, table
+from atwood.theory.linearization import equilibria, equilibrium_branches
+
+__all__ = ["theory_command"]
+
+_WRITTEN = ("latex", "markdown", "python")
+"""Methods of results that write them down, each an option."""
+
+_PICTURES = {
+    "EquilibriumBranches": "plot_branches",
+    "LinearModel": "plot_bode",
+    "NormalModes": "plot_mode",
+    "PhasePortrait": "plot_phase_portrait",
+    "PoincareSection": "plot_section",
+    "ReducedMotion": "plot_effective_potential",
+    "RootLocus": "plot_root_locus",
+}
+"""Functions of `atwood` that draw results, by their classes."""
+
+_MOST_PICTURES = 12
+
+
+def theory_command(name: str, module: str, function: str) -> click.Command:
+    """Return the command of a function of theory: its arguments are options, and its scene is the argument."""
+    found = getattr(importlib.import_module(module), function)
+    of = found.__annotations__["return"]
+    made = vars(importlib.import_module(module)).get(of)
+    more: dict[str, tuple[Kind, Any]] = {one: (FLAG, False) for one in _WRITTEN if hasattr(made, one)}
+    more |= {"plot": (FILE, None)} if of in _PICTURES else {}
+    special, own = _SPECIAL.get(name, (None, {}))
+
+    def run(request: Request) -> None:
+        written = [one for one in (*_WRITTEN, "as_json") if getattr(request, one, False)]
+        if len(written) > 1:
+            names = " and ".join(f"--{one.removeprefix('as_')}" for one in written)
+            raise UsageError(f"{names} do not go together", advice="Give one of them.")
+        if getattr(request, "plot", None) is not None:
+            check_picture(request.plot)
+        asked, scene = _read(found, request)
+        value = _called(found, scene, asked) if special is None else special(found, scene, asked, request)
+        _show(value, name, scene.flat.name, written[0] if written else "", getattr(request, "plot", None))
+
+    run.__doc__ = (special or found).__doc__
+    told = [*([special] if special else []), _show, found]
+    names = {"plot": "--bode"} if of == "LinearModel" else {}
+    return command(name, run, *told, more=more | own, names=names)
+
+
+def _read(function: Callable[..., Any], request: Request) -> tuple[dict[str, Any], Assembly]:
+    """Return the arguments that were given, and the scene, assembled as they ask for it."""
+    scene, name = prepare(request.scene, request.settings, request.start_values)
+    asked = {key: value for key, value in request.of(function).items() if value is not None}
+    for key, value in asked.items():
+        if kinds_of(function)[key].word == "PATH=VALUE" and isinstance(value, Mapping):
+            for path, text in value.items():
+                warn_of_radians(scene, path, [text], f"--{key}", text)
+    given = {key: asked[key] for key in ("form", "orientation") if key in asked}
+    return asked, assemble(scene, name=name, **given)
+
+
+def _called(function: Callable[..., Any], scene: Assembly, asked: Mapping[str, Any]) -> Any:
+    """Return what a function says of a scene, or of what it takes in place of one."""
+    made = {key: kind.of_scene(scene) for key, kind in kinds_of(function).items() if kind.of_scene is not None}
+    if "scene" in kinds_of(function):
+        made["scene"] = scene
+    return function(**made, **asked)
+
+
+# -- commands with more than their function ----------------------------------------------------------------------------
+
+
+def _equations(function: Callable[..., Any], scene: Assembly, asked: dict[str, Any], request: Request) -> Any:
+    """Write the equations of motion of SCENE: Lagrange's equations, with symbols as in a textbook.
+
+    In space, --orientation euler-zxz gives them in Euler angles; else angular velocities are in the axes of the body.
+
+    Parameters
+    ----------
+    values
+        Put the values of parameters in place of their symbols.
+    hamiltonian
+        Write the Hamiltonian and the momenta instead.
+    """
+    if request.values:
+        asked["parameters"] = "values"
+    if not request.hamiltonian:
+        return _called(function, scene, asked)
+    if request.python:
+        raise UsageError("--hamiltonian is not written in Python", advice="Give --latex, --markdown or --json.")
+    return read_hamiltonian(scene, asked["parameters"])
+
+
+def _equilibria(function: Callable[..., Any], scene: Assembly, asked: dict[str, Any], request: Request) -> Any:
+    """Find the equilibria of SCENE, and whether they are stable.
+
+    Parameters
+    ----------
+    along
+        Follow them while a parameter changes, SI units.
+    plot
+        With --along: save a picture of the branches (.png, .svg, .pdf).
+    """
+    if request.along is None:
+        if request.plot is not None:
+            raise UsageError("there is nothing to draw", where="--plot", advice="Give --along PATH=FROM:TO too.")
+        return _called(function, scene, asked)
+    ((path, text),) = pairs([request.along], "--along")
+    low, high = range_of(text)
+    if isinstance(low, str) or isinstance(high, str):
+        raise UsageError(f"{text!r} is no range", where=path, advice="Write --along PATH=FROM:TO, SI units.")
+    return equilibrium_branches(scene, path, (low, high), **asked)
+
+
+def _modes(function: Callable[..., Any], scene: Assembly, asked: dict[str, Any], request: Request) -> Any:
+    """Show the normal modes of SCENE: about its start if it is at rest there, else about its stable equilibria."""
+    try:
+        return [_called(function, scene, asked)]
+    except UsageError as error:
+        found = [one.modes for one in equilibria(scene) if one.stable] if not asked else []
+        if not found:
+            raise error
+        return found
+
+
+_SPECIAL: dict[str, tuple[Callable[..., Any], dict[str, tuple[Kind, Any]]]] = {
+    "equations": (_equations, {"values": (FLAG, False), "hamiltonian": (FLAG, False)}),
+    "equilibria": (_equilibria, {"along": (replace(TEXT, word="PATH=FROM:TO"), None), "plot": (FILE, None)}),
+    "modes": (_modes, {}),
+}
+"""What commands do beside calling their function, and their further options."""
+
+
+# -- what is shown -----------------------------------------------------------------------------------------------------
+
+
+def _show(value: Any, command: str, scene: str, written: str, picture: Path | None) -> None:
+    """Write what was found to standard output, and draw it.
+
+    Parameters
+    ----------
+    latex
+        Write it in LaTeX.
+    markdown
+        Write a page: symbols, energies, momenta, formulas, matrices.
+    python
+        Write a module of Python that computes it.
+    plot
+        Save a picture (.png, .svg, .pdf): one each, numbered, of several modes.
+    at
+        The state, such as rod.angle='180 deg' or wheel.angular_velocity=3: speeds that are not named are zero; the
+        scene's own start if not given.
+    region
+        Where to look, such as rod.angle=-90deg:90deg; everywhere if not given.
+    orientation
+        Coordinates of orientations in space: quaternion, or Euler angles such as euler-zyz.
+    """
+    several = value if isinstance(value, (list, tuple)) and not isinstance(value, Shown) else [value]
+    if picture is not None:
+        _draw(several[0], picture)
+    if written == "as_json":
+        print_json(_data(value, command, scene))
+        return
+    if written:
+        text = getattr(value, written)()
+        click.echo(text, nl=not text.endswith("\n"))
+        return
+    out = writer()
+    for number, one in enumerate(several):
+        if number:
+            out.line()
+        says = vars(type(one)).get("__str__")
+        if isinstance(one, Shown) and says in (None, Shown.as_text):
+            out.show(*one.tables())
+        elif hasattr(one, "text") or any("__str__" in vars(base) for base in type(one).__mro__[:-1]):
+            out.line((one.text() if hasattr(one, "text") else str(one), ""))
+        else:
+            rows = ((name, _text(held), meaning) for name, held, meaning in _attributes(one))
+            out.show(table(("", "~", "~"), rows, f"{scene}: {type(one).__name__}"))
+    if picture is not None:
+        out.files(plotted=picture)
+    elif type(several[0]).__name__ == "PhasePortrait":
+        out.line(("Draw it with --plot phase.png.", "dim"))
+
+
+def _draw(value: Any, file: Path) -> None:
+    """Draw what was found; every mode in a picture of its own, numbered where there are several."""
+    draw = getattr(importlib.import_module("atwood"), _PICTURES[type(value).__name__])
+    if draw.__name__ != "plot_mode":
+        draw(value, file=file)
+        return
+    if len(value) > _MOST_PICTURES:
+        warn(f"only the first {_MOST_PICTURES} of {len(value)} modes are drawn")
+    for mode in range(min(len(value), _MOST_PICTURES)):
+        draw(value, mode, file if len(value) == 1 else file.with_name(f"{file.stem}-{mode}{file.suffix}"))
+
+
+def _data(value: Any, command: str, scene: str) -> dict[str, Any]:
+    """Return what was found as plain data."""
+    if isinstance(value, (list, tuple)):
+        return {"scene": scene, command: [_as_data(one) for one in value]}
+    found = _as_data(value)
+    told: dict[str, Any] = found if isinstance(found, dict) else {command: found}
+    return told if hasattr(value, "to_data") or hasattr(value, "to_dict") else {"scene": scene, **told}
+
+
+def _as_data(value: Any) -> Any:
+    """Return a value as it says itself, or by what it holds."""
+    if hasattr(value, "to_data") or hasattr(value, "to_dict") or not str(type(value).__module__).startswith("atwood"):
+        return plain(value)
+    held = {name: _as_data(one) if _is_theory(one) else plain(one) for name, one, _ in _attributes(value)}
+    return held or plain(value)
+
+
+def _attributes(value: Any) -> Iterator[tuple[str, Any, str]]:
+    """Yield what a value holds that can be written: name, value and meaning; first what its docstring tells."""
+    kind, told = type(value), documented(type(value))
+    for base in reversed(kind.__mro__):
+        for name, one in vars(base).items():
+            if isinstance(one, (property, cached_property)) and not name.startswith("_"):
+                told.setdefault(name, inspect.getdoc(one) or "")
+    for name, meaning in told.items():
+        try:
+            held = getattr(value, name)
+        except AtwoodError:  # what it does not have
+            continue
+        is_empty = isinstance(held, (str, tuple, list, Mapping)) and not held
+        if name not in ("name", "scene") and not is_empty and (_is_plain(held) or _is_theory(held)):
+            yield name, held, first_sentence(meaning)
+
+
+def _is_theory(value: Any) -> bool:
+    """Return whether a value is what a public function of theory returns."""
+    return str(type(value).__module__).startswith("atwood.theory") and type(value).__name__ in atwood.__all__
+
+
+def _is_plain(value: Any) -> bool:
+    if isinstance(value, (dict, tuple, list)):
+        return all(_is_plain(one) for one in (value.values() if isinstance(value, dict) else value))
+    is_one = isinstance(value, (str, bool, int, float, complex))
+    return is_one or hasattr(value, "dtype") or hasattr(value, "free_symbols")
+
+
+def _text(value: Any) -> str:
+    """Return a value in a line; of large arrays their shape."""
+    if _is_theory(value):
+        return repr(value)
+    if isinstance(value, Mapping):
+        return ", ".join(f"{name} = {_text(one)}" for name, one in value.items())
+    if getattr(value, "shape", None) and math.prod(value.shape) > _LARGE and hasattr(value, "dtype"):
+        return f"array of shape {value.shape}: --json writes it"
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, (tuple, list)):
+        return ", ".join(f"[{_text(one)}]" if isinstance(one, (tuple, list)) else _text(one) for one in value)
+    return f"{value:.9g}" if isinstance(value, (float, complex)) else str(value)
+
+
+_LARGE = 16
+"""Arrays of more numbers are not written in a line."""

@@ -1,1 +1,0 @@
-"""What theory knows of a scene, on the command line."""

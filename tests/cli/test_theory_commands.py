@@ -1,0 +1,137 @@
+"""Every public function of theory has a command, which nothing but its file makes."""
+
+from __future__ import annotations
+
+import inspect
+import json
+from pathlib import Path
+
+import click
+import pytest
+from click.testing import CliRunner
+
+import atwood
+from atwood.cli import app, main
+
+
+def ran(*arguments: str) -> str:
+    done = CliRunner().invoke(main, arguments, catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    return done.stdout
+
+
+def public_functions() -> dict[str, object]:
+    """Return the public functions of theory by name."""
+    every = {name: getattr(atwood, name) for name in atwood.__all__}
+    is_theory = {name: one for name, one in every.items() if getattr(one, "__module__", "").startswith("atwood.theory")}
+    return {name: one for name, one in is_theory.items() if inspect.isfunction(one)}
+
+
+def test_every_public_function_of_theory_has_a_command() -> None:
+    found = {one.function: name for name, one in app.theory_functions().items()}
+    assert set(found) == set(public_functions())
+    shown = ran("--help")
+    for function, name in found.items():
+        made = main.get_command(click.Context(main), name)
+        assert made is not None, function
+        assert f"\n  {name} " in shown
+        assert {"scene", "as_json"} <= {one.name for one in made.params}, name
+
+
+def test_a_file_with_a_table_of_kinds_is_all_that_a_command_needs(tmp_path: Path, monkeypatch) -> None:
+    (tmp_path / "more.py").write_text(
+        "from atwood.arguments import BY_PATH, command, takes\n\n\n"
+        '@command("short")\n@takes(\n    scene=SCENE,\n    end=BY_PATH,\n)\n'
+        "def a_long_name(\n    scene: Model, end: Mapping[str, Any]\n) -> int:\n"
+        '    """Return what is new.\n\n    More.\n    """\n\n\n'
+        '@takes(scene=SCENE)\ndef other(scene: Model) -> str:\n    """Find `it`."""\n\n\n'
+        '@takes(scene=SCENE)\ndef _private(scene: Model) -> str:\n    """Hide."""\n\n\n'
+        'def plain(scene: Model) -> str:\n    """Have no table."""\n',
+        encoding="utf-8",
+    )
+    monkeypatch.setattr(app, "_THEORY", tmp_path)
+    app.theory_functions.cache_clear()
+    try:
+        found = app.theory_functions()
+    finally:
+        app.theory_functions.cache_clear()
+    assert {name: (one.function, one.summary) for name, one in found.items()} == {
+        "short": ("a_long_name", "Show what is new."),
+        "other": ("other", "Find it."),
+    }
+
+
+@pytest.mark.parametrize(
+    ("command", "key", "said"),
+    [
+        ("action simple-pendulum --t-end 1", "value", "S, J s."),
+        ("action-angle simple-pendulum", "period", "libration"),
+        ("bracket simple-pendulum --f theta --g p_theta", "bracket", "1"),
+        ("brackets simple-pendulum --function theta --function p_theta", "brackets", "Matrix([[0, 1], [-1, 0]])"),
+        ("canonical-transformation simple-pendulum --coordinate Q=p_theta --momenta P=-theta", "hamiltonian", "cos(P)"),
+        ("equilibrium-branches simple-pendulum --path gravity --span 9:10", "branches", "26 of 26 points stable"),
+        ("generated-transformation simple-pendulum --function theta*P --kind 2 --coordinate Q --momenta P",
+         "hamiltonian", "cos(Q)"),
+        ("hamiltonian simple-pendulum", "momenta", "it is conserved"),
+        ("motions simple-pendulum --end rod.angle=0.5 --t-end 0.3", "motions", "is_minimum"),
+        ("reduced simple-pendulum", "turning_points", "-1, 1"),
+        ("root-locus pendulum-on-cart --at rod.angle=0 --path gravity --values 9:11:3", "eigenvalues", "9 to 11"),
+        ("routhian kepler", "effective_potential", "sqrt(x(t)**2 + z(t)**2)"),
+        ("section double-pendulum --surface 'rod1.angle crosses 0' --quantity rod2.angle --t-end 1", "values", "rad"),
+        ("separation kepler", "separates", "does not separate in x, z"),
+        ("solve-start simple-pendulum --unknown rod.angular_velocity --condition bob.velocity.x=1", "values", "1.850"),
+        ("tangent-flow simple-pendulum --t-end 0.1", "matrices", "Liouville"),
+        ("total-derivative simple-pendulum --f p_theta**2", "total-derivative", "sin(theta(t))"),
+        ("transform simple-pendulum --old rod.angle=2*u --coordinate u", "hamiltonian", "p_u**2/(8*l**2*m)"),
+        ("trim simple-pendulum --at rod.angle=0", "values", "rod.angle = 0"),
+    ],
+)  # fmt: skip
+def test_functions_of_theory_are_asked_on_the_command_line(command: str, key: str, said: str) -> None:
+    import shlex
+
+    arguments = shlex.split(command)
+    assert said in " ".join(ran(*arguments).split())
+    data = json.loads(ran(*arguments, "--json"))
+    assert key in data
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (["actoin", "simple-pendulum"], 2, "Did you mean 'action'"),
+        (["root-locus", "simple-pendulum", "--path", "gravity"], 2, "Missing option '--values'"),
+        (["root-locus", "simple-pendulum", "--path", "gravity", "--values", "1:2"], 1, "Write FROM:TO:COUNT"),
+        (["reduced", "kepler"], 1, "not reduced to one coordinate"),
+        (["motions", "simple-pendulum", "--end", "rod.angel=1"], 1, "rod.angle"),
+        (["motions", "simple-pendulum", "--end", "rod.angle"], 1, "Write --end PATH=VALUE"),
+        (["lyapunov", "simple-pendulum", "--count", "0"], 2, "Give a number of exponents"),
+        (["action", "simple-pendulum", "--t-end", "soon"], 2, "Give seconds"),
+        (["modes", "double-pendulum", "--at", "rod1.angle=1"], 1, "Give --at values"),
+        (["solve-start", "simple-pendulum", "--unknown", "bob.mass", "--condition", "bob.mas=1"], 1, "bob.mas"),
+        (["bracket", "simple-pendulum", "--f", "1 +", "--g", "p_theta"], 1, "cannot be read"),
+        (["phase", "simple-pendulum", "--coordinates", "3"], 1, "--coordinates: '3' is no range"),
+    ],
+)
+def test_mistakes_are_answered(arguments: list[str], code: int, said: str) -> None:
+    done = CliRunner().invoke(main, arguments, catch_exceptions=False)
+    assert done.exit_code == code, done.output
+    assert said in done.output
+    assert "Traceback" not in done.output
+
+
+def test_times_have_units_and_pictures_are_drawn(tmp_path: Path) -> None:
+    assert json.loads(ran("action", "simple-pendulum", "--t-end", "100 ms", "--json"))["time"] == [0.0, 0.1]
+    picture = tmp_path / "locus.png"
+    ran(
+        "root-locus",
+        "pendulum-on-cart",
+        "--at",
+        "rod.angle=0",
+        "--path",
+        "gravity",
+        "--values",
+        "9,10",
+        "--plot",
+        str(picture),
+    )
+    assert picture.stat().st_size > 1000
