@@ -102,5 +102,5 @@ def _path(value: Any) -> str:
     return str(value)
 
 
-PATH = Kind("the path of a quantity, such as 'rod.angle'", _path)
+PATH = Kind("the path of a quantity, such as 'rod.angle'", _path, "PATH")
 PATHS = optional(each(PATH, "the paths of quantities, such as ['rod.angle']"))
