@@ -46,7 +46,6 @@ GENERATORS = (
     "llvm/module.py",
     "llvm/routines.py",
     "llvm/text.py",
-    "llvm/unit.py",
     "routines/elimination.py",
     "routines/kernels.py",
     "routines/kinds.py",

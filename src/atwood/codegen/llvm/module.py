@@ -18,10 +18,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from atwood.codegen.llvm.layout import Body, Layout, lay_out, main_body, prologue_body
+from atwood.codegen.llvm.layout import Body, Layout, Unit, lay_out, main_body, prologue_body
 from atwood.codegen.llvm.linear_systems import Solver
 from atwood.codegen.llvm.text import LIBRARY_FUNCTIONS, Needs, Writer
-from atwood.codegen.llvm.unit import prologue, write_unit
 from atwood.errors import UnsupportedError
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.operations import ExternalFunction
@@ -183,7 +182,7 @@ def _write_function(
         writer = Writer(places, options.sincos, needs, held if alone else frozenset())
         solver.start_chunk()
         for unit in chunk:
-            write_unit(writer, solver, unit)
+            _write_unit(writer, solver, unit)
             for node in unit:
                 if node.index in layout.slots:
                     writer.store(writer.value(node), "scratch", layout.slots[node.index])
@@ -204,6 +203,30 @@ def _write_function(
         parts.append(_as_chunk(f"{name}.{len(parts)}", writer))
     parts.append(_write_calls(name, len(parts)))
     return parts
+
+
+def _write_unit(writer: Writer, solver: Solver, unit: Unit) -> None:
+    """Write operations that stay together."""
+    node = unit[0]
+    if node.operation == "solve":
+        solver.write(writer, node, unit[1:])
+    elif len(unit) == 2:
+        sine, cosine = unit if node.operation == "sin" else (unit[1], node)
+        writer.write_wave(sine, cosine)
+    else:
+        writer.write(node)
+
+
+def _pointers(writer: Writer) -> list[str]:
+    """Return the instructions that fetch the pointers that a chunk uses."""
+    lines = ["  %sine = alloca double", "  %cosine = alloca double"] if writer.waves else []
+    for pointer in sorted(writer.pointers):
+        for prefix, table in (("in", "inputs"), ("out", "outputs")):
+            if pointer.startswith(prefix):
+                place = f"%{pointer}.place"
+                lines.append(f"  {place} = getelementptr ptr, ptr %{table}, i64 {pointer.removeprefix(prefix)}")
+                lines.append(f"  %{pointer} = load ptr, ptr {place}, !invariant.load !0")
+    return lines
 
 
 def _write_result(writer: Writer, node: Expression, targets: Sequence[tuple[str, int]]) -> None:
@@ -230,14 +253,14 @@ def _pack(writer: Writer, lanes: int) -> None:
 def _as_chunk(name: str, writer: Writer) -> str:
     """Return a chunk as a function of its own, which returns the sum of its results."""
     checked = writer.checked()
-    start = [f"define internal double @{name}({_ARGUMENTS}) #0 {{", *prologue(writer)]
+    start = [f"define internal double @{name}({_ARGUMENTS}) #0 {{", *_pointers(writer)]
     return "\n".join([*start, *writer.lines, f"  ret double {checked}", "}"])
 
 
 def _as_function(name: str, writer: Writer) -> str:
     """Return the only chunk of a body as the whole function."""
     checked = writer.checked()
-    start = [f"define i32 @{name}({_ARGUMENTS}) #0 {{", *prologue(writer)]
+    start = [f"define i32 @{name}({_ARGUMENTS}) #0 {{", *_pointers(writer)]
     return "\n".join([*start, *writer.lines, *_ending(checked)])
 
 

@@ -6,9 +6,9 @@ written by hand.
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Sequence
 
+from atwood.codegen.llvm.text import literal
 from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER, Kind, Lanes
 from atwood.codegen.routines.language import Routine, Value
 from atwood.codegen.routines.tree import Block, Branch, Call, Instruction, Jump, Loop
@@ -223,14 +223,10 @@ def _name(value: Value) -> str:
     if isinstance(name, str):
         return f"%{name}"
     if isinstance(value.kind, Lanes):
-        one = f"double {_exact(name)}" if isinstance(name, float) else f"i1 {name}"
+        one = f"double {literal(name)}" if isinstance(name, float) else f"i1 {name}"
         return f"<{', '.join([one] * value.kind.count)}>"
-    return _exact(name) if isinstance(name, float) else str(name)
+    return literal(name) if isinstance(name, float) else str(name)
 
 
 def _typed(value: Value) -> str:
     return f"{_type(value.kind)} {_name(value)}"
-
-
-def _exact(value: float) -> str:
-    return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
-from ctypes import c_void_p
-
 import numpy as np
 
 from atwood.codegen.llvm.build import build_code, default_options
@@ -40,19 +37,14 @@ class CompiledComposition:
         routines = composition_source(self.layout, order)
         self._built = build_code(parts, options, exports=FUNCTIONS, routines=routines)
         self.functions = bind_functions(self._built)
-        prologue = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)
-        self._prologues = [prologue(self._built.code.addresses[f"{name}_prologue"]) for name in ("kernel", "flow")]
-        self._derived = [len(one.prologue) for one in (forces, velocities)]
+        self._programs = {"kernel": forces, "flow": velocities}
 
     def memory(self, parameter_values: FloatArray) -> tuple[FloatArray, tuple[object, ...]]:
         """Return the array of a session, and what it leads to."""
-        values, scratch = np.array(parameter_values, dtype=np.float64), np.empty(max(self._built.scratch, 1))
-        derived = [np.empty(max(size, 1)) for size in self._derived]
-        for prologue, one in zip(self._prologues, derived, strict=True):
-            prologue(values.ctypes.data, one.ctypes.data, scratch.ctypes.data)
+        found = [self._built.derive(name, one, parameter_values) for name, one in self._programs.items()]
         memory = np.zeros(self.layout.places["end"])
         pointers = memory[: len(POINTERS)].view(np.uint64)
-        pointers[POINTERS.index("derived")] = derived[0].ctypes.data
-        pointers[POINTERS.index("derived_2")] = derived[1].ctypes.data
-        pointers[POINTERS.index("scratch")] = scratch.ctypes.data
-        return memory, (self._built, derived, scratch)
+        for name, (derived, scratch) in zip(("derived", "derived_2"), found, strict=True):
+            pointers[POINTERS.index(name)] = derived.ctypes.data
+            pointers[POINTERS.index("scratch")] = scratch.ctypes.data
+        return memory, (self._built, found)

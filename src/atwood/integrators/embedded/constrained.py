@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable
-from ctypes import c_void_p
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -55,19 +53,16 @@ class CompiledConstraints:
         projects
             Whether there are constraints to be met.
         """
-        values = np.array(parameter_values, dtype=np.float64)
-        addresses, scratch = self._built.code.addresses, np.empty(self._built.scratch)
-        derived = [np.empty(len(program.prologue)) for program in self.programs]
-        for name, one in zip(("kernel", "nearer"), derived, strict=True):
-            prologue = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)(addresses[f"{name}_prologue"])
-            prologue(values.ctypes.data, one.ctypes.data, scratch.ctypes.data)
+        addresses, room = self._built.code.addresses, 5 + self._built.scratch
+        named = zip(("kernel", "nearer"), self.programs, strict=True)
+        derived = [self._built.derive(name, program, parameter_values)[0] for name, program in named]
 
         def rates() -> CompiledRates:
             # The pointers to derived values, scratch and room of each function, and then scratch and room themselves.
-            own = np.empty(5 + len(scratch) + self.room)
+            own = np.empty(room + self.room)
             data = own.ctypes.data
-            first, room = data + 40, data + 40 + 8 * len(scratch)
-            own[:5].view(np.uint64)[:] = derived[0].ctypes.data, first, derived[1].ctypes.data, first, room
+            first, second = (one.ctypes.data for one in derived)
+            own[:5].view(np.uint64)[:] = first, data + 40, second, data + 40, data + 8 * room
             keep = (self._built, derived, own)
             project = addresses["project"] if projects else 0
             return CompiledRates(addresses["rates"], data, keep, project, data + 16)

@@ -22,7 +22,7 @@ from atwood.codegen.llvm.build import build_code, default_options
 from atwood.codegen.llvm.module import Part
 from atwood.codegen.once import once
 from atwood.codegen.routines.source import RoutineSource
-from atwood.errors import KernelEvaluationError, UnsupportedError, UsageError
+from atwood.errors import KernelEvaluationError, UnsupportedError
 from atwood.expr import Program
 from atwood.integrators.compiled_functions import Lookout
 from atwood.integrators.embedded.memory import COUNTS, LANES, NUMBERS, POINTERS
@@ -81,12 +81,7 @@ class CompiledAccelerations:
         parameter_values
             The values in the order of the program's parameters.
         """
-        values = np.array(parameter_values, dtype=np.float64)
-        if values.shape != (len(self.program.parameters),):
-            raise UsageError(f"needs {len(self.program.parameters)} parameter values, got an array of {values.shape}")
-        derived, scratch = np.empty(len(self.program.prologue)), np.empty(self._built.scratch)
-        self._prologue(values.ctypes.data, derived.ctypes.data, scratch.ctypes.data)
-
+        derived, scratch = self._built.derive("kernel", self.program, parameter_values)
         function, place, room = self._built.code.addresses["rates"], derived.ctypes.data, 2 + len(scratch)
 
         def rates() -> CompiledRates:

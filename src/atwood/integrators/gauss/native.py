@@ -68,14 +68,11 @@ class CompiledGauss:
         options = CodeOptions(level=level, sincos=default_options([part]).sincos)
         self._built = build_code([part], options, exports=FUNCTIONS, routines=gauss_source(self.layout, order))
         self.functions = bind_functions(self._built)
-        self._prologue = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)(self._built.code.addresses["kernel_prologue"])
-        self._derived = len(equations.prologue)
+        self._equations = equations
 
     def memory(self, parameter_values: FloatArray) -> tuple[FloatArray, tuple[object, ...]]:
         """Return the array of a session, and what it leads to."""
-        values = np.array(parameter_values, dtype=np.float64)
-        derived, scratch = np.empty(max(self._derived, 1)), np.empty(max(self._built.scratch, 1))
-        self._prologue(values.ctypes.data, derived.ctypes.data, scratch.ctypes.data)
+        derived, scratch = self._built.derive("kernel", self._equations, parameter_values)
         memory = np.zeros(self.layout.places["end"])
         memory[:2].view(np.uint64)[:] = derived.ctypes.data, scratch.ctypes.data
         return memory, (self._built, derived, scratch)

@@ -6,8 +6,6 @@ its recurrences, as two compiled programs.
 
 from __future__ import annotations
 
-import ctypes
-from ctypes import c_void_p
 from itertools import accumulate
 from math import inf, log2
 from types import MappingProxyType
@@ -20,7 +18,6 @@ from atwood.codegen.llvm.build import build_code, default_options
 from atwood.codegen.llvm.module import Part
 from atwood.codegen.once import once
 from atwood.codegen.routines.source import RoutineSource
-from atwood.errors import UsageError
 from atwood.expr.series.taylor import TaylorPrograms
 from atwood.integrators.compiled_functions import StepGuard
 from atwood.integrators.explicit_problem import absolute_tolerances
@@ -71,14 +68,7 @@ class CompiledRecurrences:
 
     def bind(self, parameter_values: ArrayLike) -> FloatArray:
         """Return what depends on parameters alone."""
-        values = np.array(parameter_values, dtype=np.float64)
-        count = len(self.programs.start.parameters)
-        if values.shape != (count,):
-            raise UsageError(f"needs {count} parameter values, got an array of {values.shape}")
-        derived, scratch = np.empty(len(self.programs.start.prologue)), np.empty(self.built.scratch)
-        prologue = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)(self.addresses["start_prologue"])
-        prologue(values.ctypes.data, derived.ctypes.data, scratch.ctypes.data)
-        return derived
+        return self.built.derive("start", self.programs.start, parameter_values)[0]
 
 
 class _Layout:
