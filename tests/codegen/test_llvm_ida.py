@@ -8,10 +8,10 @@ import pytest
 from atwood import expr as ex
 from atwood.codegen import compile_ida_callbacks, compile_native
 from atwood.codegen.sundials.layout import SundialsLayout, layout_for, sundials_layout
-from atwood.codegen.sundials.residuals import JACOBIAN_TYPE, RESIDUAL_TYPE, WEIGHTS_TYPE
 from atwood.errors import KernelEvaluationError, UsageError
 from atwood.integrators.compiled_functions import NativeCallbacks
 from atwood.integrators.ida import library as sundials_library, native as ida_native
+from atwood.integrators.ida.signatures import JACOBIAN, RESIDUAL, WEIGHTS
 from atwood.integrators.protocol import ImplicitProblem, SolverOptions
 from atwood.pipeline import assemble
 from atwood_library.scenes import Chain, DoublePendulum, SimplePendulum
@@ -68,9 +68,9 @@ def test_values_in_sundials_own_structures(sundials, scene, form):
     for sparse, step in ((False, 1), (True, 1), (False, -1), (True, -1)):
         compiled = callbacks_of(program, sparse, step)
         data = compiled.bind(parameters)
-        assert RESIDUAL_TYPE(compiled.residual_address)(0.3, *vectors, data.address) == 0
+        assert RESIDUAL(compiled.residual_address)(0.3, *vectors, data.address) == 0
         np.testing.assert_array_equal(out, residual)
-        jacobian = JACOBIAN_TYPE(compiled.jacobian_address)
+        jacobian = JACOBIAN(compiled.jacobian_address)
         index = library.index_type
         if sparse:
             matrix = library.SUNSparseMatrix(size, size, entries, 0, context)
@@ -103,7 +103,7 @@ def test_a_sparse_matrix_without_room_is_refused(sundials):
     data = compiled.bind(parameters)
     vectors = vectors_of(sundials, *np.ones((3, program.size)))
     matrix = library.SUNSparseMatrix(program.size, program.size, len(program.rows) - 1, 0, context)
-    call = JACOBIAN_TYPE(compiled.jacobian_address)
+    call = JACOBIAN(compiled.jacobian_address)
     assert call(0.0, 1.0, *vectors, matrix, data.address, None, None, None) == -1
 
 
@@ -199,7 +199,7 @@ def test_a_value_that_is_not_finite_is_recoverable():
     dense = (ctypes.c_int64 * 2)(0, matrix.ctypes.data)  # M and N, then the data
     holder = _Generic(ctypes.addressof(dense), None, None)
     vectors = [by_hand(array, kept) for array in (y, yp, out)]
-    residual, jacobian = RESIDUAL_TYPE(compiled.residual_address), JACOBIAN_TYPE(compiled.jacobian_address)
+    residual, jacobian = RESIDUAL(compiled.residual_address), JACOBIAN(compiled.jacobian_address)
     rest = (ctypes.addressof(holder), data.address, None, None, None)
     assert residual(0.5, *vectors, data.address) == 0
     assert out[0] == 6.5
@@ -215,7 +215,7 @@ def test_error_weights():
     data = compiled.bind([3.0])
     kept = []
     y, weights = np.array([-4.0]), np.zeros(1)
-    call = WEIGHTS_TYPE(compiled.weights_address)
+    call = WEIGHTS(compiled.weights_address)
     vectors = by_hand(y, kept), by_hand(weights, kept)
     data.set_weights(0.5, 2.0)
     assert call(*vectors, data.address) == 0

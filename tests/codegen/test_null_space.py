@@ -10,10 +10,10 @@ import pytest
 
 from atwood.codegen.sundials.null_space import NullSpaceShape
 from atwood.codegen.sundials.null_space_residuals import compile_null_space_callbacks
-from atwood.codegen.sundials.residuals import JACOBIAN_TYPE, RESIDUAL_TYPE, WEIGHTS_TYPE
 from atwood.errors import KernelEvaluationError, UsageError
 from atwood.forms.null_space import null_space_program
 from atwood.integrators.ida import library as sundials_library
+from atwood.integrators.ida.signatures import JACOBIAN, RESIDUAL, WEIGHTS
 from atwood.simulation.dynamics.partitioning import POOR, choose_dependent_coordinates
 from atwood.simulation.problem.partition_arrays import choice_lists, null_space_shape
 from atwood_library.scenes import FourBar, SliderCrank
@@ -70,13 +70,13 @@ class Caller:
 
     def residual(self, t, y, yp):
         self.arrays[0], self.arrays[1] = y, yp
-        code = RESIDUAL_TYPE(self.compiled.residual_address)(t, *self.vectors, self.data.address)
+        code = RESIDUAL(self.compiled.residual_address)(t, *self.vectors, self.data.address)
         return code, self.arrays[2].copy()
 
     def jacobian(self, t, y, yp, cj):
         self.arrays[0], self.arrays[1] = y, yp
         self.library.SUNMatZero(self.matrix)
-        call = JACOBIAN_TYPE(self.compiled.jacobian_address)
+        call = JACOBIAN(self.compiled.jacobian_address)
         code = call(t, cj, *self.vectors, self.matrix, self.data.address, None, None, None)
         if not self.sparse:
             entries = self._read(self.library.SUNDenseMatrix_Data, c_double, self.size**2)
@@ -95,7 +95,7 @@ class Caller:
 
     def weights(self, y):
         self.arrays[0] = y
-        code = WEIGHTS_TYPE(self.compiled.weights_address)(*self.vectors[:2], self.data.address)
+        code = WEIGHTS(self.compiled.weights_address)(*self.vectors[:2], self.data.address)
         return code, self.arrays[1].copy()
 
     def free(self):

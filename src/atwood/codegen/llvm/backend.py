@@ -25,7 +25,6 @@ __all__ = ["NativeKernel", "NativeProgram", "compile_native"]
 
 
 _KERNEL = ctypes.CFUNCTYPE(ctypes.c_int, *[c_void_p] * 4)
-_PROLOGUE = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)
 
 
 def compile_native(program: Program, *, cache: bool = True, options: CodeOptions | None = None) -> NativeProgram:
@@ -61,10 +60,10 @@ class NativeProgram:
 
     Attributes
     ----------
-    address, prologue_address
-        The addresses of the two functions; see `atwood.codegen.llvm.module` for their signatures.
+    call
+        The function; see `atwood.codegen.llvm.module` for its signature.
     scratch
-        The length of the scratch array that they need.
+        The length of the scratch array that it needs.
     from_cache
         Whether nothing had to be compiled.
     """
@@ -72,14 +71,11 @@ class NativeProgram:
     def __init__(self, program: Program, built: Built) -> None:
         self.program = program
         self.built = built
-        self.address = built.code.addresses["kernel"]
-        self.prologue_address = built.code.addresses["kernel_prologue"]
         self.scratch = built.scratch
         self.from_cache = built.from_cache
-        self.call: Callable[..., int] = _KERNEL(self.address)
-        self._prologue: Callable[..., None] = _PROLOGUE(self.prologue_address)
+        self.call: Callable[..., int] = _KERNEL(built.code.addresses["kernel"])
         if built.failures is not None:
-            self.call, self._prologue = map(built.failures.watch, (self.call, self._prologue))
+            self.call = built.failures.watch(self.call)
 
     def bind(self, parameter_values: ArrayLike) -> NativeKernel:
         """Compute once what depends on parameters alone.
@@ -94,18 +90,10 @@ class NativeProgram:
         KernelEvaluationError
             If the number of values is wrong, or an external function of parameters alone fails.
         """
-        values = np.array(parameter_values, dtype=float)
-        count = len(self.program.parameters)
-        if values.shape != (count,):
-            raise KernelEvaluationError(
-                f"needs {count} parameter values but got an array of shape {values.shape}", where=self.program.name
-            )
-        derived = np.empty(len(self.program.prologue))
-        scratch = np.empty(self.scratch)
-        self._prologue(values.ctypes.data, derived.ctypes.data, scratch.ctypes.data)
+        derived, _ = self.built.derive("kernel", self.program, parameter_values)
         if self.built.failures is not None:
             _raise_failure(self.program.name, self.built.failures.take())
-        return NativeKernel(self, values, derived)
+        return NativeKernel(self, np.array(parameter_values, dtype=float), derived)
 
 
 class NativeKernel:

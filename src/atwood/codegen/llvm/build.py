@@ -137,7 +137,9 @@ class Built:
                 f"needs {count} parameter values but got an array of shape {values.shape}", where=program.name
             )
         derived, scratch = np.empty(len(program.prologue)), np.empty(self.scratch)
-        prologue = _PROLOGUE(self.code.addresses[f"{name}_prologue"])
+        prologue: Callable[..., None] = _PROLOGUE(self.code.addresses[f"{name}_prologue"])
+        if self.failures is not None:
+            prologue = self.failures.watch(prologue)
         prologue(values.ctypes.data, derived.ctypes.data, scratch.ctypes.data)
         return derived, scratch
 

@@ -18,15 +18,6 @@ from atwood.expr.core.program import Program
 
 __all__ = ["IdaCallbacks", "IdaData", "check_groups", "compile_ida_callbacks"]
 
-RESIDUAL_TYPE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, *[ctypes.c_void_p] * 4)
-"""The signature of IDA's residual: time, y, y', the result, the user's data."""
-
-JACOBIAN_TYPE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, ctypes.c_double, *[ctypes.c_void_p] * 8)
-"""The signature of IDA's Jacobian: time, cj, y, y', the residual, the matrix, the user's data, three vectors."""
-
-WEIGHTS_TYPE = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 3)
-"""The signature of IDA's error weights: y, the weights, the user's data."""
-
 
 def compile_ida_callbacks(
     residual: Program,
