@@ -15,8 +15,8 @@ import numpy as np
 from mechanisms import FloatArray, Mechanism
 
 from atwood import simulate
-from atwood.integrators.explicit_session import open_explicit
 from atwood.integrators.ida import native as ida_native
+from atwood.integrators.methods import EXPLICIT, TAYLOR, Task
 from atwood.integrators.protocol import SolverOptions, Statistics, Status, StepResult
 from atwood.simulation.problem.explicit_scene import explicit_problem
 from atwood.simulation.problem.preparation import pack_state
@@ -94,18 +94,20 @@ def explicit_run(prepared: Prepared, rtol: float) -> Run:
     problem = explicit_problem(prepared.plan.assembly)
     assert problem is not None
     settings, t_end = prepared.settings(rtol), prepared.mechanism.t_end
-    return _run(prepared, lambda: open_explicit(problem, settings, 0.0, prepared.y, end=t_end))
+    task = Task(settings, 0.0, prepared.y, end=t_end, explicit=problem)
+    return _run(prepared, lambda: EXPLICIT.open(task))
 
 
 def taylor_run(prepared: Prepared, rtol: float) -> Run:
     """Return a run with the Taylor-series method."""
-    from atwood.simulation.problem.taylor_scene import open_taylor, taylor_problem
+    from atwood.simulation.problem.taylor_scene import taylor_problem
 
     assembly = prepared.plan.assembly
     problem, series = explicit_problem(assembly), taylor_problem(assembly, prepared.mechanism.t_end)
     assert problem is not None
     settings = prepared.settings(rtol)
-    return _run(prepared, lambda: open_taylor(problem, series, settings, 0.0, prepared.y))
+    task = Task(settings, 0.0, prepared.y, explicit=problem, series=lambda: series)
+    return _run(prepared, lambda: TAYLOR.open(task))
 
 
 def ida_session(prepared: Prepared, rtol: float, python: bool = False) -> Callable[[], ida_native.NativeSession]:

@@ -18,7 +18,8 @@ import startup
 from timing import options, print_table, save
 
 from atwood import Assembly, Model, Result, Scene, assemble, simulate, sweep
-from atwood.integrators.explicit_session import open_explicit
+from atwood.integrators.explicit_session import ExplicitSession
+from atwood.integrators.methods import EXPLICIT, Task
 from atwood.integrators.protocol import SolverOptions
 from atwood.simulation.problem.explicit_scene import explicit_problem
 from atwood_library import Mass1D, TranslationalGap
@@ -92,11 +93,13 @@ def sessions(rounds: int) -> list[Row]:
     problem = explicit_problem(assembly)
     assert problem is not None
     chosen, start = SolverOptions(1e-8, 1e-8), np.array([1.0, 1.0, 0.0, 0.0])
-    session = open_explicit(problem, chosen, 0.0, start)
+    task = Task(chosen, 0.0, start, explicit=problem)
+    session = EXPLICIT.open(task)
+    assert isinstance(session, ExplicitSession)
     new, again = [], []
     for _ in range(20 * rounds):
         began = time.perf_counter()
-        open_explicit(problem, chosen, 0.0, start)
+        EXPLICIT.open(task)
         new.append(1e6 * (time.perf_counter() - began))
         began = time.perf_counter()
         session.begin_again(0.0, start, 1.0, None, None, 1.0)

@@ -23,7 +23,6 @@ from mechanisms import FloatArray, Mechanism, chain, double_pendulum
 from timing import at_error, options, peer, print_table, ratio, save
 
 from atwood.errors import AtwoodError
-from atwood.simulation.problem.options import SOLVERS
 
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
 
@@ -69,8 +68,7 @@ def ways(mechanism: Mechanism, flags: str, quick: bool) -> dict[str, tuple[list[
             found[f"{C_IDA}, band solver"] = coarse, partial(ida_by_hand, tuning=hand.PLAIN, band=True)
             found[f"{C_IDA}, Atwood's options, band solver"] = coarse, partial(ida_by_hand, tuning=told, band=True)
     found[EXPLICIT] = fine, partial(atwood.explicit_run, reduced)
-    if "taylor" in SOLVERS:
-        found[TAYLOR] = [*fine, 1e-15], partial(atwood.taylor_run, reduced)
+    found[TAYLOR] = [*fine, 1e-15], partial(atwood.taylor_run, reduced)
     found[IDA] = coarse, partial(atwood.ida_run, dae)
     found["Atwood IDA reduced"] = coarse, partial(atwood.ida_run, reduced)
     found["Atwood simulate, explicit"] = powers(2, 14), partial(atwood.whole_run, reduced, "explicit")

@@ -216,8 +216,6 @@ EXPLICIT = explicit_pair(
     "Dormand-Prince 8(5,3)",
     "E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed., Springer 1993, II.10",
     TABLEAU,
-    nodes_in_step=7,
-    reach=8.0,
     steps_seen=0.3,
     steps_unseen=5.0,
 )

@@ -170,6 +170,7 @@ def explicit_pair(key: str, title: str, citation: str, pair: Tableau, **more: An
 
         return CompiledStepper(task.problem, task.settings, pair).batch_places()
 
+    usual = {"nodes_in_step": pair.order // 2 + 3, "reach": 8.0, "steps_seen": 0.5, "steps_unseen": 10.0}
     return Method(
         key,
         title,
@@ -181,5 +182,5 @@ def explicit_pair(key: str, title: str, citation: str, pair: Tableau, **more: An
         keeps_constraints=True,
         tableau=pair,
         batch=places,
-        **more,
+        **{**usual, **more},
     )

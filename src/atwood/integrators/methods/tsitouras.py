@@ -16,7 +16,7 @@ TABLEAU = Tableau(
     order=5,
     dense_order=4,
     end=6,
-    edge=3.5,
+    edge=3.4,
     nodes=(0.0, 0.161, 0.327, 0.9, 0.9800255409045097, 1.0, 1.0),
     stages=(
         {0: 0.161},
@@ -68,8 +68,4 @@ TSITOURAS = explicit_pair(
     "Tsitouras 5(4)",
     "C. Tsitouras, Computers and Mathematics with Applications 62 (2011) 770-775",
     TABLEAU,
-    nodes_in_step=5,
-    reach=8.0,
-    steps_seen=0.5,
-    steps_unseen=10.0,
 )
