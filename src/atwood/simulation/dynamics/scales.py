@@ -22,6 +22,7 @@ __all__ = [
     "Scales",
     "coordinate_scales",
     "find_scales",
+    "find_times",
     "is_length",
     "motion_names",
     "motion_scales",
@@ -29,7 +30,6 @@ __all__ = [
     "origin_part",
     "scene_length",
     "size_of",
-    "total_mass",
     "total_masses",
 ]
 
@@ -101,17 +101,26 @@ def origin_part(assembly: Assembly, observable: Observable) -> float:
     return float(evaluate([mechanism.table.graph.convert(shift)], mechanism.table.values)[0])
 
 
-def coordinate_scales(equations: Equations, length: float) -> FloatArray:
-    """Return the size of each coordinate: the extent for a length, one radian for an angle, else one."""
-    sizes = np.array([length if one.unit == "m" else 1.0 for one in equations.names])
-    for i, one in enumerate(equations.states, start=equations.placing):
-        sizes[i] = one.nominal or sizes[i]
-    return sizes
+def coordinate_scales(equations: Equations, length: Sizes) -> FloatArray:
+    """Return the size of each coordinate: the extent for a length, one radian for an angle, else one; or rows of these.
+
+    Parameters
+    ----------
+    equations
+        The scene.
+    length
+        Its extent, m, or those of many runs.
+    """
+    nominal = {i: one.nominal for i, one in enumerate(equations.states, start=equations.placing) if one.nominal}
+    own = np.array([nominal.get(i, 1.0) for i in range(len(equations.names))])
+    is_extent = [one.unit == "m" and i not in nominal for i, one in enumerate(equations.names)]
+    return np.where(np.array(is_extent, dtype=bool), np.asarray(length)[..., None], own)
 
 
-def motion_scales(equations: Equations, length: float) -> FloatArray:
-    """Return the size of a displacement along each speed: the extent, or one radian."""
-    return np.array([length if one.unit == "m/s" else 1.0 for one in equations.speed_names])
+def motion_scales(equations: Equations, length: Sizes) -> FloatArray:
+    """Return the size of a displacement along each speed: the extent, or one radian; see `coordinate_scales`."""
+    is_extent = np.array([one.unit == "m/s" for one in equations.speed_names], dtype=bool)
+    return np.where(is_extent, np.asarray(length)[..., None], 1.0)
 
 
 def is_length(equations: Equations, key: tuple[str, str, int]) -> bool:
@@ -172,38 +181,51 @@ def find_scales(
     span
         Length of the run, s.
     """
-    times = [span]
-    with np.errstate(divide="ignore"):
-        times += (sizes / np.abs(speeds)).tolist()
-        times += np.sqrt(sizes / np.abs(accelerations)).tolist()
-    parameters = assembly.mechanism.table.values
-    gravity = next((v for s, v in parameters.items() if s.name == "gravity"), 0.0)
-    if gravity:
-        times.append(float(np.sqrt(length / abs(gravity))))
-    time = min(t for t in times if t > 0.0)
-    return Scales(length, time, (total_mass(assembly) or 1.0) * length / time**2)
+    gravity = next((v for s, v in assembly.mechanism.table.values.items() if s.name == "gravity"), 0.0)
+    time = float(find_times(length, speeds, accelerations, sizes, gravity, span))
+    return Scales(length, time, float(total_masses(assembly)) * length / time**2)
 
 
 _MASSES: Key[Program] = Key("masses")
 
 
-def total_mass(assembly: Assembly) -> float:
-    """Return the mass of all that moves, at the start, kg."""
-    return float(sum(assembly.kernel(_masses(assembly))([assembly.flat.t_start])[0]))
+def find_times(
+    length: Sizes, speeds: FloatArray, accelerations: FloatArray, sizes: FloatArray, gravity: Sizes, span: float
+) -> FloatArray:
+    """Return in what time something happens, s: speeds, accelerations or gravity lead as far as the sizes.
+
+    Parameters
+    ----------
+    length
+        Extent of the scene, m; of each run, where there are many.
+    speeds, accelerations, sizes
+        As of `find_scales`; a row for each run.
+    gravity
+        m/s^2.
+    span
+        Length of the run, s: nothing takes longer.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        falling = np.sqrt(np.asarray(length) / np.abs(gravity))
+        times = [np.full((*falling.shape, 1), span), falling[..., None]]
+        times += [sizes / np.abs(speeds), np.sqrt(sizes / np.abs(accelerations))]
+    every = np.concatenate(times, axis=-1)
+    found: FloatArray = np.min(np.where(every > 0.0, every, np.inf), axis=-1)
+    return found
 
 
-def total_masses(assembly: Assembly, rows: FloatArray | None) -> FloatArray | float:
-    """Return the same for runs with parameters of their own; 1 kg where nothing that moves has a mass.
+def total_masses(assembly: Assembly, rows: FloatArray | None = None) -> FloatArray | float:
+    """Return the mass of all that moves, at the start, kg; 1 kg where nothing that moves has a mass.
 
     Parameters
     ----------
     assembly
         The scene.
     rows
-        Parameters of each run, shape (runs, number); None where all have the same.
+        Parameters of each run, shape (runs, number); None where there is one, or all have the same.
     """
     if rows is None:
-        return total_mass(assembly) or 1.0
+        return float(sum(assembly.kernel(_masses(assembly))([assembly.flat.t_start])[0])) or 1.0
     kernel = assembly.compiled(_masses(assembly), vectorized=True).bind(rows.T)
     found = np.sum(kernel(np.full((1, len(rows)), assembly.flat.t_start))[0], axis=0)
     return np.where(found > 0.0, found, 1.0)

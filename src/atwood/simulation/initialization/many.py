@@ -7,26 +7,16 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.forms.assembly import Assembly
-from atwood.mechanics.dynamics.equations import Equations
 from atwood.numerics.rank import ranks
 from atwood.numerics.solutions import least_norm
-from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales
 from atwood.simulation.initialization.system import Conditions
 from atwood.tolerances import tolerances
 
-__all__ = ["meet_positions", "meet_speeds", "size_rows"]
+__all__ = ["meet_positions", "meet_speeds"]
 
 
 _ITERATIONS = 60
 """So many steps are tried."""
-
-
-def size_rows(equations: Equations, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the size of each coordinate, and of a displacement along each speed, one row for each extent."""
-    found = []
-    for unit in (coordinate_scales(equations, 0.0), motion_scales(equations, 0.0)):  # zero for lengths, else one
-        found.append(np.where(unit[None, :] == 0.0, lengths[:, None], unit[None, :]))
-    return found[0], found[1]
 
 
 def meet_positions(

@@ -13,7 +13,7 @@ from atwood.expr import Program
 from atwood.forms.assembly import Assembly
 from atwood.forms.loops.closed_form import ClosedForm
 from atwood.late import dataclass
-from atwood.simulation.initialization.many import size_rows
+from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales
 from atwood.simulation.problem.closed_loops import AGREES, ASIDE, CLEAR, TURN
 
 __all__ = ["ManyBranches"]
@@ -67,7 +67,8 @@ class ManyBranches:
             return values, found
         free = list(self.form.loops.independent)
         y = np.concatenate([q[:, free], u[:, free]], axis=1)
-        sizes, moving_sizes = size_rows(self.assembly.reduced, lengths)
+        equations = self.assembly.reduced
+        sizes, moving_sizes = coordinate_scales(equations, lengths), motion_scales(equations, lengths)
         with np.errstate(all="ignore"):
             places, _ = self.states(np.full(len(y), t), y, values)
             found &= np.all(np.abs(places.T - q) / sizes <= AGREES, axis=1)

@@ -106,8 +106,9 @@ def find_stiffness(
     relative_tolerance
         Of the run.
     """
-    matrix = _jacobian(rates, t, y, scale)
-    if matrix is None:
+    try:
+        matrix = _jacobians(lambda rows: np.asarray([rates(t, rows[0])], dtype=float), y[None], scale[None])[0]
+    except (KernelEvaluationError, ArithmeticError):
         return Stiffness(0.0, 0.0, RATIO)
     return _judged(matrix, time, span, relative_tolerance)
 
@@ -161,24 +162,15 @@ def find_stiff_rows(
     relative_tolerance
         Of all runs.
     """
-    runs, count = y.shape
-    matrix = np.empty((runs, count, count))
-    with np.errstate(all="ignore"):
-        here = rates(y)
-        for j in range(count):
-            moved = y.copy()
-            moved[:, j] += 1e-7 * scale[:, j]
-            step = moved[:, j] - y[:, j]
-            matrix[:, :, j] = (rates(moved) - here) * (scale[:, j] / step)[:, None] / scale
-    known = np.isfinite(matrix).all(axis=(1, 2))
-    found: NDArray[np.bool_] = np.zeros(runs, dtype=np.bool_)
-    for k in np.flatnonzero(known).tolist():
-        found[k] = _judged(matrix[k], float(time[k]), float(span[k]), relative_tolerance).is_stiff
-    return found
+    matrices = _jacobians(rates, y, scale)
+    each = zip(matrices, time.tolist(), span.tolist(), strict=True)
+    return np.array([_judged(*one, relative_tolerance).is_stiff for one in each], dtype=np.bool_)
 
 
 def _judged(matrix: FloatArray, time: float, span: float, relative_tolerance: float) -> Stiffness:
     """Return how stiff a problem is by its Jacobian in units of its sizes."""
+    if not np.isfinite(matrix).all():
+        return Stiffness(0.0, 0.0, RATIO)
     try:
         values = np.linalg.eigvals(matrix)
     except np.linalg.LinAlgError:  # nothing is known of it; the explicit method tells by its steps where it is stiff
@@ -194,19 +186,15 @@ def _judged(matrix: FloatArray, time: float, span: float, relative_tolerance: fl
     return next((one for one in found if one.is_stiff), found[0])
 
 
-def _jacobian(
-    rates: Callable[[float, FloatArray], Values], t: float, y: FloatArray, scale: FloatArray
-) -> FloatArray | None:
-    """Return the Jacobian in units of the scene's sizes, by differences; None where it has no value."""
-    matrix = np.empty((len(y), len(y)))
+def _jacobians(rates: Callable[[FloatArray], FloatArray], y: FloatArray, scale: FloatArray) -> FloatArray:
+    """Return the Jacobians of runs in units of their sizes, by differences; not finite where they have no value."""
+    runs, count = y.shape
+    matrix = np.empty((runs, count, count))
     with np.errstate(all="ignore"):
-        try:
-            here = np.asarray(rates(t, y), dtype=float)
-            for j, size in enumerate(scale):
-                moved = y.copy()
-                moved[j] += 1e-7 * size
-                step = moved[j] - y[j]
-                matrix[:, j] = (np.asarray(rates(t, moved), dtype=float) - here) * (size / step) / scale
-        except (KernelEvaluationError, ArithmeticError):
-            return None
-    return matrix if np.isfinite(matrix).all() else None
+        here = rates(y)
+        for j in range(count):
+            moved = y.copy()
+            moved[:, j] += 1e-7 * scale[:, j]
+            step = moved[:, j] - y[:, j]
+            matrix[:, :, j] = (rates(moved) - here) * (scale[:, j] / step)[:, None] / scale
+    return matrix

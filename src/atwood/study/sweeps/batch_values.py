@@ -20,8 +20,8 @@ from atwood.mechanics.kinematics.mechanism import extent, sizing_parameters
 from atwood.model.declare.component import Component
 from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.local.flatten import flatten
-from atwood.simulation.dynamics.scales import origin_part
-from atwood.simulation.initialization.many import meet_positions, meet_speeds, size_rows
+from atwood.simulation.dynamics.scales import motion_scales, origin_part
+from atwood.simulation.initialization.many import meet_positions, meet_speeds
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.initialization.system import Conditions, start_conditions
 from atwood.simulation.initialization.targets import Level, sort_targets
@@ -271,7 +271,7 @@ class StartRows:
                 for place, given in said:
                     rows[:, place] = _of(given, runs)
             values = assembly.parameter_values if parameters is None else parameters.T
-            _, sizes = size_rows(assembly.reduced, lengths)
+            sizes = motion_scales(assembly.reduced, lengths)
             of_speeds, of_places = self._conditions
             t, met = assembly.flat.t_start, np.ones(len(runs), dtype=bool)
             if of_places is not None:

@@ -9,7 +9,7 @@ from atwood.arrays import FloatArray
 from atwood.forms.assembly import Assembly
 from atwood.integrators.explicit_problem import LOOSEST
 from atwood.integrators.methods import AUTO
-from atwood.simulation.initialization.many import size_rows
+from atwood.simulation.dynamics.scales import coordinate_scales, find_times, motion_scales
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.stiffness import can_be_stiff, find_stiff_rows
 from atwood.study.sweeps.motions import Motion
@@ -45,15 +45,11 @@ def time_scales(
     if not len(t):
         return np.zeros(0)
     a = motion.accelerations(t, q.T, u.T, values).T
-    _, sizes = size_rows(assembly.reduced, lengths)
-    times = [np.full_like(u, span), sizes / np.abs(u), np.sqrt(sizes / np.abs(a))]
+    sizes = motion_scales(assembly.reduced, lengths)
     symbols = [one.name for one in assembly.parameters]
-    if "gravity" in symbols:
-        given = assembly.parameter_values if values is None else values.T
-        gravity = np.abs(given[symbols.index("gravity")])
-        times.append(np.broadcast_to(np.sqrt(lengths / gravity)[:, None], u.shape))
-    every = np.concatenate(times, axis=1)
-    time: FloatArray = np.min(np.where(every > 0.0, every, np.inf), axis=1)
+    given = assembly.parameter_values if values is None else values.T
+    gravity = given[symbols.index("gravity")] if "gravity" in symbols else 0.0
+    time = find_times(lengths, u, a, sizes, gravity, span)
     return np.where(np.all(np.isfinite(a), axis=1), time, np.nan)
 
 
@@ -69,9 +65,9 @@ def absolute_tolerances(assembly: Assembly, lengths: FloatArray, time: FloatArra
     relative
         The relative tolerance that was asked for.
     """
-    coordinate_sizes, sizes = size_rows(assembly.reduced, lengths)
-    share = min(relative, LOOSEST)
-    return np.concatenate([share * coordinate_sizes, share * (sizes / time[:, None])], axis=1)
+    share, equations = min(relative, LOOSEST), assembly.reduced
+    sizes = coordinate_scales(equations, lengths), motion_scales(equations, lengths) / time[:, None]
+    return np.concatenate([share * one for one in sizes], axis=1)
 
 
 def have_inertia(
@@ -81,7 +77,7 @@ def have_inertia(
     mass = motion.masses(t, q.T, u.T, values)
     directions = motion.open_directions(t, q.T, u.T, values)
     if directions is None:
-        _, sizes = size_rows(motion.assembly.reduced, lengths)
+        sizes = motion_scales(motion.assembly.reduced, lengths)
     else:
         mass = np.swapaxes(directions, 1, 2) @ mass @ directions
         sizes = 1.0 / np.sqrt(np.abs(np.diagonal(mass, axis1=1, axis2=2)))
