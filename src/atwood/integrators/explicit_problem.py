@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from enum import IntEnum
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,13 +19,15 @@ from atwood.integrators.event_location import State
 from atwood.integrators.protocol import FloatArray, SolverOptions, Values
 from atwood.late import dataclass
 
+if TYPE_CHECKING:
+    from atwood.codegen.sundials.events import EventData
+
 __all__ = [
     "CALM",
     "LOOSEST",
     "MET",
     "STEPS",
     "STIFF",
-    "CompiledEvents",
     "CompiledRates",
     "Counts",
     "ExplicitProblem",
@@ -70,32 +73,6 @@ class CompiledRates:
 
 
 @dataclass(frozen=True, eq=False)
-class CompiledEvents:
-    """The address of compiled event functions, for one session.
-
-    Parameters
-    ----------
-    function
-        ``int (double t, const double *y, const double *yp, double *values, void *data)``, called after every step. It
-        returns 0, or another number where a value is not finite or may have passed zero.
-    data
-        Its last argument.
-    count
-        The number of events.
-    restart
-        ``restart(t)``: called before the first step after a start at a time.
-    keep
-        Whatever must live as long as the addresses are used.
-    """
-
-    function: int
-    data: int
-    count: int
-    restart: Callable[[float], None]
-    keep: object = None
-
-
-@dataclass(frozen=True, eq=False)
 class ExplicitProblem:
     """The equations ``y' = f(t, y)`` of one mode.
 
@@ -123,7 +100,7 @@ class ExplicitProblem:
     compiled
         ``compiled()``: a compiled form of `rates`.  Each session asks once, and must not share it with another one.
     compiled_events
-        ``compiled_events()``: the same for `events`, if there is one.
+        The same for `events`, if there is one: bound to values, and to no other session.
     project
         ``project(t, y)``: the values nearest to these that meet the constraints, with which steps end; None where there
         are none.
@@ -139,7 +116,7 @@ class ExplicitProblem:
     event_rough: tuple[int, ...] = ()
     event_signs: tuple[int, ...] = ()
     compiled: Callable[[], CompiledRates] | None = None
-    compiled_events: Callable[[], CompiledEvents | None] | None = None
+    compiled_events: EventData | None = None
     project: Callable[[float, FloatArray], Values] | None = None
     guard: StepGuard | None = None
 
@@ -220,7 +197,7 @@ class Stepper(ABC):
             _, y[filled], yp[filled] = self.interpolate(float(t))
         return y, yp, Outcome.REACHED
 
-    def watch(self, events: CompiledEvents) -> bool:
+    def watch(self, events: EventData) -> bool:
         """Come back with `Outcome.NOTICED` after a step in which an event may have happened; return whether it can."""
         return False
 

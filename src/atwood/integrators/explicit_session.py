@@ -81,7 +81,7 @@ class ExplicitSession(Session):
         self._stepper = stepper
         self._problem = problem
         self._watch(options.horizon)
-        events = None if problem.compiled_events is None else problem.compiled_events()
+        events = problem.compiled_events
         self._notices = events is not None and stepper.watch(events)  # whether the stepper looks for events by itself
         if leave is not None:
             stepper.heed_stiffness()

@@ -29,7 +29,6 @@ from atwood.integrators.embedded.memory import COUNTS, LANES, NUMBERS, POINTERS
 from atwood.integrators.embedded.rates import rates_source
 from atwood.integrators.embedded.tableau import Tableau
 from atwood.integrators.explicit_problem import (
-    CompiledEvents,
     CompiledRates,
     ExplicitProblem,
     absolute_tolerances,
@@ -39,6 +38,7 @@ from atwood.integrators.protocol import FloatArray, SolverOptions
 from atwood.late import dataclass
 
 if TYPE_CHECKING:
+    from atwood.codegen.sundials.events import EventData
     from atwood.integrators.ensemble.batch import BatchPlaces
 
 __all__ = ["CompiledAccelerations", "CompiledStepper", "OwnRates"]
@@ -184,12 +184,12 @@ class CompiledStepper(NativeStepper):
         """Return the addresses with which many runs can be made in one call."""
         return self._places(self._arrays[self._rows["absolute"]])
 
-    def watch(self, events: CompiledEvents) -> bool:
+    def watch(self, events: EventData) -> bool:
         """Come back with `Outcome.NOTICED` after a step in which an event may have happened."""
         self._events, self._signs = np.zeros((2, events.count))
         self._keep, self._restart = (self._keep, events), events.restart
         places = (array.ctypes.data for array in (self._events, self._signs))
-        self._pointers[5:9] = events.function, events.data, *places
+        self._pointers[5:9] = events.explicit, events.address, *places
         self._counts[_EVENTS] = events.count
         return True
 

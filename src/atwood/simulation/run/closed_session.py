@@ -15,7 +15,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, substitute
 from atwood.forms.kept import Key
-from atwood.integrators.explicit_problem import LOOSEST, CompiledEvents, ExplicitProblem
+from atwood.integrators.explicit_problem import LOOSEST, ExplicitProblem
 from atwood.integrators.explicit_session import Leave
 from atwood.integrators.methods import Method, Task
 from atwood.integrators.protocol import Budget, SolverOptions, Statistics, Status, StepResult
@@ -292,8 +292,7 @@ class ClosedLoopSession(Session):
             return problem
         self._events, code = made
         data = code.bind(solved.values, np.concatenate([probe.shift, shifts]))
-        compiled = CompiledEvents(data.explicit, data.address, data.count, data.restart, data)
-        return replace(problem, events=data.function(), compiled_events=lambda: compiled)
+        return replace(problem, events=data.function(), compiled_events=data)
 
 
 _CODE: Key[tuple[Program, EventCode] | None] = Key("event functions with dead centres")

@@ -10,7 +10,7 @@ import numpy as np
 
 from atwood.errors import UsageError
 from atwood.integrators.compiled_functions import GuardedResidual, NativeCallbacks, StepGuard
-from atwood.integrators.explicit_problem import CompiledEvents, ExplicitProblem
+from atwood.integrators.explicit_problem import ExplicitProblem
 from atwood.integrators.explicit_session import ExplicitSession, Leave
 from atwood.integrators.methods import EXPLICIT, IDA, LEAST, Method, Task, advise
 from atwood.integrators.protocol import Budget, FloatArray, ImplicitProblem, LinearSolver, SolverOptions
@@ -355,7 +355,4 @@ def _watched(request: SolverRequest, problem: ExplicitProblem, method: Method) -
     probe = request.probe
     problem = replace(problem, event_rough=probe.rough, event_signs=probe.handed, guard=request.guard(method))
     found = None if problem.events is None else probe.compiled(for_ida=False)
-    if found is None:
-        return problem
-    own = CompiledEvents(found.explicit, found.address, found.count, found.restart, found)
-    return replace(problem, events=found.function(), compiled_events=lambda: own)
+    return problem if found is None else replace(problem, events=found.function(), compiled_events=found)

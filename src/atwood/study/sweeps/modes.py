@@ -15,21 +15,18 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.shared import decisions_of
 from atwood.forms.sides.taken_out import has_sides
 from atwood.integrators.embedded.native import CompiledAccelerations, OwnRates
-from atwood.integrators.explicit_problem import CompiledEvents
 from atwood.integrators.explicit_session import ExplicitSession
-from atwood.integrators.methods import Method, Task
-from atwood.integrators.protocol import Budget, SolverOptions, Statistics, Status, StepResult
+from atwood.integrators.protocol import Budget, Statistics, Status, StepResult
 from atwood.late import dataclass, replace
 from atwood.mechanics.outputs.event_functions import EventFunction
 from atwood.simulation.dynamics.orientation_coordinates import COORDINATE_SWITCH
 from atwood.simulation.dynamics.scales import size_of, total_masses
 from atwood.simulation.events.margins import without_margin
 from atwood.simulation.events.modes import MARGIN, EventProbe, EventRecord, margins_at_start
-from atwood.simulation.problem.explicit_scene import explicit_problem_of, own_rates
+from atwood.simulation.problem.explicit_scene import own_rates
 from atwood.simulation.problem.preparation import make_plan
-from atwood.simulation.problem.step_guard import step_guard
 from atwood.simulation.run.choice import choose
-from atwood.study.sweeps.motions import OpenTree
+from atwood.study.sweeps.motions import OpenTree, task_of
 from atwood.study.sweeps.runs import SweepRequest
 
 __all__ = ["SweepMode", "find_mode"]
@@ -227,34 +224,10 @@ def find_mode(
     found, data = own_rates(assembly), probe.compiled(for_ida=False)
     if found is None or (functions and data is None):
         return None, "it calls functions in Python"
-    session = _opened(assembly, chosen, found[1], functions, data, request, (t, np.concatenate([q, u])))
+    motion = OpenTree(assembly)
+    task = task_of(motion, chosen, options, assembly.parameter_values, found[1], functions, data)
+    session = chosen.open(replace(task, t=t, y=np.concatenate([q, u])))
+    assert isinstance(session, ExplicitSession)
     code = None if data is None else probe.code(for_ida=False)
     program = probe.program() if functions else None
-    return SweepMode(OpenTree(assembly), functions, session, *found, code, data, program, columns), ""
-
-
-def _opened(
-    assembly: Assembly,
-    method: Method,
-    rates: OwnRates,
-    functions: tuple[EventFunction, ...],
-    data: EventData | None,
-    request: SweepRequest,
-    start: tuple[float, FloatArray],
-) -> ExplicitSession:
-    """Return a session that looks for events by itself; each run begins it again."""
-    options = request.options
-    directions = tuple(one.direction for one in functions)
-    events = None if data is None else data.function()
-    program = OpenTree(assembly).program
-    problem = explicit_problem_of(assembly, program, assembly.parameter_values, events, directions)
-    guard = step_guard(assembly, (assembly.flat.t_start, options.t_end), method.reach)
-    problem = replace(problem, compiled=lambda: rates.rates, guard=guard)
-    if data is not None:
-        compiled = CompiledEvents(data.explicit, data.address, data.count, data.restart, data)
-        problem = replace(problem, compiled_events=lambda: compiled)
-    relative = min(options.relative_tolerance, method.loosest_tolerance)
-    settings = SolverOptions(relative, 1.0, max_step=options.max_step, horizon=options.t_end - start[0])
-    session = method.open(Task(settings, *start, end=options.t_end, explicit=problem))
-    assert isinstance(session, ExplicitSession)
-    return session
+    return SweepMode(motion, functions, session, *found, code, data, program, columns), ""

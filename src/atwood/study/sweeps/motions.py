@@ -6,19 +6,24 @@ Everything here is worked out for many runs at once, one row each. What a run by
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import partial
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
+from atwood.codegen.sundials.events import EventData
 from atwood.errors import AtwoodError
 from atwood.forms.accelerations import AccelerationProgram, accelerations_of
 from atwood.forms.assembly import Assembly
+from atwood.integrators.embedded.native import OwnRates
 from atwood.integrators.ensemble.batch import BatchPlaces
 from atwood.integrators.methods import Method, Task
 from atwood.integrators.protocol import SolverOptions
 from atwood.late import dataclass, replace
+from atwood.mechanics.outputs.event_functions import EventFunction
 from atwood.simulation.dynamics.columns import masses_at
 from atwood.simulation.dynamics.reactions import accelerations_at
 from atwood.simulation.initialization.start import find_start
@@ -32,7 +37,7 @@ from atwood.simulation.problem.taylor_scene import taylor_problem
 from atwood.simulation.run.choice import choose
 from atwood.study.sweeps.runs import SweepRequest
 
-__all__ = ["ClosedLoops", "Motion", "OpenTree", "Way", "find_way", "open_places"]
+__all__ = ["ClosedLoops", "Motion", "OpenTree", "Way", "find_way", "open_places", "task_of"]
 
 
 class Motion(Protocol):
@@ -266,25 +271,45 @@ def open_places(motion: Motion, method: Method, options: RunOptions, values: Flo
     values
         Parameters of one run.
     """
-    assembly = motion.assembly
-    relative = min(options.relative_tolerance, method.loosest_tolerance)
-    span = options.t_end - assembly.flat.t_start
-    settings = SolverOptions(relative, 1.0, max_step=options.max_step, horizon=span)
-    form = (motion.solved.form, values) if isinstance(motion, ClosedLoops) else None
-    guard = step_guard(assembly, (assembly.flat.t_start, options.t_end), method.reach, form)
-    code, problem = compiled_rates(assembly, motion.program), explicit_problem_of(assembly, motion.program, values)
-    own = code.open()
-    code.fill(own, values)
-    task = Task(
-        settings,
-        assembly.flat.t_start,
-        values,
-        explicit=replace(problem, compiled=lambda: own.rates, guard=guard),
-        series=lambda: taylor_problem(assembly, options.t_end, False, motion.program, values),
-    )
+    own = compiled_rates(motion.assembly, motion.program).open()
+    task = task_of(motion, method, options, values, own)
     assert method.batch is not None
     places = method.batch(task)
     return replace(places, parameters=(own.prologue, own.derived, own.scratch)) if method.tableau else places
+
+
+def task_of(
+    motion: Motion,
+    method: Method,
+    options: RunOptions,
+    values: FloatArray,
+    own: OwnRates,
+    functions: Sequence[EventFunction] = (),
+    data: EventData | None = None,
+) -> Task:
+    """Return what a session is opened for that makes one run of a sweep after another.
+
+    Parameters
+    ----------
+    motion, method, options, values
+        As of `open_places`.
+    own
+        The rates, with their place for parameters, which get those of one run.
+    functions, data
+        What is watched, as machine code.
+    """
+    assembly, begin = motion.assembly, motion.assembly.flat.t_start
+    relative = min(options.relative_tolerance, method.loosest_tolerance)
+    settings = SolverOptions(relative, 1.0, max_step=options.max_step, horizon=options.t_end - begin)
+    form = (motion.solved.form, values) if isinstance(motion, ClosedLoops) else None
+    guard = step_guard(assembly, (begin, options.t_end), method.reach, form)
+    compiled_rates(assembly, motion.program).fill(own, values)
+    directions = tuple(one.direction for one in functions)
+    events = None if data is None else data.function()
+    problem = explicit_problem_of(assembly, motion.program, values, events, directions)
+    problem = replace(problem, compiled=lambda: own.rates, guard=guard, compiled_events=data)
+    series = partial(taylor_problem, assembly, options.t_end, False, motion.program, values)
+    return Task(settings, begin, np.zeros(problem.size), end=options.t_end, explicit=problem, series=series)
 
 
 def _bound(assembly: Assembly, values: FloatArray | None) -> FloatArray:
