@@ -13,7 +13,7 @@ from typing import cast
 
 import numpy as np
 
-from atwood.errors import KernelEvaluationError, StartError, UsageError
+from atwood.errors import StartError, UsageError
 from atwood.integrators.compiled_functions import Lookout
 from atwood.integrators.event_location import ROUNDING, EventLocator, Root
 from atwood.integrators.explicit_problem import ExplicitProblem, Outcome, Stepper
@@ -179,34 +179,8 @@ class ExplicitSession(Session):
         self._root: Root | None = None
         self._searched = self._here[0]
         self._stalled = 0
-        self._broken = self._sees = False
+        self._stale = self._sees = False
         self._starts += 1
-
-    def advance(self, t_out: float) -> StepResult:
-        """Go on to exactly a time, or stop earlier at an event, a limit or a failure.
-
-        Parameters
-        ----------
-        t_out
-            Not before the time at which the last advance ended.
-        """
-        if not self._here[0] <= t_out < inf:
-            raise UsageError(f"cannot advance from t = {self._here[0]:.9g} to t = {t_out:.9g}")
-        began = time.perf_counter()
-        self._opened = self._opened or began
-        try:
-            return self._run(float(t_out))
-        except KeyboardInterrupt:
-            self._broken = True
-            return self._stopped(Status.INTERRUPTED, "interrupted")
-        except KernelEvaluationError as error:
-            self._broken = True
-            return self._stopped(Status.FAILED, str(error))
-        except BaseException:
-            self._broken = True
-            raise
-        finally:
-            self._seconds += time.perf_counter() - began
 
     def sample(self, times: FloatArray) -> tuple[FloatArray, FloatArray, StepResult]:
         """Go on through many times at once, as far as nothing stops it.
@@ -227,7 +201,7 @@ class ExplicitSession(Session):
         values, rates = np.empty((len(times), self._size)), np.empty((len(times), self._size))
         filled, stopped = 0, None
         looks_itself = self._locator is None or self._notices
-        if looks_itself and self.budget.poll is None and not self._broken:
+        if looks_itself and self.budget.poll is None and not self._stale:
             filled, stopped = self._sample_quickly(times, values, rates)
         if stopped is not None or filled == len(times):
             return values[:filled], rates[:filled], stopped or self.here
@@ -246,10 +220,10 @@ class ExplicitSession(Session):
         tuple
             How many times it filled, and why it must end there; None if single advances can go on.
         """
-        began = time.perf_counter()
-        self._opened = self._opened or began
         filled = 0
-        try:
+
+        def fill() -> None:
+            nonlocal filled
             while filled < len(times) and self._find_root() is None:
                 is_ahead = times[-1] > self._newest[0]
                 if is_ahead and self._limit() is not None:
@@ -261,18 +235,9 @@ class ExplicitSession(Session):
                     filled += count
                 if outcome is Outcome.TOO_SMALL or self._sees:
                     break
-        except KeyboardInterrupt:
-            self._broken = True
-            return filled, self._stopped(Status.INTERRUPTED, "interrupted")
-        except KernelEvaluationError as error:
-            self._broken = True
-            return filled, self._stopped(Status.FAILED, str(error))
-        except BaseException:
-            self._broken = True
-            raise
-        finally:
-            self._seconds += time.perf_counter() - began
-        return filled, None
+
+        stopped = self._taken(fill)
+        return filled, stopped
 
     def _fill(self, times: FloatArray, values: FloatArray, rates: FloatArray) -> tuple[int, Outcome]:
         """Let the stepper fill tables for a moment; return how many times it reached."""
@@ -312,7 +277,7 @@ class ExplicitSession(Session):
             self._searched = max(self._searched, last)
 
     def _run(self, t_out: float) -> StepResult:
-        if self._broken:
+        if self._stale:
             self.reinitialize(self._here[0], self._here[1])
         while True:
             root = self._find_root()
@@ -366,7 +331,7 @@ class ExplicitSession(Session):
         outcome = self._take(t_out, self._allowed())
         if outcome is Outcome.TOO_SMALL:
             self._here = self._newest
-            self._broken = True
+            self._stale = True
             reason = "the steps became too small to move the time"
             if self._stepper.counts.undefined:
                 reason += ": the right-hand side has no finite value beyond, or the solution grows without bound"
@@ -377,7 +342,7 @@ class ExplicitSession(Session):
         else:
             self._stalled += taken
         if self._stalled >= _STALLED:
-            self._here, self._broken = self._newest, True
+            self._here, self._stale = self._newest, True
             return self._stopped(Status.FAILED, "the steps became too small to move the time")
         return None
 

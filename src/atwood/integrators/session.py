@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from math import inf
+from typing import TypeVar
 
 import numpy as np
 
+from atwood.errors import KernelEvaluationError, UsageError
 from atwood.integrators.compiled_functions import Lookout
 from atwood.integrators.event_location import EventLocator, Root, State
 from atwood.integrators.protocol import Budget, FloatArray, Statistics, Status, StepResult
 
 __all__ = ["Session", "copied"]
+
+_T = TypeVar("_T")
 
 
 class Session(ABC):
@@ -31,8 +36,9 @@ class Session(ABC):
     _locator: EventLocator | None
     _root: Root | None
     _opened: float
+    _seconds: float
+    _stale: bool
 
-    @abstractmethod
     def advance(self, t_out: float) -> StepResult:
         """Go on to exactly a time, or stop earlier at an event, a limit or a failure.
 
@@ -40,7 +46,37 @@ class Session(ABC):
         ----------
         t_out
             Not before the time at which the last advance ended.
+
+        Returns
+        -------
+        StepResult
+            Where it ended and why, always with a good state.
         """
+        if not self._here[0] <= t_out < inf:
+            raise UsageError(f"cannot advance from t = {self._here[0]:.9g} to t = {t_out:.9g}")
+        return self._taken(lambda: self._run(float(t_out)))
+
+    @abstractmethod
+    def _run(self, t_out: float) -> StepResult:
+        """Go on to a time, or as far as nothing stops it."""
+
+    def _taken(self, go: Callable[[], _T]) -> _T | StepResult:
+        """Return what a way on gives, or why it ended; it then goes on from the state that was handed out last."""
+        began = time.perf_counter()
+        self._opened = self._opened or began
+        try:
+            return go()
+        except KeyboardInterrupt:
+            self._stale = True
+            return self._stopped(Status.INTERRUPTED, "interrupted")
+        except KernelEvaluationError as error:
+            self._stale = True
+            return self._stopped(Status.FAILED, str(error))
+        except BaseException:
+            self._stale = True
+            raise
+        finally:
+            self._seconds += time.perf_counter() - began
 
     @abstractmethod
     def reinitialize(self, t: float, y: FloatArray, yp: FloatArray | None = None) -> None:

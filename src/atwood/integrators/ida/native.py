@@ -161,46 +161,26 @@ class NativeSession(Session):
         self._restart(checked_state(self._problem.size, t, y, yp))
 
     def advance(self, t_out: float) -> StepResult:
-        """Go on to exactly a time, or stop earlier at an event, a limit or a failure.
-
-        Parameters
-        ----------
-        t_out
-            Not before the time at which the last advance ended.
-
-        Returns
-        -------
-        StepResult
-            Where it ended and why, always with a good state.
-        """
+        """Go on to exactly a time, or stop earlier at an event, a limit or a failure; see `Session.advance`."""
         self._check_open()
         if self._pending is not None:
             pending, self._pending = self._pending, None
             return pending
-        if not self._here[0] <= t_out < inf:
-            raise UsageError(f"cannot advance from t = {self._here[0]:.9g} to t = {t_out:.9g}")
-        if self._stop_time is not None and t_out > self._stop_time:
+        if self._stop_time is not None and self._stop_time < t_out < inf:
             raise UsageError(f"cannot advance past t = {self._stop_time:.9g}, where the run must stop")
-        began = time.perf_counter()
-        self._opened = self._opened or began
+        return super().advance(t_out)
+
+    def _run(self, t_out: float) -> StepResult:
+        if not self._record.calls_python and (self._locator is None or self._finds_events):
+            return self._stride_on(t_out)
         try:
-            if not self._record.calls_python and (self._locator is None or self._finds_events):
-                return self._run(float(t_out))
             with np.errstate(all="ignore"), InterruptLater(self._record):
-                end = self._run(float(t_out))
+                end = self._stride_on(t_out)
                 self._record.raise_again()
                 return end
         except KeyboardInterrupt:
-            self._record.interrupted, self._stale = False, True
-            return self._stopped(Status.INTERRUPTED, "interrupted")
-        except KernelEvaluationError as error:
-            self._stale = True
-            return self._stopped(Status.FAILED, str(error))
-        except BaseException:
-            self._stale = True
+            self._record.interrupted = False
             raise
-        finally:
-            self._seconds += time.perf_counter() - began
 
     def _check_open(self) -> None:
         if self._memory.is_closed:
@@ -245,7 +225,8 @@ class NativeSession(Session):
             convergence_failures=counts.solve_failures,
         )
 
-    def _run(self, t_out: float) -> StepResult:
+    def _stride_on(self, t_out: float) -> StepResult:
+        """Go on to a time; see `_run`."""
         if self._stale:
             self._restart(self._here)
         by_steps = self._by_steps

@@ -16,7 +16,6 @@ Facts about scikit-sundae that this module rests on:
 
 from __future__ import annotations
 
-import time
 import warnings
 from collections.abc import Callable
 from math import inf, isfinite
@@ -150,38 +149,6 @@ class SundaeSession(Session):
         """Go on from another consistent state, after an event, a change of mode, or a projection."""
         self._restart(checked_state(self._size, t, y, yp))
 
-    def advance(self, t_out: float) -> StepResult:
-        """Go on to exactly a time, or stop earlier at an event, a limit or a failure.
-
-        Parameters
-        ----------
-        t_out
-            Not before the time at which the last advance ended.
-
-        Returns
-        -------
-        StepResult
-            Where it ended and why, always with a good state.
-        """
-        if not self._here[0] <= t_out < inf:
-            raise UsageError(f"cannot advance from t = {self._here[0]:.9g} to t = {t_out:.9g}")
-        began = time.perf_counter()
-        self._opened = self._opened or began
-        try:
-            with without_solver_messages(), np.errstate(all="ignore"):
-                return self._run(float(t_out))
-        except KeyboardInterrupt:
-            self._stale = True
-            return self._stopped(Status.INTERRUPTED, "interrupted")
-        except KernelEvaluationError as error:
-            self._stale = True
-            return self._stopped(Status.FAILED, str(error))
-        except BaseException:
-            self._stale = True
-            raise
-        finally:
-            self._seconds += time.perf_counter() - began
-
     def _restart(self, state: State) -> None:
         if self._begins is not None:
             self._begins(*state)
@@ -197,6 +164,10 @@ class SundaeSession(Session):
         self._starts += 1
 
     def _run(self, t_out: float) -> StepResult:
+        with without_solver_messages(), np.errstate(all="ignore"):
+            return self._go_on(t_out)
+
+    def _go_on(self, t_out: float) -> StepResult:
         if self._stale:
             self._restart(self._here)
         while True:

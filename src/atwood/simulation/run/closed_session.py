@@ -115,8 +115,11 @@ class ClosedLoopSession(Session):
 
     def advance(self, t_out: float) -> StepResult:
         """Go on to exactly a time, or stop earlier at an event, a limit or a failure."""
+        return self._run(t_out)
+
+    def _run(self, t_out: float) -> StepResult:
         while True:
-            found = self._taken(self._session.advance(t_out))
+            found = self._handed_out(self._session.advance(t_out))
             if found is not None:
                 return found
 
@@ -128,14 +131,14 @@ class ClosedLoopSession(Session):
             y, _, result = self._session.sample(times[done:])
             parts.append(self._solved.states(times[done : done + len(y)], y))
             done += len(y)
-            found = self._taken(result)
+            found = self._handed_out(result)
             if found is not None:
                 values = np.concatenate(parts)
                 return values, np.zeros_like(values), found
 
     # -- choices --------------------------------------------------------------------------------------------------
 
-    def _taken(self, result: StepResult) -> StepResult | None:
+    def _handed_out(self, result: StepResult) -> StepResult | None:
         """Return what is handed out; None where only a choice or a count has changed and the run goes on."""
         y = self._solved.state(result.t, result.y)
         full = replace(result, y=y, yp=self._rates(result, y), events=tuple(result.events[: self._count]))
