@@ -24,10 +24,8 @@ from atwood.errors import (
     UnsupportedError,
     UsageError,
 )
-from atwood.expr.core.functions import Scalar
-from atwood.expr.core.graph import Expression
-from atwood.expr.core.operations import ExternalFunction
-from atwood.functions import (  # these stay out of __all__: who imports all names has cos of another library mostly
+from atwood.expr.core.functions import (
+    Scalar,
     absolute as absolute,
     acos as acos,
     asin as asin,
@@ -47,17 +45,20 @@ from atwood.functions import (  # these stay out of __all__: who imports all nam
     sign as sign,
     sin as sin,
     sinh as sinh,
-    solve_linear,
+    solve as solve_linear,
     sqrt as sqrt,
     tan as tan,
     tanh as tanh,
 )
-from atwood.model.compose.composite import Model, connect
+from atwood.expr.core.graph import Expression
+from atwood.expr.core.operations import ExternalFunction
+from atwood.model.compose.composite import Model
+from atwood.model.compose.connection_rules import connect
 from atwood.model.compose.scene import Scene
 from atwood.model.declare.component import Component
 from atwood.model.declare.connectors import Connector, Frame, Groove, Point, Shaft, Slide, connector
 from atwood.model.declare.contributions import BodyInertia, CoordinateLoad, Load, Placement, PointInertia
-from atwood.model.declare.field_functions import Number, Triple, parameter, signal
+from atwood.model.declare.field_functions import Number, Triple, discrete_state, parameter, signal, state
 from atwood.model.declare.laws import (
     constraint,
     derivative,
@@ -71,7 +72,6 @@ from atwood.model.declare.laws import (
     potential,
     update,
 )
-from atwood.model.declare.states import discrete_state, state
 from atwood.model.values.outline import Outline
 from atwood.model.values.rotation import FREE, Rotation, normals, turn
 from atwood.model.values.vector import Vector, as_vector, cross, dot, norm
@@ -79,10 +79,10 @@ from atwood.model.values.vector import Vector, as_vector, cross, dot, norm
 if TYPE_CHECKING:
     from atwood.checking import CheckReport, check
     from atwood.expr.formulas.formula import Formula, formula
+    from atwood.forms.assembly import Assembly
     from atwood.model.compose.serialization import from_data, load_scene, save_scene, to_data
-    from atwood.pipeline import Assembly, assemble, simulate
-    from atwood.plotting.drawing import animate, plot_mechanism
-    from atwood.plotting.mode_shapes import plot_mode
+    from atwood.pipeline import assemble, simulate
+    from atwood.plotting.drawing import animate, plot_mechanism, plot_mode
     from atwood.plotting.plots.energies import plot_energies
     from atwood.plotting.plots.linear import plot_bode, plot_branches, plot_nyquist, plot_root_locus
     from atwood.plotting.plots.phase import plot_phase_portrait, plot_section
@@ -98,7 +98,8 @@ if TYPE_CHECKING:
     from atwood.study.comparison.found import Comparison, ComparisonRow
     from atwood.study.comparison.long_runs import LongComparison, compare_long
     from atwood.study.sweeps.files import load_sweep
-    from atwood.study.sweeps.sweep import Sweep, sweep
+    from atwood.study.sweeps.result import Sweep
+    from atwood.study.sweeps.sweep import sweep
     from atwood.theory.action import (
         Action,
         ActionAngle,
@@ -111,18 +112,7 @@ if TYPE_CHECKING:
         motions_between,
         separation,
     )
-    from atwood.theory.canonical import (
-        CanonicalTransformation,
-        PointTransformation,
-        canonical_transformation,
-        fundamental_brackets,
-        generated_transformation,
-        point_transformation,
-        poisson_bracket,
-        poisson_brackets,
-        total_derivative,
-    )
-    from atwood.theory.dynamics import Dynamics, dynamics
+    from atwood.theory.dynamics import Dynamics, StartSolution, dynamics, solve_start
     from atwood.theory.equations import EquationsOfMotion, PartOfEquations, equations
     from atwood.theory.flow import (
         LyapunovExponents,
@@ -135,8 +125,20 @@ if TYPE_CHECKING:
         poincare_section,
         tangent_flow,
     )
-    from atwood.theory.hamiltonian import Hamiltonian, hamiltonian
-    from atwood.theory.linearization import (
+    from atwood.theory.hamiltonian import (
+        CanonicalTransformation,
+        Hamiltonian,
+        PointTransformation,
+        canonical_transformation,
+        fundamental_brackets,
+        generated_transformation,
+        hamiltonian,
+        point_transformation,
+        poisson_bracket,
+        poisson_brackets,
+        total_derivative,
+    )
+    from atwood.theory.linear import (
         BranchPoint,
         Equilibria,
         Equilibrium,
@@ -154,8 +156,7 @@ if TYPE_CHECKING:
         trim,
     )
     from atwood.theory.reduction import ReducedMotion, Routhian, reduced, routhian
-    from atwood.theory.start_solution import StartSolution, solve_start
-    from atwood.theory.symmetries import Conserved, ConservedQuantity, Symmetry, conserved
+    from atwood.theory.symmetry import Conserved, ConservedQuantity, Symmetry, conserved
 
     __version__: str
 
@@ -308,7 +309,7 @@ _ROOMS = {
     "atwood.model.compose.serialization": ("from_data", "load_scene", "save_scene", "to_data"),
     "atwood.pipeline": ("Assembly", "assemble", "simulate"),
     "atwood.plotting": ("animate", "plot", "plot_comparison", "plot_mechanism", "plot_sweep"),
-    "atwood.plotting.mode_shapes": ("plot_mode",),
+    "atwood.plotting.drawing": ("plot_mode",),
     "atwood.plotting.plots.energies": ("plot_energies",),
     "atwood.plotting.plots.linear": ("plot_bode", "plot_branches", "plot_nyquist", "plot_root_locus"),
     "atwood.plotting.plots.reduction": ("plot_effective_potential", "plot_top_path"),
@@ -323,26 +324,25 @@ _ROOMS = {
         "Action", "ActionAngle", "JoiningMotion", "SeparatedMotion", "Separation", "Variation",
         "action", "action_angle", "motions_between", "separation",
     ),
-    "atwood.theory.canonical": (
-        "CanonicalTransformation", "PointTransformation", "canonical_transformation", "fundamental_brackets",
-        "generated_transformation", "point_transformation", "poisson_bracket", "poisson_brackets", "total_derivative",
+    "atwood.theory.hamiltonian": (
+        "CanonicalTransformation", "Hamiltonian", "PointTransformation",
+        "canonical_transformation", "fundamental_brackets", "generated_transformation", "hamiltonian",
+        "point_transformation", "poisson_bracket", "poisson_brackets", "total_derivative",
     ),
-    "atwood.theory.dynamics": ("Dynamics", "dynamics"),
+    "atwood.theory.dynamics": ("Dynamics", "StartSolution", "dynamics", "solve_start"),
     "atwood.theory.equations": ("EquationsOfMotion", "PartOfEquations", "equations"),
     "atwood.theory.flow": (
         "LyapunovExponents", "PhasePortrait", "PoincareSection", "RestPoint", "TangentFlow",
         "lyapunov_exponents", "phase_portrait",
         "poincare_section", "tangent_flow",
     ),
-    "atwood.theory.hamiltonian": ("Hamiltonian", "hamiltonian"),
-    "atwood.theory.linearization": (
+    "atwood.theory.linear": (
         "BranchPoint", "Equilibria", "Equilibrium", "EquilibriumBranch", "EquilibriumBranches",
         "LinearModel", "NormalModes",
         "RootLocus", "Trim", "equilibria", "equilibrium_branches", "linearize", "normal_modes", "root_locus", "trim",
     ),
     "atwood.theory.reduction": ("ReducedMotion", "Routhian", "reduced", "routhian"),
-    "atwood.theory.start_solution": ("StartSolution", "solve_start"),
-    "atwood.theory.symmetries": ("Conserved", "ConservedQuantity", "Symmetry", "conserved"),
+    "atwood.theory.symmetry": ("Conserved", "ConservedQuantity", "Symmetry", "conserved"),
 }  # fmt: skip
 _LATER = {name: room for room, names in _ROOMS.items() for name in names}
 """Names whose modules are imported when they are first used; each also stands in `__all__` and above."""

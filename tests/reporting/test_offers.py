@@ -28,9 +28,9 @@ from atwood import (
     select,
     simulate,
 )
-from atwood.analysis.free_scene import LooseScene
 from atwood.reporting import Offer
 from atwood.simulation.initialization.start import find_start
+from atwood.theory.symmetry.generic_dynamics import LooseScene
 from atwood_library import (
     Box,
     Cone,

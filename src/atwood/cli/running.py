@@ -94,7 +94,7 @@ def _run(request: Request) -> Result:
         check_view(assembly.mechanism.space.name, request.view)
     monitor = None
     if request.conserved:
-        from atwood.theory.symmetries import conserved
+        from atwood.theory.symmetry import conserved
 
         monitor = conserved(assembly)
     t_start, t_end = assembly.flat.t_start, assembly.flat.t_end if request.t_end is None else request.t_end

@@ -13,7 +13,6 @@ from typing import Any
 import click
 
 import atwood
-from atwood.analysis.hamiltonian import read_hamiltonian
 from atwood.arguments import FILE, FLAG, TEXT, Kind
 from atwood.cli.command import Request, command, documented, first_sentence, kinds_of
 from atwood.cli.output import print_json, warn, writer
@@ -26,7 +25,8 @@ from atwood.plotting.canvas import check_picture
 from atwood.ranges import range_of
 from atwood.showing import plain
 from atwood.table import Shown, table
-from atwood.theory.linearization import equilibria, equilibrium_branches
+from atwood.theory.hamiltonian.hamiltonian import read_hamiltonian
+from atwood.theory.linear import equilibria, equilibrium_branches
 
 __all__ = ["theory_command"]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from atwood.arguments import FILE, instance, optional, takes, whole
 from atwood.plotting.canvas import finished, titled
 from atwood.plotting.drawing import plot_mechanism
-from atwood.theory.linearization import NormalModes
+from atwood.theory.linear import NormalModes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from atwood.analysis.symmetry import Symmetry, find_symmetries
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.expr import evaluate
@@ -28,6 +27,7 @@ from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.start import Start, find_start, own_state
 from atwood.simulation.problem.preparation import make_plan
+from atwood.theory.symmetry.dimension import Symmetry, find_symmetries
 
 __all__ = ["Offer", "find_offers"]
 

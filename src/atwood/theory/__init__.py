@@ -1,1 +1,1 @@
-"""What theory says of a scene: its equations to be read, and as functions of numbers."""
+"""What analytical mechanics says of a scene: a subject a room, each with its derivation and its public functions."""

@@ -8,7 +8,7 @@ import pytest
 
 import atwood
 from atwood import PhasePortrait, UsageError, phase_portrait
-from atwood.analysis.flow.plane_field import Window, curves_through
+from atwood.theory.flow.plane_field import Window, curves_through
 from atwood_library import Drag
 from atwood_library.scenes import (
     Atwood,

@@ -13,7 +13,7 @@ from atwood.arguments import FILE, TEXT, each as several, instance, number, opti
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError, suggestion
 from atwood.plotting.canvas import COLOURS, GREY, INK, finished, new_figure, polish
-from atwood.theory.linearization import EquilibriumBranches, LinearModel, RootLocus
+from atwood.theory.linear import EquilibriumBranches, LinearModel, RootLocus
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

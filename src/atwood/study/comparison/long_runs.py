@@ -26,7 +26,7 @@ from atwood.simulation.problem.arguments import LIMITS, NAME, PROGRESS
 from atwood.simulation.problem.options import how_solved
 from atwood.study.comparison.environment import environment
 from atwood.table import Shown, Table, table
-from atwood.theory.symmetries import conserved
+from atwood.theory.symmetry import conserved
 
 __all__ = ["LongComparison", "LongRow", "compare_long"]
 

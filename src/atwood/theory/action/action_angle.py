@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from atwood.analysis.hamiltonian import Hamiltonian
 from atwood.arguments import instance, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
@@ -17,7 +16,7 @@ from atwood.model.compose.composite import Model
 from atwood.showing import data_of
 from atwood.simulation.initialization.start import find_start
 from atwood.theory.action.quadrature import Level, level_through
-from atwood.theory.hamiltonian import hamiltonian
+from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian
 
 __all__ = ["ActionAngle", "action_angle"]
 

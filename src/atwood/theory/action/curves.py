@@ -11,7 +11,7 @@ from numpy.polynomial import legendre
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, UsageError, suggestion
 from atwood.late import dataclass
-from atwood.theory.arguments import as_expression
+from atwood.theory.hamiltonian.arguments import as_expression
 
 __all__ = ["Nodes", "curves_at", "panels"]
 

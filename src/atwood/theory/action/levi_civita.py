@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from atwood.analysis.formulas.objects import Sympy
 from atwood.errors import UnsupportedError
+from atwood.theory.formulas.objects import Sympy
 
 __all__ = ["DIGITS", "STATES", "ZERO", "worst_condition"]
 

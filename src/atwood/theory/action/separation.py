@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from atwood.analysis.formulas.objects import Sympy
-from atwood.analysis.hamiltonian import Hamiltonian
 from atwood.arguments import BY_PATH, check, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UnsupportedError, UsageError, suggestion
@@ -18,8 +16,9 @@ from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.theory.action.levi_civita import DIGITS, STATES, ZERO, worst_condition
 from atwood.theory.action.quadrature import Level, level_through
-from atwood.theory.arguments import EXPRESSION
-from atwood.theory.hamiltonian import hamiltonian
+from atwood.theory.formulas.objects import Sympy
+from atwood.theory.hamiltonian.arguments import EXPRESSION
+from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian
 
 __all__ = ["SeparatedMotion", "Separation", "separation"]
 

@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from atwood.analysis.flow.field import States, VariationalEquations, variational_equations
-from atwood.analysis.flow.steps import Steps, find_steps
-from atwood.analysis.linear.minimal import Minimal, find_minimal
-from atwood.analysis.linear.steady import pace_of
-from atwood.analysis.linear.variations import LinearScene
 from atwood.arrays import FloatArray
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
+from atwood.theory.flow.field import States, VariationalEquations, variational_equations
 from atwood.theory.flow.smooth_motion import SmoothMotion
+from atwood.theory.flow.steps import Steps, find_steps
+from atwood.theory.linear.minimal import Minimal, find_minimal
+from atwood.theory.linear.steady import pace_of
+from atwood.theory.linear.variations import LinearScene
 
 __all__ = ["Deviations", "find_deviations"]
 

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from atwood.analysis.flow.growth import orthonormal_growth
 from atwood.arguments import check, command, number, optional, takes, whole
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
@@ -17,6 +16,7 @@ from atwood.pipeline import SCENE
 from atwood.showing import data_of, fitted
 from atwood.simulation.problem.arguments import RTOL, SOLVER, T_END
 from atwood.theory.flow.deviations import find_deviations
+from atwood.theory.flow.growth import orthonormal_growth
 
 __all__ = ["LyapunovExponents", "lyapunov_exponents"]
 

@@ -8,9 +8,6 @@ from typing import Any, TypeAlias
 import numpy as np
 from scipy.optimize import brentq
 
-from atwood.analysis.dynamics import Dynamics
-from atwood.analysis.flow.plane_field import Field, Window, separatrices, spaced_curves
-from atwood.analysis.linear.variations import LinearScene
 from atwood.arguments import Kind, Refused, command, optional, real, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
@@ -24,7 +21,10 @@ from atwood.showing import count_of, data_of, fitted
 from atwood.simulation.dynamics.scales import scene_length
 from atwood.simulation.events.modes import find_event_functions
 from atwood.table import Shown, Table, facts, table
-from atwood.theory.linearization.linear_model import complex_text
+from atwood.theory.dynamics.dynamics import Dynamics
+from atwood.theory.flow.plane_field import Field, Window, separatrices, spaced_curves
+from atwood.theory.linear.linear_model import complex_text
+from atwood.theory.linear.variations import LinearScene
 
 __all__ = ["PhasePortrait", "RestPoint", "phase_portrait"]
 

@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from atwood.analysis.flow.field import States
-from atwood.analysis.linear.variations import LinearScene
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError, UsageError
 from atwood.forms.assembly import Assembly
@@ -19,6 +17,8 @@ from atwood.pipeline import assemble, simulate
 from atwood.result.result import Result
 from atwood.simulation.dynamics.orientation_coordinates import to_regular
 from atwood.simulation.run.record import SegmentRecord
+from atwood.theory.flow.field import States
+from atwood.theory.linear.variations import LinearScene
 
 __all__ = ["SmoothMotion", "Stretch"]
 

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from atwood.analysis.flow.volume import log_volumes
 from atwood.arguments import takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
@@ -20,6 +19,7 @@ from atwood.result.result import Result
 from atwood.showing import fitted
 from atwood.simulation.problem.arguments import OUTPUTS, RTOL, SOLVER, T_END
 from atwood.theory.flow.deviations import Deviations, find_deviations
+from atwood.theory.flow.volume import log_volumes
 
 __all__ = ["TangentFlow", "tangent_flow"]
 

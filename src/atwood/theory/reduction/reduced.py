@@ -8,10 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from atwood.analysis.conservation.quantities import Quantities
-from atwood.analysis.reduction.parts import parts_of
-from atwood.analysis.reduction.quadrature import Path, find_path
-from atwood.analysis.reduction.radial import Radial
 from atwood.arguments import ARRAY, TEXT, check, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, UnsupportedError, UsageError, suggestion
@@ -24,9 +20,13 @@ from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
-from atwood.theory.canonical.points import PointTransformation
+from atwood.theory.hamiltonian.points import PointTransformation
+from atwood.theory.reduction.parts import parts_of
+from atwood.theory.reduction.quadrature import Path, find_path
+from atwood.theory.reduction.radial import Radial
 from atwood.theory.reduction.routhian import Routhian, ignorable_of, routhian_of
 from atwood.theory.reduction.transformed import start_in, transformed_parts
+from atwood.theory.symmetry.quantities import Quantities
 
 __all__ = ["ReducedMotion", "reduced"]
 

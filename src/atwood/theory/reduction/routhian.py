@@ -5,13 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 
-from atwood.analysis.conservation.find import find_conserved
-from atwood.analysis.conservation.proof import Prover
-from atwood.analysis.conservation.quantities import Quantities
-from atwood.analysis.equation_formulas import EquationFormulas
-from atwood.analysis.formulas import objects
-from atwood.analysis.formulas.notation import notation_of
-from atwood.analysis.formulas.tree import Sum
 from atwood.arguments import PATHS, TEXT, optional, takes
 from atwood.errors import UnsupportedError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
@@ -19,7 +12,14 @@ from atwood.forms.lagrangian import Lagrangian, lagrangian_of
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of
-from atwood.theory.canonical.phase_space import Sympy, collected, short
+from atwood.theory.equations.formulas import EquationFormulas
+from atwood.theory.formulas import objects
+from atwood.theory.formulas.notation import notation_of
+from atwood.theory.formulas.tree import Sum
+from atwood.theory.hamiltonian.phase_space import Sympy, collected, short
+from atwood.theory.symmetry.find import find_conserved
+from atwood.theory.symmetry.proof import Prover
+from atwood.theory.symmetry.quantities import Quantities
 from atwood.topology.orientation_coordinates import Orientation
 
 __all__ = ["Routhian", "ignorable_of", "routhian", "routhian_of"]
@@ -187,7 +187,7 @@ def ignorable_of(scene: Model | Assembly, orientation: str | None) -> tuple[Asse
     UnsupportedError
         If its coordinates are not free, or its energy function is not conserved.
     """
-    from atwood.analysis.canonical.checks import refuse_without_hamiltonian
+    from atwood.theory.hamiltonian.checks import refuse_without_hamiltonian
 
     assembly = assembly_of(scene, orientation=orientation)
     refuse_without_hamiltonian(assembly)

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from atwood.analysis.reduction.parts import Parts, PartsAt
 from atwood.arrays import FloatArray
 from atwood.errors import StartError, UnsupportedError
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
-from atwood.theory.canonical.points import PointTransformation
+from atwood.theory.hamiltonian.points import PointTransformation
+from atwood.theory.reduction.parts import Parts, PartsAt
 
 __all__ = ["start_in", "transformed_parts"]
 

@@ -1,1 +1,0 @@
-"""How neighbouring motions move: the variational equations along a motion, and what they do to volumes."""

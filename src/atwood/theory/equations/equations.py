@@ -1,0 +1,390 @@
+"""The equations of motion of a scene for people to read: sympy objects, LaTeX, Markdown, plain text and Python code.
+
+The equations of motion of a scene, to be read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+from atwood.arguments import one_of, optional, takes
+from atwood.errors import UnsupportedError, UsageError, suggestion
+from atwood.expr import Expression
+from atwood.forms.assembly import Assembly
+from atwood.forms.lagrangian import lagrangian_of, rows_by_part
+from atwood.late import dataclass
+from atwood.model.compose.composite import Model
+from atwood.pipeline import SCENE, assembly_of
+from atwood.simulation.problem.arguments import FORM, ORIENTATION
+from atwood.theory.equations.closures import solve_closures
+from atwood.theory.equations.formulas import EquationFormulas, Parameters
+from atwood.theory.equations.modules import module_of
+from atwood.theory.equations.pages import as_data, equation_lines, html_of, sections_of, symbol_lines, symbol_table
+from atwood.theory.formulas import objects, page
+from atwood.theory.formulas.notation import notation_of
+from atwood.theory.formulas.objects import Sympy
+from atwood.theory.formulas.page import Section
+from atwood.theory.formulas.tree import Sum
+
+__all__ = ["EquationsOfMotion", "PartOfEquations", "equations", "read_equations"]
+
+
+def read_equations(assembly: Assembly, parameters: Parameters = "symbolic") -> EquationsOfMotion:
+    """Return the equations of motion of an assembly, to be read.
+
+    Parameters
+    ----------
+    assembly
+        The scene, in the form that the equations are to have.
+    parameters
+        Whether parameters are symbols, or their values are put in.
+    """
+    found = lagrangian_of(assembly)
+    return EquationsOfMotion(assembly, found, notation_of(assembly, found), parameters)
+
+
+@dataclass(frozen=True, eq=False)
+class PartOfEquations:
+    """What one part, or a model with all its parts, contributes to the equations of motion; sympy objects.
+
+    Attributes
+    ----------
+    path
+        The part.
+    kinetic_energy, potential_energy, lagrangian, rayleigh_function
+        J, and W.
+    generalized_forces
+        One for each velocity.
+    rows
+        What it adds to each equation of motion, forces of its constraints included; empty where velocities are not all
+        derivatives of free coordinates, so that the equations are not those of a sum of Lagrangians.
+    """
+
+    path: str
+    kinetic_energy: Sympy
+    potential_energy: Sympy
+    lagrangian: Sympy
+    rayleigh_function: Sympy
+    generalized_forces: tuple[Sympy, ...]
+    rows: tuple[Sympy, ...]
+
+
+class EquationsOfMotion(EquationFormulas):
+    """The equations of motion of a scene, to be read.
+
+    Lagrange's equations with multipliers, ``d/dt dL/dq' - dL/dq + dR/dq' = Q + G^T lambda`` with ``g(q, t) = 0`` and
+    ``G = dg/dq`` (Goldstein, equations 1.57, 1.70 and 2.23). Where orientations are quaternions, velocities are the
+    components of angular velocities in the axes of the body, and the equations are Euler's. Coordinates are functions
+    of ``t``, as `sympy.physics.mechanics.dynamicsymbols` makes them; parameters are plain symbols.
+
+    Attributes
+    ----------
+    assembly
+        The scene.
+    expressions
+        The same as expressions of the graph.
+    notation
+        What stands for what.
+    parameters
+        ``"symbolic"`` or ``"values"``.
+    """
+
+    # -- as sympy objects ---------------------------------------------------------------------------------------------
+
+    def symbol(self, path: str) -> Sympy:
+        """Return the sympy symbol of a coordinate, multiplier or parameter by its path.
+
+        Raises
+        ------
+        UsageError
+            If nothing has this path.
+        """
+        for one in self.legend:
+            if one.path == path:
+                return objects.symbol_of(one)
+        merged = {other.name: self.notation.symbols[first] for other, first in self.notation.merged.items()}
+        if path in merged and self.parameters == "symbolic":
+            return objects.symbol_of(merged[path])
+        raise UsageError("it has no symbol", where=path, advice=suggestion(path, [one.path for one in self.legend]))
+
+    @property
+    def values(self) -> dict[Sympy, float]:
+        """The value of each parameter's symbol, in SI units."""
+        return {objects.symbol_of(one): one.value for one in self.legend if one.value is not None}
+
+    @property
+    def coordinates(self) -> tuple[Sympy, ...]:
+        """The coordinates q, functions of t."""
+        return tuple(objects.symbol_of(self.notation.symbols[q]) for q in self.expressions.coordinates)
+
+    @property
+    def velocities(self) -> tuple[Sympy, ...]:
+        """The velocities: derivatives of coordinates, and components of angular velocities in the axes of a body."""
+        return tuple(objects.derivative(*self.notation.velocities[u]) for u in self.expressions.velocities)
+
+    @property
+    def accelerations(self) -> tuple[Sympy, ...]:
+        """The derivatives of the velocities."""
+        return tuple(objects.derivative(*self.notation.velocities[a]) for a in self.expressions.accelerations)
+
+    @property
+    def multipliers(self) -> tuple[Sympy, ...]:
+        """One for each constraint; the generalized force of the constraints is ``G^T lambda``."""
+        return tuple(objects.symbol_of(self.notation.symbols[one.multiplier]) for one in self.expressions.constraints)
+
+    @property
+    def rates(self) -> tuple[Sympy, ...]:
+        """The derivatives of the coordinates in terms of the velocities."""
+        return tuple(map(objects.formula, self.written.rates))
+
+    @property
+    def kinetic_energy(self) -> Sympy:
+        """The kinetic energy T, J."""
+        return objects.formula(self.written.kinetic)
+
+    @property
+    def potential_energy(self) -> Sympy:
+        """The potential energy V, J; weight included."""
+        return objects.formula(self.written.potential)
+
+    @property
+    def rayleigh_function(self) -> Sympy:
+        """The Rayleigh function R, W."""
+        return objects.formula(self.written.rayleigh)
+
+    @property
+    def lagrangian(self) -> Sympy:
+        """The Lagrangian, J: T - V, and terms linear in the velocities, as of a charge in a magnetic field."""
+        return self.kinetic_energy - self.potential_energy + objects.formula(self.written.linear)
+
+    @property
+    def momenta(self) -> tuple[Sympy, ...]:
+        """The momenta ``dL/dq'``; for an angular velocity the angular momentum, in the axes of the body."""
+        return tuple(map(objects.formula, self.written.momenta))
+
+    @property
+    def mass_matrix(self) -> Sympy:
+        """The mass matrix M."""
+        return _sympy_matrix(self.mass)
+
+    @property
+    def velocity_terms(self) -> tuple[Sympy, ...]:
+        """What is left of ``d/dt dT/dq' - dT/dq`` where accelerations are zero."""
+        return tuple(map(objects.formula, self.written.velocity_terms))
+
+    @property
+    def generalized_forces(self) -> tuple[Sympy, ...]:
+        """The generalized forces Q of loads: those that neither V nor R give."""
+        return tuple(map(objects.formula, self.written.forces))
+
+    @property
+    def constraints(self) -> tuple[Sympy, ...]:
+        """What stays zero: functions g of coordinates and time; of constraints on velocities these themselves."""
+        return tuple(map(objects.formula, self.written.constraints))
+
+    @property
+    def constraint_jacobian(self) -> Sympy:
+        """The matrix G of derivatives of the constraints by the coordinates, or of their rates by the velocities."""
+        return _sympy_matrix(self.slopes)
+
+    @property
+    def rows(self) -> tuple[Sympy, ...]:
+        """The equations of motion: each is zero. ``M a`` and velocity terms, less all forces."""
+        return tuple(map(objects.formula, self.written.rows))
+
+    @property
+    def shared(self) -> tuple[tuple[Sympy, Sympy], ...]:
+        """Names in formulas that are too long to be written out, and what they stand for, in order."""
+        _ = self.written
+        return tuple((objects.formula(name), objects.formula(value)) for name, value in self.book.shared)
+
+    def eliminate(self, *paths: str) -> list[dict[Sympy, Sympy]]:
+        """Return dependent coordinates of closed loops in closed form.
+
+        Parameters
+        ----------
+        *paths
+            Coordinates, as many as there are constraints.
+
+        Returns
+        -------
+        list of dict
+            What each of these coordinates is in terms of the others: one dictionary for each way in which the mechanism
+            can be put together, such as a four-bar linkage with its coupler on either side.
+
+        Raises
+        ------
+        UnsupportedError
+            If there is no closed form that one would find by hand.
+        UsageError
+            If a path is no coordinate, or their number is not that of the constraints.
+        """
+        if len(paths) != len(self.expressions.constraints) or not all(
+            one.holonomic for one in self.expressions.constraints
+        ):
+            raise UsageError(
+                f"{len(paths)} coordinates cannot follow from {len(self.expressions.constraints)} constraints",
+                where=self.name,
+                advice="Name a coordinate for each constraint on positions.",
+            )
+        unknowns = [self.symbol(path) for path in paths]
+        for path, one in zip(paths, unknowns, strict=True):
+            if one not in self.coordinates:
+                raise UsageError("it is no coordinate", where=path)
+        found = solve_closures(self.constraints, unknowns)
+        if found is None:
+            raise UnsupportedError(
+                "its loops have no closed form that one would find by hand",
+                where=self.name,
+                advice="Keep the constraints and their multipliers, or name other coordinates.",
+            )
+        return found
+
+    def terms(self, path: str) -> PartOfEquations:
+        """Return what a part contributes, or a model with all its parts.
+
+        Parameters
+        ----------
+        path
+            The part, such as ``"rod1"``.
+
+        Raises
+        ------
+        UsageError
+            If there is no such part.
+        """
+        every = list(self.assembly.mechanism.locals_)
+        chosen = [one for one in every if one == path or one.startswith((f"{path}.", f"{path}["))]
+        if not chosen:
+            raise UsageError("there is no such part", where=path, advice=suggestion(path, every))
+        found = self.expressions
+        own = [one for one in found.parts if one.path in chosen]
+
+        def total(values: Sequence[Expression], energy: bool = False) -> Sympy:
+            return objects.formula(self.formula(sum(values, found.graph.zero), energy=energy))
+
+        shares = rows_by_part(found)
+        rows = [[shares[one][k] for one in shares if one in chosen] for k in range(len(found.velocities))]
+        return PartOfEquations(
+            path,
+            total([one.kinetic for one in own], True),
+            total([one.potential for one in own], True),
+            total([one.lagrangian for one in own], True),
+            total([one.rayleigh for one in own], True),
+            tuple(total([one.forces[k] for one in own]) for k in range(len(found.velocities))),
+            tuple(map(total, rows)) if shares else (),
+        )
+
+    # -- to be shown --------------------------------------------------------------------------------------------------
+
+    def latex(self) -> str:
+        """Return the equations of motion, and the constraints if there are any, as an aligned block of LaTeX."""
+        if not self.is_readable:
+            said = self.structure.sentence.replace("_", r"\_")
+            return rf"\text{{{said}}}"
+        return page.as_latex(equation_lines(self))
+
+    def markdown(self) -> str:
+        """Return a page with symbols, energies, momenta, equations and matrices, formulas between dollar signs."""
+        if not self.is_readable:
+            return f"# {self.name}\n\n{self.structure.sentence}\n\n```\n{self.structure.picture()}\n```\n"
+        return page.as_markdown(f"{self.name} ({self.form} form)", self.sections, [symbol_table(self)])
+
+    def text(self) -> str:
+        """Return the same in plain text, for a terminal."""
+        if not self.is_readable:
+            return f"{self.structure.sentence}\n\n{self.structure.picture()}"
+        return "\n".join(["Symbols", *(line.rstrip() for line in symbol_lines(self)), "", page.as_text(self.sections)])
+
+    @cached_property
+    def sections(self) -> list[Section]:
+        """What a page of them says, section by section."""
+        return sections_of(self)
+
+    def python(self) -> str:
+        """Return a module of Python that computes and solves the equations, with nothing but `math` and NumPy.
+
+        It holds for the modes that the parts start in: events are not in it. Of multipliers that redundant constraints
+        leave open, it gives the smallest.
+
+        Raises
+        ------
+        UnsupportedError
+            If the scene calls functions of somebody's own, which cannot be written down, or reads values that are held
+            from sample to sample, which are no coordinates.
+        """
+        return module_of(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data: symbols with paths and units, formulas in LaTeX and as expressions of Python."""
+        return as_data(self)
+
+    def __repr__(self) -> str:
+        n, m = len(self.expressions.velocities), len(self.expressions.constraints)
+        held = f", {m} constraint{'s' if m > 1 else ''}" if m else ""
+        return f"EquationsOfMotion({self.name!r}, {self.form}: {n} equation{'s' if n > 1 else ''} of motion{held})"
+
+    def _repr_latex_(self) -> str:
+        return f"$\\displaystyle {self.latex()}$"
+
+    def _repr_html_(self) -> str:
+        if not self.is_readable:
+            return f"<p>{self.structure.sentence}</p>{self.structure.svg()}"
+        return html_of(self)
+
+
+def _sympy_matrix(entries: Sequence[Sequence[Sum]]) -> Sympy:
+    import sympy
+
+    columns = len(entries[0]) if entries else 0
+    return sympy.ImmutableMatrix(len(entries), columns, [objects.formula(one) for row in entries for one in row])
+
+
+PARAMETERS = one_of(("symbolic", "values"))
+
+
+@takes(scene=SCENE, form=optional(FORM), parameters=PARAMETERS, orientation=optional(ORIENTATION))
+def equations(
+    scene: Model | Assembly,
+    *,
+    form: str | None = None,
+    parameters: str = "symbolic",
+    orientation: str | None = None,
+) -> EquationsOfMotion:
+    """Return the equations of motion of a scene, to be read.
+
+    Lagrange's equations ``d/dt dL/dq' - dL/dq + dR/dq' = Q + G^T lambda``, ``g(q, t) = 0``, with symbols as in a
+    textbook (theta_1, x, m, l, g) and a legend that says what they stand for. Formulas are short: what belongs together
+    is put together, sums and differences of angles are recognised. Shown in a notebook, or by `latex`, `markdown`,
+    `text` and `python`; everything else is sympy objects.
+
+    Parameters
+    ----------
+    scene
+        The scene, or an assembly of it; what contradicts that is refused.
+    form
+        ``"reduced"``, as usual: generalized coordinates (Lagrange's equations of the second kind); constraints of
+        closed loops stay, with multipliers. ``"dae"``: every joint is a constraint with a multiplier (of the first
+        kind).
+    parameters
+        ``"symbolic"``, or ``"values"``: then the numbers are put in.
+    orientation
+        See `atwood.assemble`. With Euler angles L is a function of these and their derivatives; with quaternions the
+        velocities are angular velocities in the axes of the body.
+
+    Returns
+    -------
+    EquationsOfMotion
+        Energies, momenta, mass matrix, forces, constraints and equations. What is too large to be read says so, and
+        shows its structure.
+
+    Raises
+    ------
+    UsageError
+        If orientations are in three coordinates that are no Euler angles.
+    """
+    assembly = assembly_of(scene, form=form, orientation=orientation)
+    chosen: Any = parameters
+    return read_equations(assembly, chosen)

@@ -1,0 +1,364 @@
+"""Names as a textbook has them: theta and x for coordinates, m, l and g for parameters, each with its path and unit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+
+from atwood.expr import Expression
+from atwood.forms.assembly import Assembly
+from atwood.forms.lagrangian import Lagrangian
+from atwood.late import dataclass
+from atwood.theory.formulas.tree import Symbol
+
+__all__ = ["GREEK", "Notation", "notation_of"]
+
+_LETTERS: Mapping[str, tuple[str, ...]] = {
+    "mass": ("m",),
+    "length": ("l",),
+    "natural_length": ("l", "0"),
+    "stiffness": ("k",),
+    "damping": ("c",),
+    "gravity": ("g",),
+    "radius": ("r",),
+    "moment": ("I",),
+    "axial_moment": ("I",),
+    "amplitude": ("A",),
+    "frequency": ("f",),
+    "angular_frequency": ("Omega",),
+    "angular_speed": ("Omega",),
+    "rate": ("Omega",),
+    "charge": ("e",),
+    "charge_a": ("e", "a"),
+    "charge_b": ("e", "b"),
+    "gravitational_constant": ("G",),
+    "gravitational_parameter": ("mu",),
+    "coulomb_constant": ("k", "e"),
+    "field": ("B",),
+    "angle": ("alpha",),
+    "phase": ("delta",),
+    "torque": ("M",),
+    "force": ("F",),
+    "pitch": ("h",),
+    "height": ("h",),
+    "width": ("b",),
+    "inertia": ("I",),
+    "ratio": ("n",),
+    "slope": ("Omega",),
+    "offset": ("b",),
+    "speed": ("v",),
+    "time": ("T",),
+    "friction": ("mu",),
+    "strength": ("K",),
+    "acceleration": ("a",),
+    "density": ("rho",),
+    "area": ("A",),
+    "temperature": ("T",),
+    "voltage": ("U",),
+    "current": ("I",),
+}
+"""Letters of parameters by their names."""
+
+_VECTORS: Mapping[str, tuple[str, Mapping[str, str]]] = {
+    "moments": ("I", {"x": "1", "y": "2", "z": "3"}),
+    "center": ("c", {"x": "x", "y": "y", "z": "z"}),
+    "center_of_mass": ("c", {"x": "x", "y": "y", "z": "z"}),
+    "displacement": ("d", {"x": "x", "y": "y", "z": "z"}),
+    "products": ("D", {"x": "1", "y": "2", "z": "3"}),
+}
+"""Letters of the components of vectors."""
+
+GREEK = (
+    *(
+        "alpha",
+        "beta",
+        "gamma",
+        "delta",
+        "epsilon",
+        "zeta",
+        "eta",
+        "theta",
+        "iota",
+        "kappa",
+        "lambda",
+        "mu",
+        "nu",
+        "xi",
+    ),
+    *("pi", "rho", "sigma", "tau", "upsilon", "phi", "chi", "psi", "omega", "Gamma", "Delta", "Theta", "Lambda", "Xi"),
+    *("Pi", "Sigma", "Upsilon", "Phi", "Psi", "Omega"),
+)
+"""The names of Greek letters."""
+
+_COORDINATES: Mapping[str, tuple[str, ...]] = {
+    "angle": ("theta",),
+    "angle_a": ("alpha",),
+    "angle_b": ("beta",),
+    "displacement": ("x",),
+    "displacement_1": ("x",),
+    "displacement_2": ("y",),
+    "quaternion.w": ("e", "0"),
+    "quaternion.x": ("e", "1"),
+    "quaternion.y": ("e", "2"),
+    "quaternion.z": ("e", "3"),
+    "spin.x": ("omega", "x"),
+    "spin.y": ("omega", "y"),
+    "spin.z": ("omega", "z"),
+    "euler.phi": ("phi",),
+    "euler.theta": ("theta",),
+    "euler.psi": ("psi",),
+    "position.x": ("x",),
+    "position.y": ("y",),
+    "position.z": ("z",),
+    "longitude": ("phi",),
+    "inclination": ("theta",),
+    "distance": ("r",),
+}
+"""Letters of coordinates and of angular velocities, by the ends of their paths."""
+
+
+@dataclass(frozen=True)
+class Notation:
+    """The symbols of a scene.
+
+    Attributes
+    ----------
+    symbols
+        What stands for the symbols of coordinates, multipliers, parameters and time in expressions.
+    velocities, accelerations
+        For a symbol of a velocity or of its derivative: the symbol, and how many dots it has.
+    legend
+        All symbols in order: coordinates, angular velocities, multipliers, parameters.
+    merged
+        Parameters that another stands for: equal principal moments of a body.
+    """
+
+    symbols: Mapping[Expression, Symbol]
+    velocities: Mapping[Expression, tuple[Symbol, int]]
+    legend: tuple[Symbol, ...]
+    merged: Mapping[Expression, Expression]
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """Something that needs a symbol."""
+
+    expression: Expression
+    stem: tuple[str, ...]
+    path: str
+    part: str
+    unit: str
+    meaning: str
+    value: float | None
+    kind: str
+
+
+def notation_of(assembly: Assembly, found: Lagrangian) -> Notation:
+    """Return the symbols of a scene.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    found
+        Its Lagrangian.
+    """
+    merged = _equal_moments(assembly)
+    wanted = [*_coordinates(found), *_spins(found), *_multipliers(found), *_parameters(assembly, merged)]
+    subscripts = _subscripts(wanted)
+    symbols: dict[Expression, Symbol] = {found.time: Symbol("t", path="time", unit="s", meaning="Time.", kind="time")}
+    for order, (one, more) in enumerate(zip(wanted, subscripts, strict=True)):
+        symbols[one.expression] = Symbol(
+            one.stem[0], (*one.stem[1:], *more), one.path, one.unit, one.meaning, one.value, one.kind, order
+        )
+    velocities: dict[Expression, tuple[Symbol, int]] = {}
+    for velocity, rate, place in zip(found.velocities, found.accelerations, found.moves, strict=True):
+        dots = 0 if place is None else 1
+        own = symbols[velocity] if place is None else symbols[found.coordinates[place]]
+        velocities[velocity], velocities[rate] = (own, dots), (own, dots + 1)
+    legend = [symbols[one.expression] for one in wanted]
+    return Notation(symbols, velocities, tuple(legend), merged)
+
+
+def _coordinates(found: Lagrangian) -> list[_Wanted]:
+    made = []
+    for q, name in zip(found.coordinates, found.names, strict=True):
+        stem, part = _stem(name.name)
+        made.append(_Wanted(q, stem, name.name, part, name.unit, "", None, "coordinate"))
+    return made
+
+
+def _spins(found: Lagrangian) -> list[_Wanted]:
+    made = []
+    for u, name, place in zip(found.velocities, found.velocity_names, found.moves, strict=True):
+        if place is None:
+            stem, part = _stem(name.name)
+            meaning = "Angular velocity in the axes of the body."
+            made.append(_Wanted(u, stem, name.name, part, name.unit, meaning, None, "angular velocity"))
+    return made
+
+
+def _stem(path: str) -> tuple[tuple[str, ...], str]:
+    """Return the letter of a coordinate and the part that it belongs to."""
+    pieces = path.split(".")
+    for count in (2, 1):
+        end = ".".join(pieces[-count:])
+        if end in _COORDINATES and len(pieces) > count:
+            return _COORDINATES[end], ".".join(pieces[:-count])
+    return _word(pieces[-1]), ".".join(pieces[:-1])
+
+
+def _multipliers(found: Lagrangian) -> list[_Wanted]:
+    several = len(found.constraints) > 1
+    made = []
+    for number, one in enumerate(found.constraints):
+        stem = ("lambda", str(number + 1)) if several else ("lambda",)
+        meaning = f"{one.key[0]}.{one.reaction} is {'-' if one.sign < 0 else ''}it."
+        made.append(_Wanted(one.multiplier, stem, one.label, one.key[0], "", meaning, None, "multiplier"))
+    return made
+
+
+def _parameters(assembly: Assembly, merged: Mapping[Expression, Expression]) -> list[_Wanted]:
+    made = []
+    for symbol, value in assembly.mechanism.table.values.items():
+        if symbol in merged:
+            continue
+        path = symbol.name
+        part, name, axis = _parameter_place(assembly, path)
+        unit, meaning = _said(assembly, part, name)
+        made.append(_Wanted(symbol, _parameter_stem(name, axis), path, part, unit, meaning, value, "parameter"))
+    return made
+
+
+def _parameter_place(assembly: Assembly, path: str) -> tuple[str, str, str]:
+    """Return the part, the name and the axis of a parameter."""
+    part, _, name = path.rpartition(".")
+    if part in assembly.mechanism.locals_:
+        return part, name, ""
+    outer, _, owner = part.rpartition(".")
+    return (outer, owner, name) if outer in assembly.mechanism.locals_ else (part, name, "")
+
+
+def _said(assembly: Assembly, part: str, name: str) -> tuple[str, str]:
+    """Return unit and meaning of a parameter."""
+    if part not in assembly.mechanism.locals_:
+        return ("m/s^2", "Acceleration of free fall.") if name == "gravity" else ("", "Constant of the start.")
+    component = assembly.mechanism.locals_[part].part.component
+    spec = component.parameter_specs().get(name) or component.signal_specs().get(name)
+    return ("", "") if spec is None else (spec.unit.text.replace("any", ""), spec.doc)
+
+
+def _parameter_stem(name: str, axis: str) -> tuple[str, ...]:
+    if axis and name in _VECTORS:
+        letter, axes = _VECTORS[name]
+        return letter, axes.get(axis, axis)
+    if axis and name == "position":
+        return (axis,)
+    if axis:
+        return (*_word(name), axis)
+    return _LETTERS.get(name) or _word(name)
+
+
+def _word(name: str) -> tuple[str, ...]:
+    """Return a name as a letter and a number, or as the word that it is."""
+    found = re.fullmatch(r"([A-Za-z]|" + "|".join(GREEK) + r")_?(\d*)", name)
+    if found:
+        return (found[1], found[2]) if found[2] else (found[1],)
+    return (name.replace("_", ""),)
+
+
+def _equal_moments(assembly: Assembly) -> dict[Expression, Expression]:
+    """Return principal moments of a body that are equal to one before: a symmetric body has two, a ball one."""
+    groups: dict[str, list[Expression]] = {}
+    for symbol in assembly.mechanism.table.values:
+        part, name, axis = _parameter_place(assembly, symbol.name)
+        if axis and name == "moments":
+            groups.setdefault(part, []).append(symbol)
+    values, merged = assembly.mechanism.table.values, {}
+    for group in groups.values():
+        for i, symbol in enumerate(group):
+            first = next((one for one in group[:i] if values[one] == values[symbol]), None)
+            if first is not None:
+                merged[symbol] = first
+    return merged
+
+
+def _subscripts(wanted: Sequence[_Wanted]) -> list[tuple[str, ...]]:
+    """Return what tells apart those that have the same letter: a number if all have one, else the part.
+
+    Coordinates have the plainer names: a parameter with the letter of one says of which part it is.
+    """
+    groups: dict[tuple[tuple[str, ...], bool], list[int]] = {}
+    for i, one in enumerate(wanted):
+        groups.setdefault((one.stem, one.kind == "parameter"), []).append(i)
+    numbered = _numbered(wanted, list(groups.values()))
+    found: list[tuple[str, ...]] = [()] * len(wanted)
+    taken: set[tuple[str, ...]] = {("t",), ("pi",)}
+    stems: set[tuple[str, ...]] = set()
+    for (stem, _), members in sorted(groups.items(), key=lambda item: item[0][1]):
+        parts = [wanted[i].part for i in members]
+        plain = [""] if len(members) == 1 and stem not in stems else None
+        stems.add(stem)
+        counted = [numbered[part] for part in parts] if all(part in numbered for part in parts) else None
+        paths = [one.replace(".", "") for one in _full(wanted[i].path for i in members)]
+        for labels in (plain, _numbers(parts), counted, _last_names(parts, stem[0]), _full(parts), paths):
+            names = [] if labels is None else [(*stem, one) if one else stem for one in labels]
+            if labels is not None and len(set(names)) == len(names) and taken.isdisjoint(names):
+                taken.update(names)
+                for i, label in zip(members, labels, strict=True):
+                    found[i] = (label,) if label else ()
+                break
+    return found
+
+
+def _numbered(wanted: Sequence[_Wanted], groups: Sequence[Sequence[int]]) -> dict[str, str]:
+    """Return numbers for parts that have words for names, where words would fill the lines.
+
+    That is where three parts or more have the same letters, as crank, coupler and rocker: each has one number in all
+    of them. Two words, as cart and bob, and what has a figure already, as principal moments, keep the words.
+    """
+    families: list[tuple[list[str], bool]] = []
+    for members in groups:
+        parts = list(dict.fromkeys(wanted[i].part for i in members))
+        if len(members) < 2 or len(parts) < len(members) or _numbers(parts) is not None:
+            continue
+        has_figure = len(wanted[members[0]].stem) > 1
+        met = [one for one in families if not set(one[0]).isdisjoint(parts)]
+        joined = list(dict.fromkeys([*(part for one in met for part in one[0]), *parts]))
+        families = [one for one in families if one not in met]
+        families.append((joined, has_figure or any(one[1] for one in met)))
+    order = {part: i for i, part in enumerate(dict.fromkeys(one.part for one in wanted))}
+    found: dict[str, str] = {}
+    for parts, has_figure in families:
+        if len(parts) > 2 and not has_figure:
+            found |= {part: str(i + 1) for i, part in enumerate(sorted(parts, key=order.__getitem__))}
+    return found
+
+
+def _numbers(parts: Sequence[str]) -> list[str] | None:
+    """Return the number at the end of each name, from one on; None if one has none."""
+    numbers = []
+    for part in parts:
+        indexed = re.search(r"\[(\d+)\]$", part)
+        plain = re.search(r"(?<=\D)(\d+)$", part)
+        if indexed:
+            numbers.append(int(indexed[1]) + 1)
+        elif plain:
+            numbers.append(int(plain[1]))
+        else:
+            return None
+    shift = 1 if 0 in numbers else 0
+    return [str(number + shift) for number in numbers]
+
+
+def _last_names(parts: Iterable[str], letter: str) -> list[str]:
+    """Return the last words of the names of parts; of one that is a letter with a number, as m1, the number."""
+    names = [part.rpartition(".")[2] for part in parts]
+    plain = [re.sub(r"\[(\d+)\]$", lambda found: str(int(found[1]) + 1), name) for name in names]
+    words = [name.rpartition("_")[2] for name in plain]
+    chosen = words if len(set(words)) == len(words) else [name.replace("_", "") for name in plain]
+    return [name[len(letter) :] if re.fullmatch(letter + r"\d+", name) else name for name in chosen]
+
+
+def _full(parts: Iterable[str]) -> list[str]:
+    return [re.sub(r"\W+|_", "", part.replace("[", "")) for part in parts]

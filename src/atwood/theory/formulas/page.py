@@ -1,0 +1,254 @@
+"""Formulas on a page: lines that fit, shared brackets with names, in LaTeX, Markdown, HTML and plain text."""
+
+from __future__ import annotations
+
+import unicodedata
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from fractions import Fraction
+from html import escape
+
+from atwood.late import dataclass
+from atwood.theory.formulas import latex, text
+from atwood.theory.formulas.tree import Call, Name, Node, Sum, Symbol, Term, replaced
+
+__all__ = ["Line", "Matrix", "Section", "as_html", "as_latex", "as_markdown", "as_text", "width", "with_names"]
+
+_WIDTH = 88
+"""Columns of a line of formulas, as plain text."""
+
+_LONG = 2
+"""Formulas of more lines have their brackets named."""
+
+_WORTH_A_NAME, _TIMES = 14, 3
+"""A bracket has a name where it is at least so wide and stands so often."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """One equation: a formula with what stands before and after it.
+
+    Attributes
+    ----------
+    left
+        In LaTeX and in plain text; empty where there is nothing.
+    formula
+        The formula.
+    right
+        What it is equal to, such as ``"= 0"``.
+    """
+
+    left: tuple[str, str]
+    formula: Sum
+    right: str = ""
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """A matrix with its name, by rows; entries that are zero are empty sums."""
+
+    left: tuple[str, str]
+    entries: tuple[tuple[Sum, ...], ...]
+
+
+@dataclass(frozen=True)
+class Section:
+    """Equations under a heading, with a sentence."""
+
+    title: str
+    lines: tuple[Line | Matrix, ...]
+    note: str = ""
+
+
+def width(written: str) -> int:
+    """Return how many columns a plain text takes."""
+    return sum(not unicodedata.combining(one) for one in written)
+
+
+# -- names for brackets ---------------------------------------------------------------------------------------------
+
+
+def with_names(sections: Sequence[Section], taken: Iterable[str]) -> list[Section]:
+    """Return sections in which brackets that stand often have names, if formulas would not fit; and what these are.
+
+    Parameters
+    ----------
+    sections
+        The sections.
+    taken
+        Names of symbols that are in use.
+    """
+    formulas = [one for section in sections for line in section.lines for one in _formulas(line)]
+    if not any(width(text.formula(one)) > _LONG * _WIDTH for one in formulas):
+        return list(sections)
+    counts = Counter(bracket for one in formulas for bracket in _brackets(one))
+    chosen = [one for one, n in counts.items() if n >= _TIMES and width(text.formula(one)) >= _WORTH_A_NAME]
+    if not chosen:
+        return list(sections)
+    letter = next(one for one in ("S", "Sigma", "Xi") if not any(name.startswith(f"{one}_") for name in taken))
+    names: dict[Node, Node] = {
+        bracket: Name(Symbol(letter, (str(i + 1),), kind="shared", order=i)) for i, bracket in enumerate(chosen)
+    }
+    shorter = [Section(one.title, tuple(_renamed(line, names) for line in one.lines), one.note) for one in sections]
+    where = []
+    for bracket, name in names.items():
+        assert isinstance(bracket, Sum)
+        inner = {other: short for other, short in names.items() if other is not bracket}
+        shown = replaced(bracket, inner)
+        assert isinstance(name, Name)
+        assert isinstance(shown, Sum)
+        where.append(Line((latex.formula(name), text.formula(name)), shown))
+    return [*shorter, Section("Abbreviations", tuple(where), "What stands in brackets several times has a name.")]
+
+
+def _formulas(line: Line | Matrix) -> list[Sum]:
+    return [line.formula] if isinstance(line, Line) else [one for row in line.entries for one in row]
+
+
+def _brackets(node: Node) -> Iterable[Sum]:
+    """Yield the sums within products, outer ones first."""
+    if isinstance(node, Call):
+        return
+    if isinstance(node, Sum):
+        for term in node.terms:
+            for inner, _ in term.factors:
+                if isinstance(inner, Sum) and len(inner.terms) > 1:
+                    yield inner
+                yield from _brackets(inner)
+
+
+def _renamed(line: Line | Matrix, names: Mapping[Node, Node]) -> Line | Matrix:
+    if isinstance(line, Line):
+        return Line(line.left, _sum(replaced(line.formula, names)), line.right)
+    return Matrix(line.left, tuple(tuple(_sum(replaced(one, names)) for one in row) for row in line.entries))
+
+
+def _sum(node: Node) -> Sum:
+    return node if isinstance(node, Sum) else Sum((Term(Fraction(1), ((node, Fraction(1)),)),))
+
+
+# -- lines ------------------------------------------------------------------------------------------------------------
+
+
+def _pieces(line: Line, write: Callable[[Sum], str]) -> list[str]:
+    """Return a formula in pieces that fit a line each, signs first."""
+    pieces: list[list[Term]] = [[]]
+    used = width(line.left[1])
+    for term in line.formula.terms:
+        size = width(text.formula(Sum((term,)))) + 2
+        if pieces[-1] and used + size > _WIDTH:
+            pieces.append([])
+            used = 6
+        pieces[-1].append(term)
+        used += size
+    written = []
+    for i, terms in enumerate(pieces):
+        body = write(Sum(tuple(terms)))
+        if i and terms[0].number > 0:
+            body = f"+ {body}"
+        elif i and body.startswith("-"):
+            body = f"- {body[1:].lstrip()}"
+        written.append(body)
+    return written
+
+
+def _latex_rows(line: Line | Matrix) -> list[str]:
+    """Return the rows of an aligned block."""
+    if isinstance(line, Matrix):
+        return _latex_matrix(line)
+    pieces = _pieces(line, latex.formula)
+    pieces[-1] += f" {line.right}" if line.right else ""
+    head = f"{line.left[0]} &= " if line.left[0] else "& "
+    return [head + pieces[0], *(rf"&\qquad {piece}" for piece in pieces[1:])]
+
+
+def _latex_matrix(matrix: Matrix) -> list[str]:
+    widths = [max(width(text.formula(row[j])) for row in matrix.entries) for j in range(len(matrix.entries[0]))]
+    if sum(widths) + 2 * len(widths) <= _WIDTH + 10:
+        rows = r" \\ ".join(" & ".join(latex.formula(one) for one in row) for row in matrix.entries)
+        return [rf"{matrix.left[0]} &= \begin{{pmatrix}} {rows} \end{{pmatrix}}"]
+    return [row for line in _single(matrix) for row in _latex_rows(line)]
+
+
+def _single(matrix: Matrix) -> list[Line]:
+    """Return the entries of a matrix that are not zero as lines; of a symmetric one those from the diagonal on."""
+    rows = matrix.entries
+    symmetric = len(rows) == len(rows[0]) and all(rows[i][j] == rows[j][i] for i in range(len(rows)) for j in range(i))
+    found = []
+    for i, row in enumerate(rows):
+        for j, one in enumerate(row):
+            if one.terms and not (symmetric and j < i):
+                place = f"{i + 1}{j + 1}" if max(len(rows), len(row)) < 10 else f"{i + 1},{j + 1}"
+                both = rf" = {matrix.left[0]}_{{{place[::-1]}}}" if symmetric and i != j and len(place) == 2 else ""
+                found.append(Line((f"{matrix.left[0]}_{{{place}}}{both}", f"{matrix.left[1]}[{i + 1},{j + 1}]"), one))
+    return found
+
+
+def as_latex(lines: Sequence[Line | Matrix]) -> str:
+    """Return equations as one aligned block, for use in display mathematics."""
+    rows = " \\\\\n".join(row for line in lines for row in _latex_rows(line))
+    return f"\\begin{{aligned}}\n{rows}\n\\end{{aligned}}"
+
+
+def as_markdown(title: str, sections: Sequence[Section], tables: Sequence[str] = ()) -> str:
+    """Return sections as a page of Markdown with formulas between dollar signs.
+
+    Parameters
+    ----------
+    title
+        Its heading.
+    sections
+        What it says.
+    tables
+        What stands before them.
+    """
+    blocks = [f"# {title}", *tables]
+    for section in sections:
+        blocks.append(f"## {section.title}")
+        if section.note:
+            blocks.append(section.note)
+        blocks.append(f"$$\n{as_latex(section.lines)}\n$$")
+    return "\n\n".join(blocks) + "\n"
+
+
+def as_text(sections: Sequence[Section]) -> str:
+    """Return sections in plain text."""
+    blocks = []
+    for section in sections:
+        blocks.append(section.title)
+        for line in section.lines:
+            blocks += [f"  {one}" for one in _text_rows(line)]
+        blocks.append("")
+    return "\n".join(blocks[:-1])
+
+
+def _text_rows(line: Line | Matrix) -> list[str]:
+    if isinstance(line, Matrix):
+        return [row for one in _single(line) for row in _text_rows(one)]
+    pieces = _pieces(line, text.formula)
+    pieces[-1] += f" {line.right}" if line.right else ""
+    head = f"{line.left[1]} = " if line.left[1] else ""
+    return [head + pieces[0], *(f"{' ' * 6}{piece}" for piece in pieces[1:])]
+
+
+def as_html(title: str, sections: Sequence[Section], tables: Sequence[str] = ()) -> str:
+    """Return sections for a notebook; each term says on hovering from which parts it comes."""
+    blocks = [f"<h4>{escape(title)}</h4>", *tables]
+    for section in sections:
+        rows = [f"<div>{_html_line(line)}</div>" for line in section.lines]
+        blocks.append(f"<p><b>{escape(section.title)}</b></p>" + "".join(rows))
+    return "".join(blocks)
+
+
+def _html_line(line: Line | Matrix) -> str:
+    if isinstance(line, Matrix):
+        return f"$\\displaystyle {as_latex([line])}$"
+    head = f"${line.left[0]} =$ " if line.left[0] else ""
+    spans = []
+    for i, term in enumerate(line.formula.terms):
+        body = latex.formula(Sum((term,)))
+        if i:
+            body = f"- {body[1:]}" if term.number < 0 else f"+ {body}"
+        tip = f' title="{escape(", ".join(term.owners), quote=True)}"' if term.owners else ""
+        spans.append(f"<span{tip}>$\\displaystyle {escape(body, quote=False)}$</span>")
+    return f"{head}{' '.join(spans) or '$0$'}" + (f" ${line.right}$" if line.right else "")

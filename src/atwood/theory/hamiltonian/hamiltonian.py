@@ -1,0 +1,447 @@
+"""The Hamiltonian of a scene: in symbols where it is short, in numbers always.
+
+The Hamiltonian of a scene.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from atwood.arguments import optional, takes
+from atwood.arrays import FloatArray
+from atwood.errors import KernelEvaluationError, StartError, UnsupportedError
+from atwood.expr import Program, depends_on
+from atwood.forms.assembly import Assembly
+from atwood.forms.kept import Key
+from atwood.forms.lagrangian import Lagrangian, lagrangian_of
+from atwood.forms.quantities import known_program
+from atwood.late import dataclass
+from atwood.model.compose.composite import Model
+from atwood.pipeline import SCENE, assembly_of
+from atwood.showing import count_of
+from atwood.simulation.dynamics.orientation_coordinates import from_regular
+from atwood.simulation.initialization.start import find_start
+from atwood.simulation.problem.arguments import ORIENTATION
+from atwood.theory.dynamics.functions import Numbers
+from atwood.theory.equations.equations import PARAMETERS
+from atwood.theory.equations.formulas import EquationFormulas, Parameters
+from atwood.theory.formulas import latex, objects, page, text
+from atwood.theory.formulas.notation import notation_of
+from atwood.theory.formulas.objects import Sympy
+from atwood.theory.formulas.page import Line, Section
+from atwood.theory.formulas.tree import Sum, Symbol, cost, names_in
+from atwood.theory.hamiltonian.checks import (
+    changes_in_time,
+    check_mass,
+    is_energy,
+    refuse_without_hamiltonian,
+)
+from atwood.theory.hamiltonian.formula import hamiltonian_formula, momentum_symbol, with_momenta
+from atwood.theory.hamiltonian.legendre import LegendreTransform
+from atwood.topology.orientation_coordinates import Orientation
+
+__all__ = ["Hamiltonian", "hamiltonian", "read_hamiltonian"]
+
+
+_VELOCITIES: Key[Program] = Key("velocities")
+
+_LONGEST = 2_000
+"""Signs and symbols beyond which H is not written down."""
+
+_GOLDSTEIN = "euler-zxz"
+"""Orientation coordinates where a scene has quaternions, which have no momenta (Goldstein, section 4.4)."""
+
+
+def read_hamiltonian(assembly: Assembly, parameters: Parameters = "symbolic") -> Hamiltonian:
+    """Return the Hamiltonian of an assembly.
+
+    Parameters
+    ----------
+    assembly
+        The scene. Orientations that are quaternions are taken in Euler angles z, x, z.
+    parameters
+        Whether parameters are symbols, or their values are put in.
+
+    Raises
+    ------
+    UsageError
+        If the assembly is in the dae form.
+    UnsupportedError
+        If the scene has no Hamiltonian: it rolls, its coordinates are tied to each other, or momenta do not determine
+        its velocities.
+    """
+    refuse_without_hamiltonian(assembly)
+    if any(one.kind == "quaternion" for one in assembly.reduced.orientation_coordinates):
+        assembly = assembly.other_mode(assembly.modes, {}, Orientation(_GOLDSTEIN))
+    found = lagrangian_of(assembly)
+    transform = LegendreTransform(assembly, found)
+    check_mass(transform)
+    notation = with_momenta(notation_of(assembly, found), found)
+    return Hamiltonian(EquationFormulas(assembly, found, notation, parameters), transform, is_energy(transform))
+
+
+@dataclass(frozen=True, eq=False)
+class Hamiltonian:
+    """The Hamiltonian ``H(q, p, t) = p q' - L`` of a scene (Goldstein, equation 8.15).
+
+    Functions of numbers take one state, or many with a row each; time is that of the start where it is not given.
+    Momenta belong to the coordinates in the same order. In sympy, coordinates and momenta are functions of `t`.
+
+    Attributes
+    ----------
+    formulas
+        What writes it.
+    transform
+        What computes it.
+    is_energy
+        Whether H is T + V; where motions are prescribed it may be something else that is kept (Goldstein, section 8.2).
+    """
+
+    formulas: EquationFormulas
+    transform: LegendreTransform
+    is_energy: bool
+
+    # -- what there is ------------------------------------------------------------------------------------------------
+
+    @property
+    def assembly(self) -> Assembly:
+        """The scene."""
+        return self.formulas.assembly
+
+    @property
+    def name(self) -> str:
+        """What the scene is called."""
+        return self.formulas.name
+
+    @property
+    def _lagrangian(self) -> Lagrangian:
+        return self.formulas.expressions
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Paths of the coordinates, in the order of q and of p."""
+        return tuple(one.name for one in self._lagrangian.names)
+
+    @cached_property
+    def is_conserved(self) -> bool:
+        """Whether H stays what it is: it does not depend on time, and no forces act that do not follow from it."""
+        return not self.other_forces and not self.depends_on_time
+
+    @cached_property
+    def depends_on_time(self) -> bool:
+        """Whether H depends on time, as compared at random states and times where time is in L at all."""
+        found = self._lagrangian.lagrangian
+        if depends_on(found, [one.symbol for one in self.assembly.relations]):
+            return True
+        return depends_on(found, [self._lagrangian.time]) and changes_in_time(self.transform)
+
+    @cached_property
+    def other_forces(self) -> tuple[str, ...]:
+        """Paths of the parts whose forces do not follow from H: dampers and loads; they come on top of -dH/dq."""
+        found = self._lagrangian
+        acting = (one for one in found.parts if not (one.rayleigh.is_zero and all(f.is_zero for f in one.forces)))
+        return tuple(one.path for one in acting)
+
+    @property
+    def sentence(self) -> str:
+        """What H is, in words."""
+        what = "H = T + V" if self.is_energy else "H is not T + V"
+        if self.other_forces:
+            names = ", ".join(self.other_forces[:3]) + (" and others" if len(self.other_forces) > 3 else "")
+            return f"{what}; it changes, since forces act that do not follow from it ({names})."
+        return f"{what}; {'it depends on time, and changes' if self.depends_on_time else 'it is conserved'}."
+
+    # -- in numbers -----------------------------------------------------------------------------------------------
+
+    def start(self) -> tuple[FloatArray, FloatArray]:
+        """Return coordinates and momenta where the scene starts.
+
+        Raises
+        ------
+        StartError
+            If the start is not consistent, or the coordinates are singular there.
+        """
+        begun = find_start(self.assembly)
+        q = from_regular(self.assembly, begun.coordinates)
+        return q, self.momenta_at(q, self._velocities_of(q, begun.speeds, begun.time), begun.time)
+
+    def _velocities_of(self, q: FloatArray, u: FloatArray, t: float) -> FloatArray:
+        """Return the derivatives of the coordinates, from speeds that may be angular velocities."""
+        equations = self.assembly.reduced
+        program = known_program(self.assembly, _VELOCITIES, lambda: list(equations.rates))
+        idle = np.zeros(len(equations.speeds)), np.zeros(len(self.assembly.reactions))
+        try:
+            return np.asarray(self.assembly.kernel(program)([t], q, u, *idle)[0], dtype=float)
+        except KernelEvaluationError as error:
+            raise StartError(
+                f"it starts where its coordinates as {self.assembly.orientation.kind!r} are singular",
+                where=self.name,
+                advice="Ask for the Hamiltonian in other Euler angles, such as orientation='euler-zyx'.",
+            ) from error
+
+    def __call__(self, q: Numbers, p: Numbers, t: float | None = None) -> FloatArray:
+        """Return H, J; a number, or one for each state.
+
+        Parameters
+        ----------
+        q, p
+            Coordinates and momenta, shape (n,) or (states, n).
+        t
+            Time, s; that of the start if not given.
+
+        Raises
+        ------
+        SolveError
+            If the mass matrix is singular there.
+        """
+        return self.transform.value(q, p, t)
+
+    def momenta_at(self, q: Numbers, v: Numbers, t: float | None = None) -> FloatArray:
+        """Return the momenta ``p = dL/dq'``.
+
+        Parameters
+        ----------
+        q, v
+            Coordinates and their derivatives.
+        t
+            Time, s.
+        """
+        return self.transform.momenta(q, v, t)
+
+    def velocities_at(self, q: Numbers, p: Numbers, t: float | None = None) -> FloatArray:
+        """Return the derivatives of the coordinates, ``q' = dH/dp``.
+
+        Parameters
+        ----------
+        q, p, t
+            See `__call__`.
+        """
+        return self.transform.velocities(q, p, t)
+
+    def gradient(self, q: Numbers, p: Numbers, t: float | None = None) -> tuple[FloatArray, FloatArray]:
+        """Return ``dH/dq`` and ``dH/dp``; the first is ``-dL/dq``, the second the velocities.
+
+        Parameters
+        ----------
+        q, p, t
+            See `__call__`.
+        """
+        v = self.velocities_at(q, p, t)
+        return -self.transform.coordinate_gradient(q, v, t), v
+
+    def time_derivative(self, q: Numbers, p: Numbers, t: float | None = None) -> FloatArray:
+        """Return the partial derivative ``dH/dt = -dL/dt``, W.
+
+        Parameters
+        ----------
+        q, p, t
+            See `__call__`.
+        """
+        return -self.transform.time_derivative(q, self.velocities_at(q, p, t), t)
+
+    def rates(self, q: Numbers, p: Numbers, t: float | None = None) -> tuple[FloatArray, FloatArray]:
+        """Return q' and p' by Hamilton's equations, forces that do not follow from H included.
+
+        Parameters
+        ----------
+        q, p, t
+            See `__call__`.
+        """
+        v = self.velocities_at(q, p, t)
+        forces = self.transform.coordinate_gradient(q, v, t)
+        return v, forces + self.transform.forces(q, v, t) if self.other_forces else forces
+
+    # -- in symbols -----------------------------------------------------------------------------------------------
+
+    @property
+    def coordinates(self) -> tuple[Sympy, ...]:
+        """The coordinates q, functions of t."""
+        return tuple(objects.symbol_of(self.formulas.notation.symbols[q]) for q in self._lagrangian.coordinates)
+
+    @property
+    def momenta(self) -> tuple[Sympy, ...]:
+        """The momenta p, functions of t."""
+        return tuple(map(objects.symbol_of, self._letters))
+
+    @property
+    def values(self) -> dict[Sympy, float]:
+        """The value of each parameter's symbol, in SI units."""
+        return {objects.symbol_of(one): one.value for one in self.formulas.legend if one.value is not None}
+
+    @cached_property
+    def is_short(self) -> bool:
+        """Whether H is written in symbols."""
+        return self._written is not None
+
+    @cached_property
+    def expression(self) -> Sympy:
+        """H as a sympy expression of coordinates, momenta, parameters and t.
+
+        Raises
+        ------
+        UnsupportedError
+            If it would be too long: numbers are there all the same.
+        """
+        formula = objects.formula(self.formula)
+        for name, value in reversed(self.formulas.book.shared):
+            formula = formula.xreplace({objects.formula(name): objects.formula(value)})
+        return formula
+
+    @property
+    def definitions(self) -> tuple[Sympy, ...]:
+        """What the momenta are in terms of coordinates and velocities: ``dL/dq'``, in the order of `momenta`."""
+        return tuple(map(objects.formula, self._definitions))
+
+    @cached_property
+    def equations(self) -> tuple[tuple[Sympy, ...], tuple[Sympy, ...]]:
+        """Hamilton's equations: q' = dH/dp, and -dH/dq, to which p' is equal where no other forces act."""
+        made = self.expression
+        return tuple(made.diff(p) for p in self.momenta), tuple(-made.diff(q) for q in self.coordinates)
+
+    @property
+    def formula(self) -> Sum:
+        """H as a formula, which the views write; errors as of `expression`."""
+        if self._written is None:
+            raise UnsupportedError(
+                f"its Hamiltonian in {count_of(len(self.paths), 'coordinate')} would fill a page",
+                where=self.name,
+                advice="It is there in numbers: call it with coordinates and momenta.",
+            )
+        return self._written
+
+    @property
+    def _letters(self) -> tuple[Symbol, ...]:
+        found = self._lagrangian
+        return tuple(self.formulas.notation.symbols[momentum_symbol(found, i)] for i in range(len(found.coordinates)))
+
+    @cached_property
+    def _definitions(self) -> tuple[Sum, ...]:
+        return self.formulas.formulas(self.transform.momentum_expressions)
+
+    @cached_property
+    def _written(self) -> Sum | None:
+        if not self.formulas.is_readable or self.transform.has_moving_mass:
+            return None
+        try:
+            made = hamiltonian_formula(self.formulas, self.transform)
+        except UnsupportedError:
+            return None
+        return made if made is not None and cost(made) <= _LONGEST else None
+
+    # -- to be shown ----------------------------------------------------------------------------------------------
+
+    @cached_property
+    def sections(self) -> list[Section]:
+        """What a page of it says, section by section."""
+        if self._written is None:
+            return []
+        heads = [(latex.letter(one), text.letter(one)) for one in self._letters]
+        lines = tuple(Line(head, one) for head, one in zip(heads, self._definitions, strict=True))
+        said = [
+            Section("Hamiltonian", (Line(("H", "H"), self.formula),), self.sentence),
+            Section("Momenta", lines),
+        ]
+        return page.with_names(said, [one.name for one in self.formulas.notation.legend])
+
+    def latex(self) -> str:
+        """Return H in LaTeX."""
+        if self._written is None:
+            return rf"\text{{{self._too_long}}}".replace("_", r"\_")
+        return page.as_latex([Line(("H", "H"), self.formula)])
+
+    def markdown(self) -> str:
+        """Return a page with H, the momenta and what stands for what, formulas between dollar signs."""
+        if self._written is None:
+            return f"# {self.name}\n\n{self._too_long}\n\n{self.sentence}\n"
+        rows = ["| symbol | stands for | unit | value |", "|---|---|---|---|"]
+        for one in self._shown:
+            value = "" if one.value is None else f"{one.value:.6g}"
+            rows.append(f"| ${latex.letter(one)}$ | `{one.path}` | {one.unit} | {value} |")
+        return page.as_markdown(f"{self.name}: Hamiltonian", self.sections, ["\n".join(rows)])
+
+    def text(self) -> str:
+        """Return the same in plain text, for a terminal."""
+        if self._written is None:
+            return f"{self._too_long}\n{self.sentence}"
+        rows = [(text.letter(one), one.path, "" if one.value is None else f"{one.value:.6g}") for one in self._shown]
+        width = [max(page.width(row[i]) for row in rows) + 2 for i in range(2)]
+        symbols = [
+            "  " + "".join(cell + " " * (size - page.width(cell)) for cell, size in zip(row, (*width, 0), strict=True))
+            for row in rows
+        ]
+        said = page.as_text(self.sections)
+        return "\n".join(["Symbols", *(line.rstrip() for line in symbols), "", said, "", self.sentence])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data: H and the momenta in LaTeX, paths, and what is said of it."""
+        made: dict[str, Any] = {"name": self.name, "coordinates": list(self.paths), "is_energy": self.is_energy}
+        made |= {"is_conserved": self.is_conserved, "other_forces": list(self.other_forces)}
+        made["hamiltonian"] = None if self._written is None else latex.formula(self.formula)
+        made["momenta"] = [] if self._written is None else [latex.formula(one) for one in self._definitions]
+        made["symbols"] = [
+            {"symbol": one.name, "path": one.path, "unit": one.unit, "value": one.value, "kind": one.kind}
+            for one in self.formulas.legend
+        ]
+        return made
+
+    @property
+    def _shown(self) -> list[Symbol]:
+        used = {name.symbol for name in names_in([self.formula, *self._definitions])}
+        return [one for one in self.formulas.legend if one in used or one.kind in ("coordinate", "momentum")]
+
+    @property
+    def _too_long(self) -> str:
+        number = count_of(len(self.paths), "coordinate")
+        return f"The Hamiltonian of {self.name} in {number} is there in numbers; in symbols it would fill a page."
+
+    def __repr__(self) -> str:
+        return f"Hamiltonian({self.name!r}: {count_of(len(self.paths), 'coordinate')}; {self.sentence[:-1]})"
+
+    def _repr_latex_(self) -> str:
+        return f"$\\displaystyle {self.latex()}$"
+
+    def _repr_html_(self) -> str:
+        if self._written is None:
+            return f"<p>{self._too_long}</p><p>{self.sentence}</p>"
+        return page.as_html(f"{self.name}: Hamiltonian", self.sections) + f"<p>{self.sentence}</p>"
+
+
+@takes(scene=SCENE, parameters=PARAMETERS, orientation=optional(ORIENTATION))
+def hamiltonian(
+    scene: Model | Assembly, *, parameters: str = "symbolic", orientation: str | None = None
+) -> Hamiltonian:
+    """Return the Hamiltonian of a scene, ``H(q, p, t) = p q' - L`` with ``p = dL/dq'``.
+
+    In symbols where it is short, in numbers always (Goldstein, section 8.1). Forces that are linear in the velocities,
+    as of magnetic fields, are in it by their potentials; prescribed motions make it differ from T + V, or depend on
+    time; dampers and loads come on top of it, and it says which parts they are.
+
+    Parameters
+    ----------
+    scene
+        The scene, or an assembly of it in the reduced form.
+    parameters
+        ``"symbolic"``, or ``"values"``: then the numbers are put in.
+    orientation
+        Euler angles in which orientations in space are; quaternions have no momenta, and ``"euler-zxz"`` takes their
+        place.
+
+    Returns
+    -------
+    Hamiltonian
+        Its expression, coordinates and momenta in sympy, and H, its derivatives and Hamilton's equations in numbers.
+
+    Raises
+    ------
+    UnsupportedError
+        If there is none: the scene rolls, closed loops tie its coordinates, parts have states of their own, or its mass
+        matrix is singular.
+    UsageError
+        If an assembly is in the dae form.
+    """
+    assembly = assembly_of(scene, orientation=orientation)
+    chosen: Any = parameters
+    return read_hamiltonian(assembly, chosen)

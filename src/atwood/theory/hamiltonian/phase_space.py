@@ -1,0 +1,326 @@
+"""Functions on phase space in sympy: read on symbols of their own, brought to one form, and tested for being zero."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, TypeAlias
+
+from atwood.errors import AtwoodError, UsageError
+from atwood.expr import Expression, Graph, sqrt
+from atwood.expr.formulas.sympy_bridge import from_sympy
+from atwood.late import dataclass
+from atwood.theory.formulas import objects
+from atwood.theory.formulas.book import Book, TooLargeError
+from atwood.theory.formulas.tree import Name, Symbol
+from atwood.theory.hamiltonian.hamiltonian import Hamiltonian
+from atwood.theory.symmetry.identities import is_proven_zero
+
+__all__ = ["PhaseSpace", "Sympy", "Verdict", "collected", "phase_space_of", "short", "vanishes"]
+
+Sympy: TypeAlias = Any
+"""A sympy object."""
+
+_POINTS, _DIGITS = 8, 50
+"""Where there is no proof: at so many random points, with so many digits."""
+
+_BOUND = 1e-30
+"""Relative to the largest of its terms: what is less is zero at these points, to those digits."""
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseSpace:
+    """Coordinates and momenta as plain symbols, so that functions of them can be differentiated by time as well.
+
+    Attributes
+    ----------
+    coordinates, momenta
+        The symbols that stand for them.
+    given
+        What they were: functions of t, or symbols.
+    """
+
+    coordinates: tuple[Sympy, ...]
+    momenta: tuple[Sympy, ...]
+    given: tuple[Sympy, ...]
+
+    def read(self, value: Sympy, new: Sequence[Sympy] = ()) -> Sympy:
+        """Return an expression on the plain symbols; a symbol with the name of one of the given stands for it.
+
+        Parameters
+        ----------
+        value
+            The expression.
+        new
+            Symbols that stand for themselves.
+        """
+        import sympy
+
+        found = value.xreplace(dict(zip(self.given, self._own, strict=True)))
+        named = {sympy.Symbol(_plain(given)): own for given, own in zip(self.given, self._own, strict=True)}
+        found = found.xreplace({name: own for name, own in named.items() if name not in new})
+        stray = found.atoms(sympy.Derivative) | found.atoms(sympy.core.function.AppliedUndef)
+        if stray:
+            names = ", ".join(map(str, self.given))
+            raise UsageError(
+                f"{sorted(map(str, stray))[0]} is neither a coordinate nor a momentum",
+                where=str(value)[:80],
+                advice=f"Write it in {names}, parameters and t.",
+            )
+        return found
+
+    def shown(self, value: Sympy) -> Sympy:
+        """Return an expression in what coordinates and momenta were."""
+        return value.xreplace(dict(zip(self._own, self.given, strict=True)))
+
+    @property
+    def _own(self) -> tuple[Sympy, ...]:
+        return (*self.coordinates, *self.momenta)
+
+
+def phase_space_of(given: Hamiltonian | tuple[Sequence[Sympy], Sequence[Sympy]]) -> PhaseSpace:
+    """Return the phase space of a Hamiltonian, or of a pair: coordinates and momenta.
+
+    Raises
+    ------
+    UsageError
+        If there are not as many momenta as coordinates.
+    """
+    import sympy
+
+    q, p = given if isinstance(given, (tuple, list)) else (given.coordinates, given.momenta)
+    q, p = tuple(q), tuple(p)
+    if len(q) != len(p) or not q or len({*q, *p}) != 2 * len(q):
+        advice = "Give as many momenta as coordinates, all different."
+        raise UsageError(
+            f"{len(q)} coordinates and {len(p)} momenta are no phase space", where=f"{q}, {p}"[:80], advice=advice
+        )
+    for one in (*q, *p):
+        if not one.is_Symbol and not isinstance(one, sympy.core.function.AppliedUndef):
+            advice = "Give symbols of sympy, or functions of t."
+            raise UsageError(f"{one} is no coordinate and no momentum", where="phase space", advice=advice)
+    own = [sympy.Symbol(_plain(one)) if one.is_Symbol else sympy.Dummy(_plain(one)) for one in (*q, *p)]
+    n = len(q)
+    return PhaseSpace(tuple(own[:n]), tuple(own[n:]), (*q, *p))
+
+
+def _plain(one: Sympy) -> str:
+    return str(one.func) if one.args else str(one)
+
+
+# -- one form, and whether it is zero ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether expressions are zero, and how that is known.
+
+    Attributes
+    ----------
+    holds
+        Whether they are.
+    proven
+        Whether that is proven for all values.
+    bound
+        Where it is not: the largest value at random points, relative to the largest of the terms.
+    """
+
+    holds: bool
+    proven: bool
+    bound: float
+
+    @property
+    def sentence(self) -> str:
+        """The same in words."""
+        if self.proven:
+            return "proven for all values"
+        told = f"{self.bound:.1e} of its terms at {_POINTS} random points"
+        return f"not proven: at most {told}" if self.holds else f"off by {told}"
+
+
+_LONG = 600
+"""Signs beyond which fractions are left as they are."""
+
+
+_FACTORED = 150
+"""Signs beyond which coefficients are not factored."""
+
+
+def vanishes(values: Iterable[Sympy]) -> Verdict:
+    """Return whether expressions are all zero: by their normal form, or else at random points in many digits."""
+    rest = [one for one in values if one != 0 and not _is_proven(one)]
+    if not rest:
+        return Verdict(True, True, 0.0)
+    worst = max(_relative_size(one) for one in rest)
+    return Verdict(worst <= _BOUND, False, worst)
+
+
+def _is_proven(value: Sympy) -> bool:
+    import sympy
+
+    symbols = sorted(value.free_symbols, key=str)  # two of them may have one name
+    value = value.xreplace({one: sympy.Symbol(f"s{k}") for k, one in enumerate(symbols)})
+    plain, roots = _with_roots(value)
+    try:
+        graph, known = Graph(), dict[Sympy, Expression]()
+        for one, base in roots.items():
+            known[one] = graph.convert(sqrt(from_sympy(base, graph, known)))
+        made = from_sympy(plain, graph, known)
+    except (AtwoodError, TypeError):  # a function that programs have not, or a number that is not real
+        return False
+    return is_proven_zero(made, [graph.symbol(one.name) for one in _in_waves(value)])
+
+
+def _with_roots(value: Sympy) -> tuple[Sympy, dict[Sympy, Sympy]]:
+    """Return an expression with symbols in place of square roots, and what is under each, of earlier ones."""
+    import sympy
+
+    roots: dict[Sympy, Sympy] = {}
+    known: dict[Sympy, Sympy] = {}
+
+    def taken(power: Sympy) -> Sympy:
+        if power.base not in known:
+            known[power.base] = sympy.Dummy(f"root{len(known)}", positive=True)
+            roots[known[power.base]] = min(_as_written(power.base), _cancelled(power.base), key=_signs)
+        return known[power.base] ** (2 * power.exp)
+
+    plain = value.replace(lambda one: one.is_Pow and one.exp.is_Rational and one.exp.q == 2, taken)
+    return plain, roots
+
+
+def _signs(value: Sympy) -> int:
+    return int(value.count_ops())
+
+
+def _cancelled(value: Sympy) -> Sympy:
+    """Return a rational function in lowest terms; other things as they are."""
+    import sympy
+
+    try:
+        return sympy.cancel(value) if value.count_ops() <= _LONG else value
+    except sympy.PolynomialError:
+        return value
+
+
+def collected(value: Sympy, variables: Sequence[Sympy]) -> Sympy:
+    """Return what is a polynomial in some symbols with each of its coefficients as short as it comes.
+
+    Parameters
+    ----------
+    value
+        The expression; where it is no such polynomial, it is made short as a whole.
+    variables
+        The symbols.
+    """
+    import sympy
+
+    plain, roots = _with_roots(value)
+    if not plain.is_polynomial(*variables) or any(one.has(*variables) for one in roots.values()):
+        return short(value)
+    back = {root: sympy.sqrt(base) for root, base in roots.items()}
+    terms = sympy.Poly(plain, *variables).terms()
+    found = []
+    for powers, coefficient in terms:
+        factor = sympy.Mul(*(one**power for one, power in zip(variables, powers, strict=True)))
+        made = min(short(coefficient), short(_cancelled(coefficient)), key=_signs)
+        if _signs(made) <= _FACTORED and not made.atoms(sympy.Float):
+            made = min(made, sympy.factor(made), key=_signs)
+        found.append(made.xreplace(back) * factor)
+    return sympy.Add(*found)
+
+
+def _in_waves(value: Sympy) -> list[Sympy]:
+    """Return the symbols in arguments of sines and cosines."""
+    import sympy
+
+    inside = [one.free_symbols for one in value.atoms(sympy.sin, sympy.cos)]
+    return sorted(set().union(*inside), key=str)
+
+
+def _relative_size(value: Sympy) -> float:
+    """Return the largest value at random points, relative to the terms that it is the sum of."""
+    import random
+
+    import mpmath  # type: ignore[import-untyped]
+    import sympy
+
+    numbers = random.Random(19)
+    terms = sympy.Add.make_args(sympy.expand(value))
+    symbols = sorted(value.free_symbols, key=str)
+    integrals = set().union(*(one.atoms(sympy.Integral) for one in terms))
+    integrated = {one: sympy.lambdify(symbols, one, "mpmath") for one in integrals}
+    worst = 0.0
+    for _ in range(_POINTS):
+        point = {one: sympy.Rational(numbers.randint(3000, 19000), 10000) for one in symbols}
+        with mpmath.workdps(_DIGITS):
+            numbers_there = [mpmath.mpf(one.p) / one.q for one in point.values()]
+            point |= {one: sympy.sympify(known(*numbers_there)) for one, known in integrated.items()}
+        found = [one.xreplace(point).evalf(_DIGITS) for one in terms]
+        size = max(map(abs, found), default=0)
+        if size:
+            worst = max(worst, float(abs(sum(found)) / size))
+    return worst
+
+
+def short(value: Sympy) -> Sympy:
+    """Return an expression in the shortest of some forms, as equations are written; as it is where it is long.
+
+    Parameters
+    ----------
+    value
+        The expression, of symbols.
+    """
+    import sympy
+
+    if not value.free_symbols:
+        return value
+    value = value.replace(sympy.tan, lambda x: sympy.sin(x) / sympy.cos(x))
+    return min((_as_written(value), _with_roots_cancelled(value)), key=_signs)
+
+
+def _with_roots_cancelled(value: Sympy) -> Sympy:
+    """Return a fraction of symbols, functions and square roots without what is above and below.
+
+    What is under a root is put in place of its like.
+    """
+    import sympy
+
+    if value.count_ops() > _LONG or not value.has(sympy.Pow):
+        return value
+    plain, roots = _with_roots(value)
+    functions = sorted(plain.atoms(sympy.Function), key=lambda one: -one.count_ops())
+    stand_ins = {one: sympy.Dummy(f"f{k}") for k, one in enumerate(functions)}
+    plain = plain.xreplace(stand_ins)
+    try:
+        above, below = sympy.fraction(sympy.together(plain))
+        if len(roots) == 1:
+            [(root, base)] = roots.items()
+            relation = sympy.fraction(sympy.together(base.xreplace(stand_ins) - root**2))[0]
+            for by in sorted(base.free_symbols, key=str):
+                if sympy.degree(relation, by) in (1, 2):
+                    above = sympy.rem(sympy.expand(above), relation, by)
+                    break
+        found = sympy.cancel(above / below)
+    except sympy.PolynomialError:
+        return value
+    back = {own: one for one, own in stand_ins.items()}
+    return _as_written(found.xreplace(back)).xreplace({root: sympy.sqrt(base) for root, base in roots.items()})
+
+
+def _as_written(value: Sympy) -> Sympy:
+    """Return an expression as equations are written."""
+    import sympy
+
+    if any(one.base.is_number for one in value.atoms(sympy.Pow) if not one.exp.is_Integer):
+        return value  # an irrational number would become a decimal
+    symbols = sorted(value.free_symbols, key=str)
+    stand_ins = [sympy.Symbol(f"s{k}") for k in range(len(symbols))]
+    graph = Graph()
+    try:
+        made = from_sympy(value.xreplace(dict(zip(symbols, stand_ins, strict=True))), graph)
+        names = {graph.symbol(one.name): Name(Symbol(one.name)) for one in stand_ins}
+        waves = {str(one) for one in _in_waves(value)}
+        angles = tuple(graph.symbol(s.name) for one, s in zip(symbols, stand_ins, strict=True) if str(one) in waves)
+        written = Book(names, angles, ()).write(made, grouped=True)
+    except (AtwoodError, TooLargeError, TypeError):
+        return value
+    return objects.formula(written).xreplace(dict(zip(stand_ins, symbols, strict=True)))

@@ -1,0 +1,336 @@
+"""Canonical transformations: tested by their matrix, made from generating functions or from new coordinates.
+
+``J Omega J^T = Omega`` with J the derivatives of new coordinates and momenta by the old (Goldstein, equation 9.55).
+Where they depend on time, the new Hamiltonian is ``K = H + dF/dt`` (Goldstein, equation 9.12 and table 9.1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+from atwood.arguments import takes, whole
+from atwood.errors import UnsupportedError, UsageError
+from atwood.late import dataclass
+from atwood.theory.hamiltonian.arguments import BY_SYMBOL, EXPRESSION, INVERSE, PHASE_SPACE, SYMBOLS
+from atwood.theory.hamiltonian.hamiltonian import Hamiltonian
+from atwood.theory.hamiltonian.phase_space import PhaseSpace, Sympy, Verdict, phase_space_of, short, vanishes
+
+__all__ = ["CanonicalTransformation", "canonical_transformation", "generated_transformation"]
+
+Space = Hamiltonian | tuple[Sequence[Sympy], Sequence[Sympy]]
+_KINDS = {1: ("q", "Q"), 2: ("q", "P"), 3: ("p", "Q"), 4: ("p", "P")}
+
+
+@dataclass(frozen=True, eq=False)
+class CanonicalTransformation:
+    """New coordinates and momenta in terms of the old ones, and whether they are canonical.
+
+    Attributes
+    ----------
+    space
+        The old coordinates and momenta.
+    coordinates, momenta
+        Symbols of the new ones.
+    new_coordinates, new_momenta
+        What they are in terms of the old and of time.
+    inverse
+        What the old ones are in terms of the new; empty where that is not known.
+    old_hamiltonian
+        H on the plain symbols of `space`; None where only coordinates and momenta were given.
+    added
+        ``dF/dt`` in terms of the new ones; None where it is not known.
+    """
+
+    space: PhaseSpace
+    coordinates: tuple[Sympy, ...]
+    momenta: tuple[Sympy, ...]
+    new_coordinates: tuple[Sympy, ...]
+    new_momenta: tuple[Sympy, ...]
+    inverse: Mapping[Sympy, Sympy]
+    old_hamiltonian: Sympy | None
+    added: Sympy | None
+
+    @cached_property
+    def matrix(self) -> Sympy:
+        """J: derivatives of new coordinates and momenta by the old, shape (2n, 2n)."""
+        import sympy
+
+        new = [self.space.read(one) for one in (*self.new_coordinates, *self.new_momenta)]
+        old = (*self.space.coordinates, *self.space.momenta)
+        return sympy.ImmutableMatrix([[self.space.shown(one.diff(x)) for x in old] for one in new])
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Whether ``J Omega J^T = Omega``, and how that is known."""
+        import sympy
+
+        n = len(self.coordinates)
+        omega = sympy.zeros(2 * n, 2 * n)
+        for k in range(n):
+            omega[k, n + k], omega[n + k, k] = 1, -1
+        read = self.matrix.applyfunc(self.space.read)
+        off = read * omega * read.T - omega
+        return vanishes(off[i, j] for i in range(2 * n) for j in range(i))
+
+    @property
+    def is_canonical(self) -> bool:
+        """Whether it is canonical."""
+        return self.verdict.holds
+
+    @cached_property
+    def hamiltonian(self) -> Sympy:
+        """The new Hamiltonian ``K = H + dF/dt``, in the new coordinates and momenta.
+
+        Raises
+        ------
+        UsageError
+            If the transformation is not canonical, or no Hamiltonian was given.
+        UnsupportedError
+            If the old coordinates and momenta, or dF/dt, are not known in terms of the new ones.
+        """
+        if self.old_hamiltonian is None:
+            raise UsageError("no Hamiltonian was given", where="canonical transformation", advice="Give one.")
+        if not self.is_canonical:
+            raise UsageError(
+                f"the transformation is not canonical: J Omega J^T is {self.verdict.sentence.removeprefix('off by')} "
+                "away from Omega",
+                where="canonical transformation",
+            )
+        if not self.inverse or self.added is None:
+            raise UnsupportedError(
+                "the old coordinates and momenta are not known in terms of the new ones, or dF/dt is not",
+                where="canonical transformation",
+                advice="Give `inverse`, or a generating function.",
+            )
+        return short(self.old_hamiltonian.xreplace(dict(self.inverse)) + self.added)
+
+    def __repr__(self) -> str:
+        told = "canonical" if self.is_canonical else "not canonical"
+        return f"<CanonicalTransformation to {', '.join(map(str, self.coordinates))}: {told}, {self.verdict.sentence}>"
+
+
+@takes(hamiltonian=PHASE_SPACE, coordinates=BY_SYMBOL, momenta=BY_SYMBOL, inverse=INVERSE)
+def canonical_transformation(
+    hamiltonian: Space,
+    coordinates: Mapping[Any, Any],
+    momenta: Mapping[Any, Any],
+    *,
+    inverse: Mapping[Any, Any] | None = None,
+) -> CanonicalTransformation:
+    """Return new coordinates and momenta, with whether they are canonical and their Hamiltonian.
+
+    Parameters
+    ----------
+    hamiltonian
+        What `atwood.hamiltonian` returns, or a pair: coordinates and momenta.
+    coordinates, momenta
+        Each new symbol with what it is in terms of the old coordinates and momenta, parameters and t.
+    inverse
+        Each old coordinate and momentum in terms of the new; it is sought if not given.
+
+    Returns
+    -------
+    CanonicalTransformation
+        Ready to be asked for J, for whether it is canonical, and for the new Hamiltonian.
+
+    Raises
+    ------
+    UsageError
+        If there are not as many new coordinates and momenta as old ones.
+    """
+    space = phase_space_of(hamiltonian)
+    n = len(space.coordinates)
+    new = [*coordinates, *momenta]
+    if len(coordinates) != n or len(momenta) != n or len(set(new)) != 2 * n:
+        raise _not_as_many(n, coordinates, momenta)
+    values = [space.read(one) for one in (*coordinates.values(), *momenta.values())]
+    old = [*space.coordinates, *space.momenta]
+    if inverse is not None:
+        by = {space.read(key): value for key, value in inverse.items()}
+        if set(by) != set(old):
+            raise UsageError(
+                "the inverse does not give every old coordinate and momentum",
+                where=f"{list(inverse)}"[:80],
+                advice=f"Give {', '.join(map(str, space.given))}, each in terms of the new ones.",
+            )
+    else:
+        by = _solved([value - one for value, one in zip(values, new, strict=True)], old)
+    return CanonicalTransformation(
+        space,
+        tuple(new[:n]),
+        tuple(new[n:]),
+        tuple(space.shown(one) for one in values[:n]),
+        tuple(space.shown(one) for one in values[n:]),
+        by,
+        _old_hamiltonian(hamiltonian, space),
+        _added(values, new, by),
+    )
+
+
+@takes(
+    function=EXPRESSION, kind=whole("1, 2, 3 or 4", 1, 4), hamiltonian=PHASE_SPACE, coordinates=SYMBOLS, momenta=SYMBOLS
+)
+def generated_transformation(
+    function: Any, kind: int, hamiltonian: Space, coordinates: Sequence[Any], momenta: Sequence[Any]
+) -> CanonicalTransformation:
+    """Return the canonical transformation of a generating function (Goldstein, table 9.1).
+
+    Parameters
+    ----------
+    function
+        F in terms of old and new variables, parameters and t, in sympy.
+    kind
+        1: F(q, Q, t), with ``p = dF/dq`` and ``P = -dF/dQ``. 2: F(q, P, t), with ``p = dF/dq`` and ``Q = dF/dP``.
+        3: F(p, Q, t), with ``q = -dF/dp`` and ``P = -dF/dQ``. 4: F(p, P, t), with ``q = -dF/dp`` and ``Q = dF/dP``.
+    hamiltonian
+        See `canonical_transformation`.
+    coordinates, momenta
+        Symbols of the new coordinates and momenta.
+
+    Raises
+    ------
+    UsageError
+        If the function holds variables of the wrong kind, or leaves new variables undetermined.
+    """
+    import sympy
+
+    space = phase_space_of(hamiltonian)
+    n, new_q, new_p = len(space.coordinates), tuple(coordinates), tuple(momenta)
+    f = space.read(function, (*new_q, *new_p))
+    if len(new_q) != n or len(new_p) != n:
+        raise _not_as_many(n, coordinates, momenta)
+    variables = {"q": space.coordinates, "p": space.momenta, "Q": new_q, "P": new_p}
+    used = _KINDS[kind]
+    wrong = [one for name, own in variables.items() if name not in used for one in own if f.has(one)]
+    if wrong:
+        raise UsageError(
+            f"a generating function of kind {kind} is one of {used[0]} and {used[1]}, and this holds {wrong[0]}",
+            where=str(function)[:80],
+        )
+    first, second = ("p", 1) if used[0] == "q" else ("q", -1), ("P", -1) if used[1] == "Q" else ("Q", 1)
+    new = [*new_q, *new_p]
+    given = [
+        {y: _without_arcs(sign * f.diff(x)) for x, y in zip(variables[by], variables[name], strict=True)}
+        for by, name, sign in ((used[0], *first), (used[1], *second))
+    ]
+    forward = _in_turn(given[0], variables[used[1]], given[1])
+    inverse = _in_turn(given[1], variables[used[0]], given[0])
+    if not forward:
+        raise UsageError(
+            "it leaves new coordinates or momenta undetermined, or has no solution that is found",
+            where=str(function)[:80],
+            advice=f"The mixed second derivatives by {used[0]} and {used[1]} must not be singular.",
+        )
+    added = f.diff(sympy.Symbol("t"))
+    if inverse:
+        added = added.xreplace(inverse)
+    values = [forward[one] for one in new]
+    return CanonicalTransformation(
+        space,
+        new_q,
+        new_p,
+        tuple(space.shown(short(one)) for one in values[:n]),
+        tuple(space.shown(short(one)) for one in values[n:]),
+        inverse,
+        _old_hamiltonian(hamiltonian, space),
+        added if inverse or added == 0 else None,
+    )
+
+
+def _not_as_many(n: int, coordinates: Iterable[Sympy], momenta: Iterable[Sympy]) -> UsageError:
+    given = (
+        f"coordinates {', '.join(map(str, coordinates)) or 'none'}; momenta {', '.join(map(str, momenta)) or 'none'}"
+    )
+    advice = f"Give as many of each as the old ones, {n}, all different."
+    return UsageError(f"{n} new coordinates and {n} new momenta are needed", where=given[:80], advice=advice)
+
+
+def _old_hamiltonian(given: Space, space: PhaseSpace) -> Sympy | None:
+    return None if isinstance(given, (tuple, list)) else space.read(given.expression)
+
+
+def _solved(equations: Sequence[Sympy], unknowns: Sequence[Sympy]) -> dict[Sympy, Sympy]:
+    """Return a solution of equations; empty where none is found. Linear ones are solved as such, others in turn."""
+    import sympy
+
+    if any(one.has(*unknowns) for equation in equations for one in equation.atoms(sympy.Integral)):
+        return {}
+    try:
+        found = sympy.solve(list(equations), list(unknowns), dict=True, simplify=False, check=False)
+    except _UNSOLVED:
+        return {}
+    whole = [one for one in found if set(one) == set(unknowns)]
+    chosen = next((one for one in reversed(whole) if _is_real(one.values())), None)
+    return {} if chosen is None else {key: short(value) for key, value in chosen.items()}
+
+
+_UNSOLVED = (ArithmeticError, AttributeError, LookupError, NotImplementedError, RecursionError, TypeError, ValueError)
+"""What sympy raises where it finds no solution, as of an integral by its end."""
+
+
+def _in_turn(
+    given: Mapping[Sympy, Sympy], unknowns: Sequence[Sympy], explicit: Mapping[Sympy, Sympy]
+) -> dict[Sympy, Sympy]:
+    """Return a solution for some unknowns, and what follows from these; empty where none is found.
+
+    Half of a generating function's equations hold one group of the unknowns alone, and the other half gives the others.
+    """
+    solved = _solved([one - value for one, value in given.items()], unknowns)
+    if not solved:
+        return {}
+    others = {one: short(value.xreplace(solved)) for one, value in explicit.items()}
+    return {**solved, **others}
+
+
+def _without_arcs(value: Sympy) -> Sympy:
+    """Return an expression with roots of fractions as fractions of roots, so that what arcs leave behind cancels."""
+    import sympy
+
+    def split(power: Sympy) -> Sympy:
+        above, below = sympy.fraction(sympy.together(power.base))
+        return above**power.exp / below**power.exp
+
+    def is_root(one: Sympy) -> bool:
+        return bool(one.is_Pow and one.exp.is_Rational and one.exp.q == 2)
+
+    made = value.replace(is_root, split)
+    return value if made == value or value.has(sympy.Integral) else short(made)
+
+
+def _is_real(values: Iterable[Sympy]) -> bool:
+    """Return whether expressions are real where all symbols are some positive numbers."""
+    import sympy
+
+    def at(value: Sympy) -> complex:
+        symbols = sorted(value.free_symbols, key=str)
+        point = {one: sympy.Rational(7 + 3 * k, 11 + 2 * k) for k, one in enumerate(symbols)}
+        return complex(value.xreplace(point).evalf(30))
+
+    found = [at(one) for one in values]
+    return all(abs(one.imag) <= 1e-20 * (abs(one) + 1.0) for one in found)
+
+
+def _added(values: Sequence[Sympy], new: Sequence[Sympy], inverse: Mapping[Sympy, Sympy]) -> Sympy | None:
+    """Return dF/dt, from how new coordinates and momenta move while the old ones stay.
+
+    That motion is the one of dF/dt as a Hamiltonian, which is found along straight lines from the origin: for what is a
+    polynomial in the new variables.
+    """
+    import sympy
+
+    t = sympy.Symbol("t")
+    rates = [one.diff(t) for one in values]
+    if all(one == 0 for one in rates):
+        return sympy.Integer(0)
+    if not inverse:
+        return None
+    n, share = len(new) // 2, sympy.Dummy("s")
+    rates = [short(one.xreplace(dict(inverse))) for one in rates]
+    scaled = [one.xreplace({x: share * x for x in new}) for one in rates]
+    total = sympy.expand(sum(new[n + k] * scaled[k] - new[k] * scaled[n + k] for k in range(n)))
+    if not total.is_polynomial(share):
+        return None
+    found = sum(c * sympy.Rational(1, m[0] + 1) for m, c in sympy.Poly(total, share).terms())
+    return short(sympy.expand(found))

@@ -1,0 +1,222 @@
+"""`linearize`: the linear model of a scene about a state."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from atwood.arguments import PATHS, takes
+from atwood.arrays import FloatArray
+from atwood.errors import UsageError
+from atwood.expr import live
+from atwood.forms.assembly import Assembly
+from atwood.model.compose.composite import Model
+from atwood.pipeline import SCENE
+from atwood.simulation.problem.arguments import FORM
+from atwood.theory.linear.linear_model import LinearModel
+from atwood.theory.linear.maximal import image_of, pulled_back
+from atwood.theory.linear.minimal import Minimal
+from atwood.theory.linear.operating_point import (
+    AT,
+    At,
+    OperatingPoint,
+    find_operating_point,
+    speed_name,
+    values_at,
+)
+from atwood.theory.linear.quantities import output_rows
+from atwood.theory.linear.state_space import StateSpace, find_state_space
+from atwood.theory.linear.steady import Steady, find_steady, still
+from atwood.theory.linear.switches import refuse_switches
+from atwood.theory.linear.variations import Flow
+
+__all__ = ["linearize", "not_steady"]
+
+
+@takes(scene=SCENE, at=AT, inputs=PATHS, outputs=PATHS, form=FORM)
+def linearize(
+    scene: Model | Assembly,
+    *,
+    at: At = None,
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    form: str = "reduced",
+) -> LinearModel:
+    """Linearise a scene about a state of rest, a steady motion, or a state of a run.
+
+    All derivatives are those of the expression graph; no differences are taken. States are minimal: of closed loops
+    and of rolling, only independent deviations. About a steady motion (a relative equilibrium: a top that precesses, a
+    wheel that rolls) neighbours are seen by somebody who moves along, so that A does not depend on time.
+
+    Parameters
+    ----------
+    scene
+        The scene, or an assembly of it, which is faster if it is linearised often.
+    at
+        Values by path, of positions and speeds: positions that are not said stay near the scene's own start, speeds
+        that are not said are zero as far as the constraints let them. Or a result and one of its output times. The
+        scene's start if not given.
+    inputs
+        Inputs of forces, motors and drives by path, such as ``"force.value"``, or outputs of sources that feed some. Of
+        a prescribed motion the acceleration is the input, and its position and speed become states.
+    outputs
+        Quantities by path.
+    form
+        Whose equations are linearised: those of the reduced form, or with ``"dae"`` the constrained ones in maximal
+        coordinates. The states are the same, and so are the matrices to rounding.
+
+    Returns
+    -------
+    LinearModel
+        The matrices, with the names of what they belong to.
+
+    Raises
+    ------
+    StartError
+        If there is no such state, or it is a singular position.
+    ParameterError
+        If there is no such input or output.
+    UsageError
+        If the motion at the state is not steady, or a switch or an event is there.
+    """
+    point = find_operating_point(scene, at, inputs)
+    flow = point.scene.flow(point.t, point.q, point.u, point.kept)
+    refuse_switches(point.scene, flow, point.kept)
+    steady = still(flow) if point.is_from_result else find_steady(point.scene, flow, point.kept)
+    if not steady.is_steady:
+        raise not_steady(point, flow, steady)
+    space = find_state_space(point.scene, flow, steady, point.kept)
+    if form == "dae":
+        space = _of_dae_form(point, flow, steady, space)
+    rows = output_rows(point, flow, space.minimal, outputs)
+    return _model(point, flow, space, rows, list(outputs), form)
+
+
+def _of_dae_form(point: OperatingPoint, flow: Flow, steady: Steady, space: StateSpace) -> StateSpace:
+    """Return the same model with accelerations from the constrained equations in maximal coordinates."""
+    minimal, count = space.minimal, len(point.scene.tangents)
+    image, _, own = image_of(point.scene, flow, minimal)
+    accelerations = pulled_back(image, own) - steady.moving[count:] @ minimal.state
+    matrix = space.matrix.copy()
+    matrix[len(minimal.displacements) :] = accelerations[list(minimal.speeds)]
+    return StateSpace(minimal, matrix, space.error, space.sizes)
+
+
+def not_steady(point: OperatingPoint, flow: Flow, steady: Steady) -> UsageError:
+    """Return the error that says what changes at a state that is no steady motion."""
+    scene, count = point.scene, len(point.scene.tangents)
+    if steady.fastest < 0:
+        what = "nothing moves now, and the equations depend on time"
+    elif steady.fastest < count:
+        name, rate = scene.tangents.names[steady.fastest], flow.variation.displacement_rates[steady.fastest]
+        unit = "m/s" if scene.tangents.units[steady.fastest] == "m" else "rad/s"
+        what = f"{name} moves at {rate:.3g} {unit}, and the equations depend on it"
+    else:
+        number = steady.fastest - count
+        one = scene.equations.speed_names[number]
+        what = f"{one.name} changes at {flow.variation.a[number]:.3g} {one.unit}/s".replace("/s/s", "/s^2")
+    return UsageError(
+        f"the state is neither at rest nor a steady motion: {what}",
+        where=point.assembly.flat.name,
+        advice="Give `at=` values of one (`equilibria` and `trim` find them), or a result and a time for a linear "
+        "model that holds at that time alone.",
+    )
+
+
+# -- the model -------------------------------------------------------------------------------------------------------
+
+
+def _model(
+    point: OperatingPoint, flow: Flow, space: StateSpace, rows: FloatArray, outputs: list[str], form: str
+) -> LinearModel:
+    minimal, n = space.minimal, space.minimal.states
+    inputs, units, moved = _inputs(point, space, rows)
+    count = n + 2 * len(moved)
+    a, error = np.zeros((count, count)), np.zeros((count, count))
+    a[:n, :n], error[:n, :n] = space.matrix[:, :n], space.error[:, :n]
+    c, d = np.zeros((len(outputs), count)), np.zeros((len(outputs), len(inputs)))
+    b = np.zeros((count, len(inputs)))
+    c[:, :n] = rows[:, :n]
+    for k, (_, columns) in enumerate(inputs.items()):
+        value, rate, second = (n + column for column in columns)
+        if k not in moved:
+            b[:n, k], d[:, k] = space.matrix[:, value], rows[:, value]
+            continue
+        place = n + 2 * list(moved).index(k)
+        for offset, column in enumerate((value, rate)):
+            a[:n, place + offset], c[:, place + offset] = space.matrix[:, column], rows[:, column]
+            error[:n, place + offset] = space.error[:, column]
+        a[place, place + 1] = b[place + 1, k] = 1.0
+        b[:n, k], d[:, k] = space.matrix[:, second], rows[:, second]
+    names = _state_names(point, minimal)
+    names += [name + mark for k in moved for name in [list(inputs)[k]] for mark in ("", "'")]
+    shown = tuple(f"{name}''" if k in moved else name for k, name in enumerate(inputs))
+    units |= _units(point, minimal) | {path: point.assembly.start_observables[path].unit for path in outputs}
+    about = "motion" if point.is_from_result else "steady motion" if _moves(point, flow) else "rest"
+    driven = np.ones(2 * len(moved))
+    return LinearModel(
+        A=a,
+        B=b,
+        C=c,
+        D=d,
+        states=tuple(names),
+        inputs=shown,
+        outputs=tuple(outputs),
+        units=units,
+        values=values_at(point),
+        scene=point.assembly.flat.name,
+        form=form,
+        about=about,
+        error=error,
+        sizes=np.concatenate([space.sizes, driven]),
+    )
+
+
+def _inputs(
+    point: OperatingPoint, space: StateSpace, rows: FloatArray
+) -> tuple[dict[str, tuple[int, int, int]], dict[str, str], tuple[int, ...]]:
+    """Return the columns of each input, their units, and which of the inputs are prescribed motions."""
+    n, first = space.minimal.states, 0
+    found: dict[str, tuple[int, int, int]] = {}
+    units: dict[str, str] = {}
+    moved = []
+    for k, one in enumerate(point.inputs):
+        for other in range(1, len(one.keys)):  # one source that feeds several inputs
+            for matrix in (space.matrix, rows):
+                matrix[:, n + first : n + first + 3] += matrix[:, n + first + 3 * other : n + first + 3 * other + 3]
+        found[one.path] = (first, first + 1, first + 2)
+        units[one.path] = one.unit
+        if _places_bodies(point, first):
+            moved.append(k)
+            units |= {f"{one.path}'": f"{one.unit}/s", f"{one.path}''": f"{one.unit}/s^2"}
+        first += 3 * len(one.keys)
+    return found, units, tuple(moved)
+
+
+def _places_bodies(point: OperatingPoint, number: int) -> bool:
+    """Return whether an input is a motion that is prescribed: whether positions or orientations depend on it."""
+    placements, value = point.scene.equations.kinematics.placements, point.scene.inputs[number]
+    found = [one for position in placements.positions.values() for one in position]
+    found += [one for axes in placements.axes.values() for axis in axes for one in axis]
+    found += list(placements.angles.values())
+    return any(node is value for node in live(found))
+
+
+def _moves(point: OperatingPoint, flow: Flow) -> bool:
+    sizes = point.scene.sizes
+    return bool(np.any(np.abs(point.u) > 1e-12 * sizes * max(1.0, float(np.max(np.abs(point.u) / sizes, initial=0.0)))))
+
+
+def _state_names(point: OperatingPoint, minimal: Minimal) -> list[str]:
+    scene = point.scene
+    return [
+        *(scene.tangents.names[k] for k in minimal.displacements),
+        *(speed_name(point, k) for k in minimal.speeds),
+    ]
+
+
+def _units(point: OperatingPoint, minimal: Minimal) -> dict[str, str]:
+    scene = point.scene
+    found = {scene.tangents.names[k]: scene.tangents.units[k] for k in minimal.displacements}
+    return found | {speed_name(point, k): scene.equations.speed_names[k].unit for k in minimal.speeds}

@@ -1,0 +1,346 @@
+"""First variations of the equations of motion about a state, by derivatives of the expression graph.
+
+The equations ``F(t, q, u, a, w) = G^T lambda``, the constraints' values, rates ``c1`` and second derivatives ``c2``,
+and the coordinates' rates are differentiated by displacements, speeds, time and inputs; no differences are taken. They
+give the variations of accelerations and multipliers as the equations themselves do:
+
+    M da - G^T dlambda = -(F_s ds + F_u du + F_t dt + F_w dw),    G da = -(c2_s ds + c2_u du + c2_t dt + c2_w dw).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import copy
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.arrays import FloatArray
+from atwood.codegen import BoundKernel
+from atwood.codegen.rounding import ROUGHNESS
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, SparseMatrix, jacobian
+from atwood.forms.assembly import Assembly, FormName
+from atwood.forms.kept import Key
+from atwood.late import dataclass
+from atwood.mechanics.dynamics.equations import Equations
+from atwood.simulation.dynamics.balance import balance_of, solve_determined
+from atwood.simulation.dynamics.redundancy import RankFinding, find_rank
+from atwood.simulation.dynamics.scales import motion_scales, scene_length
+from atwood.theory.linear.tangents import Tangents, find_tangents
+
+__all__ = ["Differentiated", "Flow", "LinearScene", "Variation"]
+
+_VARIATIONS: Key[tuple[list[Differentiated], Program]] = Key("derivatives of the equations")
+
+
+@dataclass(frozen=True)
+class Differentiated:
+    """One group of expressions with its derivatives by some groups of symbols."""
+
+    name: str
+    rows: int
+    columns: Mapping[str, int]
+    places: Mapping[str, SparseMatrix]
+
+    @cached_property
+    def numbers(self) -> dict[str, tuple[NDArray[np.intp], NDArray[np.intp]]]:
+        """Rows and columns of the entries, by what the derivatives are taken."""
+        return {by: (np.array(x.rows, np.intp), np.array(x.columns, np.intp)) for by, x in self.places.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class Variation:
+    """Numbers of the equations at a state, with their derivatives along displacements, speeds, time and inputs.
+
+    Attributes
+    ----------
+    t, q, u, a, multipliers
+        The state, with the accelerations and multipliers that belong to it.
+    basis
+        ``N(q)``; see `Tangents`.
+    displacement_rates
+        ``s'``: how the configuration moves, shape (displacements,).
+    values
+        Of each group of expressions.
+    by
+        Derivatives of each group: ``by["force", "q"]`` and so on, along coordinates.
+    """
+
+    t: float
+    q: FloatArray
+    u: FloatArray
+    a: FloatArray
+    multipliers: FloatArray
+    basis: FloatArray
+    displacement_rates: FloatArray
+    values: Mapping[str, FloatArray]
+    by: Mapping[tuple[str, str], FloatArray]
+
+    def along(self, name: str) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return the derivatives of a group along displacements, speeds, time and inputs."""
+        return self.by[name, "q"] @ self.basis, self.by[name, "u"], self.by[name, "t"], self.by[name, "w"]
+
+
+@dataclass(frozen=True, eq=False)
+class Flow:
+    """How a state moves, and how neighbouring states move beside it.
+
+    Columns are displacements, speeds, time and inputs, in this order.
+
+    Attributes
+    ----------
+    variation
+        What it was found from.
+    shift
+        ``s'`` of neighbours, shape (displacements, columns).
+    acceleration, multiplier
+        ``da`` and ``dlambda``, of shape (speeds, columns) and (constraints, columns).
+    """
+
+    variation: Variation
+    shift: FloatArray
+    acceleration: FloatArray
+    multiplier: FloatArray
+
+    @property
+    def field(self) -> FloatArray:
+        """The state's own motion: ``s'`` and ``u'``."""
+        return np.concatenate([self.variation.displacement_rates, self.variation.a])
+
+    @property
+    def matrix(self) -> FloatArray:
+        """The derivative of that along displacements and speeds, then time and inputs."""
+        return np.concatenate([self.shift, self.acceleration])
+
+
+class LinearScene:
+    """The equations of a scene with their first derivatives as programs.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    form
+        In which coordinates: generalized ones, in which orientations are quaternions, or maximal ones.
+    inputs
+        The symbols of inputs: parameters that are zero.
+    """
+
+    def __init__(self, assembly: Assembly, form: FormName, inputs: Sequence[Expression] = ()) -> None:
+        self.assembly, self.form, self.inputs = assembly, form, tuple(inputs)
+        self.equations: Equations = assembly.regular if form == "reduced" else assembly.maximal
+        self.tangents: Tangents = find_tangents(self.equations)
+        self._measure(scene_length(assembly))
+        self._bound: BoundKernel | None = None
+
+    def _measure(self, length: float) -> None:
+        self.length = length
+        self.sizes = motion_scales(self.equations, length)
+        self.displacement_sizes = np.array([length if unit == "m" else 1.0 for unit in self.tangents.units])
+
+    def sized(self, length: float) -> LinearScene:
+        """Return the same with another size of the scene, m."""
+        found = copy(self)
+        found._measure(length)
+        return found
+
+    # -- programs -------------------------------------------------------------------------------------------------
+
+    @property
+    def groups(self) -> tuple[InputGroup, ...]:
+        """The inputs (t, q, u, a, multipliers) of programs of a state."""
+        e = self.equations
+        return (
+            InputGroup("t", (e.time,)),
+            InputGroup("q", e.coordinates),
+            InputGroup("u", e.speeds),
+            InputGroup("a", e.accelerations),
+            InputGroup("multipliers", e.multipliers),
+        )
+
+    @cached_property
+    def _expressions(self) -> dict[str, list[Expression]]:
+        e = self.equations
+        zero = e.graph.zero
+        force = [row - held for row, held in zip(e.rows, e.constraint_rows, strict=True)] if e.constraints else e.rows
+        return {
+            "rates": list(e.rates),
+            "force": list(force),
+            "value": [zero if one.value is None else one.value for one in e.constraints],
+            "rate": [one.rate for one in e.constraints],
+            "second": [one.second for one in e.constraints],
+        }
+
+    @cached_property
+    def _made(self) -> tuple[list[Differentiated], Program]:
+        """The derivatives and their program, made once for all scenes of a structure."""
+
+        def make() -> tuple[list[Differentiated], Program]:
+            parts = [self.differentiated(name, found) for name, found in self._expressions.items()]
+            return parts, self.program("variations", self._expressions, parts)
+
+        about = self.form, tuple(symbol.name for symbol in self.inputs)
+        return self.assembly.shared.get(_VARIATIONS, make, *about)
+
+    @property
+    def parts(self) -> list[Differentiated]:
+        """Where the derivatives of each group of expressions stand."""
+        return self._made[0]
+
+    def differentiated(self, name: str, found: Sequence[Expression]) -> Differentiated:
+        """Return where the derivatives of some expressions stand, with the expressions of the entries."""
+        e = self.equations
+        symbols = {
+            "q": e.coordinates,
+            "u": e.speeds,
+            "a": e.accelerations,
+            "multipliers": e.multipliers,
+            "t": (e.time,),
+            "w": self.inputs,
+        }
+        places = {one: jacobian(list(found), list(by)) for one, by in symbols.items() if by and found}
+        return Differentiated(name, len(found), {one: len(by) for one, by in symbols.items()}, places)
+
+    def program(
+        self, name: str, expressions: Mapping[str, Sequence[Expression]], parts: Sequence[Differentiated]
+    ) -> Program:
+        """Return the program of a state that gives expressions and the entries of their derivatives."""
+        outputs = [OutputGroup(group, tuple(found)) for group, found in expressions.items()]
+        for part in parts:
+            outputs += [
+                OutputGroup(f"{part.name} by {by}", tuple(matrix.entries)) for by, matrix in part.places.items()
+            ]
+        return Program(f"{self.assembly.flat.name} {name}", self.groups, self.assembly.parameters, tuple(outputs))
+
+    @property
+    def derivatives(self) -> Program:
+        """The program of the expressions and the entries of their derivatives at a state."""
+        return self._made[1]
+
+    @property
+    def _kernel(self) -> BoundKernel:
+        if self._bound is None:
+            self._bound = self.assembly.kernel(self.derivatives)
+        return self._bound
+
+    def _with_values(self, values: FloatArray) -> LinearScene:
+        """Return the same with other values of the parameters."""
+        found = copy(self)
+        found._bound = self.assembly.compiled(self.derivatives).bind(values)
+        return found
+
+    def with_inputs(self, values: Mapping[str, float]) -> LinearScene:
+        """Return the same with inputs that have other values than zero, by the name of their symbol."""
+        numbers = self.assembly.parameter_values.copy()
+        place = {symbol.name: i for i, symbol in enumerate(self.assembly.parameters)}
+        for name, value in values.items():
+            numbers[place[name]] = value
+        return self._with_values(numbers)
+
+    @property
+    def depends_on_time(self) -> bool:
+        """Whether time appears in the equations."""
+        return any(len(part.places["t"].entries) > 0 for part in self.parts if "t" in part.places)
+
+    def disturbed(self, random: np.random.Generator) -> LinearScene:
+        """Return the same with parameters that are off by a little more than rounding."""
+        values = self.assembly.parameter_values
+        return self._with_values(values * (1.0 + ROUGHNESS * random.uniform(-1.0, 1.0, values.shape)))
+
+    # -- numbers --------------------------------------------------------------------------------------------------
+
+    def rank(self, t: float, q: FloatArray) -> RankFinding:
+        """Return which constraints are independent; `find_rank` asks places near by as well."""
+        return find_rank(balance_of(self.assembly, "dae" if self.form == "dae" else "reduced"), t, q, self.sizes)
+
+    def matrices(self, part: Differentiated, values: Mapping[str, FloatArray]) -> dict[tuple[str, str], FloatArray]:
+        """Return the derivatives of a group as matrices."""
+        found: dict[tuple[str, str], FloatArray] = {}
+        for by, count in part.columns.items():
+            matrix = np.zeros((part.rows, count))
+            if by in part.numbers:
+                matrix[part.numbers[by]] = values[f"{part.name} by {by}"]
+            found[part.name, by] = matrix
+        return found
+
+    def evaluate(self, kernel: Any, program: Program, state: tuple[FloatArray, ...]) -> dict[str, FloatArray]:
+        """Return the output groups of a program by name."""
+        groups = [group.name for group in program.outputs]
+        return {name: np.asarray(x, dtype=float) for name, x in zip(groups, kernel(*state), strict=True)}
+
+    def variation(self, t: float, q: FloatArray, u: FloatArray, a: FloatArray, held: FloatArray) -> Variation:
+        """Return the equations and their derivatives at a state.
+
+        Parameters
+        ----------
+        t, q, u
+            The state.
+        a, held
+            Accelerations and multipliers.
+        """
+        values = self.evaluate(self._kernel, self.derivatives, (np.array([t]), q, u, a, held))
+        by: dict[tuple[str, str], FloatArray] = {}
+        for part in self.parts:
+            by |= self.matrices(part, values)
+        basis, inverse = self.tangents.basis(q), self.tangents.inverse(q)
+        return Variation(t, q, u, a, held, basis, inverse @ values["rates"], values, by)
+
+    def flow(self, t: float, q: FloatArray, u: FloatArray, kept: Sequence[int]) -> Flow:
+        """Return how a state and its neighbours move.
+
+        Parameters
+        ----------
+        t, q, u
+            The state; constraints on it need not be met, as its neighbours need not.
+        kept
+            Independent constraints.
+
+        Raises
+        ------
+        SolveError
+            If the forces do not determine the accelerations.
+        """
+        n, kept = len(self.equations.speeds), list(kept)
+        zero_a, zero_held = np.zeros(n), np.zeros(len(self.equations.constraints))
+        still = self.variation(t, q, u, zero_a, zero_held)
+        m = len(kept)
+        matrix = np.zeros((n + m, n + m))
+        matrix[:n, :n] = still.by["force", "a"]
+        if m:
+            matrix[:n, n:] = still.by["force", "multipliers"][:, kept]
+            matrix[n:, :n] = still.by["second", "a"][kept]
+        solved = solve_determined(matrix, -np.concatenate([still.values["force"], still.values["second"][kept]]), t)
+        a, held = solved[:n], zero_held.copy()
+        held[kept] = solved[n:]
+        now = self.variation(t, q, u, a, held)
+        force, second = (np.hstack(now.along(name)) for name in ("force", "second"))
+        moved = solve_determined(matrix, -np.concatenate([force, second[kept]]), t)
+        multiplier = np.zeros((len(zero_held), force.shape[1]))
+        multiplier[kept] = moved[n:]
+        shift = self.shift(q, now.basis, now.displacement_rates, np.hstack(now.along("rates")))
+        return Flow(now, shift, moved[:n], multiplier)
+
+    def shift(self, q: FloatArray, basis: FloatArray, moving: FloatArray, rates: FloatArray) -> FloatArray:
+        """Return how displacements of neighbours change: ``ds' = N^+ (R_q N - N') ds + N^+ R_u du + ...``.
+
+        Parameters
+        ----------
+        q, basis
+            Coordinates and N(q); of one state, or of several along the first axis.
+        moving
+            The rates of the displacements, shape (..., displacements).
+        rates
+            The derivatives of the coordinates' rates along displacements, speeds and what else there is, as columns.
+        """
+        found = rates
+        if self.tangents.orientation_coordinates:
+            # N is linear in q; coordinates that move by themselves have a constant part of it, which does not change.
+            turned = self.tangents.basis((basis @ moving[..., None])[..., 0])
+            for i, k in self.tangents.plain:
+                turned[..., i, k] = 0.0
+            found = rates.copy()
+            found[..., : len(self.tangents)] -= turned
+        shifted: FloatArray = self.tangents.inverse(q) @ found
+        return shifted

@@ -1,0 +1,306 @@
+"""`conserved`: what is conserved along the motions of a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from typing import Any
+
+from atwood.arguments import Kind, check, each, instance, optional, takes
+from atwood.errors import UsageError
+from atwood.forms.assembly import Assembly
+from atwood.forms.lagrangian import lagrangian_of
+from atwood.late import dataclass
+from atwood.model.compose.composite import Model
+from atwood.pipeline import SCENE, assembly_of
+from atwood.result.conserved import ConservedLedger, ConservedValues
+from atwood.result.result import Result
+from atwood.showing import data_of, fitted, listed
+from atwood.simulation.problem.arguments import ORIENTATION
+from atwood.table import Shown, Table, table
+from atwood.theory.equations.formulas import EquationFormulas
+from atwood.theory.formulas import latex, objects, text
+from atwood.theory.formulas.notation import notation_of
+from atwood.theory.formulas.objects import Sympy
+from atwood.theory.formulas.tree import Sum
+from atwood.theory.symmetry.find import Finding, find_conserved
+from atwood.theory.symmetry.monitor import along_run
+from atwood.theory.symmetry.proof import Prover
+from atwood.theory.symmetry.quantities import Quantities
+from atwood.theory.symmetry.stated import Symmetry, check_symmetry
+
+__all__ = ["Conserved", "ConservedQuantity", "conserved"]
+
+
+@dataclass(frozen=True, eq=False)
+class ConservedQuantity:
+    """A quantity that is conserved along all motions of a scene.
+
+    Attributes
+    ----------
+    finding
+        What was found.
+    formulas
+        What writes it down.
+    """
+
+    finding: Finding
+    formulas: EquationFormulas
+
+    @property
+    def name(self) -> str:
+        """Such as ``"h"``, ``"p:rail.displacement"``, ``"P.x"``, ``"L.z"`` and ``"K.x"``."""
+        return self.finding.name
+
+    @property
+    def kind(self) -> str:
+        """By what it is conserved.
+
+        ``"energy function"``, ``"ignorable coordinate"``, ``"linear momentum"``, ``"angular momentum"``, ``"boost"``,
+        ``"symmetric body"``, ``"total energy"`` where that is not the energy function, or ``"stated symmetry"``.
+        """
+        return self.finding.kind
+
+    @property
+    def unit(self) -> str:
+        """Its SI unit."""
+        return self.finding.unit
+
+    @property
+    def meaning(self) -> str:
+        """What it is, in words."""
+        return self.finding.meaning
+
+    @property
+    def proven(self) -> bool:
+        """Whether it is proven on the expression graph; else it was checked at random states."""
+        return self.finding.proven
+
+    @property
+    def evidence(self) -> str:
+        """How it is known: proven, or checked at how many states, and why it is not proven."""
+        return self.finding.evidence
+
+    @property
+    def direction(self) -> tuple[float, ...]:
+        """Of a total momentum or a boost, its direction in world axes; of a symmetric body, its axis in the body's."""
+        return self.finding.direction
+
+    @property
+    def point(self) -> tuple[float, ...]:
+        """Of an angular momentum, a point of its axis, m."""
+        return self.finding.point
+
+    @cached_property
+    def expression(self) -> Sympy:
+        """The quantity as a sympy expression, in the symbols of `atwood.equations`.
+
+        Raises
+        ------
+        UnsupportedError
+            If it would fill a book.
+        """
+        return objects.formula(self._written)
+
+    @cached_property
+    def _written(self) -> Sum:
+        return self.formulas.formula(self.finding.value, energy=True)
+
+    def latex(self) -> str:
+        """Return the quantity in LaTeX."""
+        return latex.formula(self._written)
+
+    def text(self) -> str:
+        """Return the quantity in plain text, for a terminal; empty where nobody would read it."""
+        return text.formula(self._written) if self.formulas.is_readable else ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        expression = str(self.expression) if self.formulas.is_readable else None
+        told = data_of(self, "name", "kind", "unit", "meaning", "proven", "evidence")
+        return {**told, "expression": expression, **data_of(self, "direction", "point")}
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.meaning}; {self.evidence}"
+
+    def __repr__(self) -> str:
+        return fitted(f"<ConservedQuantity {self}>")
+
+    def _repr_latex_(self) -> str:
+        return f"$\\displaystyle {self.latex()}$"
+
+
+class Conserved(Shown, Sequence[ConservedQuantity]):
+    """What is conserved along the motions of a scene: a sequence of quantities, also by name.
+
+    What is proven and what was checked at states is in it; `proven`, `checked` and `not_looked_for` say which.
+
+    Parameters
+    ----------
+    quantities
+        What is conserved.
+    notes
+        What is not, and what it depends on.
+    scene
+        What the scene is called.
+    not_looked_for
+        What may be conserved besides.
+    """
+
+    def __init__(
+        self,
+        quantities: Sequence[ConservedQuantity],
+        notes: Sequence[str],
+        scene: str,
+        not_looked_for: Sequence[str] = (),
+    ) -> None:
+        self.quantities, self.notes, self.scene = tuple(quantities), tuple(notes), scene
+        self.not_looked_for = tuple(not_looked_for)
+
+    @property
+    def proven(self) -> tuple[ConservedQuantity, ...]:
+        """The quantities that are proven to be conserved."""
+        return tuple(one for one in self.quantities if one.proven)
+
+    @property
+    def checked(self) -> tuple[ConservedQuantity, ...]:
+        """The quantities that stay at all states that were looked at, which is no proof."""
+        return tuple(one for one in self.quantities if not one.proven)
+
+    def __len__(self) -> int:
+        return len(self.quantities)
+
+    def __iter__(self) -> Iterator[ConservedQuantity]:
+        return iter(self.quantities)
+
+    def __getitem__(self, key: Any) -> Any:
+        """Return a quantity by its number or its name."""
+        if not isinstance(key, str):
+            return self.quantities[key]
+        for one in self.quantities:
+            if one.name == key:
+                return one
+        names = [one.name for one in self.quantities]
+        told = f"Conserved are {', '.join(names)}." if names else "Nothing is."
+        raise UsageError("it is not conserved", where=f"{self.scene}: {key}", advice=told)
+
+    def __contains__(self, key: object) -> bool:
+        return key in self.quantities or any(one.name == key for one in self.quantities)
+
+    def along(self, result: Result) -> ConservedLedger:
+        """Return the quantities along a run, and how far they drift.
+
+        Parameters
+        ----------
+        result
+            The run, in either form.
+
+        Raises
+        ------
+        UsageError
+            If it is a run of another scene.
+        """
+        result = check(instance("what `simulate` returned", Result), result, "result", "along")
+        if not self.quantities:
+            return ConservedLedger(())
+        source = self.quantities[0].formulas
+        quantities = Quantities(source.assembly, source.expressions)
+        values, sizes = along_run(quantities, [one.finding.value for one in self], result)
+        rows = zip(self, values, sizes, strict=True)
+        return ConservedLedger(
+            tuple(ConservedValues(one.name, one.kind, one.unit, row, float(size)) for one, row, size in rows)
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the quantities."""
+        return tuple(one.name for one in self.quantities)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        names = {kind: [one.name for one in getattr(self, kind)] for kind in ("proven", "checked")}
+        found = [one.to_dict() for one in self]
+        return {"scene": self.scene, "conserved": found, **names, **data_of(self, "not_looked_for", "notes")}
+
+    def __str__(self) -> str:
+        lines = [self._heading]
+        for one in (*self.proven, *self.checked):
+            lines.append(f"  {one}")
+            lines += [f"      {one.text()}"] * one.formulas.is_readable
+        lines += [f"  not looked for: {one}" for one in self.not_looked_for]
+        return "\n".join([*lines, *(f"  note: {note}" for note in self.notes)])
+
+    @property
+    def _heading(self) -> str:
+        return f"{self.scene}: {len(self.proven)} proven to be conserved, {len(self.checked)} checked"
+
+    def __repr__(self) -> str:
+        parts = [("proven", self.proven), ("checked", self.checked)]
+        told = "; ".join(f"{name} {listed([one.name for one in some])}" for name, some in parts if some)
+        return f"Conserved({self.scene!r}: {told or 'nothing'})"
+
+    def tables(self) -> tuple[Table, ...]:
+        """Return a row for each quantity, with how it is known."""
+        rows = [(one.name, one.kind, one.text(), one.meaning, one.evidence) for one in self]
+        heads = ("name", "kind", "expression", "meaning", "how it is known")
+        below = [*(f"not looked for: {one}" for one in self.not_looked_for), *self.notes]
+        return (table(heads, rows, self._heading, ["; ".join(below)]),)
+
+
+def _listed(value: Any) -> Any:
+    return _SYMMETRIES.read([value] if isinstance(value, Symmetry) else value)
+
+
+_SYMMETRIES = each(instance("a Symmetry", Symmetry), "symmetries, as a list")
+_BEYOND = (
+    "integrals of symmetries that depend on velocities, as that of Laplace, Runge and Lenz: state them, `Symmetry`"
+)
+_ROLLING = "integrals of rolling that belong to no symmetry"
+SYMMETRIES = Kind("a Symmetry, or a list of them", _listed)
+
+
+@takes(scene=SCENE, symmetries=SYMMETRIES, orientation=optional(ORIENTATION))
+def conserved(
+    scene: Model | Assembly, symmetries: Symmetry | Sequence[Symmetry] = (), *, orientation: str | None = None
+) -> Conserved:
+    """Return what is conserved along all motions of a scene.
+
+    Momenta of ignorable coordinates; the energy function ``h = sum p q' - L`` (Jacobi integral), and whether it is
+    T + V; linear and angular momentum along all directions in which the scene is invariant, whatever these are; boosts
+    of closed scenes; angular momenta of symmetric bodies about their own axes.
+
+    Each is proven on the expression graph, for all states and parameters, or where that is too large, checked at random
+    states, which it says.
+
+    Parameters
+    ----------
+    scene
+        The scene, or an assembly of it.
+    symmetries
+        Symmetries that are stated, besides those that are found.
+    orientation
+        See `atwood.assemble`. With Euler angles, these can be ignorable coordinates.
+
+    Returns
+    -------
+    Conserved
+        The quantities, each with a name, an expression, and how it is known; and what is not conserved.
+
+    Raises
+    ------
+    StartError
+        If the scene has no consistent start.
+    UsageError
+        If a symmetry that is stated is none; the error has a state at which it fails.
+    """
+    assembly = assembly_of(scene, orientation=orientation)
+    found = lagrangian_of(assembly, "reduced")
+    notation = notation_of(assembly, found)
+    quantities = Quantities(assembly, found)
+    prover, formulas = Prover(quantities, notation), EquationFormulas(assembly, found, notation)
+    every: Any = symmetries
+    stated = [check_symmetry(one, quantities, prover, formulas) for one in every]
+    findings = find_conserved(assembly, quantities, prover)
+    made = [ConservedQuantity(one, formulas) for one in (*findings.items, *stated)]
+    beyond = [_BEYOND, *([_ROLLING] if any(not one.holonomic for one in assembly.reduced.constraints) else [])]
+    return Conserved(made, findings.notes, assembly.flat.name, beyond)

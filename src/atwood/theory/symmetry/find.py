@@ -1,0 +1,371 @@
+"""What is conserved along the motions of a scene, and why the rest is not.
+
+A quantity C with ``dC/dt = sum w_k (row_k - G^T lambda)_k``, identically in all coordinates, velocities, accelerations
+and multipliers, is conserved: the rows are zero along motions. The displacements w are the symmetry that belongs to it
+(Noether; Goldstein, section 13.7, and Landau and Lifshitz, Mechanics, chapter 2). Where this identity is too long to be
+brought to a normal form, rates are looked at at random states.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.expr import Expression, depends_on
+from atwood.forms.assembly import Assembly
+from atwood.late import dataclass, replace
+from atwood.mechanics.outputs.observables import add_up
+from atwood.numerics.solutions import least_norm
+from atwood.simulation.dynamics.orientation_coordinates import COORDINATE_SWITCH
+from atwood.simulation.events.modes import find_event_functions
+from atwood.theory.symmetry.directions import axis_name, axis_text, planar_point, rotations_of, straight_of
+from atwood.theory.symmetry.invariance import (
+    KEPT,
+    about_center,
+    conserved_directions,
+    is_constant,
+    is_kept,
+    readable_basis,
+)
+from atwood.theory.symmetry.proof import Generator, Prover
+from atwood.theory.symmetry.quantities import Quantities
+from atwood.theory.symmetry.states import RandomStates, State
+
+__all__ = ["Finding", "Findings", "find_conserved"]
+
+_FEW = 24
+"""Up to so many velocities each momentum is looked at; beyond, those whose force is zero as it is written."""
+
+_FAR = 10.0
+"""In sizes of the scene: beyond that far from the origin, angular momenta are compared about the middle of it."""
+
+_ALIKE = 1e-11
+"""Relative to the largest: values of one quantity, computed in two ways."""
+
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """A conserved quantity.
+
+    Attributes
+    ----------
+    name
+        Such as ``"h"``, ``"p:rail.displacement"``, ``"P.x"``, ``"L.z"``, ``"K.x"``.
+    kind
+        What it is conserved by.
+    unit, meaning
+        Its SI unit, and what it is in words.
+    value
+        The quantity, on the symbols of the scene's Lagrangian.
+    proven
+        Whether it is proven on the graph.
+    evidence
+        How it is known, in words.
+    direction, point
+        Of a total momentum: its direction in world axes, and of an angular momentum a point of the axis, m.
+    """
+
+    name: str
+    kind: str
+    unit: str
+    meaning: str
+    value: Expression
+    proven: bool
+    evidence: str
+    direction: tuple[float, ...] = ()
+    point: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """What was found.
+
+    Attributes
+    ----------
+    items
+        The conserved quantities.
+    notes
+        What is not conserved, and what the findings depend on.
+    """
+
+    items: tuple[Finding, ...]
+    notes: tuple[str, ...]
+
+
+def find_conserved(assembly: Assembly, quantities: Quantities, prover: Prover) -> Findings:
+    """Return what is conserved along all motions of a scene.
+
+    Parameters
+    ----------
+    assembly
+        The scene; generalized coordinates are those of its reduced form.
+    quantities
+        What may be conserved.
+    prover
+        What proves identities.
+    """
+    return _Search(assembly, quantities, prover).run()
+
+
+class _Search:
+    """The candidates of one scene, and the states that they are looked at."""
+
+    def __init__(self, assembly: Assembly, quantities: Quantities, prover: Prover) -> None:
+        self.assembly, self.quantities, self.prover = assembly, quantities, prover
+        self.found = quantities.found
+        self.items: list[Finding] = []
+        self.notes: list[str] = []
+        self._columns: list[FloatArray] = []  # values at the states of what was found, less their mean
+        self._values: list[Expression] = []
+        self.states: list[State] = []
+
+    def add(self, values: Sequence[Expression]) -> list[int]:
+        """Note quantities that are to be looked at; return their numbers."""
+        first = len(self._values)
+        self._values += values
+        return list(range(first, len(self._values)))
+
+    def run(self) -> Findings:
+        """Return what is found."""
+        found, q = self.found, self.quantities
+        [energy, total] = self.add([q.energy_function, q.total_energy])
+        plain = [k for k, place in enumerate(found.moves) if place is not None and self._may_be_ignorable(k)]
+        momenta = self.add([q.momenta[k] for k in plain])
+        spins = [
+            (one.body, self.add([q.momenta[k] for k in one.speeds]), list(one.speeds))
+            for one in found.equations.orientation_coordinates
+            if one.kind == "quaternion" and len(one.speeds) == 3
+        ]
+        motions = q.motions
+        linear, angular = self.add(motions.momentum), self.add(motions.angular_momentum)
+        moments = self.add(motions.moments)
+        states = RandomStates(self.assembly, q.on_speeds(self._values))
+        count = max(12, len(found.velocities) + 6) if len(found.velocities) <= _FEW else 12
+        self.states = states.draw(count, q.center[1])
+        if not self.states:
+            self.notes.append(f"nothing could be checked at random states near its start: {states.reason}")
+            return Findings((), tuple(self.notes))
+        self._energy(energy, total, states.is_plain)
+        for number, k in zip(momenta, plain, strict=True):
+            self._momentum(number, k)
+        for body, numbers, speeds in spins:
+            self._spins(body, numbers, speeds)
+        self._totals(linear, angular, moments)
+        self._caveats()
+        return Findings(tuple(self.items), tuple(self.notes))
+
+    # -- one after the other ------------------------------------------------------------------------------------------
+
+    def _may_be_ignorable(self, k: int) -> bool:
+        found = self.found
+        if len(found.velocities) <= _FEW:
+            return True
+        place = found.moves[k]
+        assert place is not None
+        return not depends_on(found.rows[k], [found.coordinates[place]])
+
+    def _energy(self, number: int, total: int, is_plain: bool) -> None:
+        value, found = self.quantities.energy_function, self.found
+        kept = is_kept(self.states, number)
+        # Of functions that are set free, that and their integrals need not belong together any more.
+        proven = (kept or not is_plain) and self.prover.along(value, dict(enumerate(found.velocities)), with_rates=True)
+        if not proven and not kept:
+            worst = max(self.states, key=lambda one: abs(one.rates[total]) / (one.terms[total] or 1.0))
+            told = "neither the energy function h nor T + V is conserved"
+            if is_kept(self.states, total):
+                self._take("T + V", "total energy", "J", "T + V", self.quantities.total_energy, False, total)
+                told = "the energy function h is not conserved, T + V is"
+            else:
+                told += f": at t = {worst.t:.3g} s, at a random state, T + V changes at {worst.rates[total]:.3g} W"
+            self.notes.append(told)
+            return
+        size = max(abs(one.values[total]) for one in self.states)
+        alike = self.prover.is_zero(value - self.quantities.total_energy) or all(
+            abs(one.values[number] - one.values[total]) <= _ALIKE * size for one in self.states
+        )
+        if alike:
+            meaning = "energy function h = T + V"
+        else:
+            rest = "T + V is conserved, too" if is_kept(self.states, total) else "T + V is not conserved"
+            meaning = f"energy function h (Jacobi integral), not T + V; {rest}"
+        self._take("h", "energy function", "J", meaning, value, proven, number)
+
+    def _momentum(self, number: int, k: int) -> None:
+        found = self.found
+        place = found.moves[k]
+        assert place is not None
+        name, value = found.names[place], self.quantities.momenta[k]
+        rotates = name.unit != "m"
+        if is_kept(self.states, number) and not self._is_silent(number):
+            proven = self.prover.along(value, {k: found.graph.one})
+            unit = "kg*m^2/s" if rotates else "kg*m/s"
+            meaning = f"momentum of {name.name}, which is ignorable"
+            self._take(f"p:{name.name}", "ignorable coordinate", unit, meaning, value, proven, number)
+
+    def _spins(self, body: str, numbers: Sequence[int], speeds: Sequence[int]) -> None:
+        kept = conserved_directions(self.states, numbers, np.ones(3))
+        if not kept.shape[1]:
+            return
+        for axis in readable_basis(kept).T:
+            values = [self.quantities.momenta[k] for k in speeds]
+            value, numeric = self._combined(axis, values, numbers)
+            if self._is_known(numeric):
+                continue
+            weights = dict(zip(speeds, axis, strict=True))
+            proven = self.prover.along(value, {k: self.found.graph.constant(w) for k, w in weights.items()})
+            meaning = f"angular momentum about the axis {axis_text(axis)} of {body}"
+            name = f"spin:{body}" + axis_name(axis)
+            self._take(name, "symmetric body", "kg*m^2/s", meaning, value, proven, numeric, tuple(map(float, axis)))
+
+    def _totals(self, linear: Sequence[int], angular: Sequence[int], moments: Sequence[int]) -> None:
+        motions, n = self.quantities.motions, len(linear)
+        center, length = self.quantities.center
+        units = np.array([1.0] * n + [length] * len(angular))
+        if float(np.max(np.abs(center), initial=0.0)) > _FAR * length:
+            there, matrix = about_center(self.states, linear, angular, center, length)
+            kept = matrix @ conserved_directions(there, range(len(units)), units)
+        else:
+            kept = conserved_directions(self.states, [*linear, *angular], units)
+        if not kept.shape[1]:
+            return
+        scaled = kept * units[:, None]
+        straight = straight_of(scaled, n)
+        for axis in straight.T:
+            value, numeric = self._combined(axis, motions.momentum, linear)
+            d = self._in_world(axis)
+            name = axis_name(d)
+            told = f"linear momentum along {axis_text(d)}"
+            if not self._is_known(numeric, told):
+                proven = self.prover.of_motion(value, self._generator([*axis, *[0.0] * len(angular)], linear, angular))
+                self._take(f"P{name}", "linear momentum", "kg*m/s", told, value, proven, numeric, tuple(d))
+            if moments:
+                self._boost(axis, name, told, moments, linear, angular)
+        for axis, moved in rotations_of(scaled, n, straight):
+            moved = np.where(np.abs(moved) < 1e-9 * np.max(np.abs(axis)), 0.0, moved)  # rounding of where the axis is
+            about = length * moved  # a rotation in its own units
+            coefficients = np.concatenate([about, axis])
+            every = [*motions.momentum, *motions.angular_momentum]
+            value, numeric = self._combined(coefficients, every, [*linear, *angular])
+            self._rotation(value, numeric, axis, about, self._generator(list(coefficients), linear, angular))
+
+    def _rotation(
+        self, value: Expression, numeric: FloatArray, axis: FloatArray, about: FloatArray, generator: Generator
+    ) -> None:
+        if len(axis) == 1:  # in the plane, about the point (x, z): v = omega x p
+            direction, point, pitch, name = np.array([0.0, -1.0, 0.0]), planar_point(axis, about), 0.0, ""
+            told = "angular momentum, counter-clockwise"
+        else:
+            size = float(axis @ axis)
+            direction, point, pitch = axis, np.cross(axis, about) / size, float(axis @ about) / size
+            name = axis_name(axis)
+            told = f"angular momentum about {axis_text(axis)}"
+        point = np.where(np.abs(point) < 1e-9 * self.quantities.center[1], 0.0, point)
+        if np.any(point):
+            told += f" through {axis_text(point)} m"
+        if abs(pitch) > 1e-9 * self.quantities.center[1]:
+            told = f"{told}, with {pitch:.6g} m of the linear momentum along it (a screw)"
+        if self._is_known(numeric, told):
+            return
+        proven = self.prover.of_motion(value, generator)
+        where = tuple(map(float, direction)), tuple(map(float, point))
+        self._take(f"L{name}", "angular momentum", "kg*m^2/s", told, value, proven, numeric, *where)
+
+    def _boost(
+        self,
+        axis: FloatArray,
+        name: str,
+        told: str,
+        moments: Sequence[int],
+        linear: Sequence[int],
+        angular: Sequence[int],
+    ) -> None:
+        rates = np.array([one.rates[moments] - one.values[linear] for one in self.states]) @ axis
+        terms = np.array([one.terms[moments] + np.abs(one.values[linear]) for one in self.states]) @ np.abs(axis)
+        if np.any(np.abs(rates) > KEPT * terms):
+            return
+        motions, found = self.quantities.motions, self.found
+        pairs = zip(motions.moments, motions.momentum, strict=True)
+        value, numeric = self._combined(axis, [m - found.time * p for m, p in pairs], moments)
+        moving = self._generator([*axis, *[0.0] * len(angular)], linear, angular)
+        proven = self.prover.of_motion(
+            value, None if moving is None else {k: -found.time * w for k, w in moving.items()}
+        )
+        direction = told.removeprefix("linear momentum ")
+        meaning = f"boost {direction}: K = m r - p t, so that the centre of mass moves steadily"
+        self._take(f"K{name}", "boost", "kg*m", meaning, value, proven, numeric, tuple(self._in_world(axis)))
+
+    # -- what they share ----------------------------------------------------------------------------------------------
+
+    def _generator(self, coefficients: list[float], linear: Sequence[int], angular: Sequence[int]) -> Generator:
+        weights = np.array(coefficients)
+        moved = [weights @ one.generators[[*linear, *angular]] for one in self.states]
+        return self.prover.fitted(self.states, moved)
+
+    def _in_world(self, axis: FloatArray) -> FloatArray:
+        basis = np.array([[float(c) for c in vector] for vector in self.assembly.mechanism.space.basis])
+        return np.asarray(axis @ basis)
+
+    def _combined(
+        self, weights: FloatArray, values: Sequence[Expression], numbers: Sequence[int]
+    ) -> tuple[Expression, FloatArray]:
+        """Return a combination of quantities, and its values at the states."""
+        terms = [one if w == 1.0 else float(w) * one for w, one in zip(weights, values, strict=True) if w]
+        numeric = np.array([one.values[list(numbers)] for one in self.states]) @ weights
+        return add_up([self.found.graph.zero, *terms]), numeric
+
+    def _is_silent(self, number: int) -> bool:
+        return is_constant(np.array([one.values[number] for one in self.states]))
+
+    def _is_known(self, values: FloatArray, told: str = "") -> bool:
+        """Return whether a quantity follows from what was found; where it is one of these, that one says so."""
+        centred = values - values.mean()
+        size = float(np.linalg.norm(centred))
+        if not self._columns or not size:
+            return not size
+        columns = np.stack(self._columns, axis=1)
+        scales = np.linalg.norm(columns, axis=0)
+        scales[scales == 0.0] = 1.0
+        weights = least_norm(columns / scales, centred)
+        if (
+            float(np.linalg.norm(columns / scales @ weights - centred)) > 1e-8 * size
+            or len(columns) <= columns.shape[1]
+        ):
+            return False
+        alike = np.flatnonzero(np.abs(np.abs(weights / scales) - 1.0) < 1e-8)
+        if told and len(alike) == 1 and np.sum(np.abs(weights) > 1e-8 * size) == 1:
+            one = self.items[int(alike[0])]
+            sign = "" if weights[alike[0]] > 0.0 else "minus "
+            self.items[int(alike[0])] = replace(one, meaning=f"{one.meaning}; it is {sign}the {told}")
+        return True
+
+    def _take(
+        self,
+        name: str,
+        kind: str,
+        unit: str,
+        meaning: str,
+        value: Expression,
+        proven: bool,
+        numeric: FloatArray | int,
+        direction: tuple[float, ...] = (),
+        point: tuple[float, ...] = (),
+    ) -> None:
+        if isinstance(numeric, int):
+            numeric = np.array([one.values[numeric] for one in self.states])
+        self._columns.append(numeric - numeric.mean())
+        names = {one.name for one in self.items}
+        unique = name if name not in names else next(f"{name}_{k}" for k in range(2, 99) if f"{name}_{k}" not in names)
+        checked = f"checked at {len(self.states)} random states"
+        why = self.prover.why_not
+        e = self.found.equations
+        timely = ", at so many times" if depends_on(add_up([*e.rows]), [e.time]) else ""
+        evidence = "proven on the graph" if proven else f"{checked}{timely} ({why})"
+        self.items.append(Finding(unique, kind, unit, meaning, value, proven, evidence, direction, point))
+
+    def _caveats(self) -> None:
+        if self.assembly.modes:
+            self.notes.append("in the modes in which its parts start; an event may change what is conserved")
+        elif any(one.target != COORDINATE_SWITCH for one in find_event_functions(self.assembly)):
+            self.notes.append("between events")
