@@ -12,6 +12,7 @@ from math import inf, isfinite, sqrt
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError
 from atwood.integrators.embedded.steps import APART, GROWTH, RETREAT, SAFETY, SHRINKAGE
 from atwood.integrators.embedded.tableau import Tableau
@@ -26,7 +27,7 @@ from atwood.integrators.explicit_problem import (
     absolute_tolerances,
     no_interpolation,
 )
-from atwood.integrators.protocol import FloatArray, SolverOptions
+from atwood.integrators.protocol import SolverOptions
 
 
 def matrix(rows: Sequence[Mapping[int, float]], width: int) -> FloatArray:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.codegen.python.backend import compile_program
 from atwood.errors import KernelEvaluationError
 from atwood.integrators.compiled_functions import StepGuard
@@ -24,7 +25,7 @@ from atwood.integrators.explicit_problem import (
     absolute_tolerances,
     no_interpolation,
 )
-from atwood.integrators.protocol import FloatArray, SolverOptions
+from atwood.integrators.protocol import SolverOptions
 from atwood.integrators.taylor.problem import (
     DEFECT,
     FLOOR,

@@ -13,10 +13,11 @@ from scipy.interpolate import make_interp_spline
 
 from atwood import Result, Scene, assemble, compare, simulate
 from atwood.arrays import FloatArray
+from atwood.forms.loops.closed_form import closed_form
 from atwood.integrators.ida import library as sundials_library
 from atwood.simulation.initialization.start import find_start, own_state
 from atwood.simulation.problem import closed_loops
-from atwood.simulation.problem.closed_loops import Solved, closed_form, solve_at
+from atwood.simulation.problem.closed_loops import Solved, solve_at
 from atwood.simulation.problem.preparation import make_plan
 from atwood_library import Ground, Link, Pivot
 from atwood_library.scenes import AndrewsSqueezer, Bricard, FourBar, FourBarRow, SliderCrank, Strandbeest

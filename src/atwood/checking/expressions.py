@@ -16,8 +16,9 @@ from atwood.mechanics.dynamics.forces import local_gradients
 from atwood.model.declare.connectors import JointCoordinate
 from atwood.model.declare.law import Law
 from atwood.model.local.flatten import FlatScene, Part
-from atwood.model.local.laws import LocalPart, localize
+from atwood.model.local.laws import localize
 from atwood.model.local.parameters import ParameterTable
+from atwood.model.local.parts import LocalPart
 from atwood.model.values.rotation import from_axes
 from atwood.model.values.vector import Vector
 

@@ -27,9 +27,9 @@ from atwood.forms.reduced import reduced_form
 from atwood.forms.shared import MAXIMAL, REDUCED, REGULAR, Shared
 from atwood.forms.source import Source, no_start_quantity
 from atwood.late import dataclass, replace
-from atwood.mechanics.build import Mechanism, build_equations
+from atwood.mechanics.build import build_equations
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.mechanics.kinematics.mechanism import discrete_states_of
+from atwood.mechanics.kinematics.mechanism import Mechanism, discrete_states_of
 from atwood.mechanics.outputs.observables import Observable, Reaction, list_reactions
 from atwood.mechanics.outputs.reading import observe
 from atwood.mechanics.read import LineSigns

@@ -14,13 +14,12 @@ from typing import Any, TypeVar
 from atwood.expr import Expression
 from atwood.forms.kept import Key
 from atwood.late import dataclass, replace
-from atwood.mechanics.build import Mechanism, check_closures
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.mechanics.kinematics.mechanism import Decision
+from atwood.mechanics.kinematics.mechanism import Decision, Mechanism, check_closures
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.model.local.flatten import FlatScene, Part
-from atwood.model.local.laws import LocalPart
 from atwood.model.local.parameters import variation_names
+from atwood.model.local.parts import LocalPart
 from atwood.model.values.vector import Vector
 from atwood.stages import stage
 from atwood.topology.line_signs import find_line_signs

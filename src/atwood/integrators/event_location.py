@@ -22,10 +22,11 @@ from math import inf, isnan
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.codegen.tangents import SECANT
 from atwood.errors import KernelEvaluationError
 from atwood.integrators.dips import Point, find_dip, may_dip
-from atwood.integrators.protocol import JUST_HAPPENED, FloatArray, ImplicitProblem, Values
+from atwood.integrators.protocol import JUST_HAPPENED, ImplicitProblem, Values
 from atwood.late import dataclass
 
 __all__ = ["EventLocator", "Root", "State"]

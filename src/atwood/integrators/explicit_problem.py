@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, UsageError
 from atwood.integrators.compiled_functions import Lookout, StepGuard
 from atwood.integrators.event_location import State
-from atwood.integrators.protocol import FloatArray, SolverOptions, Values
+from atwood.integrators.protocol import SolverOptions, Values
 from atwood.late import dataclass
 
 if TYPE_CHECKING:

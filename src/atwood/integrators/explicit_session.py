@@ -13,19 +13,12 @@ from typing import cast
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.errors import StartError, UsageError
 from atwood.integrators.compiled_functions import Lookout
 from atwood.integrators.event_location import ROUNDING, EventLocator, Root
 from atwood.integrators.explicit_problem import ExplicitProblem, Outcome, Stepper
-from atwood.integrators.protocol import (
-    Budget,
-    FloatArray,
-    ImplicitProblem,
-    SolverOptions,
-    Statistics,
-    Status,
-    StepResult,
-)
+from atwood.integrators.protocol import Budget, ImplicitProblem, SolverOptions, Statistics, Status, StepResult
 from atwood.integrators.session import Session, copied
 
 __all__ = ["ExplicitSession", "Leave"]

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.arrays import FloatArray
 from atwood.codegen.llvm.build import Built, build_code
 from atwood.codegen.llvm.module import CodeOptions
 from atwood.codegen.routines.source import RoutineSource
 from atwood.integrators.event_location import State
 from atwood.integrators.explicit_problem import Counts, Outcome, Stepper, no_interpolation
-from atwood.integrators.protocol import FloatArray
 from atwood.late import dataclass, names_of
 
 if TYPE_CHECKING:

@@ -10,10 +10,11 @@ from typing import TypeVar
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, UsageError
 from atwood.integrators.compiled_functions import Lookout
 from atwood.integrators.event_location import EventLocator, Root, State
-from atwood.integrators.protocol import Budget, FloatArray, Statistics, Status, StepResult
+from atwood.integrators.protocol import Budget, Statistics, Status, StepResult
 
 __all__ = ["Session", "copied"]
 

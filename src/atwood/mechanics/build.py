@@ -30,8 +30,7 @@ from atwood.mechanics.kinematics.motion import Motion, Movement, motion_in_plane
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.mechanics.kinematics.positions import BodyShape, Kinematics, shapes
 from atwood.model.declare.binding import bind
-from atwood.model.local.laws import LocalConstraint
-from atwood.model.local.parts import LocalState, multiplier_symbol
+from atwood.model.local.parts import LocalConstraint, LocalState, multiplier_symbol
 from atwood.model.values.vector import Vector
 from atwood.topology.spanning_forest import Coordinate, SpanningForest
 

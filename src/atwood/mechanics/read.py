@@ -24,8 +24,9 @@ from atwood.mechanics.kinematics.mechanism import (
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.model.declare.carried_inertia import Carried
 from atwood.model.local.flatten import FlatScene
-from atwood.model.local.laws import LocalPart, localize
+from atwood.model.local.laws import localize
 from atwood.model.local.parameters import ParameterTable
+from atwood.model.local.parts import LocalPart
 from atwood.model.values.space import Space, make_space
 from atwood.topology.bodies import Bodies, find_bodies
 from atwood.topology.graph import MechanismGraph, build_graph

@@ -8,11 +8,11 @@ from typing import Any
 from atwood.expr import Expression, Scalar, evaluate
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
-from atwood.mechanics.build import Mechanism
+from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.model.compose.composite import Model
 from atwood.model.compose.scene import Scene
 from atwood.model.declare.function_values import Function
-from atwood.model.local.laws import LocalPart
+from atwood.model.local.parts import LocalPart
 from atwood.topology.graph import Joint
 from atwood.topology.spanning_forest import SpanningForest
 

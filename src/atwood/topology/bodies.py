@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from atwood.expr import Expression, Scalar, depends_on, is_zero
 from atwood.late import dataclass
 from atwood.model.declare.law import Kind
-from atwood.model.local.laws import LocalConstraint, LocalPart
+from atwood.model.local.parts import LocalConstraint, LocalPart
 from atwood.topology.graph import WORLD, Joint, MechanismGraph
 
 __all__ = ["Bodies", "Body", "RigidStep", "find_bodies"]

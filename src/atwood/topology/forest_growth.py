@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Literal
 
 from atwood.expr import Expression
-from atwood.model.local.laws import LocalPart
+from atwood.model.local.parts import LocalPart
 from atwood.model.values.space import Space
 from atwood.topology.bodies import Bodies, reads_position
 from atwood.topology.graph import Joint, MechanismGraph, unit_of

@@ -11,7 +11,7 @@ from atwood.expr import Expression, depends_on
 from atwood.late import dataclass
 from atwood.model.declare.connectors import Frame, JointCoordinate
 from atwood.model.local.flatten import FlatScene
-from atwood.model.local.laws import LocalJoint, LocalPart
+from atwood.model.local.parts import LocalJoint, LocalPart
 from atwood.model.values.rotation import FREE, Rotation
 from atwood.topology.groups import connected_groups
 

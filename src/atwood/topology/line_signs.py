@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from atwood.expr import Expression, evaluate
 from atwood.model.local.flatten import FlatScene
-from atwood.model.local.laws import LocalPart
+from atwood.model.local.parts import LocalPart
 from atwood.model.values.space import Space
 from atwood.model.values.vector import Vector, dot
 from atwood.topology.bodies import Bodies

@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 from atwood.errors import AtwoodError
 from atwood.expr.core import algebra
-from atwood.expr.core.algebra import add, component, divide, multiply, negate, select, subtract, unary
+from atwood.expr.core.algebra import component, select, unary
 from atwood.expr.core.analysis import dependents, live
+from atwood.expr.core.arithmetic import add, divide, multiply, negate, subtract
 from atwood.expr.core.graph import Expression, Graph
 from atwood.expr.core.growth import hand_back_quotient, logarithmic_slopes, tangent_of_quotient
 from atwood.expr.core.operations import LEAVES, PIECEWISE_CONSTANT

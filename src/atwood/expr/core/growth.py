@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Mapping
 
-from atwood.expr.core.algebra import add, divide, multiply, negate, subtract, unary
+from atwood.expr.core.algebra import unary
+from atwood.expr.core.arithmetic import add, divide, multiply, negate, subtract
 from atwood.expr.core.graph import Expression
 
 __all__ = ["hand_back_quotient", "logarithmic_slopes", "tangent_of_quotient"]

@@ -11,7 +11,7 @@ from atwood.late import replace
 from atwood.mechanics.dynamics.equations import Equations, balance_rows, inertia_forces
 from atwood.mechanics.dynamics.forces import Forces, in_joint_coordinates, local_map, part_forces
 from atwood.mechanics.outputs.observables import add_up, part_energies
-from atwood.model.local.laws import LocalPart
+from atwood.model.local.parts import LocalPart
 
 __all__ = ["contribution", "inertial_terms"]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.codegen.llvm.build import build_code, default_options
 from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.expr import Program
@@ -11,7 +12,6 @@ from atwood.integrators.composition.steps import composition_source
 from atwood.integrators.gauss.layout import POINTERS, Layout
 from atwood.integrators.gauss.native import bind_functions
 from atwood.integrators.gauss.steps import FUNCTIONS
-from atwood.integrators.protocol import FloatArray
 
 __all__ = ["CompiledComposition"]
 

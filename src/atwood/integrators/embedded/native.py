@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from atwood.arrays import FloatArray
 from atwood.codegen.llvm.build import build_code, default_options
 from atwood.codegen.llvm.module import Part
 from atwood.codegen.once import once
@@ -34,7 +35,7 @@ from atwood.integrators.explicit_problem import (
     absolute_tolerances,
 )
 from atwood.integrators.native_stepper import COUNTED, NativeStepper, Routines, routines_of
-from atwood.integrators.protocol import FloatArray, SolverOptions
+from atwood.integrators.protocol import SolverOptions
 from atwood.late import dataclass
 
 if TYPE_CHECKING:

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.arrays import FloatArray
 from atwood.codegen.llvm.build import Built, build_code
 from atwood.codegen.llvm.module import CodeOptions
 from atwood.codegen.once import once
 from atwood.codegen.routines.source import RoutineSource
 from atwood.integrators.ensemble.code import FIELDS
-from atwood.integrators.protocol import FloatArray
 from atwood.late import dataclass
 
 __all__ = ["ENDS", "Batch", "BatchPlaces"]

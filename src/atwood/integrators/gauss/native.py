@@ -9,6 +9,7 @@ from ctypes import c_double, c_int, c_int64, c_void_p
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.codegen.llvm.build import Built, build_code, default_options
 from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.errors import KernelEvaluationError, SolveError
@@ -19,7 +20,7 @@ from atwood.integrators.explicit_problem import CompiledRates, Counts, Outcome, 
 from atwood.integrators.gauss.hamiltonian import CompiledMethod
 from atwood.integrators.gauss.layout import COUNTS, NUMBERS, POINTERS, Layout
 from atwood.integrators.gauss.steps import FUNCTIONS, gauss_source
-from atwood.integrators.protocol import FloatArray, SolverOptions
+from atwood.integrators.protocol import SolverOptions
 
 __all__ = ["CompiledGauss", "GaussStepper", "bind_functions"]
 

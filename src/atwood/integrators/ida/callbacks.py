@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError
 from atwood.integrators.event_location import State
 from atwood.integrators.ida.library import SundialsLibrary
 from atwood.integrators.ida.signatures import JACOBIAN, RESIDUAL, WEIGHTS
-from atwood.integrators.protocol import FloatArray, ImplicitProblem, LinearSolver
+from atwood.integrators.protocol import ImplicitProblem, LinearSolver
 from atwood.late import dataclass
 
 __all__ = [

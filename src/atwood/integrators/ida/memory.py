@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.integrators.compiled_functions import Lookout
 from atwood.integrators.ida.callbacks import Record
 from atwood.integrators.ida.library import SundialsLibrary
 from atwood.integrators.ida.signatures import JACOBIAN
 from atwood.integrators.ida.sparse import SparseSolver
-from atwood.integrators.protocol import ChoosePivots, FloatArray
+from atwood.integrators.protocol import ChoosePivots
 from atwood.late import dataclass
 
 if TYPE_CHECKING:

@@ -18,6 +18,7 @@ from math import inf
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, UsageError
 from atwood.integrators.compiled_functions import Lookout
 from atwood.integrators.event_location import EventLocator, Root, State
@@ -30,7 +31,6 @@ from atwood.integrators.ida.states import checked_state, is_finite
 from atwood.integrators.ida.sundae import REASONS, SHORTER, TOO_LONG
 from atwood.integrators.protocol import (
     Budget,
-    FloatArray,
     ImplicitProblem,
     SolverOptions,
     Statistics,

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.integrators.compiled_functions import NativeCallbacks
 from atwood.integrators.event_location import State
 from atwood.integrators.ida.callbacks import Record, address, jacobian_function, residual_function, weight_function
 from atwood.integrators.ida.library import library
 from atwood.integrators.ida.memory import IdaMemory
-from atwood.integrators.protocol import FloatArray, ImplicitProblem, LinearSolver, SolverOptions
+from atwood.integrators.protocol import ImplicitProblem, LinearSolver, SolverOptions
 from atwood.late import dataclass
 
 __all__ = ["FIXED_NEWTON", "LOOSE_NEWTON", "TIGHT_NEWTON", "IdaTuning", "measured_tuning", "prepare"]

@@ -6,9 +6,9 @@ from math import isfinite
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.errors import StartError, UsageError
 from atwood.integrators.event_location import State
-from atwood.integrators.protocol import FloatArray
 
 __all__ = ["checked_state", "is_finite"]
 

@@ -23,15 +23,14 @@ from typing import Any
 
 import numpy as np
 
+from atwood.arrays import FloatArray, IndexArray
 from atwood.errors import KernelEvaluationError, UsageError
 from atwood.integrators.event_location import ROUNDING, EventLocator, Root, State
 from atwood.integrators.ida.quiet import without_solver_messages
 from atwood.integrators.ida.states import checked_state
 from atwood.integrators.protocol import (
     Budget,
-    FloatArray,
     ImplicitProblem,
-    IndexArray,
     SolverOptions,
     Statistics,
     Status,

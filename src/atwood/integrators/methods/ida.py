@@ -14,7 +14,8 @@ __all__ = ["IDA", "IDA_SUNDAE"]
 
 
 def _open_native(task: Task) -> Session:
-    from atwood.integrators.ida.native import IdaTuning, NativeSession
+    from atwood.integrators.ida.native import NativeSession
+    from atwood.integrators.ida.setup import IdaTuning
 
     assert task.implicit is not None
     assert task.yp is not None

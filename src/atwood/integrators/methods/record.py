@@ -6,8 +6,9 @@ from collections.abc import Callable
 from math import inf
 from typing import TYPE_CHECKING, Any, Literal
 
+from atwood.arrays import FloatArray
 from atwood.integrators.explicit_problem import LOOSEST, ExplicitProblem
-from atwood.integrators.protocol import Budget, FloatArray, ImplicitProblem, SolverOptions
+from atwood.integrators.protocol import Budget, ImplicitProblem, SolverOptions
 from atwood.late import dataclass
 
 if TYPE_CHECKING:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from atwood.arrays import FloatArray
 from atwood.codegen.llvm.build import build_code, default_options
 from atwood.codegen.llvm.module import Part
 from atwood.codegen.once import once
@@ -22,7 +23,7 @@ from atwood.expr.series.taylor import TaylorPrograms
 from atwood.integrators.compiled_functions import StepGuard
 from atwood.integrators.explicit_problem import absolute_tolerances
 from atwood.integrators.native_stepper import NativeStepper, Routines, routines_of
-from atwood.integrators.protocol import FloatArray, SolverOptions
+from atwood.integrators.protocol import SolverOptions
 from atwood.integrators.taylor.memory import (
     COUNTS,
     LANES,

@@ -17,7 +17,8 @@ from collections.abc import Callable
 from math import ceil, exp, frexp, inf, ldexp, log
 from typing import TYPE_CHECKING
 
-from atwood.integrators.protocol import FloatArray, SolverOptions
+from atwood.arrays import FloatArray
+from atwood.integrators.protocol import SolverOptions
 from atwood.late import dataclass
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from atwood.mechanics.constraints.certainty import rounds_to_zero
 from atwood.mechanics.constraints.values import Values
 from atwood.mechanics.dynamics.inertia import Masses
 from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide, extent
-from atwood.model.local.laws import LocalConstraint, LocalPart
+from atwood.model.local.parts import LocalConstraint, LocalPart
 from atwood.tolerances import tolerances
 from atwood.topology.spanning_forest import SpanningForest
 

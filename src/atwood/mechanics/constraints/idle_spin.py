@@ -20,8 +20,7 @@ from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide,
 from atwood.mechanics.kinematics.motion import Movement
 from atwood.mechanics.kinematics.orientation import NodeTurn, body_offsets
 from atwood.model.declare.law import ConstraintOptions, Law
-from atwood.model.local.laws import LocalConstraint, LocalPart
-from atwood.model.local.parts import LocalConnector
+from atwood.model.local.parts import LocalConnector, LocalConstraint, LocalPart
 from atwood.model.values.rotation import from_axes
 from atwood.model.values.vector import Vector, cross, dot, norm
 

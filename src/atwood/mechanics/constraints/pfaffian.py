@@ -24,7 +24,7 @@ from atwood.mechanics.constraints.certainty import rounds_to_zero
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide, extent
 from atwood.mechanics.kinematics.motion import Movement
-from atwood.model.local.laws import LocalConstraint
+from atwood.model.local.parts import LocalConstraint
 from atwood.numerics.rank import null_space
 from atwood.numerics.solutions import least_squares
 from atwood.tolerances import tolerances

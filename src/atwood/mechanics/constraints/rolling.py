@@ -34,7 +34,7 @@ from atwood.mechanics.dynamics.forces import Site, local_map
 from atwood.mechanics.dynamics.inertia import Masses
 from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide, extent, from_start
 from atwood.mechanics.kinematics.motion import Motion, Movement
-from atwood.model.local.laws import LocalConstraint
+from atwood.model.local.parts import LocalConstraint
 from atwood.topology.spanning_forest import SpanningForest
 
 __all__ = ["Taken", "integrated", "take_up", "without_idle_spins"]

@@ -17,7 +17,7 @@ from atwood.expr import Expression, evaluate, jacobian
 from atwood.late import dataclass
 from atwood.mechanics.constraints.spin_places import Place, places_of
 from atwood.mechanics.kinematics.mechanism import Mechanism
-from atwood.model.local.laws import LocalPart
+from atwood.model.local.parts import LocalPart
 from atwood.model.values.rotation import Rotation
 from atwood.numerics.rank import null_space
 

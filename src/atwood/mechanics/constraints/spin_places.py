@@ -11,7 +11,7 @@ from atwood.arrays import FloatArray
 from atwood.expr import Expression, evaluate
 from atwood.late import dataclass
 from atwood.mechanics.kinematics.mechanism import Mechanism
-from atwood.model.local.laws import LocalPart
+from atwood.model.local.parts import LocalPart
 from atwood.model.values.rotation import FREE, as_rotation
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from atwood.late import dataclass
 from atwood.mechanics.dynamics.inertia import shifted_tensor, sum_vectors, tensor_of, turned_tensor
 from atwood.mechanics.kinematics.orientation import NodeTurn, body_offsets, rotate
 from atwood.model.declare.contributions import BodyInertia
-from atwood.model.local.laws import LocalPart
+from atwood.model.local.parts import LocalPart
 from atwood.model.values.rotation import Axes, transposed
 from atwood.model.values.space import Space, planar_axes
 from atwood.model.values.vector import ZERO, Vector

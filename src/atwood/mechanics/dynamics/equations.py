@@ -18,8 +18,7 @@ from atwood.mechanics.kinematics.mechanism import Constant, Decision
 from atwood.mechanics.kinematics.orientation import inertial_torque, torque_components
 from atwood.mechanics.kinematics.positions import BodyShape, Kinematics
 from atwood.model.declare.contributions import BodyInertia
-from atwood.model.local.laws import LocalConstraint, LocalPart
-from atwood.model.local.parts import LocalState
+from atwood.model.local.parts import LocalConstraint, LocalPart, LocalState
 from atwood.model.values.vector import cross
 from atwood.topology.orientation_coordinates import OrientationCoordinates
 from atwood.topology.spanning_forest import Coordinate, SpanningForest

@@ -13,7 +13,7 @@ from atwood.expr import Expression, Graph, Scalar, depends_on, is_zero, jvp, sub
 from atwood.late import dataclass, replace
 from atwood.mechanics.kinematics.orientation import NodeTurn, node_axes, spin_in_world, torque_components
 from atwood.mechanics.kinematics.positions import Kinematics, Placements
-from atwood.model.local.laws import LocalConstraint, LocalPart
+from atwood.model.local.parts import LocalConstraint, LocalPart
 from atwood.model.values.rotation import Axes, from_axes
 from atwood.model.values.space import Space
 from atwood.model.values.vector import Vector, cross, dot

@@ -11,7 +11,7 @@ from atwood.expr import Expression, Scalar, evaluate, is_zero
 from atwood.late import dataclass
 from atwood.mechanics.kinematics.orientation import NodeTurn, rotate
 from atwood.model.declare.contributions import BodyInertia
-from atwood.model.local.laws import LocalPart
+from atwood.model.local.parts import LocalPart
 from atwood.model.values.rotation import Axes, from_axes, transposed
 from atwood.model.values.space import Space
 from atwood.model.values.vector import ZERO as _ZERO, Vector, dot

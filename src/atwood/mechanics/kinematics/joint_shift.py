@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from atwood.expr import Expression, Graph, depends_on, jvp, substitute
-from atwood.model.local.laws import LocalJoint
+from atwood.model.local.parts import LocalJoint
 from atwood.model.values.rotation import Axes
 from atwood.model.values.vector import Vector, cross
 

@@ -13,7 +13,7 @@ from atwood.errors import UnsupportedError
 from atwood.expr import Expression, Graph, Scalar, affine_coefficients, jvp, live, substitute
 from atwood.late import dataclass
 from atwood.mechanics.kinematics.orientation import NodeTurn, rotate
-from atwood.model.local.laws import LocalPart
+from atwood.model.local.parts import LocalPart
 from atwood.model.values.rotation import Axes
 from atwood.model.values.space import Space
 from atwood.model.values.vector import Vector

@@ -8,8 +8,8 @@ from typing import Any
 
 from atwood.expr import Expression, Graph
 from atwood.late import dataclass
-from atwood.mechanics.build import Mechanism
 from atwood.mechanics.dynamics.equations import Equations
+from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.mechanics.outputs.observables import Reaction
 from atwood.mechanics.outputs.reading import Reader
 from atwood.model.declare.binding import bind

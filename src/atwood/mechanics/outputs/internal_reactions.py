@@ -10,12 +10,13 @@ from collections.abc import Collection, Mapping, Sequence
 
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, Scalar
 from atwood.late import dataclass
-from atwood.mechanics.build import Mechanism, resolve_signals
+from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations, push_body
 from atwood.mechanics.dynamics.forces import Forces, constraint_forces, in_coordinates, local_map, part_forces
+from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.mechanics.kinematics.orientation import spin_in_world
 from atwood.mechanics.outputs.observables import Reaction
-from atwood.model.local.laws import LocalPart
+from atwood.model.local.parts import LocalPart
 from atwood.model.values.space import Space
 from atwood.model.values.vector import Vector, cross
 from atwood.topology.bodies import Body

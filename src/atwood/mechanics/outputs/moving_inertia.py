@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from atwood.expr import Expression, Scalar
 from atwood.late import dataclass
-from atwood.mechanics.build import Mechanism
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.inertia import tensor_of, turned_tensor
 from atwood.mechanics.kinematics.body_points import body_point_of
+from atwood.mechanics.kinematics.mechanism import Mechanism
 
 __all__ = ["MovingMass", "moving_masses"]
 

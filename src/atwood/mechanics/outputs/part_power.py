@@ -12,13 +12,14 @@ from typing import Literal
 
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jvp, substitute
 from atwood.late import dataclass, replace
-from atwood.mechanics.build import Mechanism, resolve_signals
+from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import Forces, in_joint_coordinates, local_map, part_forces
+from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.mechanics.outputs.internal_reactions import add_inertia, add_reactions, multipliers_by_part
 from atwood.mechanics.outputs.observables import part_energies
-from atwood.model.local.laws import LocalPart
 from atwood.model.local.moving_mass import inertial_energy
+from atwood.model.local.parts import LocalPart
 
 __all__ = ["Flow", "PartPowers", "part_energy_program", "part_powers"]
 

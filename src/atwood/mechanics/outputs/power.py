@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from atwood.expr import Expression, jvp, substitute
 from atwood.late import replace
-from atwood.mechanics.build import Mechanism, resolve_signals
+from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import Forces, in_joint_coordinates, local_map, part_forces
+from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.model.local.moving_mass import inertial_energy
 
 __all__ = ["applied_power", "switched_energy"]

@@ -13,12 +13,13 @@ from typing import Any
 from atwood.errors import AtwoodError, MissingNameError
 from atwood.expr import Expression, is_zero
 from atwood.late import replace
-from atwood.mechanics.build import Mechanism, resolve_signals
+from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
+from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.mechanics.outputs.observables import Observable, Reaction, add_up, make_binding, part_energies, take
 from atwood.mechanics.outputs.totals import Totals, add_totals, energy_rate, observe_totals, part_totals
 from atwood.model.declare.binding import Binding, bind
-from atwood.model.local.laws import LocalPart
+from atwood.model.local.parts import LocalPart
 from atwood.model.returned import call_law, law_value, not_evaluated, one_scalar
 from atwood.model.values.vector import Vector
 from atwood.showing import count_of

@@ -11,8 +11,9 @@ from atwood.expr import Scalar
 from atwood.model.declare.binding import Binding
 from atwood.model.declare.connectors import Connector, ConnectorSpec, InputRef, OutputRef, connector
 from atwood.model.declare.declaring import ComponentType, collect_declarations
-from atwood.model.declare.fields import MISSING, Field, ParameterExpression, ParameterSpec, SignalSpec
+from atwood.model.declare.fields import MISSING, Field, ParameterSpec, SignalSpec
 from atwood.model.declare.law import Kind, Law
+from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.declare.quantities import Quantity
 from atwood.model.declare.refusals import (
     given_without_name,

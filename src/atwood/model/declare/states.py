@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from atwood.arguments import ANYTHING, CALLBACK, DOC, NAME, TEXT, either, number, optional, takes
 from atwood.errors import DeclarationError, ParameterError
-from atwood.model.declare.fields import Field, FieldReference, ParameterExpression, ParameterSpec
+from atwood.model.declare.fields import Field, FieldReference, ParameterSpec
+from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.declare.quantities import Quantity
 
 if TYPE_CHECKING:

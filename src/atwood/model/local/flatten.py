@@ -16,8 +16,9 @@ from atwood.model.compose.connection_rules import find_end
 from atwood.model.compose.scene import Scene
 from atwood.model.declare.component import Component
 from atwood.model.declare.connectors import InputRef, OutputRef
-from atwood.model.declare.fields import LARGEST_ANGLE, FieldReference, ParameterExpression, too_large_an_angle
+from atwood.model.declare.fields import LARGEST_ANGLE, FieldReference, too_large_an_angle
 from atwood.model.declare.function_values import Function
+from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.values.units import Unit, parse_quantity, parse_si_unit, parse_unit, split_quantity, unit_of
 
 __all__ = ["FlatScene", "Part", "flatten", "unit_at"]

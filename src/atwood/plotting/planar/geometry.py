@@ -16,11 +16,10 @@ from atwood.expr import Expression, Scalar, depends_on, evaluate
 from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import state_program
 from atwood.late import dataclass, replace
-from atwood.mechanics.build import Mechanism
-from atwood.mechanics.kinematics.mechanism import world_position
+from atwood.mechanics.kinematics.mechanism import Mechanism, world_position
 from atwood.mechanics.kinematics.orientation import body_offsets, plain
 from atwood.model.declare.connectors import Groove
-from atwood.model.local.laws import LocalPart
+from atwood.model.local.parts import LocalPart
 from atwood.model.values.outline import Outline
 from atwood.plotting.planar.columns import spread_columns
 from atwood.plotting.planar.slack import pulling

@@ -8,8 +8,8 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.expr import Expression
-from atwood.mechanics.build import Mechanism
-from atwood.model.local.laws import LocalJoint
+from atwood.mechanics.kinematics.mechanism import Mechanism
+from atwood.model.local.parts import LocalJoint
 from atwood.model.values.rotation import FreeRotation, Rotation, as_rotation
 from atwood.plotting.scene3d.reading import Joining, Reading
 from atwood.plotting.shapes.curves import depends, joint_curve, joint_shift, joint_step, numbers

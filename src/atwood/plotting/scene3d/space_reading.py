@@ -10,11 +10,10 @@ from atwood.arrays import FloatArray
 from atwood.expr import depends_on, is_zero
 from atwood.forms.quantities import state_program
 from atwood.late import replace
-from atwood.mechanics.build import Mechanism
-from atwood.mechanics.kinematics.mechanism import world_position
+from atwood.mechanics.kinematics.mechanism import Mechanism, world_position
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.model.declare.contributions import BodyInertia
-from atwood.model.local.laws import LocalPart
+from atwood.model.local.parts import LocalPart
 from atwood.plotting.scene3d.joint_reading import read_joint, seen_from
 from atwood.plotting.scene3d.reading import Joining, Lump, Pose, Reading, Tie, TieKind
 from atwood.plotting.shapes.curves import holds_distance, numbers

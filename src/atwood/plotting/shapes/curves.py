@@ -8,8 +8,8 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.expr import Expression, Scalar, depends_on, evaluate
-from atwood.mechanics.build import Mechanism
-from atwood.model.local.laws import LocalJoint, LocalPart
+from atwood.mechanics.kinematics.mechanism import Mechanism
+from atwood.model.local.parts import LocalJoint, LocalPart
 
 __all__ = ["depends", "holds_distance", "joint_curve", "joint_shift", "joint_step", "numbers"]
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.model.declare.binding import Binding, bind
-from atwood.model.local.laws import LocalPart
+from atwood.model.local.parts import LocalPart
 from atwood.model.values.outline import Outline
 from atwood.plotting.shapes.meshes import Mesh, box, revolved
 

@@ -11,9 +11,9 @@ from atwood.expr import InputGroup, OutputGroup, Program, depends_on, evaluate
 from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.kept import Key
 from atwood.late import dataclass
-from atwood.mechanics.build import extent
 from atwood.mechanics.constraints.knots import BALANCES
 from atwood.mechanics.dynamics.equations import Equations
+from atwood.mechanics.kinematics.mechanism import extent
 from atwood.mechanics.outputs.observables import Observable
 from atwood.model.values.units import parse_unit
 from atwood.simulation.dynamics.floating import FAR, spread

@@ -11,18 +11,18 @@ from math import isfinite
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.expr import Expression, OutputGroup, Program, evaluate, live, substitute, vjp
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.program import state_groups
-from atwood.integrators.protocol import FloatArray
 from atwood.late import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.forces import local_map
 from atwood.model.declare.binding import bind
 from atwood.model.declare.contributions import CoordinateLoad, Load
 from atwood.model.declare.law import scalars
-from atwood.model.local.laws import LocalPart
+from atwood.model.local.parts import LocalPart
 
 __all__ = ["ADVICE_AT_START", "UndefinedValue", "find_undefined_value", "states_ahead", "undefined_value_at"]
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from atwood.integrators.protocol import FloatArray, StepResult
+from atwood.arrays import FloatArray
+from atwood.integrators.protocol import StepResult
 from atwood.late import replace
 
 __all__ = ["without_margin"]

@@ -14,7 +14,7 @@ from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.constraints.knots import BALANCES
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import local_map
-from atwood.model.local.laws import LocalConnector, LocalConstraint, LocalPart
+from atwood.model.local.parts import LocalConnector, LocalConstraint, LocalPart
 from atwood.numerics.solutions import least_norm
 from atwood.tolerances import tolerances
 

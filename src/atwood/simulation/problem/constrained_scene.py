@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.codegen import BoundKernel
 from atwood.errors import KernelEvaluationError
 from atwood.forms.constrained.programs import ConstrainedProgram, constrained_program
 from atwood.forms.kept import Key
 from atwood.forms.places import to_maximal
 from atwood.integrators.explicit_problem import MET, STEPS, CompiledRates, ExplicitProblem
-from atwood.integrators.protocol import FloatArray, Values
+from atwood.integrators.protocol import Values
 from atwood.simulation.problem.explicit_scene import first_order
 from atwood.simulation.problem.problem import Plan
 from atwood.topology.groups import connected_groups

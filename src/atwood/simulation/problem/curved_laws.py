@@ -25,7 +25,7 @@ from atwood.late import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import in_joint_coordinates, local_map
-from atwood.model.local.laws import LocalPart
+from atwood.model.local.parts import LocalPart
 
 __all__ = ["Curved", "find_curved", "find_external", "is_needed", "watched_program"]
 

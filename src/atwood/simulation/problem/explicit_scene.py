@@ -6,12 +6,13 @@ from collections.abc import Callable, Sequence
 from functools import cache
 from typing import TYPE_CHECKING
 
+from atwood.arrays import FloatArray
 from atwood.codegen import BoundKernel
 from atwood.forms.accelerations import AccelerationProgram, accelerations_of
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.integrators.explicit_problem import CompiledRates, ExplicitProblem
-from atwood.integrators.protocol import FloatArray, Values
+from atwood.integrators.protocol import Values
 
 if TYPE_CHECKING:
     from atwood.integrators.embedded.native import CompiledAccelerations, OwnRates

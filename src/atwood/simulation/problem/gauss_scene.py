@@ -7,6 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.codegen import BoundKernel
 from atwood.errors import UsageError
 from atwood.expr import Program
@@ -16,7 +17,6 @@ from atwood.forms.kept import Key
 from atwood.integrators.explicit_problem import ExplicitProblem
 from atwood.integrators.gauss.hamiltonian import CompiledMethod, Hamiltonian
 from atwood.integrators.methods import IDA, advise
-from atwood.integrators.protocol import FloatArray
 from atwood.simulation.problem.closed_loops import Solved
 
 __all__ = ["hamiltonian"]

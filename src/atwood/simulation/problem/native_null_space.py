@@ -6,10 +6,11 @@ import weakref
 from collections.abc import Callable
 from dataclasses import field
 
+from atwood.arrays import FloatArray
 from atwood.codegen.sundials.null_space_residuals import NullSpaceCallbacks, NullSpaceData, compile_null_space_callbacks
 from atwood.forms.null_space import NullSpaceProgram
 from atwood.integrators.compiled_functions import NativeCallbacks
-from atwood.integrators.protocol import FloatArray, LinearSolver
+from atwood.integrators.protocol import LinearSolver
 from atwood.late import dataclass
 from atwood.simulation.dynamics.partitioning import POOR
 from atwood.simulation.problem.partition_arrays import choice_lists, null_space_shape

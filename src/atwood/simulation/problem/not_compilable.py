@@ -16,7 +16,7 @@ from atwood.expr.core.program import Program
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.model.declare.binding import bind
-from atwood.model.local.laws import LocalPart
+from atwood.model.local.parts import LocalPart
 from atwood.model.values.vector import Vector
 
 __all__ = ["announce", "find_not_compilable"]

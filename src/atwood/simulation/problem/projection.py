@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.arrays import FloatArray
 from atwood.forms.kept import Key
-from atwood.integrators.protocol import FloatArray
 from atwood.late import dataclass
 from atwood.numerics.independence import trusted_sizes
 from atwood.numerics.matrices import is_best_full

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.errors import UnsupportedError, UsageError
 from atwood.expr import Expression, live, substitute
 from atwood.expr.series.taylor import TaylorPrograms, taylor_programs
@@ -16,7 +17,6 @@ from atwood.forms.accelerations import AccelerationProgram, accelerations_of
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.integrators.methods import EXPLICIT, IDA, advise
-from atwood.integrators.protocol import FloatArray
 from atwood.integrators.taylor.problem import REACH, TaylorProblem
 
 if TYPE_CHECKING:

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.integrators.explicit_problem import ExplicitProblem
 from atwood.integrators.methods import AUTO, EXPLICIT, IDA, IDA_SUNDAE, METHODS, TAYLOR, Method, advise
-from atwood.integrators.protocol import FloatArray
 from atwood.late import dataclass
 from atwood.simulation.problem.explicit_scene import explicit_problem, explicit_problem_of
 from atwood.simulation.problem.options import RunOptions

@@ -11,8 +11,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
-from atwood.integrators.protocol import FloatArray
 from atwood.late import replace
 from atwood.simulation.run.made import Run
 

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.clock import TimeIsUp, more_time, time_left
 from atwood.errors import AtwoodError, SolveError, StartError
 from atwood.integrators.methods import AUTO, Method
-from atwood.integrators.protocol import Budget, FloatArray, Statistics, Status, StepResult
+from atwood.integrators.protocol import Budget, Statistics, Status, StepResult
 from atwood.integrators.session import Session
 from atwood.late import replace
 from atwood.simulation.dynamics.numerical_failure import is_numerical, numerical_failure

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.integrators.compiled_functions import GuardedResidual, NativeCallbacks, StepGuard
 from atwood.integrators.explicit_problem import ExplicitProblem
 from atwood.integrators.explicit_session import ExplicitSession, Leave
 from atwood.integrators.methods import EXPLICIT, IDA, LEAST, Method, Task, advise
-from atwood.integrators.protocol import Budget, FloatArray, ImplicitProblem, LinearSolver, SolverOptions
+from atwood.integrators.protocol import Budget, ImplicitProblem, LinearSolver, SolverOptions
 from atwood.integrators.session import Session
 from atwood.late import dataclass, replace
 from atwood.simulation.dynamics.orientation_coordinates import longest_step

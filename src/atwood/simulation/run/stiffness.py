@@ -16,11 +16,12 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError
 from atwood.expr import Expression, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
-from atwood.integrators.protocol import FloatArray, Values
+from atwood.integrators.protocol import Values
 from atwood.late import dataclass
 
 __all__ = ["Stiffness", "can_be_stiff", "find_stiff_rows", "find_stiffness", "present_time"]

@@ -15,8 +15,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.polynomial import legendre
 
+from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
-from atwood.integrators.protocol import FloatArray
 from atwood.late import dataclass
 from atwood.simulation.dynamics.reactions import accelerations_at
 from atwood.simulation.problem.problem import Plan

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.arrays import FloatArray
 from atwood.errors import SolveError
 from atwood.integrators.event_location import EventLocator, Root, State
-from atwood.integrators.protocol import FloatArray
 from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.simulation.events.modes import EventProbe

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.forms.kept import Key
 from atwood.integrators.compiled_functions import Lookout
-from atwood.integrators.protocol import FloatArray
 from atwood.simulation.problem.problem import Plan
 
 if TYPE_CHECKING:
@@ -136,7 +136,7 @@ def compiled_looks(plan: Plan, whole: float, size: int) -> LookoutData | None:
 
 def as_lookout(data: LookoutData) -> Lookout:
     """Return what a session is given to look with."""
-    from atwood.codegen.sundials.lookout import NOTICED, PAUSED
+    from atwood.codegen.sundials.lookout_routines import NOTICED, PAUSED
 
     code = data.code
     return Lookout(code.drive, code.fill, NOTICED, PAUSED, data.address, data.due, data.due_at, code.look_address, data)

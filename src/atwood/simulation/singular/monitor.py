@@ -12,8 +12,9 @@ import time
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.integrators.compiled_functions import Lookout
-from atwood.integrators.protocol import FloatArray, Status, StepResult
+from atwood.integrators.protocol import Status, StepResult
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.singular.crossing import SingularCrossing
 from atwood.simulation.singular.looks import Look, as_lookout, compiled_looks, going_on, stride_from

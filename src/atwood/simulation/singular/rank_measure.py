@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.polynomial import legendre
 
-from atwood.integrators.protocol import FloatArray
+from atwood.arrays import FloatArray
 from atwood.late import dataclass
 from atwood.numerics.matrices import scaled, to_array
 from atwood.numerics.rank import decompose, lost_rank, rank, singular_values

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from atwood.integrators.protocol import FloatArray
+from atwood.arrays import FloatArray
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.singular.collocation import Arc
 from atwood.simulation.singular.rank_measure import RankMeasure

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, SolveError
-from atwood.integrators.protocol import FloatArray
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import project_safely, project_states
 from atwood.simulation.singular.collocation import Arc, Path, find_arc, follow

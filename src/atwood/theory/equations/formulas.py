@@ -10,11 +10,12 @@ from atwood.errors import UnsupportedError
 from atwood.expr import Expression, SparseMatrix, count_operations, substitute
 from atwood.expr.core import algebra
 from atwood.expr.core.relations import Relation
+from atwood.expr.simplify.polynomial import TooLargeError
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian
 from atwood.late import dataclass
 from atwood.theory.equations.structure import Structure, structure_of
-from atwood.theory.formulas.book import Book, TooLargeError
+from atwood.theory.formulas.book import Book
 from atwood.theory.formulas.notation import Notation
 from atwood.theory.formulas.tree import Name, Sum, Symbol
 

@@ -8,9 +8,10 @@ from typing import Any, TypeAlias
 from atwood.errors import AtwoodError, UsageError
 from atwood.expr import Expression, Graph, sqrt
 from atwood.expr.formulas.sympy_bridge import from_sympy
+from atwood.expr.simplify.polynomial import TooLargeError
 from atwood.late import dataclass
 from atwood.theory.formulas import objects
-from atwood.theory.formulas.book import Book, TooLargeError
+from atwood.theory.formulas.book import Book
 from atwood.theory.formulas.tree import Name, Symbol
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian
 from atwood.theory.symmetry.identities import is_proven_zero

@@ -13,7 +13,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, ParameterError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass, replace
-from atwood.mechanics.build import extent
+from atwood.mechanics.kinematics.mechanism import extent
 from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.pipeline import SCENE

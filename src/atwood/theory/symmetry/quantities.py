@@ -18,7 +18,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian, lagrangian_of
 from atwood.forms.places import to_maximal
 from atwood.late import dataclass
-from atwood.mechanics.build import extent
+from atwood.mechanics.kinematics.mechanism import extent
 from atwood.mechanics.kinematics.orientation import spin_in_world
 from atwood.mechanics.outputs.observables import add_up
 from atwood.simulation.dynamics.orientation_coordinates import from_regular

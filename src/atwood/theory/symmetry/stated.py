@@ -17,10 +17,9 @@ from atwood.model.values.units import parse_unit
 from atwood.theory.equations.formulas import EquationFormulas
 from atwood.theory.formulas import objects
 from atwood.theory.symmetry.find import Finding
-from atwood.theory.symmetry.invariance import KEPT
 from atwood.theory.symmetry.proof import Prover
 from atwood.theory.symmetry.quantities import Quantities
-from atwood.theory.symmetry.states import RandomStates, State
+from atwood.theory.symmetry.states import KEPT, RandomStates, State
 
 __all__ = ["Symmetry", "check_symmetry"]
 
