@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 from atwood.cli import main
 from atwood.cli.output import strict
 from atwood.cli.summary import sparkline
-from atwood.model.compose.libraries import GROUP
+from atwood.model.compose.serialization import GROUP
 from atwood.result.files import load_result
 
 FILE = Path(__file__).with_name("scenes_for_tests.py")

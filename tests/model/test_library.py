@@ -15,7 +15,7 @@ import atwood as aw
 import atwood_library
 from atwood.consistency.trials import Body
 from atwood.expr import Graph, evaluate
-from atwood.model.declare.binding import Binding, bind
+from atwood.model.declare.component import Binding, bind
 from atwood.model.declare.connectors import Frame, Motion
 from atwood.model.declare.contributions import BodyInertia, Load, Placement, PointInertia
 from atwood.model.declare.law import scalars

@@ -7,9 +7,9 @@ import pytest
 
 import atwood
 from atwood.expr import Graph
+from atwood.model.local.bound import ParameterTable
 from atwood.model.local.flatten import flatten
 from atwood.model.local.laws import localize
-from atwood.model.local.parameters import ParameterTable
 from atwood.model.values.space import make_space
 
 from .things import Bob

@@ -9,10 +9,10 @@ import atwood_library as lib
 from atwood import Component, Scene, simulate
 from atwood.checking.bench import on_bench
 from atwood.checking.samples import as_part, in_space, samples_of
-from atwood.consistency.draws import make_trial
+from atwood.consistency.trials import make_trial
 from atwood.model.values.space import make_space
 from atwood.plotting.planar.geometry import make_picture
-from atwood.plotting.scene3d.space_reading import read_scene
+from atwood.plotting.scene3d.reading import read_scene
 
 pytest.importorskip("matplotlib")
 

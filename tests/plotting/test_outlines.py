@@ -8,9 +8,8 @@ import pytest
 from atwood import Component, Outline, Scene, simulate
 from atwood.plotting.planar.geometry import make_picture
 from atwood.plotting.scene3d.model import build_model
-from atwood.plotting.scene3d.space_reading import read_scene
-from atwood.plotting.shapes.meshes import Mesh
-from atwood.plotting.shapes.outlines import outline_mesh
+from atwood.plotting.scene3d.reading import read_scene
+from atwood.plotting.shapes.meshes import Mesh, outline_mesh
 from atwood.solids import read_stl
 from atwood_library import (
     Bar,

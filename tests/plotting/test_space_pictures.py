@@ -13,7 +13,7 @@ from atwood.pipeline import simulate
 from atwood.plotting.camera import as_camera
 from atwood.plotting.scene3d.model import SpaceModel, build_model
 from atwood.plotting.scene3d.picture import make_space_picture
-from atwood.plotting.scene3d.space_reading import read_scene
+from atwood.plotting.scene3d.reading import read_scene
 from atwood.result.result import Result
 from atwood_library import (
     Cylindrical,

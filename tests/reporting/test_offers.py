@@ -30,7 +30,7 @@ from atwood import (
 )
 from atwood.reporting import Offer
 from atwood.simulation.initialization.start import find_start
-from atwood.theory.symmetry.generic_dynamics import LooseScene
+from atwood.theory.symmetry.generic import LooseScene
 from atwood_library import (
     Box,
     Cone,

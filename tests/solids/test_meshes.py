@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from atwood.errors import ParameterError
 from atwood.solids import box, closed_mesh, mesh_solid, read_stl, sphere, stl_solid
-from atwood.solids.shells import winding_number
+from atwood.solids.mesh import winding_number
 
 from . import meshes
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 import networkx as nx
 from hypothesis import given, strategies as st
 
-from atwood.topology.groups import connected_groups
+from atwood.topology.graph import connected_groups
 
 pairs = st.lists(st.tuples(st.integers(0, 30), st.integers(0, 30)), max_size=40)
 

@@ -16,8 +16,6 @@ from atwood.model.declare.laws import constraint, inertia, joint, observable
 from atwood.model.values.rotation import normals, turn
 from atwood.model.values.vector import Vector, as_vector, dot
 
-__all__ = ["on_bench"]
-
 
 class Ball(Component):
     """A point mass."""

@@ -1,28 +1,27 @@
-"""Laws on expressions against the same laws on numbers: values, and derivatives against differences."""
+"""Laws and updates on expressions against the same on numbers: values, and derivatives against differences."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from atwood.checking.forces import energy_forces, in_motion, load_forces, ways
-from atwood.checking.report import Finding
+from atwood.checking.samples import Finding
 from atwood.consistency.joints import Unknown
 from atwood.consistency.trials import Trial
 from atwood.expr import Expression, Graph, evaluate
 from atwood.mechanics.dynamics.forces import local_gradients
 from atwood.model.declare.connectors import JointCoordinate
 from atwood.model.declare.law import Law
+from atwood.model.local.bound import ParameterTable
 from atwood.model.local.flatten import FlatScene, Part
 from atwood.model.local.laws import localize
-from atwood.model.local.parameters import ParameterTable
 from atwood.model.local.parts import LocalPart
 from atwood.model.values.rotation import from_axes
 from atwood.model.values.vector import Vector
-
-__all__ = ["wrong_on_expressions"]
 
 TOLERANCE = 1e-5
 """Relative: differences on numbers are good to some 1e-9, and mistakes of laws are far larger."""
@@ -121,3 +120,49 @@ def _finding(laws: Sequence[Law], what: str, space: str) -> Finding:
         "see to the derivatives of external functions"
     )
     return Finding("failure", "derivatives", laws[0].name if len(laws) == 1 else "", space, message)
+
+
+def wrong_updates(trial: Trial, mode: str) -> Iterator[Finding | None]:
+    """Yield, for each update law, what is wrong with what it returns, or None.
+
+    Parameters
+    ----------
+    trial
+        The component in a random state.
+    mode
+        Its mode.
+    """
+    for law in trial.component.laws("update"):
+        if law.holds_in(trial.space.name) and law.acts_in(mode):
+            specs = trial.component.state_specs()
+            count = sum(len(specs[name].names(trial.part.values)) for name in law.options.sets)
+            text = _wrong(trial, law.name, count)
+            yield Finding("failure", "updates", law.name, trial.space.name, text) if text else None
+
+
+def _wrong(trial: Trial, name: str, count: int) -> str:
+    """Return what is wrong, in words, or nothing."""
+    try:
+        given = getattr(in_motion(trial), name)()
+    except Exception as error:  # whatever a law of somebody's own can raise
+        return f"it raises {type(error).__name__}: {error}"
+    values = list(_flat(given))
+    if len(values) != count:
+        return f"it returns {len(values)} values where it sets {count}"
+    for value in values:
+        try:
+            if math.isfinite(float(value)):
+                continue
+        except (TypeError, ValueError):
+            return f"it returns {value!r} where a number is wanted"
+        return f"it returns {float(value)!r}, which no state can be"
+    return ""
+
+
+def _flat(given: Any) -> Iterator[Any]:
+    """Yield the values in what an update returned."""
+    if isinstance(given, Iterable) and not isinstance(given, str):
+        for one in given:
+            yield from _flat(one)
+    else:
+        yield given

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.checking.report import Finding
+from atwood.checking.samples import Finding
 from atwood.consistency.joints import Unknown, attempt
 from atwood.consistency.trials import Pose, Trial, nudged
 from atwood.late import replace
@@ -16,8 +16,6 @@ from atwood.model.declare.connectors import Motion
 from atwood.model.declare.contributions import Load
 from atwood.model.declare.law import Law
 from atwood.model.values.vector import Vector, cross
-
-__all__ = ["Wrench", "energy_forces", "in_motion", "load_forces", "ways", "wrong_forces"]
 
 TOLERANCE = 1e-5
 """Relative: differences of energies are good to some 1e-9, and mistakes of laws are far larger."""

@@ -11,11 +11,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from atwood.checking.report import Finding
+from atwood.checking.samples import Finding
 from atwood.consistency.trials import Body, Trial
 from atwood.late import dataclass, replace
-from atwood.model.declare.binding import Binding, bind
-from atwood.model.declare.component import Component
+from atwood.model.declare.component import Binding, Component, bind
 from atwood.model.declare.connectors import JointCoordinate, Motion, Slide
 from atwood.model.declare.contributions import BodyInertia, CoordinateLoad, Load, Placement, PointInertia
 from atwood.model.declare.function_values import Function
@@ -23,8 +22,6 @@ from atwood.model.declare.law import Law, scalars
 from atwood.model.values.rotation import Rotation
 from atwood.model.values.units import Exponents, parse_unit
 from atwood.model.values.vector import Vector
-
-__all__ = ["wrong_units"]
 
 NOTHING: Exponents = (0, 0, 0, 0)
 LENGTH: Exponents = (0, 1, 0, 0)

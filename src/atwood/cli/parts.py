@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from atwood.cli.output import print_json, writer
 from atwood.errors import UsageError, near_matches, suggestion
-from atwood.model.compose.libraries import all_libraries
+from atwood.model.compose.serialization import all_libraries
 from atwood.table import table
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from atwood.cli.output import warn
 from atwood.errors import AtwoodError, UsageError, near_matches, suggestion
-from atwood.model.compose.libraries import all_libraries, declared_libraries
+from atwood.model.compose.serialization import all_libraries, declared_libraries
 
 if TYPE_CHECKING:
     from atwood.model.compose.composite import Model

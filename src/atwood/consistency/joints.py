@@ -8,16 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from atwood.consistency.sources import contradiction_at
-from atwood.consistency.trials import STEP, Pose, Trial, in_components, nudged, rate_of, rotation_between
+from atwood.consistency.trials import (
+    STEP,
+    Pose,
+    Trial,
+    contradiction_at,
+    in_components,
+    nudged,
+    rate_of,
+    rotation_between,
+)
 from atwood.errors import DeclarationError
 from atwood.expr import Scalar
 from atwood.model.declare.connectors import Motion
 from atwood.model.declare.law import Law, scalars
 from atwood.model.values.rotation import FREE
 from atwood.numerics.rank import rank
-
-__all__ = ["Unknown", "attempt", "wrong_joint", "wrong_rates"]
 
 TOLERANCE = 1e-6
 """Of values against each other, by their sizes; differences are good to some 1e-10, and mistakes are far larger."""

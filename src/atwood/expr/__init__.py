@@ -1,6 +1,5 @@
 """The expression graph: arithmetic, derivatives, sparsity, operation counts, and the road to and from sympy."""
 
-from atwood.expr.core.affine import affine_coefficients
 from atwood.expr.core.analysis import (
     count_operations,
     dependencies,
@@ -10,7 +9,7 @@ from atwood.expr.core.analysis import (
     substitute,
 )
 from atwood.expr.core.arithmetic import DivisionByExactZeroError
-from atwood.expr.core.derivatives import SparseMatrix, jacobian, jvp, sweeps_exceed, vjp
+from atwood.expr.core.derivatives import SparseMatrix, affine_coefficients, jacobian, jvp, sweeps_exceed, vjp
 from atwood.expr.core.functions import (
     Scalar,
     absolute,

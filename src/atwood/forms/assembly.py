@@ -37,8 +37,8 @@ from atwood.model.local.flatten import FlatScene, flatten
 from atwood.model.local.parts import DiscreteState
 from atwood.model.local.states import declared_starts
 from atwood.showing import count_of, fitted
-from atwood.topology.forest_growth import grow_spanning_forest
 from atwood.topology.orientation_coordinates import Orientation
+from atwood.topology.spanning_forest import grow_spanning_forest
 
 if TYPE_CHECKING:
     from atwood.codegen.llvm.columns import ColumnKernel, ColumnProgram

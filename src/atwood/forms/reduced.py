@@ -12,7 +12,7 @@ from collections.abc import Collection, Sequence
 from atwood.expr import Expression, jacobian, solve
 from atwood.forms.program import FormProgram, either_sign, kinematic_rows, make_form_program, rows_along_speeds
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.topology.groups import connected_groups
+from atwood.topology.graph import connected_groups
 
 __all__ = ["reduced_form"]
 

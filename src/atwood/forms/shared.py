@@ -17,8 +17,8 @@ from atwood.late import dataclass, replace
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Decision, Mechanism, check_closures
 from atwood.mechanics.kinematics.orientation import body_offsets
+from atwood.model.local.bound import variation_names
 from atwood.model.local.flatten import FlatScene, Part
-from atwood.model.local.parameters import variation_names
 from atwood.model.local.parts import LocalPart
 from atwood.model.values.vector import Vector
 from atwood.stages import stage

@@ -29,7 +29,7 @@ from atwood.mechanics.kinematics.mechanism import (
 from atwood.mechanics.kinematics.motion import Motion, Movement, motion_in_plane, motion_in_space
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.mechanics.kinematics.positions import BodyShape, Kinematics, shapes
-from atwood.model.declare.binding import bind
+from atwood.model.declare.component import bind
 from atwood.model.local.parts import LocalConstraint, LocalState, multiplier_symbol
 from atwood.model.values.vector import Vector
 from atwood.topology.spanning_forest import Coordinate, SpanningForest
@@ -262,7 +262,7 @@ def _resolved(mechanism: Mechanism, site: Site, kinematics: Kinematics) -> dict[
         if name not in mechanism.locals_[path].signal_symbols:
             continue  # a function of time, which is in place already
         local = mechanism.locals_[source]
-        from atwood.model.local.output_values import output_value  # few scenes have links
+        from atwood.model.local.laws import output_value  # few scenes have links
 
         inputs = replace(local.binding, values={**local.binding.values, **local.signal_symbols})
         value = output_value(local.part, bind(local.part.component, inputs), observable, mechanism.space)

@@ -22,10 +22,10 @@ from atwood.mechanics.kinematics.mechanism import (
     origin_at,
 )
 from atwood.mechanics.kinematics.orientation import body_offsets
-from atwood.model.declare.carried_inertia import Carried
+from atwood.model.declare.contributions import Carried
+from atwood.model.local.bound import ParameterTable
 from atwood.model.local.flatten import FlatScene
 from atwood.model.local.laws import localize
-from atwood.model.local.parameters import ParameterTable
 from atwood.model.local.parts import LocalPart
 from atwood.model.values.space import Space, make_space
 from atwood.topology.bodies import Bodies, find_bodies

@@ -13,8 +13,6 @@ from atwood.model.declare.contributions import Load, Placement, PointInertia
 from atwood.model.declare.law import Law
 from atwood.model.values.vector import Vector
 
-__all__ = ["call_law", "finite_scalar", "law_value", "listed", "not_evaluated", "one_scalar"]
-
 
 def law_value(bound: Any, name: str) -> Any:
     """Return what a law of a bound component gives that is called with nothing; a state is read, and not called."""

@@ -15,9 +15,6 @@ from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.late import dataclass
 
-__all__ = ["DEFAULT_VIEW", "Camera", "View", "as_camera", "check_view"]
-
-
 View: TypeAlias = Sequence[float] | str
 """Azimuth and elevation of the eye, degrees; as a text with a comma between them."""
 

@@ -14,21 +14,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = [
-    "ANIMATED",
-    "COLOURS",
-    "GREY",
-    "INK",
-    "SUFFIXES",
-    "check_picture",
-    "finished",
-    "need_matplotlib",
-    "new_figure",
-    "polish",
-    "save_figure",
-    "titled",
-    "with_unit",
-]
 
 COLOURS = ("#2a6fbb", "#d1495b", "#2e9e6b", "#c98a1b", "#7b5ea7", "#3aa6b9", "#8a6d5a", "#d46ba3")
 """Told apart by most readers, and in print."""

@@ -16,8 +16,6 @@ from atwood.plotting.plots.precision import plot_comparison, style_of
 from atwood.study.comparison.found import RELATIVE, Comparison, write_rows
 from atwood.study.comparison.verdict import cost_at
 
-__all__ = ["check_page", "write_page"]
-
 _ERRORS = (1e-3, 1e-6, 1e-9)
 """Errors whose costs stand in the table of all scenes."""
 

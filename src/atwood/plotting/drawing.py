@@ -1,4 +1,4 @@
-"""The mechanism itself: rods, links, springs, ropes, pulleys, masses and bodies, at a few times or moving."""
+"""Pictures of the mechanism itself, at a few times, moving, or displaced along a mode of oscillation."""
 
 from __future__ import annotations
 
@@ -21,14 +21,13 @@ from atwood.plotting.planar.strokes import Pen, draw_trace
 from atwood.plotting.scene3d.drawing import draw_space, frame_space, space_panels
 from atwood.plotting.scene3d.picture import SpacePicture, make_space_picture
 from atwood.result.result import Result
+from atwood.theory.linear import NormalModes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from atwood.plotting.figure import Animation
-
-__all__ = ["animate", "plot_mechanism"]
 
 
 RESULT = instance("a Result, as simulate returns it", Result)
@@ -292,3 +291,35 @@ def _frame(axes: Axes, lows: FloatArray, highs: FloatArray) -> None:
     axes.set_ylim(float(lows[1]), float(highs[1]))
     axes.set_aspect("equal")
     axes.set_axis_off()
+
+
+@takes(
+    modes=instance("NormalModes, as normal_modes returns them", NormalModes),
+    mode=whole("the number of a mode", 0),
+    file=optional(FILE),
+)
+def plot_mode(modes: NormalModes, mode: int = 0, file: str | os.PathLike[str] | None = None) -> Figure:
+    """Draw the mechanism at both ends of a mode's swing and in the middle.
+
+    Parameters
+    ----------
+    modes
+        What `atwood.normal_modes` gave.
+    mode
+        Number of the mode.
+    file
+        Where to save the picture; `NormalModes.motion` gives what `atwood.animate` moves.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+    """
+    motion = modes.motion(mode)
+    last = float(motion.time[-1] - motion.time[0])
+    times = [float(motion.time[0]) + share * last for share in (0.5, 0.25, 0.0)]
+    figure = plot_mechanism(motion, times=sorted(times))
+    omega, growth = modes.angular_frequencies[mode], modes.growth_rates[mode]
+    said = f"{modes.scene}, mode {mode}: {omega:.5g} rad/s" + (f", growth {growth:.4g} 1/s" if growth else "")
+    titled(figure, said, fontweight="bold")
+    return finished(figure, file)

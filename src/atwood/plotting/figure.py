@@ -10,8 +10,6 @@ from matplotlib.figure import Figure
 
 from atwood.late import dataclass
 
-__all__ = ["Animation", "ShownFigure"]
-
 
 class ShownFigure(Figure):
     """A figure that belongs to no window, and that a notebook shows as what a cell returns, without any setting."""

@@ -11,14 +11,13 @@ from atwood.arguments import FILE, TEXT, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError, suggestion
 from atwood.plotting.canvas import COLOURS, GREY, INK, finished, new_figure
-from atwood.plotting.scene3d.space_reading import read_scene
+from atwood.plotting.scene3d.reading import read_scene
 from atwood.plotting.sphere import SEEN, draw_on_sphere, draw_sphere
 from atwood.result.result import Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["plot_polhodes", "polhode"]
 
 _EQUAL = 1e-9
 """Moments that differ by less, relative to the largest, are equal."""

@@ -12,8 +12,6 @@ from atwood.plotting.canvas import GREY
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["SEEN", "draw_on_sphere", "draw_sphere"]
-
 
 def _view(azimuth: float, elevation: float) -> FloatArray:
     """Return the axes of the picture (right, up, towards the eye) as rows."""

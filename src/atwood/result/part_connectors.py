@@ -10,10 +10,9 @@ from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.mechanics.outputs.part_power import Flow
 from atwood.model.declare.connectors import JointCoordinate
 from atwood.model.local.flatten import FlatScene
-from atwood.model.local.joint_references import find_joint_coordinate_uses
+from atwood.model.local.joint_coordinates import find_joint_coordinate_uses
 from atwood.topology.bodies import Body
-from atwood.topology.graph import WORLD, Joint
-from atwood.topology.groups import connected_groups
+from atwood.topology.graph import WORLD, Joint, connected_groups
 
 __all__ = ["Connectors", "Ends"]
 

@@ -9,8 +9,7 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from atwood.solids.integrals import mesh_solid, stl_solid
-    from atwood.solids.mesh import TriangleMesh, closed_mesh
+    from atwood.solids.mesh import TriangleMesh, closed_mesh, mesh_solid, stl_solid
     from atwood.solids.properties import MassProperties, combine, point_mass, subtract
     from atwood.solids.shapes import box, cone, cylinder, disc, ellipsoid, rod, sphere, spherical_shell, tube
     from atwood.solids.stl import read_stl
@@ -37,8 +36,7 @@ __all__ = [
 ]
 
 _MODULES = {
-    "integrals": ("mesh_solid", "stl_solid"),
-    "mesh": ("TriangleMesh", "closed_mesh"),
+    "mesh": ("TriangleMesh", "closed_mesh", "mesh_solid", "stl_solid"),
     "properties": ("MassProperties", "combine", "point_mass", "subtract"),
     "shapes": ("box", "cone", "cylinder", "disc", "ellipsoid", "rod", "sphere", "spherical_shell", "tube"),
     "stl": ("read_stl",),

@@ -16,18 +16,6 @@ from atwood.arguments import check, one_of, real, show, takes_names
 from atwood.errors import ParameterError
 from atwood.solids.properties import MassProperties
 
-__all__ = [
-    "box",
-    "cone",
-    "cylinder",
-    "disc",
-    "ellipsoid",
-    "rod",
-    "sphere",
-    "spherical_shell",
-    "tube",
-]
-
 Axis = Literal["x", "y", "z"]
 
 

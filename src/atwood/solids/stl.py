@@ -16,9 +16,6 @@ from atwood.arrays import FloatArray
 from atwood.errors import ParameterError, UsageError
 from atwood.files import check_readable
 
-__all__ = ["read_stl"]
-
-
 _HEADER = 84
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 

@@ -10,8 +10,6 @@ from atwood.model.declare.law import Kind
 from atwood.model.local.parts import LocalConstraint, LocalPart
 from atwood.topology.graph import WORLD, Joint, MechanismGraph
 
-__all__ = ["Bodies", "Body", "RigidStep", "find_bodies"]
-
 Key = tuple[str, str, int]
 """A scalar constraint: (part, law, number within the law)."""
 

@@ -1,10 +1,10 @@
-"""The graph of what the user said: nodes where connectors meet, and joints between them."""
+"""The graph of connections: nodes where connectors meet, joints between them, and connected components."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from atwood.errors import ConnectError, DeclarationError, suggestion
 from atwood.expr import Expression, depends_on
@@ -13,12 +13,10 @@ from atwood.model.declare.connectors import Frame, JointCoordinate
 from atwood.model.local.flatten import FlatScene
 from atwood.model.local.parts import LocalJoint, LocalPart
 from atwood.model.values.rotation import FREE, Rotation
-from atwood.topology.groups import connected_groups
 
 if TYPE_CHECKING:
     import networkx as nx
 
-__all__ = ["WORLD", "Joint", "MechanismGraph", "Node", "build_graph", "unit_of"]
 
 WORLD = 0
 """Index of the node that is the world itself."""
@@ -236,3 +234,43 @@ def unit_of(local: LocalPart, path: str) -> str:
         if law.name == name:
             return str(law.options.unit)
     raise DeclarationError(f"the joint coordinate {name!r} is not an observable of the part", where=local.part.path)
+
+
+T = TypeVar("T", bound=Hashable)
+
+
+def connected_groups(members: Iterable[T], pairs: Iterable[tuple[T, T]]) -> list[list[T]]:
+    """Return groups whose members are connected by pairs, directly or through others.
+
+    Parameters
+    ----------
+    members
+        Everything that belongs to a group, on its own if no pair names it.
+    pairs
+        Pairs of members.
+
+    Returns
+    -------
+    list of list
+        The groups in the order of their first members, each in the order of the members.
+    """
+    above: dict[T, T] = {member: member for member in members}
+
+    def root(member: T) -> T:
+        top = member
+        while above[top] != top:
+            top = above[top]
+        while above[member] != top:  # so that the way is short next time
+            above[member], member = top, above[member]
+        return top
+
+    size = dict.fromkeys(above, 1)
+    for a, b in pairs:
+        low, high = sorted((root(a), root(b)), key=size.__getitem__)
+        if low != high:
+            above[low] = high
+            size[high] += size[low]
+    groups: dict[T, list[T]] = {}
+    for member in above:
+        groups.setdefault(root(member), []).append(member)
+    return list(groups.values())

@@ -12,8 +12,6 @@ from atwood.model.values.vector import Vector, dot
 from atwood.topology.bodies import Bodies
 from atwood.topology.graph import MechanismGraph
 
-__all__ = ["find_line_signs"]
-
 
 def find_line_signs(
     flat: FlatScene,

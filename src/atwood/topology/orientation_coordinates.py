@@ -8,8 +8,6 @@ from math import pi
 from atwood.errors import UsageError, suggestion
 from atwood.late import dataclass
 
-__all__ = ["ORIENTATIONS", "Orientation", "OrientationCoordinates", "check_orientation"]
-
 _EULER = tuple(f"euler-{a}{b}{c}" for a, b, c in product("xyz", repeat=3) if a != b != c)
 
 ORIENTATIONS = ("quaternion", *_EULER)

@@ -5,9 +5,8 @@ import pytest
 from scipy.linalg import expm
 
 from atwood import SolveError
-from atwood.theory.flow.growth import orthonormal_growth
-from atwood.theory.flow.propagators import POINTS, node_times, propagators
-from atwood.theory.flow.steps import find_steps
+from atwood.theory.flow.tangent_flow import orthonormal_growth
+from atwood.theory.flow.variational_equations import POINTS, find_steps, node_times, propagators
 
 
 def turning(times: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ import scipy.optimize
 
 from atwood import Scene, linearize, simulate, trim
 from atwood.simulation.dynamics.balance import balance_of
-from atwood.theory.linear.minimal import find_minimal
+from atwood.theory.linear.displacements import find_minimal
 from atwood.theory.linear.operating_point import find_operating_point
 from atwood_library import Ground, Pivot, RigidBody, Weld
 from atwood_library.scenes import AndrewsSqueezer, CartPole, FlyballGovernor, QuarterCar, StewartPlatform

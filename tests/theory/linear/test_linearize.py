@@ -13,7 +13,7 @@ import atwood
 from atwood import ParameterError, Scene, StartError, UsageError, absolute, linearize, simulate
 from atwood.model.local.flatten import flatten
 from atwood.simulation.dynamics.balance import balance_of
-from atwood.theory.linear.minimal import find_minimal
+from atwood.theory.linear.displacements import find_minimal
 from atwood.theory.linear.operating_point import OperatingPoint, find_operating_point
 from atwood.theory.linear.variations import Flow
 from atwood_library import (

@@ -10,8 +10,6 @@ from atwood.errors import AtwoodError
 if TYPE_CHECKING:
     from atwood.expr.core.graph import Expression
 
-__all__ = ["DivisionByExactZeroError", "add", "divide", "multiply", "negate", "plainer_opposite", "subtract"]
-
 
 def add(a: Expression, b: Expression) -> Expression:
     """Return ``a + b``."""

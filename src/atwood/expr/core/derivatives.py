@@ -1,22 +1,22 @@
-"""Derivatives of expressions, as expressions: forward, reverse, and sparse Jacobians.
+"""Derivatives of expressions, as expressions: forward, reverse, sparse Jacobians, and affine parts.
 
 Every operation of one or two arguments is described once, by the product of a number ``t`` with each of its
 partial derivatives.  The forward sweep adds these products up over the arguments; the reverse sweep hands them
 back to the arguments.  Where a sum can share a division, or a selection, the forward sweep has a rule of its own.
+What outgrows all numbers is differentiated by its logarithm, so that a quotient by it has derivatives where it is zero.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from atwood.errors import AtwoodError
 from atwood.expr.core import algebra
 from atwood.expr.core.algebra import component, select, unary
-from atwood.expr.core.analysis import dependents, live
+from atwood.expr.core.analysis import dependents, live, substitute, varying
 from atwood.expr.core.arithmetic import add, divide, multiply, negate, subtract
 from atwood.expr.core.graph import Expression, Graph
-from atwood.expr.core.growth import hand_back_quotient, logarithmic_slopes, tangent_of_quotient
 from atwood.expr.core.operations import LEAVES, PIECEWISE_CONSTANT
 
 _Rule = Callable[[Expression, Expression], Expression]
@@ -398,3 +398,114 @@ def _graph_of(*groups: Iterable[Expression | float]) -> Graph:
             if isinstance(value, Expression):
                 return value.graph
     raise AtwoodError("there is no expression to differentiate")
+
+
+Slopes = list[tuple[Expression, Expression]]
+
+
+def logarithmic_slopes(d: Expression, kept: Container[int]) -> Slopes | None:
+    """Return expressions and factors with which the sum of ``factor * derivative`` is the derivative of ``log(d)``.
+
+    An exponential, a hyperbolic cosine, their products, and their sums with what depends on parameters alone have
+    factors that stay finite where they themselves do not. None for all else.
+
+    Parameters
+    ----------
+    d
+        What a quotient is divided by.
+    kept
+        Numbers of expressions that are independent, whatever they are made of.
+    """
+    if d.index in kept or d.is_parametric:
+        return None
+    if d.operation == "exp":
+        return [(d.arguments[0], d.graph.one)]
+    if d.operation == "cosh":
+        return [(d.arguments[0], unary("tanh", d.arguments[0]))]
+    if d.operation == "mul":
+        found: Slopes = []
+        for one in d.arguments:
+            slopes = [] if one.is_parametric else logarithmic_slopes(one, kept)
+            if slopes is None:
+                return None
+            found += slopes
+        return found
+    if d.operation == "add" and d.arguments[0].is_parametric != d.arguments[1].is_parametric:
+        fixed, moving = d.arguments if d.arguments[0].is_parametric else d.arguments[::-1]
+        slopes = logarithmic_slopes(moving, kept)
+        share = subtract(d.graph.one, divide(fixed, d))
+        return None if slopes is None else [(one, multiply(share, factor)) for one, factor in slopes]
+    return None
+
+
+def tangent_of_quotient(n: Expression, slopes: Slopes, tangents: Mapping[int, Expression]) -> Expression:
+    """Return the derivative of a quotient from those slopes of its divisor.
+
+    Parameters
+    ----------
+    n
+        The quotient.
+    slopes
+        See `logarithmic_slopes`.
+    tangents
+        Derivatives by the numbers of expressions; others have none.
+    """
+    a, d = n.arguments
+    total = zero = n.graph.zero
+    for one, factor in slopes:
+        total = add(total, multiply(factor, tangents.get(one.index, zero)))
+    return subtract(divide(tangents.get(a.index, zero), d), multiply(n, total))
+
+
+def hand_back_quotient(
+    n: Expression, slopes: Slopes, weight: Expression, hand_back: Callable[[Expression, Expression], None]
+) -> None:
+    """Hand the weight of a quotient back to what it is made of.
+
+    Parameters
+    ----------
+    n, slopes
+        See `tangent_of_quotient`.
+    weight
+        Its weight.
+    hand_back
+        Takes an expression and what is added to its weight.
+    """
+    hand_back(n.arguments[0], divide(weight, n.arguments[1]))
+    for one, factor in slopes:
+        hand_back(one, negate(multiply(multiply(factor, weight), n)))
+
+
+def affine_coefficients(
+    expression: Expression, variables: Sequence[Expression], parameters: Collection[Expression]
+) -> tuple[list[Expression], Expression] | None:
+    """Write an expression as a sum of coefficients times variables, plus a remainder.
+
+    Parameters
+    ----------
+    expression
+        The expression to take apart.
+    variables
+        The symbols it may be affine in.
+    parameters
+        Symbols that coefficients may depend on.
+
+    Returns
+    -------
+    tuple or None
+        The coefficients in the order of the variables, which depend on constants and parameters only, and the
+        remainder, which depends on none of the variables.  ``None`` if the expression has no such form.
+    """
+    nodes = live([expression])
+    active = dependents(nodes, variables)
+    if any(node.operation in PIECEWISE_CONSTANT and node.index in active for node in nodes):
+        return None
+    coefficients = [expression.graph.zero] * len(variables)
+    derivative = jacobian([expression], variables)
+    for column, entry in zip(derivative.columns, derivative.entries, strict=True):
+        coefficients[column] = entry
+    slopes = live(coefficients)
+    if varying(slopes, parameters) & {coefficient.index for coefficient in coefficients}:
+        return None
+    [remainder] = substitute([expression], dict.fromkeys(variables, 0.0))
+    return coefficients, remainder

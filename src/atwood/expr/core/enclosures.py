@@ -30,8 +30,6 @@ from atwood.expr.core.functions import (
 )
 from atwood.expr.core.graph import Expression
 
-__all__ = ["Pair", "enclose"]
-
 Pair = tuple[Scalar, Scalar]
 """Lower and upper bound."""
 

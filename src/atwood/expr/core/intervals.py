@@ -16,8 +16,6 @@ from atwood.arrays import FloatArray
 from atwood.expr.core.analysis import live
 from atwood.expr.core.graph import Expression
 
-__all__ = ["Bounds", "bounds"]
-
 Bounds = tuple[FloatArray, FloatArray]
 """Lower and upper bounds."""
 

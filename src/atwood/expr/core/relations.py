@@ -21,8 +21,6 @@ from atwood.expr.core.derivatives import jvp
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.intervals import bounds
 
-__all__ = ["MotionRelations", "Relation", "TimeRelations", "relation_value", "values_just_after"]
-
 _KNOWN, _TIMED, _MOVING, _OTHER = 0, 1, 2, 3
 
 _ORDERS = 6

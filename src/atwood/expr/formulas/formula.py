@@ -14,8 +14,6 @@ from atwood.expr.core.graph import Expression, Graph
 from atwood.expr.formulas.sympy_bridge import from_sympy
 from atwood.showing import fitted
 
-__all__ = ["Formula", "formula"]
-
 
 class Formula:
     """A function that evaluates a sympy expression on numbers, on expressions and on sympy terms.

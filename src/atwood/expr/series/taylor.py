@@ -1,8 +1,8 @@
 """Taylor coefficients of the solution of ``x' = f(t, x)``, from the expression graph of f.
 
 Every value of a program is a series in time while the solution is one.  The coefficients of one order follow from
-those of all lower orders by recurrences, one for each operation: `atwood.expr.series.rules`.  What an operation needs
-of lower orders is always a sum of products of the coefficients of two values,
+those of all lower orders by recurrences, one for each operation (`atwood.expr.series.recurrence`). What an operation
+needs of lower orders is always a sum of products of the coefficients of two values,
 
     S_k = sum of a_j b_(k-j) for j from 1 to k - 1,
 
@@ -28,8 +28,6 @@ from atwood.expr.core.graph import Expression, Graph
 from atwood.expr.core.program import InputGroup, OutputGroup, Program
 from atwood.expr.series.recurrence import Convolution, Recurrence
 from atwood.late import dataclass
-
-__all__ = ["NUMBERS", "TaylorPrograms", "taylor_programs"]
 
 NUMBERS = ("order", "inverse", "step", "tick")
 """What the program of an order is told of it: k, 1/k, the unit of time over (k + 1), and the coefficient of time."""

@@ -15,7 +15,7 @@ from atwood.model.local.parts import LocalPart
 from atwood.model.values.rotation import Axes, from_axes, transposed
 from atwood.model.values.space import Space
 from atwood.model.values.vector import ZERO as _ZERO, Vector, dot
-from atwood.solids.checks import symmetric_part, verify_moments
+from atwood.solids.properties import symmetric_part, verify_moments
 from atwood.topology.bodies import Bodies
 from atwood.topology.graph import MechanismGraph
 

@@ -12,7 +12,7 @@ from atwood.expr import Expression, Scalar, evaluate
 from atwood.expr.core.relations import TimeRelations, values_just_after
 from atwood.late import dataclass, names_of, replace
 from atwood.mechanics.kinematics.orientation import NodeTurn, body_offsets, plain, rotate
-from atwood.model.local.parameters import ParameterTable
+from atwood.model.local.bound import ParameterTable
 from atwood.model.local.parts import DiscreteState, LocalPart
 from atwood.model.local.states import declared_starts
 from atwood.model.values.rotation import as_rotation, compose

@@ -12,7 +12,7 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.mechanics.outputs.observables import Reaction
 from atwood.mechanics.outputs.reading import Reader
-from atwood.model.declare.binding import bind
+from atwood.model.declare.component import bind
 from atwood.model.declare.law import Law
 from atwood.model.returned import call_law, finite_scalar
 

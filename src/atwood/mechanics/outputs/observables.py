@@ -15,7 +15,7 @@ from atwood.mechanics.dynamics.inertia import tensor_of, turned_tensor
 from atwood.mechanics.kinematics.body_points import body_point_of
 from atwood.mechanics.kinematics.mechanism import Mechanism, world_position
 from atwood.mechanics.kinematics.orientation import NodeTurn, node_axes, spin_in_world
-from atwood.model.declare.binding import Binding
+from atwood.model.declare.component import Binding
 from atwood.model.declare.connectors import Frame, JointCoordinate, Motion
 from atwood.model.declare.contributions import BodyInertia
 from atwood.model.local.parts import LocalPart

@@ -18,7 +18,7 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.mechanics.outputs.observables import Observable, Reaction, add_up, make_binding, part_energies, take
 from atwood.mechanics.outputs.totals import Totals, add_totals, energy_rate, observe_totals, part_totals
-from atwood.model.declare.binding import Binding, bind
+from atwood.model.declare.component import Binding, bind
 from atwood.model.local.parts import LocalPart
 from atwood.model.returned import call_law, law_value, not_evaluated, one_scalar
 from atwood.model.values.vector import Vector

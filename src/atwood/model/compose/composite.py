@@ -13,8 +13,8 @@ from atwood.model.compose.connection_rules import (
     Connection,
     Parts,
     check_ends,
+    check_new_parts,
     check_same_connectors,
-    connect,
     declared_connection,
     declared_parts,
     named_parts,
@@ -30,16 +30,14 @@ from atwood.model.compose.differences import (
     take_over,
     take_snapshot,
 )
-from atwood.model.compose.part_rules import check_new_parts
 from atwood.model.declare.component import Component
+from atwood.model.declare.declaring import no_such_parameter
 from atwood.model.declare.parameter_expressions import ParameterExpression
-from atwood.model.declare.refusals import no_such_parameter
 from atwood.showing import count_of, field_text, fitted, listed
 from atwood.table import table
 
 PATH = Kind("a dotted path, such as 'left.rod'", NAME.read)
 
-__all__ = ["Connection", "Model", "connect"]
 
 _P = TypeVar("_P", bound=Component)
 

@@ -19,18 +19,6 @@ from atwood.model.declare.component import Component
 if TYPE_CHECKING:
     from atwood.model.compose.composite import Model
 
-__all__ = [
-    "REMOVED",
-    "Differences",
-    "Snapshot",
-    "apply_differences",
-    "check_connections",
-    "check_pairs",
-    "copy_parts",
-    "find_differences",
-    "take_over",
-    "take_snapshot",
-]
 
 REMOVED: Any = None
 """Stands for a start value that was taken away."""

@@ -4,6 +4,9 @@ A component is written as a reference to its class and the values it was given. 
 afterwards (see `atwood.model.compose.differences`). Classes are not written but named, and reading a scene imports the
 modules that they are in. So that a file cannot have code run that its reader did not choose, only modules of Atwood, of
 installed component libraries, and of whom the reader trusts are imported.
+
+`importlib.metadata` knows every way in which packages can be installed, but to import it and to have it look through
+all of them takes longer than a short run. So the files that nearly every installation has are read directly first.
 """
 
 from __future__ import annotations
@@ -11,8 +14,9 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
+import os
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,15 +26,12 @@ from atwood.files import check_readable, write_atomically
 from atwood.model.compose.composite import Model
 from atwood.model.compose.connection_rules import find_end
 from atwood.model.compose.differences import REMOVED
-from atwood.model.compose.libraries import installed_libraries, is_within
 from atwood.model.compose.written import CHANGES, find_class, join_path, write_component
 from atwood.model.declare.component import Component
 from atwood.model.declare.fields import FieldReference
 from atwood.model.declare.function_values import read_function
 from atwood.model.declare.parameter_expressions import OPERATIONS, ParameterExpression
 from atwood.model.declare.time_functions import StoredFunction
-
-__all__ = ["FORMAT", "VERSION", "find_class", "from_data", "load_scene", "save_scene", "to_data"]
 
 FORMAT = "atwood scene"
 VERSION = 1
@@ -347,3 +348,54 @@ def _read_bound(written: Any, where: str) -> Any:
     if len(operands) != (1 if operation == "neg" else 2):
         raise UsageError(f"the bound value {str(written)[:60]!r} has a wrong number of operands", where=where)
     return ParameterExpression(operation, operands, None)
+
+
+GROUP = "atwood.libraries"
+"""The entry point group in which component libraries make themselves known."""
+
+
+def declared_libraries() -> Iterator[str]:
+    """Yield the modules of libraries that are declared in files on the import path; there may be others."""
+    for folder in sys.path:
+        try:
+            names = os.listdir(folder or os.curdir)
+        except OSError:  # not a folder
+            continue
+        for name in names:
+            if name.endswith((".dist-info", ".egg-info")):
+                try:
+                    with open(os.path.join(folder, name, "entry_points.txt"), encoding="utf-8") as file:
+                        text = file.read()
+                except (OSError, UnicodeDecodeError):
+                    continue
+                if GROUP in text:
+                    yield from _entries(text)
+
+
+def _entries(text: str) -> Iterator[str]:
+    """Yield the values of the group's entries."""
+    section = ""
+    for line in text.splitlines():
+        stripped = line.strip()
+        if stripped.startswith("[") and stripped.endswith("]"):
+            section = stripped[1:-1].strip()
+        elif section == GROUP and "=" in stripped and not stripped.startswith(("#", ";")):
+            yield stripped.partition("=")[2].strip()
+
+
+def all_libraries() -> list[str]:
+    """Return the modules of all libraries that are installed in any way."""
+    from importlib.metadata import entry_points
+
+    return [entry.value for entry in entry_points(group=GROUP)]
+
+
+def installed_libraries() -> tuple[str, ...]:
+    """Return the modules of all libraries, however they are declared."""
+    return *declared_libraries(), *all_libraries()
+
+
+def is_within(module: str, packages: Iterable[str]) -> bool:
+    """Return whether a module is one of some packages, or in one of them and no command of it."""
+    is_command = module.endswith(".__main__")
+    return any(module == one or (module.startswith(f"{one}.") and not is_command) for one in packages)

@@ -16,9 +16,6 @@ from atwood.model.declare.function_values import Function
 from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.declare.time_functions import write_function
 
-__all__ = ["CHANGES", "find_class", "join_path", "write_component"]
-
-
 CHANGES = ("settings", "replaced", "added", "connections", "starts")
 """What a model can have that its class does not say."""
 

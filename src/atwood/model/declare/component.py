@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import field
 from typing import Any, ClassVar, Self, dataclass_transform
 
 from atwood.arguments import NAME, check
 from atwood.errors import DeclarationError, MissingNameError, ParameterError, UsageError, suggestion
 from atwood.expr import Scalar
-from atwood.model.declare.binding import Binding
-from atwood.model.declare.connectors import Connector, ConnectorSpec, InputRef, OutputRef, connector
-from atwood.model.declare.declaring import ComponentType, collect_declarations
-from atwood.model.declare.fields import MISSING, Field, ParameterSpec, SignalSpec
-from atwood.model.declare.law import Kind, Law
-from atwood.model.declare.parameter_expressions import ParameterExpression
-from atwood.model.declare.quantities import Quantity
-from atwood.model.declare.refusals import (
+from atwood.late import dataclass
+from atwood.model.declare.connectors import Connector, ConnectorSpec, InputRef, Motion, OutputRef, connector
+from atwood.model.declare.declaring import (
+    ComponentType,
+    collect_declarations,
     given_without_name,
     must_be_given,
     no_private_name,
@@ -23,13 +21,15 @@ from atwood.model.declare.refusals import (
     no_such_parameter,
     no_such_reaction,
 )
-from atwood.model.declare.states import StateSpec, discrete_state, state
+from atwood.model.declare.field_functions import StateSpec, discrete_state, state
+from atwood.model.declare.fields import MISSING, Field, ParameterSpec, SignalSpec
+from atwood.model.declare.law import Kind, Law
+from atwood.model.declare.parameter_expressions import ParameterExpression
+from atwood.model.declare.quantities import Quantity
 from atwood.model.values.outline import Outline
 from atwood.model.values.vector import Vector, dot, norm
 from atwood.showing import field_text, fitted
 from atwood.table import table
-
-__all__ = ["Component"]
 
 
 @dataclass_transform(kw_only_default=True, field_specifiers=(connector, state, discrete_state))
@@ -399,3 +399,58 @@ class Component(metaclass=ComponentType):
 
     def __copy__(self) -> Self:
         return self.copy()  # parts that two models share would belong to one of them
+
+
+@dataclass(frozen=True)
+class Binding:
+    """What the laws of a component are evaluated on: floats, expressions or sympy terms.
+
+    Attributes
+    ----------
+    values
+        Parameters and signals by name.
+    motions
+        What each connector knows, by name.
+    time
+        The time.
+    space
+        ``"line"``, ``"plane"`` or ``"space"``.
+    line
+        Unit vector of the line, for a scene on a line.
+    line_signs
+        On a line: +1 or -1 for a pair of connector names, the sign of the second's position minus the first's.
+        None while the signs are not known yet.
+    known
+        Observables that are known without their formula, such as a joint coordinate.
+    reactions
+        Reactions by name.
+    energies
+        Energies and totals of the model that the component is placed in, by name; see `Component.total_around`.
+    """
+
+    values: Mapping[str, Any]
+    motions: Mapping[str, Motion] = field(default_factory=dict)
+    time: Scalar = 0.0
+    space: str = "plane"
+    line: Vector | None = None
+    line_signs: Mapping[tuple[str, str], float] | None = None
+    known: Mapping[str, Any] = field(default_factory=dict)
+    reactions: Mapping[str, Any] = field(default_factory=dict)
+    energies: Mapping[str, Any] = field(default_factory=dict)
+
+
+def bind(component: Component, binding: Binding) -> Any:
+    """Return the component with values in place of its fields, so that its laws can be evaluated.
+
+    Parameters
+    ----------
+    component
+        The component.
+    binding
+        Numbers, expressions or sympy terms for everything its laws may read.
+    """
+    twin = object.__new__(type(component))
+    for name in ("_parent", "_name", "_settings"):
+        object.__setattr__(twin, name, getattr(component, name))
+    object.__setattr__(twin, "_bound", binding)
+    return twin

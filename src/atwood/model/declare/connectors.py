@@ -16,23 +16,8 @@ from atwood.late import dataclass
 from atwood.model.values.vector import Vector, dot
 
 if TYPE_CHECKING:
-    from atwood.model.declare.carried_inertia import Carried
     from atwood.model.declare.component import Component
-
-__all__ = [
-    "Connector",
-    "ConnectorSpec",
-    "Frame",
-    "Groove",
-    "InputRef",
-    "JointCoordinate",
-    "Motion",
-    "OutputRef",
-    "Point",
-    "Shaft",
-    "Slide",
-    "connector",
-]
+    from atwood.model.declare.contributions import Carried
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What a component declares in its class body: parameters and signals.
+"""Fields of a component's class body: parameters, alone and in rows, and signals.
 
 A field is a descriptor.  Read on a component it gives the value; inside a law it gives the number, expression or
 sympy term that the law is being evaluated on.  Read in the class body of a model it can be passed on to a part,
@@ -18,7 +18,6 @@ from atwood.arguments import (
     show,
 )
 from atwood.errors import AtwoodError, ParameterError, near_matches, suggestion
-from atwood.model.declare.array_values import check_array
 from atwood.model.declare.function_values import is_sympy, make_function
 from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.declare.time_functions import check_function
@@ -26,8 +25,6 @@ from atwood.model.values.units import Unit, parse_quantity, parse_si_unit
 
 if TYPE_CHECKING:
     from atwood.model.declare.component import Component
-
-__all__ = ["MISSING", "Field", "FieldReference", "ParameterExpression", "ParameterSpec", "SignalSpec"]
 
 
 class _Missing:
@@ -294,3 +291,45 @@ def _plain_number(value: Any) -> float | None:
         return real(value)
     except Exception:  # a value of somebody else's class may raise anything
         return None
+
+
+def check_array(value: Any, where: str) -> tuple[Any, ...]:
+    """Return numbers as a tuple, or as a tuple of rows that are equally long.
+
+    Parameters
+    ----------
+    value
+        A sequence of numbers or of rows, a NumPy array, a data frame.
+    where
+        The path of the parameter.
+
+    Raises
+    ------
+    ParameterError
+        If it is none of these, or a number is not finite.
+    """
+    plain = value.to_numpy() if hasattr(value, "to_numpy") else value
+    plain = plain.tolist() if hasattr(plain, "tolist") else plain
+    if not isinstance(plain, (list, tuple)) or not plain:
+        raise ParameterError(
+            f"{show(value)} is not numbers in a row, or in rows and columns", where=where, advice="Give a list of them."
+        )
+    if not isinstance(plain[0], (list, tuple)):
+        return tuple(_number(one, where) for one in plain)
+    found = tuple(tuple(_number(one, where) for one in row) for row in plain)
+    if len({len(row) for row in found}) > 1:
+        lengths = ", ".join(str(len(row)) for row in found[:5])
+        raise ParameterError(
+            f"its rows are not equally long: {lengths}", where=where, advice="Give rows with as many numbers each."
+        )
+    return found
+
+
+def _number(value: Any, where: str) -> float:
+    try:
+        number = real(value)
+    except Exception:  # a value of somebody else's class may raise anything
+        number = math.nan
+    if not math.isfinite(number):
+        raise ParameterError(f"{show(value)} in it is not a finite number", where=where, advice="Give finite numbers.")
+    return number

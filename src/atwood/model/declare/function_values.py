@@ -19,12 +19,9 @@ from atwood.expr.core.analysis import evaluate, live
 from atwood.expr.core.derivatives import jvp
 from atwood.expr.core.functions import Scalar, graph_of
 from atwood.expr.core.graph import Expression, Graph
-from atwood.model.declare.formula_text import read_text, unknown_name
-from atwood.model.declare.time_functions import StoredFunction, steps_of
+from atwood.model.declare.time_functions import StoredFunction, read_text, steps_of, unknown_name
 from atwood.model.values.units import Unit
 from atwood.model.values.vector import Vector
-
-__all__ = ["Function", "is_sympy", "make_function", "read_function"]
 
 
 class Function:

@@ -10,21 +10,6 @@ from atwood.arguments import NAME, Kind as ArgumentKind, Refused
 from atwood.errors import DeclarationError
 from atwood.late import dataclass
 
-__all__ = [
-    "REACTION",
-    "ActingOptions",
-    "ConstraintOptions",
-    "DerivativeOptions",
-    "EventOptions",
-    "JointOptions",
-    "Kind",
-    "Law",
-    "ObservableOptions",
-    "UpdateOptions",
-    "mark",
-    "scalars",
-]
-
 F = TypeVar("F", bound=Callable[..., Any])
 
 

@@ -42,20 +42,6 @@ from atwood.model.declare.law import (
 from atwood.model.declare.quantities import ObservableLaw
 from atwood.model.values.units import parse_si_unit
 
-__all__ = [
-    "constraint",
-    "derivative",
-    "dissipation",
-    "event",
-    "force",
-    "inertia",
-    "joint",
-    "lagrangian",
-    "observable",
-    "potential",
-    "update",
-]
-
 _F = TypeVar("_F", bound=Callable[..., Any])
 _R = TypeVar("_R")
 

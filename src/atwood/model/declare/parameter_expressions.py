@@ -14,7 +14,6 @@ from atwood.model.values.units import Exponents, Unit, unit_of
 if TYPE_CHECKING:
     from atwood.model.declare.component import Component
 
-__all__ = ["OPERATIONS", "ParameterExpression"]
 
 OPERATIONS: Mapping[str, Callable[..., Any]] = {
     "add": operator.add,

@@ -19,8 +19,6 @@ else:
 
     _R = TypeVar("_R")
 
-__all__ = ["PATH", "PATHS", "ObservableLaw", "Quantity"]
-
 
 class Quantity(Generic[_R]):
     """A quantity of a component: a name to read it by, ``result[scene["bob2"].position.x]``.

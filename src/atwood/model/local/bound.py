@@ -1,29 +1,30 @@
-"""A part on symbols of its own, before its laws are evaluated."""
+"""A part bound to symbols of its own, or to numbers, before its laws are evaluated."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import field
+from typing import Any
 
-from atwood.expr import Expression, Graph
+from atwood.errors import AtwoodError, DeclarationError, ParameterError
+from atwood.expr import Expression, Graph, Scalar
 from atwood.late import dataclass
-from atwood.model.declare.binding import Binding
+from atwood.model.declare.component import Binding, bind
 from atwood.model.declare.connectors import Frame, JointCoordinate, Motion
+from atwood.model.declare.fields import ParameterSpec
 from atwood.model.local.flatten import FlatScene, Part
 from atwood.model.local.joint_coordinates import (
+    JointCoordinateUse,
     JointReference,
     find_joint_references,
 )
-from atwood.model.local.joint_references import JointCoordinateUse
-from atwood.model.local.parameters import ParameterTable, read_parameter, read_signal, read_variation
 from atwood.model.local.parts import (
     LocalConnector,
     LocalPart,
 )
 from atwood.model.local.states import state_values
-from atwood.model.values.space import FIXED_AXES, Space, planar_axes
+from atwood.model.values.space import FIXED_AXES, Space, make_space, planar_axes
 from atwood.model.values.vector import Vector
-
-__all__ = ["bind_part"]
 
 
 @dataclass(frozen=True)
@@ -109,3 +110,108 @@ def local_motion(symbols: LocalConnector, space: Space, origin: tuple[Expression
         angle=symbols.angle,
         angular_velocity=Vector(0.0, -symbols.angular_speed, 0.0),
     )
+
+
+@dataclass
+class ParameterTable:
+    """The parameters of a scene as symbols, with their values; filled while the laws are read.
+
+    Attributes
+    ----------
+    graph, values, space
+        Where expressions live, the values of the parameters, and what the scene lives in.
+    origin
+        Place in the world, along the free components of the space, from which positions are counted; empty for the
+        world's own origin.
+    """
+
+    graph: Graph
+    values: dict[Expression, float] = field(default_factory=dict)
+    space: str = "plane"
+    origin: tuple[Expression, ...] = ()
+
+    def scalar(self, name: str, value: float, structural: bool = False) -> Scalar:
+        """Return the symbol of a parameter, or the plain number if it shapes the program (exact zero, structural)."""
+        if structural or value == 0.0:
+            return self.graph.constant(float(value))
+        symbol = self.graph.parameter(name)
+        self.values[symbol] = float(value)
+        return symbol
+
+
+def read_parameter(part: Part, spec: ParameterSpec, table: ParameterTable) -> Any:
+    """Return a parameter as laws see it: symbols for numbers that may change, the value itself for what shapes laws."""
+    value, name = part.values[spec.name], f"{part.path}.{spec.name}"
+    if value is None or spec.integer or spec.choices or spec.text or spec.function_of or spec.array:
+        return value
+    if spec.turning and table.space == "plane" and (value[0] != 0.0 or value[2] != 0.0):
+        advice = "Leave its x and z components zero: (0, -1, 0) turns counter-clockwise."
+        raise ParameterError("in a plane things turn about its normal only", where=name, advice=advice)
+    if spec.direction and not spec.turning and table.space == "plane" and value[1] != 0.0:
+        raise ParameterError("it points out of the plane", where=name, advice="Leave its y component zero.")
+    if spec.size is None:
+        return table.scalar(name, value, spec.structural)
+    axes = "xyz" if spec.size == 3 else [str(i) for i in range(spec.size)]
+    made = [table.scalar(f"{name}.{axis}", one, spec.structural) for axis, one in zip(axes, value, strict=True)]
+    return Vector(*made) if spec.size == 3 else tuple(made)
+
+
+def read_signal(
+    part: Part,
+    name: str,
+    given: Any,
+    flat: FlatScene,
+    time: Expression,
+    table: ParameterTable,
+    signal_symbols: dict[str, Expression],
+) -> Scalar:
+    """Return an input as laws see it: a constant, a function of time, or the symbol of what it is linked to."""
+    path = f"{part.path}.{name}"
+    if (part.path, name) in flat.links:
+        source, observable = flat.links[part.path, name]
+        if _is_source(flat.parts[source], flat):
+            return _source_value(flat.parts[source], observable, flat, time, table)
+        signal_symbols[name] = table.graph.symbol(f"{path}()")
+        return signal_symbols[name]
+    if not callable(given):
+        return table.scalar(path, given)
+    try:
+        return table.graph.convert(given(time))
+    except (TypeError, AtwoodError) as error:
+        raise DeclarationError(
+            f"this function of time cannot be evaluated on an expression ({error})",
+            where=path,
+            advice="Write it in plain arithmetic with Atwood's own functions (atwood.sin, atwood.select, ...).",
+        ) from error
+
+
+def read_variation(path: str, flat: FlatScene, time: Expression, table: ParameterTable) -> Scalar:
+    """Return the variation of an input; see `FlatScene.varied`."""
+    value, rate, second = (table.graph.parameter(name) for name in variation_names(path))
+    table.values.update(dict.fromkeys((value, rate, second), 0.0))
+    passed = time - flat.t_start
+    return value + passed * (rate + 0.5 * (passed * second))
+
+
+def variation_names(path: str) -> tuple[str, str, str]:
+    """Return the names of the parameters of an input's variation: its value, its rate and its second derivative."""
+    return f"{path} varied", f"{path} varied'", f"{path} varied''"
+
+
+def _is_source(part: Part, flat: FlatScene) -> bool:
+    """Return whether a part's outputs are functions of time, parameters and what is held alone."""
+    own = part.component
+    is_linked = any((part.path, name) in flat.links for name in part.signals)
+    moves = any(not spec.is_discrete for spec in own.state_specs().values())
+    return not own.connectors() and not moves and not is_linked
+
+
+def _source_value(source: Part, observable: str, flat: FlatScene, time: Expression, table: ParameterTable) -> Scalar:
+    """Return the output of a part that depends on time and parameters alone."""
+    from atwood.model.local.laws import output_value  # few scenes have links
+
+    values = {name: read_parameter(source, spec, table) for name, spec in source.component.parameter_specs().items()}
+    values |= {name: read_signal(source, name, given, flat, time, table, {}) for name, given in source.signals.items()}
+    values |= state_values(source, table.graph)
+    bound = bind(source.component, Binding(values=values, time=time))
+    return table.graph.convert(output_value(source, bound, observable, make_space(flat.space, flat.line_axis)))

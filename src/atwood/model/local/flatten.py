@@ -21,8 +21,6 @@ from atwood.model.declare.function_values import Function
 from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.values.units import Unit, parse_quantity, parse_si_unit, parse_unit, split_quantity, unit_of
 
-__all__ = ["FlatScene", "Part", "flatten", "unit_at"]
-
 
 @dataclass(frozen=True)
 class Part:

@@ -11,24 +11,30 @@ from contextlib import suppress
 from functools import partial
 from typing import Any, NamedTuple
 
-from atwood.errors import AtwoodError, DeclarationError, UnsupportedError
+from atwood.errors import AtwoodError, DeclarationError, UnsupportedError, suggestion
 from atwood.expr import Expression, Graph, Scalar, depends_on, live
 from atwood.late import dataclass, replace
-from atwood.model.declare.binding import Binding, bind
-from atwood.model.declare.carried_inertia import Asked, Carried
-from atwood.model.declare.contributions import BodyInertia, CoordinateLoad, Load, Placement, PointInertia
+from atwood.model.declare.component import Binding, bind
+from atwood.model.declare.contributions import (
+    Asked,
+    BodyInertia,
+    Carried,
+    CoordinateLoad,
+    Load,
+    Placement,
+    PointInertia,
+)
 from atwood.model.declare.law import Law, scalars
-from atwood.model.local.bound import bind_part
+from atwood.model.local.bound import ParameterTable, bind_part
 from atwood.model.local.flatten import FlatScene, Part
-from atwood.model.local.gravity_field import energies_in
 from atwood.model.local.joint_coordinates import (
+    JointCoordinateUse,
     counting_constraints,
+    find_joint_coordinate_uses,
     formulas_of,
     turns_read,
 )
-from atwood.model.local.joint_references import JointCoordinateUse, find_joint_coordinate_uses
-from atwood.model.local.moving_mass import check_lagrangians, find_varying
-from atwood.model.local.parameters import ParameterTable
+from atwood.model.local.moving_mass import check_lagrangians, energies_in, find_varying
 from atwood.model.local.parts import (
     LocalConnector,
     LocalConstraint,
@@ -40,8 +46,7 @@ from atwood.model.local.parts import (
 from atwood.model.local.states import discrete_states, local_states
 from atwood.model.returned import call_law, finite_scalar, law_value, listed, one_scalar
 from atwood.model.values.space import WHERE, Space
-
-__all__ = ["LocalConnector", "LocalConstraint", "LocalJoint", "LocalPart", "localize"]
+from atwood.model.values.vector import Vector
 
 
 def localize(
@@ -337,3 +342,56 @@ def _local_constraints(part: Part, law: Law, bound: Any, graph: Graph) -> Iterab
         )
     for index, (value, name) in enumerate(zip(values, names, strict=True)):
         yield LocalConstraint(law, index, value, name, law.options.sign)
+
+
+def output_value(part: Part, bound: Any, name: str, space: Space) -> Scalar:
+    """Return what an output is.
+
+    Parameters
+    ----------
+    part
+        The part.
+    bound
+        The same, bound to what its laws read.
+    name
+        The output: an observable or a reaction, with its axis if it is a vector.
+    space
+        What the scene lives in.
+
+    Raises
+    ------
+    DeclarationError
+        If it has no meaning in this space, or if it is a vector and no component is named, or the other way round.
+    """
+    stem, _, axis = name.partition(".")
+    law = next((one for one in part.component.laws("observable") if one.name == stem), None)
+    if law is None or name in bound._binding().reactions:
+        value = bound.reaction(name)  # which says which there are
+    else:
+        where = f"{part.path}.{name}"
+        if not law.holds_in(space.name):
+            message = f"{stem} has no meaning {WHERE[space.name]}"
+            raise DeclarationError(message, where=where, advice=_instead(part, law, space))
+        value = call_law(part.path, law, partial(law_value, bound, stem))
+        if isinstance(value, Vector):
+            if axis not in ("x", "y", "z"):
+                axes = space.reported(value, law.options.unit)
+                raise _no_component(axis, [f"{stem}.{'xyz'[i]}" for i in axes], where)
+            value = getattr(value, axis)
+        elif axis:
+            raise DeclarationError(f"{stem} is a number and no vector", where=where, advice=f"Connect {stem}.")
+    found: Scalar = value
+    return found
+
+
+def _instead(part: Part, law: Law, space: Space) -> str:
+    """Return a hint for an observable of another space: what looks alike here, or in which spaces it has a meaning."""
+    names = [one.name for one in part.component.laws("observable") if one.holds_in(space.name)]
+    return suggestion(law.name, names) or f"It has one {' or '.join(WHERE[one] for one in law.options.spaces)}."
+
+
+def _no_component(axis: str, names: Sequence[str], where: str) -> DeclarationError:
+    """Return the error of a vector of which no component is named, or one that it does not have."""
+    what = f"a vector has no component {axis!r}" if axis else "it is a vector"
+    *first, last = names
+    return DeclarationError(what, where=where, advice=f"Connect {', '.join(first)}{' or ' * bool(first)}{last}.")

@@ -7,23 +7,12 @@ from dataclasses import field
 
 from atwood.expr import Expression, Graph
 from atwood.late import dataclass
-from atwood.model.declare.binding import Binding
-from atwood.model.declare.carried_inertia import Asked
-from atwood.model.declare.contributions import BodyInertia, Load, Placement, PointInertia
+from atwood.model.declare.component import Binding
+from atwood.model.declare.contributions import Asked, BodyInertia, Load, Placement, PointInertia
 from atwood.model.declare.law import Law
 from atwood.model.local.flatten import Part
 from atwood.model.values.rotation import Axes
 from atwood.model.values.vector import Vector
-
-__all__ = [
-    "DiscreteState",
-    "LocalConnector",
-    "LocalConstraint",
-    "LocalJoint",
-    "LocalPart",
-    "LocalState",
-    "multiplier_symbol",
-]
 
 
 @dataclass(frozen=True)

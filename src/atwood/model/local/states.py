@@ -7,13 +7,11 @@ from typing import Any
 
 from atwood.errors import DeclarationError, suggestion
 from atwood.expr import Expression, Graph
+from atwood.model.declare.field_functions import StateSpec
 from atwood.model.declare.law import Law, scalars
-from atwood.model.declare.states import StateSpec
 from atwood.model.local.flatten import Part
 from atwood.model.local.parts import DiscreteState, LocalState
 from atwood.model.returned import call_law, law_value, one_scalar
-
-__all__ = ["declared_starts", "discrete_states", "local_states", "state_values"]
 
 
 def _symbols(part: Part, spec: StateSpec, graph: Graph) -> list[Expression]:

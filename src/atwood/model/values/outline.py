@@ -12,8 +12,6 @@ from atwood.arguments import FLAG, NAME, Kind, Refused, check, number, one_of, r
 from atwood.errors import DeclarationError, UsageError
 from atwood.late import dataclass, replace
 
-__all__ = ["Outline"]
-
 
 @dataclass(frozen=True, eq=False)
 class Outline:

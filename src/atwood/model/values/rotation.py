@@ -16,8 +16,6 @@ from atwood.expr.core.functions import SCALAR
 from atwood.late import dataclass
 from atwood.model.values.vector import Vector, as_vector, cross
 
-__all__ = ["FREE", "IDENTITY", "Axes", "Rotation", "Turn", "as_rotation", "compose", "from_axes", "to_axes", "turn"]
-
 Axes: TypeAlias = tuple[Vector, Vector, Vector]
 """The x, y and z axes of a frame, in the axes of another one: the columns of a rotation matrix."""
 

@@ -6,8 +6,6 @@ from atwood.expr import Scalar, cos, is_zero, sin
 from atwood.late import dataclass
 from atwood.model.values.vector import Vector, dot
 
-__all__ = ["Space", "make_space"]
-
 _AXIAL_UNITS = ("rad/s", "rad/s^2", "N*m", "kg*m^2/s")
 
 

@@ -12,8 +12,6 @@ from functools import lru_cache
 from atwood.errors import DeclarationError, ParameterError, suggestion
 from atwood.late import dataclass
 
-__all__ = ["Exponents", "Unit", "parse_quantity", "parse_si_unit", "parse_unit", "split_quantity", "unit_of"]
-
 Exponents = tuple[int, int, int, int]
 """Powers of mass, length, time and electric current."""
 

@@ -14,8 +14,6 @@ from atwood.errors import DeclarationError
 from atwood.expr import Expression, Scalar, sqrt
 from atwood.expr.core.functions import is_scalar
 
-__all__ = ["ZERO", "Vector", "as_vector", "cross", "dot", "norm"]
-
 
 class Vector:
     """A vector with components along x (right), y (into the page) and z (up).

@@ -5,8 +5,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 
-__all__ = ["spread_columns"]
-
 
 def spread_columns(
     ropes: Sequence[tuple[int, ...]],

@@ -1,4 +1,4 @@
-"""Where everything is, and what it looks like: shapes of parts, found from their laws and not from their names."""
+"""Places and shapes of parts in a plane, found from their laws and not from their names, slack ropes included."""
 
 from __future__ import annotations
 
@@ -22,13 +22,8 @@ from atwood.model.declare.connectors import Groove
 from atwood.model.local.parts import LocalPart
 from atwood.model.values.outline import Outline
 from atwood.plotting.planar.columns import spread_columns
-from atwood.plotting.planar.slack import pulling
-from atwood.plotting.shapes.curves import joint_curve, numbers
-from atwood.plotting.shapes.meshes import Mesh
-from atwood.plotting.shapes.outlines import outline_mesh, outline_of
+from atwood.plotting.shapes.meshes import Mesh, joint_curve, numbers, outline_mesh, outline_of
 from atwood.result.result import Result
-
-__all__ = ["Kind", "Picture", "Shape", "find_connectors", "make_picture"]
 
 Kind = Literal[
     "ground",
@@ -390,3 +385,37 @@ def _between(
 
 def _value(mechanism: Mechanism, value: Scalar) -> float:
     return float(evaluate([mechanism.table.graph.convert(value)], mechanism.known_at_start())[0])
+
+
+def pulling(result: Result, part: str) -> NDArray[np.bool_]:
+    """Return at which output times a rope has a law in its mode: slack, or let go, it has none.
+
+    Parameters
+    ----------
+    result
+        The run.
+    part
+        Path of the rope.
+    """
+    pieces = []
+    for segment in result.run.segments:
+        local = segment.assembly.mechanism.locals_[part]
+        acts = bool(local.constraints or local.joints or local.potentials)
+        pieces.append(np.full(len(segment.time), acts)[segment.shown])
+    return np.concatenate(pieces)
+
+
+def hanging(ends: FloatArray, spare: float) -> FloatArray:
+    """Return a slack rope as a parabola, about as much longer than the straight way as it has to spare.
+
+    Parameters
+    ----------
+    ends
+        Both ends on the page, m, shape (2, 2).
+    spare
+        By how much it is longer than the way between them, m.
+    """
+    share = np.linspace(0.0, 1.0, 41)[:, None]
+    sag = np.sqrt(0.375 * spare * (float(np.linalg.norm(ends[1] - ends[0])) + 0.5 * spare))
+    line: FloatArray = ends[0] + share * (ends[1] - ends[0]) - np.array([0.0, 4.0 * sag]) * share * (1.0 - share)
+    return line

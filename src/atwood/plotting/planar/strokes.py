@@ -8,13 +8,10 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.plotting.canvas import COLOURS, GREY, INK
-from atwood.plotting.planar.geometry import Picture, Shape
-from atwood.plotting.planar.slack import hanging
+from atwood.plotting.planar.geometry import Picture, Shape, hanging
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-__all__ = ["Pen", "draw_trace"]
 
 
 class Pen:

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["plot_energies"]
 
 _SHOWN = 7
 """So many components have a colour each; the rest share the last."""

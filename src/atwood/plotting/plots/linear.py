@@ -18,7 +18,6 @@ from atwood.theory.linear import EquilibriumBranches, LinearModel, RootLocus
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["plot_bode", "plot_branches", "plot_nyquist", "plot_root_locus"]
 
 _POINTS = 600
 

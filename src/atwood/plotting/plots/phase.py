@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["plot_phase_portrait", "plot_section"]
 
 _HALF_TURNS = {-4: "-2 pi", -3: "-3 pi/2", -2: "-pi", -1: "-pi/2", 0: "0", 1: "pi/2", 2: "pi", 3: "3 pi/2", 4: "2 pi"}
 

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["plot_comparison", "style_of"]
 
 _STYLES = {
     "reduced, IDA": (COLOURS[0], "o"),

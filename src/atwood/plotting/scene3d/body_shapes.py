@@ -10,11 +10,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.late import dataclass, replace
 from atwood.plotting.scene3d.reading import Lump
-from atwood.plotting.shapes.meshes import Mesh, box, cylinder, frame_along
-from atwood.plotting.shapes.outlines import outline_mesh
-
-__all__ = ["BodyShape", "shape_of"]
-
+from atwood.plotting.shapes.meshes import Mesh, box, cylinder, frame_along, outline_mesh
 
 _EQUAL = 1e-6
 """Moments that differ by less, relative to the largest, are equal."""

@@ -15,9 +15,6 @@ from atwood.plotting.scene3d.reading import Joining, Reading, Tie
 from atwood.plotting.scene3d.turning_parts import FORK, STEEL, WHITE, add_gimbals, add_shafts, add_tops, pale
 from atwood.plotting.shapes.meshes import box, cylinder, frame_along, revolved
 
-__all__ = ["AXIS_COLOURS", "SpaceModel", "build_model"]
-
-
 AXIS_COLOURS = (COLOURS[1], COLOURS[2], COLOURS[0])
 """Of x, y and z."""
 

@@ -17,8 +17,6 @@ from atwood.plotting.shapes.meshes import Mesh
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Stage", "lighter", "to_rgb"]
-
 
 _LIGHT = np.array([-0.45, 0.75, 0.5]) / np.linalg.norm([-0.45, 0.75, 0.5])
 """Where the light comes from, on the page and towards the eye: from the left, from above."""

@@ -12,11 +12,8 @@ from atwood.late import dataclass
 from atwood.plotting.camera import Camera
 from atwood.plotting.canvas import COLOURS
 from atwood.plotting.scene3d.model import SpaceModel, build_model
-from atwood.plotting.scene3d.space_reading import read_scene
+from atwood.plotting.scene3d.reading import read_scene
 from atwood.result.result import Result
-
-__all__ = ["SpacePicture", "Trail", "hull", "make_space_picture"]
-
 
 _TRAILS = 4
 """With more moving masses than this, only the last one's path is drawn."""

@@ -12,8 +12,6 @@ from atwood.plotting.scene3d.body_shapes import BodyShape
 from atwood.plotting.scene3d.reading import Joining, Reading
 from atwood.plotting.shapes.meshes import Mesh, cylinder, frame_along
 
-__all__ = ["Bench", "Hinge", "Piece", "Tip"]
-
 
 @dataclass(frozen=True, eq=False)
 class Piece:

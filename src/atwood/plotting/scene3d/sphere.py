@@ -11,16 +11,15 @@ import numpy as np
 from atwood.errors import UsageError
 from atwood.plotting.camera import Camera, View, as_camera
 from atwood.plotting.canvas import COLOURS, INK, finished, new_figure
+from atwood.plotting.scene3d.drawing import draw_corner_axes, draw_sphere
 from atwood.plotting.scene3d.painter import lighter
 from atwood.plotting.scene3d.picture import Trail
-from atwood.plotting.scene3d.scenery import draw_corner_axes, draw_sphere
 from atwood.result.result import Result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["plot_on_sphere"]
 
 _COLUMNS = 4
 _UNIT = 1e-6

@@ -14,9 +14,6 @@ from atwood.plotting.scene3d.body_shapes import BodyShape
 from atwood.plotting.scene3d.pieces import Bench, Hinge, Tip
 from atwood.plotting.shapes.meshes import cylinder, frame_along, revolved, ring
 
-__all__ = ["FORK", "STEEL", "WHITE", "add_gimbals", "add_shafts", "add_tops", "pale"]
-
-
 STEEL, WHITE = "#c8d3de", "#ffffff"
 
 FORK = 8.0

@@ -1,18 +1,21 @@
-"""Surfaces of simple bodies as small flat faces, which a painter can put in order by their distance."""
+"""Surfaces of bodies, outlines of parts and curves of joints, as small flat faces and lines."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from atwood.arrays import FloatArray, IndexArray
+from atwood.expr import Expression, Scalar, depends_on, evaluate
 from atwood.late import dataclass
-
-__all__ = ["Mesh", "box", "cylinder", "frame_along", "revolved", "ring"]
-
+from atwood.mechanics.kinematics.mechanism import Mechanism
+from atwood.model.declare.component import Binding, bind
+from atwood.model.local.parts import LocalJoint, LocalPart
+from atwood.model.values.outline import Outline
 
 _SHARP = np.cos(np.radians(35.0))
 """Faces that meet at a larger angle than this have an edge between them; smaller ones belong to a curved surface."""
@@ -199,3 +202,151 @@ def ring(radius: float, thickness: float, around: int = 64, corners: int = 14) -
     angles = 2.0 * np.pi * np.arange(corners) / corners
     profile = np.stack([radius + thickness * np.cos(angles), thickness * np.sin(angles)], axis=-1)
     return revolved(profile, around, closed=True)
+
+
+def numbers(
+    mechanism: Mechanism, given: Sequence[Scalar], also: Mapping[Expression, float] | None = None
+) -> FloatArray:
+    """Return the values of expressions of parameters, and of further symbols with the values given."""
+    graph = mechanism.table.graph
+    values = {**mechanism.known_at_start(), **(also or {})}
+    return np.array(evaluate([graph.convert(one) for one in given], values), dtype=float)
+
+
+def joint_curve(mechanism: Mechanism, path: str, joint: LocalJoint) -> FloatArray | None:
+    """Return the curve on which a joint moves its second node, from the first one, m, shape (points, 3).
+
+    None where it moves it on a straight line, not at all, or with several coordinates.
+
+    Parameters
+    ----------
+    mechanism
+        The scene.
+    path, joint
+        The part and its law.
+    """
+    shift = [mechanism.table.graph.convert(c) for c in joint.placement.displacement]
+    moving = [c for c in joint.coordinates if depends(shift, c)]
+    if len(moving) != 1:
+        return None
+    one, two = (joint_step(mechanism, joint, shift, moving[0], size) for size in (1.0, 2.0))
+    if np.allclose(two, 2.0 * one, rtol=1e-9, atol=0.0):
+        return None
+    places = np.linspace(*_ends(mechanism, path), 73)
+    return np.array([joint_shift(mechanism, joint, shift, {moving[0]: place}) for place in places])
+
+
+def holds_distance(local: LocalPart, value: Expression) -> bool:
+    """Return whether a constraint holds points apart: it reads the places of two connectors at least, and no more."""
+    several = local.connectors.values()
+    others = [symbol for one in several for symbol in (*one.velocity, *one.orientation, *one.spin)]
+    reads = [depends_on(value, list(one.position)) for one in several]
+    return sum(reads) > 1 and not depends_on(value, others)
+
+
+def _ends(mechanism: Mechanism, path: str) -> tuple[float, float]:
+    """Return between which values of its coordinate a curve is drawn: its ends, or once round."""
+    values = mechanism.locals_[path].part.values
+    low, high = values.get("lower_end"), values.get("upper_end")
+    if isinstance(low, float) and isinstance(high, float):
+        return low, high
+    if isinstance(low, float):
+        return low, low + 2.0 * np.pi
+    return (high - 2.0 * np.pi, high) if isinstance(high, float) else (-np.pi, np.pi)
+
+
+def depends(expressions: Sequence[Expression], symbol: Expression) -> bool:
+    """Return whether one of some expressions depends on a symbol."""
+    return any(depends_on(one, [symbol]) for one in expressions)
+
+
+def joint_shift(
+    mechanism: Mechanism, joint: LocalJoint, shift: Sequence[Expression], values: Mapping[Expression, float]
+) -> FloatArray:
+    """Return the displacement of a joint for some values of its coordinates; others are zero."""
+    known = {**dict.fromkeys((*joint.coordinates, *mechanism.relations.roots), 0.0), **values}
+    for axes in joint.axes:  # whichever way they are turned, the step along a coordinate is the same
+        known.update((c, float(i == k)) for i, axis in enumerate(axes) for k, c in enumerate(axis))
+    return numbers(mechanism, shift, known)
+
+
+def joint_step(
+    mechanism: Mechanism, joint: LocalJoint, shift: Sequence[Expression], one: Expression, value: float
+) -> FloatArray:
+    """Return by how much a joint's displacement changes when one of its coordinates goes from zero to a value."""
+    ends = [joint_shift(mechanism, joint, shift, {one: place}) for place in (value, 0.0)]
+    found: FloatArray = ends[0] - ends[1]
+    return found
+
+
+_PARTS = 8
+"""Into about so many parts the longest side is divided, since a painter sorts small faces better."""
+
+_THIN = 0.01
+"""What has no thickness is drawn so thick, relative to its largest side."""
+
+
+def outline_of(local: LocalPart) -> Outline | None:
+    """Return what a part looks like, with the numbers of its scene; None if it does not say.
+
+    Parameters
+    ----------
+    local
+        The part.
+    """
+    part = local.part
+    found: Outline | None = bind(part.component, Binding(values=part.values)).outline()
+    return found
+
+
+def outline_mesh(outline: Outline, around: int = 40) -> Mesh:
+    """Return the surface of an outline, in the axes of the part's frame.
+
+    Parameters
+    ----------
+    outline
+        The outline.
+    around
+        How many corners stand for a circle.
+    """
+    made = _own_mesh(outline, around)
+    return made if outline.axes is None else made.placed(np.zeros(3), outline.axes)
+
+
+def _own_mesh(outline: Outline, around: int) -> Mesh:
+    if outline.kind == "box":
+        return box(outline.sides, cells=_PARTS - 3)
+    if outline.kind == "mesh":
+        triangles = np.asarray(outline.triangles, dtype=np.intp)
+        faces = np.column_stack([triangles, triangles[:, 2]])
+        return Mesh(np.asarray(outline.vertices, dtype=float), faces, np.zeros(len(faces), dtype=bool))
+    line = _with_thickness(np.asarray(outline.profile, dtype=float), outline.is_ring)
+    made = revolved(_divided(line, outline.is_ring), around=around, marks=True, closed=outline.is_ring)
+    # z of the surface along the axis, x and y along the next two: a right-handed turn.
+    turn = np.eye(3)[:, [(outline.axis + 1) % 3, (outline.axis + 2) % 3, outline.axis]]
+    return made.placed(np.zeros(3), turn)
+
+
+def _with_thickness(line: FloatArray, is_ring: bool) -> FloatArray:
+    """Return a line that encloses something: of a plate without thickness, or a wall without it, with a little."""
+    widths, heights = np.ptp(line, axis=0)
+    least = _THIN * max(float(np.max(line[:, 0])), float(heights))
+    line = line.copy()
+    if heights < least:
+        line[:, 1] = 0.5 * least * np.array([-1.0 if i < (len(line) + 1) // 2 else 1.0 for i in range(len(line))])
+    if widths < least and is_ring:
+        line[[0, -1], 0] -= least
+    elif 0.0 < widths < least:
+        line[:, 0] *= least / widths
+    return line
+
+
+def _divided(line: FloatArray, is_ring: bool) -> FloatArray:
+    """Return a line in pieces that are not much longer than a part of its longest side."""
+    whole = np.concatenate([line, line[:1]]) if is_ring else line
+    longest = float(np.max(np.ptp(whole, axis=0)))
+    found = []
+    for one, other in pairwise(whole):
+        count = max(1, int(np.ceil(_PARTS * float(np.linalg.norm(other - one)) / (1.5 * longest))))
+        found += [one + (other - one) * k / count for k in range(count)]
+    return np.array(found if is_ring else [*found, whole[-1]])

@@ -19,7 +19,7 @@ from atwood.forms.program import state_groups
 from atwood.late import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.forces import local_map
-from atwood.model.declare.binding import bind
+from atwood.model.declare.component import bind
 from atwood.model.declare.contributions import CoordinateLoad, Load
 from atwood.model.declare.law import scalars
 from atwood.model.local.parts import LocalPart

@@ -16,8 +16,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, DeclarationError, ParameterError, SolveError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
-from atwood.model.declare.binding import Binding, bind
-from atwood.model.declare.component import Component
+from atwood.model.declare.component import Binding, Component, bind
 from atwood.model.declare.law import Law
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from atwood.integrators.explicit_problem import MET, STEPS, CompiledRates, Expli
 from atwood.integrators.protocol import Values
 from atwood.simulation.problem.explicit_scene import first_order
 from atwood.simulation.problem.problem import Plan
-from atwood.topology.groups import connected_groups
+from atwood.topology.graph import connected_groups
 
 if TYPE_CHECKING:
     from atwood.integrators.embedded.constrained import CompiledConstraints

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from atwood.codegen.sundials.null_space import NullSpaceShape
 from atwood.forms.null_space import NullSpaceProgram
-from atwood.topology.groups import connected_groups
+from atwood.topology.graph import connected_groups
 
 __all__ = ["choice_lists", "null_space_shape"]
 

@@ -18,8 +18,6 @@ from atwood.simulation.initialization.start import find_start
 from atwood.theory.action.quadrature import Level, level_through
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian
 
-__all__ = ["ActionAngle", "action_angle"]
-
 
 @dataclass(frozen=True, eq=False)
 class ActionAngle:

@@ -16,8 +16,6 @@ from atwood.arrays import FloatArray
 from atwood.errors import SolveError, UnsupportedError
 from atwood.late import dataclass
 
-__all__ = ["Level", "level_through"]
-
 Energy = Callable[[FloatArray, FloatArray], FloatArray]
 """H of arrays of q and p."""
 

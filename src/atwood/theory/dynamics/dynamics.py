@@ -2,8 +2,6 @@
 
 In the notation of Featherstone (Rigid Body Dynamics Algorithms, chapters 2 and 3), with ``h`` of all forces of the
 scene and its weight: ``M a + h = tau + G^T lambda``, ``G a + gamma = 0``, along the speeds.
-
-The dynamics of a scene as functions of numbers.
 """
 
 from __future__ import annotations
@@ -15,8 +13,8 @@ import numpy as np
 
 from atwood.arguments import NAME, check, optional, takes
 from atwood.arrays import FloatArray
-from atwood.errors import SolveError, UnsupportedError, UsageError
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, substitute
+from atwood.errors import SolveError, UnsupportedError, UsageError, suggestion_in_parts
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, jvp, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.derivative import is_too_long
 from atwood.forms.kept import Key
@@ -33,10 +31,6 @@ from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.start import Start, find_start
 from atwood.simulation.problem.arguments import FORM, ORIENTATION
 from atwood.theory.dynamics.functions import Function, Numbers, as_numbers, as_time, at_time
-from atwood.theory.dynamics.jacobians import by_speeds, velocity_jacobian
-
-__all__ = ["Dynamics", "dynamics"]
-
 
 _PROGRAM: Key[Program] = Key("program of a function of the state")
 
@@ -410,3 +404,53 @@ def dynamics(scene: Model | Assembly, *, form: str | None = None, orientation: s
         Its functions.
     """
     return Dynamics(assembly_of(scene, form=form, orientation=orientation))
+
+
+def velocity_jacobian(assembly: Assembly, equations: Equations, path: str) -> tuple[list[Expression], tuple[int, ...]]:
+    """Return the derivatives of a quantity's rate, or of a velocity, by the speeds, and the shape of what they make.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    equations
+        Its equations, in the coordinates that are wanted.
+    path
+        A quantity, or a vector of them.
+
+    Raises
+    ------
+    UsageError
+        If there is no such quantity, or it depends on accelerations or reactions.
+    """
+    e, observables = equations, assembly.observables
+    vector = [f"{path}.{axis}" for axis in "xyz" if f"{path}.{axis}" in observables]
+    if path not in observables and not vector:
+        known = sorted({one.rpartition(".")[0] if one[-2:] in (".x", ".y", ".z") else one for one in observables})
+        raise UsageError("there is no such quantity", where=path, advice=suggestion_in_parts(path, known))
+    values = [observables[one].value for one in ([path] if path in observables else vector)]
+    others = [*e.accelerations, *(one.symbol for one in assembly.reactions)]
+    if any(depends_on(value, others) for value in values):
+        raise UsageError(
+            "it depends on accelerations or reactions, and has no derivative of motion",
+            where=path,
+            advice="Ask for a position, an angle or a velocity.",
+        )
+    if not any(depends_on(value, e.speeds) for value in values):
+        values = jvp(values, {e.time: 1.0, **dict(zip(e.coordinates, e.rates, strict=True))})
+    entries = by_speeds(values, e)
+    if any(depends_on(one, e.speeds) for one in dict.fromkeys(entries)):
+        raise UsageError("it is not linear in the speeds", where=path, advice="Ask for a position or a velocity.")
+    shape = (len(e.speeds),)
+    return entries, shape if path in observables else (len(vector), *shape)
+
+
+def by_speeds(values: Sequence[Expression], equations: Equations) -> list[Expression]:
+    """Return the derivatives of values by the speeds, row by row."""
+    n = len(equations.speeds)
+    entries = [equations.graph.zero] * (len(values) * n)
+    found = jacobian(list(values), list(equations.speeds)) if values else None
+    if found is not None:
+        for row, column, entry in zip(found.rows, found.columns, found.entries, strict=True):
+            entries[row * n + column] = entry
+    return entries

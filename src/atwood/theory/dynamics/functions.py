@@ -17,8 +17,6 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.simulation.problem.not_compilable import find_not_compilable
 
-__all__ = ["Function", "Numbers", "as_numbers", "as_time", "at_time", "shape_of_states"]
-
 _NATIVE: Key[NativeProgram] = Key("machine code for one state")
 
 Numbers = Any

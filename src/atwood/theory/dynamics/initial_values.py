@@ -24,8 +24,6 @@ from atwood.theory.dynamics.dynamics import Dynamics
 from atwood.theory.dynamics.functions import Function
 from atwood.tolerances import tolerances
 
-__all__ = ["StartSolution", "solve_start"]
-
 _STEPS, _HALVINGS = 60, 40
 _NEARLY = 10.0
 """Times `tolerances.MET`, relative to the terms of a condition: what counts as met where rounding leaves no better."""

@@ -18,8 +18,7 @@ from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of
 from atwood.simulation.problem.arguments import FORM, ORIENTATION
-from atwood.theory.equations.closures import solve_closures
-from atwood.theory.equations.formulas import EquationFormulas, Parameters
+from atwood.theory.equations.formulas import EquationFormulas, Parameters, solve_closures
 from atwood.theory.equations.modules import module_of
 from atwood.theory.equations.pages import as_data, equation_lines, html_of, sections_of, symbol_lines, symbol_table
 from atwood.theory.formulas import objects, page
@@ -27,8 +26,6 @@ from atwood.theory.formulas.notation import notation_of
 from atwood.theory.formulas.objects import Sympy
 from atwood.theory.formulas.page import Section
 from atwood.theory.formulas.tree import Sum
-
-__all__ = ["EquationsOfMotion", "PartOfEquations", "equations", "read_equations"]
 
 
 def read_equations(assembly: Assembly, parameters: Parameters = "symbolic") -> EquationsOfMotion:

@@ -15,8 +15,6 @@ from atwood.tolerances import tolerances
 if TYPE_CHECKING:
     from atwood.theory.equations.equations import EquationsOfMotion
 
-__all__ = ["module_of"]
-
 
 def module_of(eq: EquationsOfMotion) -> str:
     """Return the module; see `EquationsOfMotion.python`."""
@@ -90,7 +88,8 @@ def _check(eq: EquationsOfMotion, formulas: Sequence[Sum]) -> None:
     """Refuse what a module cannot compute by itself: functions of somebody's own, and values that are no state."""
     found, shared = eq.expressions, {name.symbol: value for name, value in eq.book.shared}
     known = {eq.notation.symbols[one] for one in found.coordinates} | set(shared)
-    known |= {eq.notation.velocities[one][0] for one in found.velocities} | set(eq.legend)
+    known |= {eq.notation.velocities[one][0] for one in found.velocities}
+    known |= {one for one in eq.legend if one.kind != "sampled value"}
     stack: list[Node] = [*formulas]
     while stack:
         node = stack.pop()

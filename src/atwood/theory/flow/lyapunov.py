@@ -15,10 +15,8 @@ from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE
 from atwood.showing import data_of, fitted
 from atwood.simulation.problem.arguments import RTOL, SOLVER, T_END
-from atwood.theory.flow.deviations import find_deviations
-from atwood.theory.flow.growth import orthonormal_growth
-
-__all__ = ["LyapunovExponents", "lyapunov_exponents"]
+from atwood.theory.flow.tangent_flow import orthonormal_growth
+from atwood.theory.flow.variational_equations import find_deviations
 
 _BLOCKS = 10
 """The motion is cut into so many, to tell how much the exponents still scatter."""

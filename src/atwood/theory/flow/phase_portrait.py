@@ -26,8 +26,6 @@ from atwood.theory.flow.plane_field import Field, Window, separatrices, spaced_c
 from atwood.theory.linear.linear_model import complex_text
 from atwood.theory.linear.variations import LinearScene
 
-__all__ = ["PhasePortrait", "RestPoint", "phase_portrait"]
-
 _LOOKS = 2001
 """Points of rest are looked for between so many coordinates."""
 

@@ -11,8 +11,6 @@ from scipy.stats import qmc
 from atwood.arrays import FloatArray
 from atwood.late import dataclass
 
-__all__ = ["Field", "Window", "curves_through", "separatrices", "spaced_curves"]
-
 Field: TypeAlias = Callable[[FloatArray], FloatArray]
 """Gives the rates at points, both of shape (points, 2)."""
 

@@ -18,8 +18,6 @@ from atwood.pipeline import SCENE, assemble, simulate
 from atwood.showing import count_of, data_of, fitted
 from atwood.simulation.problem.arguments import RTOL, SOLVER, T_END
 
-__all__ = ["PoincareSection", "poincare_section"]
-
 
 @dataclass(frozen=True, eq=False)
 class PoincareSection:

@@ -1,4 +1,10 @@
-"""`tangent_flow`: how all neighbours of a motion move."""
+"""`tangent_flow`: how all neighbours of a motion move, and how volumes of phase space grow.
+
+The volume element of a scene with mass matrix M whose deviations meet holonomic constraints is, in displacements s and
+speeds u, ``det(T^T M T) ds du`` with T a basis of the directions that the constraints leave free: Liouville's measure
+``dq dp`` in minimal coordinates, whichever these are (Arnold, Mathematical Methods of Classical Mechanics, sections 16
+and 38). In bases that are orthonormal with respect to M it is the plain volume.
+"""
 
 from __future__ import annotations
 
@@ -14,14 +20,13 @@ from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
+from atwood.numerics.rank import null_space
+from atwood.numerics.solutions import least_norm
 from atwood.pipeline import SCENE
 from atwood.result.result import Result
 from atwood.showing import fitted
 from atwood.simulation.problem.arguments import OUTPUTS, RTOL, SOLVER, T_END
-from atwood.theory.flow.deviations import Deviations, find_deviations
-from atwood.theory.flow.volume import log_volumes
-
-__all__ = ["TangentFlow", "tangent_flow"]
+from atwood.theory.flow.variational_equations import Deviations, VariationalEquations, find_deviations
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,3 +206,64 @@ def _products(found: Deviations, times: FloatArray) -> FloatArray:
             advice="Let the motion end before, or ask for `lyapunov_exponents`.",
         )
     return matrices
+
+
+def log_volumes(equations: VariationalEquations, propagators: FloatArray, sizes: FloatArray) -> FloatArray:
+    """Return the logarithm of the factor by which each step changes volumes of phase space, shape (steps,).
+
+    Parameters
+    ----------
+    equations
+        The variational equations at the edges of the steps.
+    propagators
+        What the steps do.
+    sizes
+        Of displacements along each speed.
+    """
+    into, back = _free_deviations(equations, sizes)
+    return np.asarray(np.linalg.slogdet(back[1:] @ propagators @ into[:-1])[1])
+
+
+def _free_deviations(equations: VariationalEquations, sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return bases of the deviations that meet the constraints, as columns, and their left inverses.
+
+    With T orthonormal with respect to M, they are ``ds = T x`` and ``du = T y - G^+ d(G u)/ds T x``.
+    """
+    jacobian, mass = equations.by_displacement, equations.mass
+    count, rows, n = jacobian.shape
+    free = n - rows
+    basis = np.broadcast_to(np.diag(sizes), mass.shape)
+    if rows:
+        scaled = jacobian * sizes
+        basis = null_space(scaled / np.linalg.norm(scaled, axis=2, keepdims=True), rank=rows) * sizes[:, None]
+    triangle = np.linalg.cholesky(np.swapaxes(basis, 1, 2) @ mass @ basis)
+    across = np.linalg.solve(triangle, np.swapaxes(basis, 1, 2))
+    into, back = np.zeros((count, 2 * n, 2 * free)), np.zeros((count, 2 * free, 2 * n))
+    for one, other in ((slice(n), slice(free)), (slice(n, None), slice(free, None))):
+        into[:, one, other], back[:, other, one] = np.swapaxes(across, 1, 2), across @ mass
+    if rows:
+        follow = least_norm(equations.rate_by_speed * sizes, equations.rate_by_displacement)
+        into[:, n:, :free] = -(follow * sizes[:, None]) @ into[:, :n, :free]
+    return into, back
+
+
+def orthonormal_growth(propagators: FloatArray, basis: FloatArray) -> FloatArray:
+    """Return the logarithms by which the axes of a volume grow in each step, shape (steps, columns).
+
+    The volume is spanned anew by orthonormal vectors after each step (Benettin, Galgani, Giorgilli and Strelcyn,
+    Meccanica 15, 1980).
+
+    Parameters
+    ----------
+    propagators
+        What each step does, shape (steps, m, m), in the scale in which lengths are measured.
+    basis
+        The vectors at the start, shape (m, columns).
+    """
+    frame = np.linalg.qr(basis)[0]
+    found = np.empty((len(propagators), basis.shape[1]))
+    with np.errstate(divide="ignore"):
+        for k, step in enumerate(propagators):
+            frame, triangle = np.linalg.qr(step @ frame)
+            found[k] = np.log(np.abs(np.diagonal(triangle)))
+    return found

@@ -37,8 +37,6 @@ from atwood.theory.formulas.forms import (
     squares_in,
     with_unit_quaternion,
 )
-from atwood.theory.formulas.numbers import as_decimal, as_fraction, of_pi
-from atwood.theory.formulas.order import in_brackets, in_order, place_of_term
 from atwood.theory.formulas.tree import (
     Call,
     Factor,
@@ -49,11 +47,15 @@ from atwood.theory.formulas.tree import (
     Symbol,
     Term,
     alone,
+    as_decimal,
+    as_fraction,
     cost,
+    in_brackets,
+    in_order,
+    of_pi,
+    place_of_term,
     product,
 )
-
-__all__ = ["Book", "TooLargeError"]
 
 _BUDGET = 60_000
 _WORTH_A_NAME = 4

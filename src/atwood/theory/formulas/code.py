@@ -9,8 +9,6 @@ from math import isqrt
 from atwood.theory.formulas.lines import quotient, signed_sum
 from atwood.theory.formulas.tree import Call, Name, Node, Number, Symbol, Term
 
-__all__ = ["KNOWN", "MATH", "formula", "identifier"]
-
 _ENDS = ("", "_dot", "_ddot", "_dddot")
 _BINARY = {"less": "<", "less_equal": "<=", "logical_and": "and", "logical_or": "or", "pow": "**"}
 _NAMES = {"absolute": "abs", "minimum": "min", "maximum": "max"}

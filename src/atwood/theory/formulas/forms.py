@@ -27,18 +27,6 @@ from atwood.expr.simplify.trigonometry import (
 from atwood.late import dataclass
 from atwood.theory.formulas.tree import Number
 
-__all__ = [
-    "LIMIT",
-    "Owners",
-    "content_of",
-    "forms_of",
-    "length_of",
-    "nearer",
-    "shape_of",
-    "squares_in",
-    "with_unit_quaternion",
-]
-
 LIMIT = 300
 """The largest number of terms of a formula."""
 

@@ -8,8 +8,6 @@ from fractions import Fraction
 from atwood.theory.formulas.notation import GREEK
 from atwood.theory.formulas.tree import Call, Factor, Name, Node, Number, Sum, Symbol, Term
 
-__all__ = ["formula", "letter", "number", "signed_terms"]
-
 _DOTS = ("", r"\dot", r"\ddot", r"\dddot")
 _FUNCTIONS = {"log": r"\ln", "asin": r"\arcsin", "acos": r"\arccos", "atan": r"\arctan", "minimum": r"\min"}
 _FUNCTIONS |= {"maximum": r"\max", "sign": r"\operatorname{sgn}", "atan2": r"\operatorname{atan2}"}

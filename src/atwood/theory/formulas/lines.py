@@ -7,8 +7,6 @@ from fractions import Fraction
 
 from atwood.theory.formulas.tree import Node, Number, Term
 
-__all__ = ["quotient", "signed_sum"]
-
 
 def signed_sum(terms: Iterable[Term], written: Callable[[Term], str]) -> str:
     """Return terms, written without their signs, with the signs between them; nothing if there are none."""

@@ -11,8 +11,6 @@ from atwood.forms.lagrangian import Lagrangian
 from atwood.late import dataclass
 from atwood.theory.formulas.tree import Symbol
 
-__all__ = ["GREEK", "Notation", "notation_of"]
-
 _LETTERS: Mapping[str, tuple[str, ...]] = {
     "mass": ("m",),
     "length": ("l",),
@@ -128,7 +126,7 @@ class Notation:
     velocities, accelerations
         For a symbol of a velocity or of its derivative: the symbol, and how many dots it has.
     legend
-        All symbols in order: coordinates, angular velocities, multipliers, parameters.
+        All symbols in order: coordinates, angular velocities, multipliers, sampled values, parameters.
     merged
         Parameters that another stands for: equal principal moments of a body.
     """
@@ -164,7 +162,8 @@ def notation_of(assembly: Assembly, found: Lagrangian) -> Notation:
         Its Lagrangian.
     """
     merged = _equal_moments(assembly)
-    wanted = [*_coordinates(found), *_spins(found), *_multipliers(found), *_parameters(assembly, merged)]
+    wanted = [*_coordinates(found), *_spins(found), *_multipliers(found)]
+    wanted += [*_sampled_values(assembly), *_parameters(assembly, merged)]
     subscripts = _subscripts(wanted)
     symbols: dict[Expression, Symbol] = {found.time: Symbol("t", path="time", unit="s", meaning="Time.", kind="time")}
     for order, (one, more) in enumerate(zip(wanted, subscripts, strict=True)):
@@ -227,6 +226,16 @@ def _parameters(assembly: Assembly, merged: Mapping[Expression, Expression]) -> 
         part, name, axis = _parameter_place(assembly, path)
         unit, meaning = _said(assembly, part, name)
         made.append(_Wanted(symbol, _parameter_stem(name, axis), path, part, unit, meaning, value, "parameter"))
+    return made
+
+
+def _sampled_values(assembly: Assembly) -> list[_Wanted]:
+    made = []
+    for one in assembly.discrete_states:
+        part, _, name = one.path.rpartition(".")
+        spec = assembly.mechanism.locals_[part].part.component.state_specs()[name]
+        unit = spec.unit.text.replace("any", "")
+        made.append(_Wanted(one.symbol, _word(name), one.path, part, unit, spec.doc, None, "sampled value"))
     return made
 
 

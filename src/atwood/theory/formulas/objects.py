@@ -10,8 +10,6 @@ from typing import Any, TypeAlias
 
 from atwood.theory.formulas.tree import Call, Name, Node, Number, Symbol, Term
 
-__all__ = ["Sympy", "derivative", "formula", "symbol_of"]
-
 Sympy: TypeAlias = Any
 """A sympy object."""
 

@@ -12,8 +12,6 @@ from atwood.late import dataclass
 from atwood.theory.formulas import latex, text
 from atwood.theory.formulas.tree import Call, Name, Node, Sum, Symbol, Term, replaced
 
-__all__ = ["Line", "Matrix", "Section", "as_html", "as_latex", "as_markdown", "as_text", "width", "with_names"]
-
 _WIDTH = 88
 """Columns of a line of formulas, as plain text."""
 

@@ -8,8 +8,6 @@ from atwood.theory.formulas.lines import quotient, signed_sum
 from atwood.theory.formulas.notation import GREEK
 from atwood.theory.formulas.tree import Call, Name, Node, Number, Sum, Symbol, Term
 
-__all__ = ["formula", "letter"]
-
 _LETTERS = dict(
     zip(GREEK, "αβγδεζηθικλμνξπρστυφχψωΓΔΘΛΞΠΣΥΦΨΩ", strict=True),
 )

@@ -1,29 +1,14 @@
-"""A formula as sums of products of named things: what is written down, whichever way."""
+"""A formula as sums of products of named things, with terms, factors and numbers as textbooks have them."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from fractions import Fraction
 from typing import TypeAlias
 
 from atwood.late import dataclass, replace
-
-__all__ = [
-    "Call",
-    "Factor",
-    "Name",
-    "Node",
-    "Number",
-    "Sum",
-    "Symbol",
-    "Term",
-    "alone",
-    "cost",
-    "names_in",
-    "product",
-    "replaced",
-]
 
 Number: TypeAlias = Fraction | float
 """An exact fraction, or a number that is none."""
@@ -186,3 +171,83 @@ def replaced(node: Node, by: Mapping[Node, Node]) -> Node:
         return Call(node.function, tuple(replaced(one, by) for one in node.arguments))
     terms = [replace(t, factors=tuple((replaced(base, by), power) for base, power in t.factors)) for t in node.terms]
     return Sum(tuple(terms))
+
+
+def in_brackets(terms: Iterable[Term]) -> Sum:
+    """Return a sum in order, that begins with a term that is added if there is one."""
+    found = sorted(terms, key=place_of_term)
+    first = next((i for i, term in enumerate(found) if term.number > 0), 0)
+    return Sum((found[first], *found[:first], *found[first + 1 :]))
+
+
+def in_order(term: Term) -> Term:
+    """Return a term with its factors in the order of textbooks: masses, fields, lengths, motion, functions."""
+    return replace(term, factors=tuple(sorted(term.factors, key=_place_of_factor)))
+
+
+def _place_of_factor(factor: Factor) -> tuple[int, int, str]:
+    node, _ = factor
+    if isinstance(node, Name):
+        symbol = node.symbol
+        if symbol.kind == "time":
+            return (3, 0, symbol.name)
+        if symbol.moves:
+            place = 4 if symbol.kind == "multiplier" else 5 + (node.dots > 0 or symbol.kind == "angular velocity")
+            return (place, symbol.order, symbol.name)
+        return (_rank_of_unit(symbol), symbol.order, symbol.name)
+    if isinstance(node, Call):
+        return (8, 0, node.function)
+    moving = any(name.symbol.moves for name in names_in([node]))
+    return (7 if moving else 0, 0, "")
+
+
+def _rank_of_unit(symbol: Symbol) -> int:
+    if "kg" in symbol.unit or symbol.unit.startswith("N"):
+        return 0
+    return 1 if symbol.unit == "m/s^2" else 2
+
+
+def place_of_term(term: Term) -> tuple[int, int, tuple[int, ...], int]:
+    """Return where a term stands in a sum: accelerations first, then velocities, then the rest, each in order."""
+    dots, degree, calls = 0, 0, 0
+    orders: list[int] = []
+    for node, power in term.factors:
+        if not isinstance(node, Name):
+            dots = max([dots, *(name.dots for name in names_in([node]))])
+            calls += 1
+        elif node.dots or node.symbol.kind == "angular velocity":
+            times = max(int(power), 1)
+            dots, degree = max(dots, node.dots + (node.symbol.kind == "angular velocity")), degree + times
+            orders += [node.symbol.order] * times
+    if not orders:
+        every = [name.symbol for name in names_in(node for node, _ in term.factors)]
+        orders = [one.order for one in every if one.moves] or [1000 + one.order for one in every]
+    return -dots, -degree, tuple(sorted(orders)), calls
+
+
+_LARGEST_DENOMINATOR = 360
+_NEAR = 1e-14
+"""Relative: a few operations on fractions like 1/12 round by less."""
+
+
+def as_fraction(value: float) -> Number:
+    """Return a number as the small fraction that it is up to rounding, or as it is."""
+    if not math.isfinite(value):
+        return value
+    fraction = Fraction(value).limit_denominator(_LARGEST_DENOMINATOR)
+    near = abs(float(fraction) - value) <= _NEAR * abs(value)
+    return fraction if near else value
+
+
+def of_pi(value: float) -> Fraction | None:
+    """Return a number as a fraction of pi, if it is one and no fraction itself."""
+    turns = Fraction(value / math.pi).limit_denominator(180)
+    if turns and abs(float(turns) * math.pi - value) <= _NEAR * abs(value):
+        return turns
+    return None
+
+
+def as_decimal(value: float) -> Number:
+    """Return a number without the digits that rounding made; a whole one as a fraction."""
+    rounded = float(f"{value:.14g}")
+    return Fraction(int(rounded)) if rounded.is_integer() and abs(rounded) < 1e9 else rounded

@@ -6,11 +6,17 @@ from collections.abc import Sequence
 from typing import Any
 
 from atwood.arguments import command, takes
-from atwood.theory.hamiltonian.arguments import EXPRESSION, EXPRESSIONS, HAMILTONIAN, PHASE_SPACE
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian
-from atwood.theory.hamiltonian.phase_space import PhaseSpace, Sympy, phase_space_of, short
-
-__all__ = ["bracket", "fundamental_brackets", "poisson_bracket", "poisson_brackets", "total_derivative"]
+from atwood.theory.hamiltonian.phase_space import (
+    EXPRESSION,
+    EXPRESSIONS,
+    HAMILTONIAN,
+    PHASE_SPACE,
+    PhaseSpace,
+    Sympy,
+    phase_space_of,
+    short,
+)
 
 
 @command("bracket")

@@ -1,22 +1,21 @@
-"""Functions on phase space in sympy: read on symbols of their own, brought to one form, and tested for being zero."""
+"""Functions on phase space in sympy: read from arguments, brought to one form, and tested for being zero."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
+from atwood.arguments import Kind, Refused, each, instance, optional
 from atwood.errors import AtwoodError, UsageError
 from atwood.expr import Expression, Graph, sqrt
 from atwood.expr.formulas.sympy_bridge import from_sympy
 from atwood.expr.simplify.polynomial import TooLargeError
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.theory.formulas import objects
 from atwood.theory.formulas.book import Book
 from atwood.theory.formulas.tree import Name, Symbol
-from atwood.theory.hamiltonian.hamiltonian import Hamiltonian
-from atwood.theory.symmetry.identities import is_proven_zero
-
-__all__ = ["PhaseSpace", "Sympy", "Verdict", "collected", "phase_space_of", "short", "vanishes"]
+from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, read_hamiltonian
+from atwood.theory.symmetry.proof import is_proven_zero
 
 Sympy: TypeAlias = Any
 """A sympy object."""
@@ -325,3 +324,90 @@ def _as_written(value: Sympy) -> Sympy:
     except (AtwoodError, TooLargeError, TypeError):
         return value
     return objects.formula(written).xreplace(dict(zip(stand_ins, symbols, strict=True)))
+
+
+_LETTERS = ("beta", "gamma", "zeta", "C", "N", "O", "Q", "S")
+"""Names that sympy takes for functions and classes of its own where text is read; in mechanics they are symbols."""
+
+
+def as_expression(value: Any) -> Any:
+    """Return an expression of sympy from one, a number, or text of one; raise any error if it is none."""
+    import sympy
+
+    if value is None or isinstance(value, (bool, bytes, type)):
+        raise Refused
+    try:
+        found = sympy.sympify(value, locals={name: sympy.Symbol(name) for name in _LETTERS})
+    except Exception:  # text is read as Python
+        raise Refused(f"{value!r} cannot be read." if isinstance(value, str) else "") from None
+    if not isinstance(found, sympy.Expr):
+        raise Refused
+    if found.has(sympy.nan, sympy.zoo, sympy.oo, -sympy.oo):
+        raise Refused("It has no finite value.")
+    return found
+
+
+def as_symbol(value: Any) -> Any:
+    """Return a symbol of sympy from one or from its name; raise any error if it is none."""
+    import sympy
+
+    if isinstance(value, str):
+        if not value.isidentifier():
+            raise Refused(f"{value!r} is no name.")
+        return sympy.Symbol(value)
+    if not isinstance(value, sympy.Symbol):
+        raise Refused
+    return value
+
+
+def _by_symbol(value: Any) -> dict[Any, Any]:
+    if not isinstance(value, Mapping):
+        raise Refused
+    return {as_symbol(key): as_expression(one) for key, one in value.items()}
+
+
+def _inverse(value: Any) -> dict[Any, Any]:
+    if not isinstance(value, Mapping):
+        raise Refused
+    return {as_expression(key): as_expression(one) for key, one in value.items()}
+
+
+def _in_order(kind: Kind, what: str) -> Kind:
+    """Return the kind of several values in an order, of which text is none."""
+    several = each(kind, what, single=False)
+
+    def read(value: Any) -> Any:
+        if isinstance(value, (str, set, frozenset, Mapping)):
+            raise Refused
+        return several.read(value)
+
+    return replace(several, read=read)
+
+
+def _phase_space(value: Any) -> Any:
+    if isinstance(value, Hamiltonian):
+        return value
+    if not isinstance(value, (tuple, list)) or len(value) != 2:
+        raise Refused
+    return tuple(EXPRESSIONS.read(one) for one in value)
+
+
+EXPRESSION = Kind("an expression of sympy, a number, or text such as 'p**2/2'", as_expression, "EXPRESSION")
+EXPRESSIONS = _in_order(EXPRESSION, "a list of expressions of sympy")
+SYMBOLS = _in_order(Kind("a symbol", as_symbol, "SYMBOL"), "a list of symbols of sympy, or of their names")
+BY_SYMBOL = Kind("a dictionary by symbol, of expressions of sympy", _by_symbol, "SYMBOL=EXPRESSION", is_many=True)
+INVERSE = optional(
+    Kind(
+        "a dictionary of expressions of sympy by old coordinate and momentum",
+        _inverse,
+        "SYMBOL=EXPRESSION",
+        is_many=True,
+    )
+)
+HAMILTONIAN = replace(
+    instance("what `atwood.hamiltonian` returns", Hamiltonian),
+    of_scene=lambda assembly: read_hamiltonian(assembly, "symbolic"),
+)
+PHASE_SPACE = replace(
+    HAMILTONIAN, what="what `atwood.hamiltonian` returns, or a pair: coordinates and momenta", read=_phase_space
+)

@@ -25,9 +25,6 @@ from atwood.theory.linear.operating_point import OperatingPoint, find_operating_
 from atwood.theory.linear.rest import difference, slopes_at
 from atwood.theory.linear.variations import LinearScene
 
-__all__ = ["BranchPoint", "EquilibriumBranch", "EquilibriumBranches", "equilibrium_branches"]
-
-
 _SEEDS = (0.02, 0.5, 0.98)
 """Where in the parameter's range equilibria are looked for to begin with."""
 

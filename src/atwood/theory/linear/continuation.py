@@ -18,9 +18,6 @@ from atwood.numerics.newton import Missing, largest, newton
 from atwood.numerics.rank import decompose
 from atwood.tolerances import tolerances
 
-__all__ = ["Curve", "Problem", "branch_directions", "follow"]
-
-
 _FIRST, _LARGEST, _SMALLEST = 1e-2, 5e-2, 1e-7
 """Arc length of steps, where every unknown and the parameter's range have size one."""
 

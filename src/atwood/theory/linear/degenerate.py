@@ -19,8 +19,6 @@ from atwood.arrays import FloatArray
 from atwood.numerics.rank import decompose, rank
 from atwood.theory.linear.rest import Rest, RestSearch
 
-__all__ = ["Degenerate", "follow_null_space"]
-
 _SOFT = 1e-6
 """Relative to stiffness elsewhere: below it a direction is looked at by its higher derivatives."""
 

@@ -26,9 +26,6 @@ from atwood.theory.linear.normal_modes import NormalModes, modes_of, values_text
 from atwood.theory.linear.operating_point import OperatingPoint, find_operating_point, moved_to, values_at
 from atwood.theory.linear.rest import Rest, RestSearch, difference, wrapped
 
-__all__ = ["REGION", "Equilibria", "Equilibrium", "equilibria"]
-
-
 _STARTS = 32
 """For each independent coordinate, so many starts of Newton's method, spread evenly over the region."""
 

@@ -1,4 +1,9 @@
-"""Linear models: matrices with the names of what they belong to, and what follows from them."""
+"""Linear models: named matrices, eigenvalues, controllable and observable parts, zeros and frequency responses.
+
+A coordinate that nothing depends on gives a zero eigenvalue, together with its conserved momentum a double one, which
+rounding would make a pair of size 1e-8 that spoils its neighbours. So what a matrix takes to zero is split off first,
+step by step (the staircase form; Golub and Wilkinson, SIAM Review 18, 1976); the rest is left to the QR method.
+"""
 
 from __future__ import annotations
 
@@ -13,18 +18,10 @@ from atwood.arguments import ARRAY, check
 from atwood.arrays import ComplexArray, FloatArray
 from atwood.errors import UsageError
 from atwood.late import dataclass
+from atwood.numerics.rank import decompose, null_space, rank, span
+from atwood.numerics.solutions import least_squares
 from atwood.showing import data_of
 from atwood.table import Shown, Table, facts, table
-from atwood.theory.linear.realization import (
-    Matrices,
-    frequency_response,
-    minimal_realization,
-    static_gain,
-    transmission_zeros,
-)
-from atwood.theory.linear.spectrum import Spectrum, find_spectrum
-
-__all__ = ["LinearModel", "complex_text"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,3 +227,198 @@ def complex_text(value: complex) -> str:
     real = f"{value.real:.6g} " if abs(value.real) > _GROWING * abs(value) else ""
     sign = ("+ " if value.imag > 0.0 else "- ") if real else "-" * int(value.imag < 0.0)
     return f"{real}{sign}{abs(value.imag):.6g}i"
+
+
+Matrices = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+"""A, B, C, D."""
+
+_LOST = 1e-10
+"""How far matrices of a model, which come without errors, may be off, relative to what is in them."""
+
+
+def minimal_realization(model: Matrices) -> Matrices:
+    """Return the part of a model that inputs reach and outputs see.
+
+    Kalman's decomposition by orthogonal staircases (Van Dooren, IEEE Trans. Automatic Control 26, 1981).
+    """
+    a, b, c, d = balanced(model)
+    reached = _reached(a, b)
+    a, b, c = reached.T @ a @ reached, reached.T @ b, c @ reached
+    seen = _reached(a.T, c.T)
+    return seen.T @ a @ seen, seen.T @ b, c @ seen, d
+
+
+def balanced(model: Matrices) -> Matrices:
+    """Return the same model in states of like size."""
+    a, b, c, d = model
+    if not len(a):
+        return model
+    from scipy.linalg import matrix_balance
+
+    _, (scale, _) = matrix_balance(a, permute=False, separate=True)
+    return a * scale / scale[:, None], b / scale[:, None], c * scale, d
+
+
+def _reached(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return an orthonormal basis, as columns, of what inputs reach."""
+    n = len(a)
+    basis = np.zeros((n, 0))
+    new, size = b, max(float(np.linalg.norm(a)), 1e-300)
+    while basis.shape[1] < n and new.size:
+        left = new - basis @ (basis.T @ new)
+        columns = np.linalg.norm(new, axis=0)
+        left = left / np.where(columns > 0.0, columns, 1.0)
+        found = span(left, _LOST)
+        if not found.shape[1]:
+            break
+        found = np.linalg.qr(found - basis @ (basis.T @ found))[0]
+        basis = np.hstack([basis, found])
+        new = a @ found
+        new = np.where(np.linalg.norm(new, axis=0) > _LOST * size, new, 0.0)
+    return basis
+
+
+def transmission_zeros(model: Matrices) -> ComplexArray:
+    """Return the finite zeros of a model with as many outputs as inputs.
+
+    They are the generalized eigenvalues of ``[[A, B], [C, D]]`` and ``[[I, 0], [0, 0]]`` (Rosenbrock, 1970). Infinite
+    ones are split off before: each step leaves a smaller pencil with the same finite eigenvalues.
+    """
+    a, b, c, d = minimal_realization(model)
+    while len(a):
+        at_once = decompose(d, _LOST * max(float(np.linalg.norm(d, 2)), float(np.linalg.norm(c))))
+        if at_once.rank == len(d):
+            return np.asarray(np.linalg.eigvals(a - b @ np.linalg.solve(d, c)), dtype=complex)
+        # Outputs that no input reaches at once hold C x = 0: what stays on it is a smaller model (Silverman).
+        c, d = at_once.left.T @ c, at_once.left.T @ d
+        held = decompose(c[at_once.rank :], _LOST * float(np.linalg.norm(c)))
+        if held.rank < len(d) - at_once.rank:
+            return np.zeros(0, dtype=complex)  # outputs depend on each other: every number would be a zero
+        stay, leave = held.null_space, held.row_space
+        c = np.vstack([c[: at_once.rank] @ stay, leave.T @ a @ stay])
+        d = np.vstack([d[: at_once.rank], leave.T @ b])
+        a, b = stay.T @ a @ stay, stay.T @ b
+    return np.zeros(0, dtype=complex)
+
+
+def static_gain(model: Matrices) -> FloatArray | None:
+    """Return ``D - C A^-1 B`` of the minimal realization; None if that has an integrator."""
+    a, b, c, d = minimal_realization(model)
+    if not len(a):
+        return d
+    if rank(a, _LOST * float(np.linalg.norm(a, 2))) < len(a):
+        return None
+    return np.asarray(d - c @ np.linalg.solve(a, b))
+
+
+def frequency_response(model: Matrices, omega: FloatArray) -> ComplexArray:
+    """Return ``C (i omega - A)^-1 B + D``, shape (frequencies, outputs, inputs)."""
+    a, b, c, d = balanced(model)
+    shifted = 1j * omega[:, None, None] * np.eye(len(a)) - a
+    return np.asarray(c @ np.linalg.solve(shifted, np.broadcast_to(b.astype(complex), (len(omega), *b.shape))) + d)
+
+
+_ROUNDING = 1e-14
+"""Relative to the largest singular value after balancing: what is less is rounding of the decomposition itself."""
+
+_SWEEPS, _FACTOR = 3, 4.0
+"""So often every state is scaled, each time by this at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Eigenvalues of a matrix.
+
+    Attributes
+    ----------
+    zeros
+        How many are zero.
+    others
+        The others, sorted by real part, then imaginary part, largest first.
+    vectors
+        A column for each of these.
+    """
+
+    zeros: int
+    others: ComplexArray
+    vectors: ComplexArray
+
+    @property
+    def values(self) -> ComplexArray:
+        """All eigenvalues, zeros last."""
+        return np.concatenate([self.others, np.zeros(self.zeros, dtype=complex)])
+
+
+def find_spectrum(matrix: FloatArray, error: FloatArray, sizes: FloatArray) -> Spectrum:
+    """Return the eigenvalues of a matrix.
+
+    Parameters
+    ----------
+    matrix
+        Shape (n, n).
+    error
+        How far its entries may be off.
+    sizes
+        What is large for each state.
+    """
+    n = len(matrix)
+    if n == 0:
+        return Spectrum(0, np.zeros(0, dtype=complex), np.zeros((0, 0), dtype=complex))
+    # Entries that are nothing but rounding say nothing of how large states are beside each other.
+    certain = np.where(np.abs(matrix) > error, matrix, 0.0)
+    scale = sizes * _scale(certain * sizes / sizes[:, None])
+    balanced = certain * scale[None, :] / scale[:, None]
+    zeros, basis, left = _split(balanced, rounding(balanced, error * scale[None, :] / scale[:, None]))
+    values, own = np.linalg.eig(left)
+    chosen = np.lexsort((-values.imag, -values.real))
+    vectors = _lifted(balanced, basis, values[chosen], own[:, chosen])
+    return Spectrum(zeros, values[chosen], scale[:, None] * vectors)
+
+
+def rounding(matrix: FloatArray, error: FloatArray) -> float:
+    """Return how far a matrix may be off: its entries, and its decomposition."""
+    return max(_ROUNDING * float(np.linalg.norm(matrix, 2)), float(np.linalg.norm(error)))
+
+
+def _scale(matrix: FloatArray) -> FloatArray:
+    """Return sizes of states with which rows and columns are alike, as far as a few steps lead.
+
+    Osborne's iteration (J. ACM 7, 1960). It does not end where states do not act on each other both ways, as where
+    coordinates are cyclic; what it has reached by then is good enough.
+    """
+    scale, sizes = np.ones(len(matrix)), np.abs(matrix)
+    np.fill_diagonal(sizes, 0.0)
+    for _ in range(_SWEEPS):
+        for i in range(len(matrix)):
+            row, column = float(np.sum(sizes[i] * scale)) / scale[i], float(np.sum(sizes[:, i] / scale)) * scale[i]
+            if row > 0.0 and column > 0.0:
+                scale[i] *= np.clip(np.sqrt(row / column), 1.0 / _FACTOR, _FACTOR)
+    return np.asarray(scale / np.exp(np.mean(np.log(scale))))
+
+
+def _split(matrix: FloatArray, bound: float) -> tuple[int, FloatArray, FloatArray]:
+    """Return how many eigenvalues are zero, a basis of what is left, and the matrix on it."""
+    basis, left, zeros = np.eye(len(matrix)), matrix, 0
+    while len(left):
+        found = decompose(left, bound)
+        if found.rank == len(left):
+            break
+        zeros += len(left) - found.rank
+        # On the quotient by what goes to zero: the rest of an orthonormal basis.
+        keep = found.row_space
+        basis, left = basis @ keep, keep.T @ left @ keep
+    return zeros, basis, left
+
+
+def _lifted(matrix: FloatArray, basis: FloatArray, values: ComplexArray, own: ComplexArray) -> ComplexArray:
+    """Return eigenvectors of the whole matrix from those on the quotient."""
+    found = np.empty((len(matrix), len(values)), dtype=complex)
+    rest = null_space(basis.T, rank=basis.shape[1]) if len(values) else np.zeros((len(matrix), 0))
+    for k, value in enumerate(values):
+        # (A - lambda) v = 0 with v = basis y + what was split off; A is not singular there at lambda != 0.
+        v = basis @ own[:, k]
+        if rest.shape[1]:
+            shifted = matrix - value * np.eye(len(matrix))
+            v = v - rest @ least_squares(shifted @ rest, shifted @ v)
+        found[:, k] = v / np.linalg.norm(v)
+    return found

@@ -1,4 +1,7 @@
-"""`linearize`: the linear model of a scene about a state."""
+"""`linearize`: the linear model of a scene about a state, with the errors that rounding makes in its matrices.
+
+At a switch, where a law changes from one side to the other, there is no linear model.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +11,16 @@ import numpy as np
 
 from atwood.arguments import PATHS, takes
 from atwood.arrays import FloatArray
-from atwood.errors import UsageError
-from atwood.expr import live
+from atwood.codegen.rounding import ROUGHNESS
+from atwood.errors import AtwoodError, UsageError
+from atwood.expr import Expression, OutputGroup, Program, live
 from atwood.forms.assembly import Assembly
+from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE
 from atwood.simulation.problem.arguments import FORM
+from atwood.theory.linear.displacements import Minimal, find_minimal, image_of, pulled_back
 from atwood.theory.linear.linear_model import LinearModel
-from atwood.theory.linear.maximal import image_of, pulled_back
-from atwood.theory.linear.minimal import Minimal
 from atwood.theory.linear.operating_point import (
     AT,
     At,
@@ -26,12 +30,9 @@ from atwood.theory.linear.operating_point import (
     values_at,
 )
 from atwood.theory.linear.quantities import output_rows
-from atwood.theory.linear.state_space import StateSpace, find_state_space
-from atwood.theory.linear.steady import Steady, find_steady, still
-from atwood.theory.linear.switches import refuse_switches
-from atwood.theory.linear.variations import Flow
-
-__all__ = ["linearize", "not_steady"]
+from atwood.theory.linear.steady import Steady, find_steady, pace_of, still
+from atwood.theory.linear.variations import Flow, LinearScene
+from atwood.tolerances import tolerances
 
 
 @takes(scene=SCENE, at=AT, inputs=PATHS, outputs=PATHS, form=FORM)
@@ -220,3 +221,145 @@ def _units(point: OperatingPoint, minimal: Minimal) -> dict[str, str]:
     scene = point.scene
     found = {scene.tangents.names[k]: scene.tangents.units[k] for k in minimal.displacements}
     return found | {speed_name(point, k): scene.equations.speed_names[k].unit for k in minimal.speeds}
+
+
+_DISTURBANCES = 3
+"""How often everything is disturbed to see what rounding can do."""
+
+
+@dataclass(frozen=True, eq=False)
+class StateSpace:
+    """How minimal states change: ``x' = A x + B w``.
+
+    Attributes
+    ----------
+    minimal
+        The minimal states.
+    matrix
+        A and B side by side, shape (states, states and inputs).
+    error
+        How far rounding can have taken each entry.
+    sizes
+        What is large for each state: the scene's sizes, and for speeds the rate at which these change fastest.
+    """
+
+    minimal: Minimal
+    matrix: FloatArray
+    error: FloatArray
+    sizes: FloatArray
+
+
+def find_state_space(scene: LinearScene, flow: Flow, steady: Steady, kept: Sequence[int]) -> StateSpace:
+    """Return the linear model about a state in minimal states.
+
+    Parameters
+    ----------
+    scene, flow, steady
+        The scene, its flow at the state, and what that moves along.
+    kept
+        Independent constraints.
+    """
+    minimal = find_minimal(scene, flow, kept)
+    matrix = _matrix(scene, flow, steady, minimal)
+    random, largest = np.random.default_rng(1974), np.zeros_like(matrix)
+    now = flow.variation
+    pace = pace_of(scene, flow)
+    for _ in range(_DISTURBANCES):
+        other = scene.disturbed(random)
+        by = ROUGHNESS * scene.displacement_sizes * random.uniform(-1.0, 1.0, len(scene.tangents))
+        faster = ROUGHNESS * pace * scene.sizes * random.uniform(-1.0, 1.0, len(now.u))
+        found = other.flow(now.t, scene.tangents.moved(now.q, by), now.u + faster, kept)
+        near = _matrix(other, found, steady, find_minimal(other, found, kept, minimal))
+        largest = np.maximum(largest, np.abs(near - matrix))
+    n = len(minimal.displacements)
+    own = scene.displacement_sizes[list(minimal.displacements)], scene.sizes[list(minimal.speeds)]
+    fastest = np.sqrt(np.max(np.abs(matrix[n:, :n] * own[0] / own[1][:, None]), initial=0.0))
+    fastest = max(float(fastest), float(np.max(np.abs(matrix[n:, n : minimal.states]), initial=0.0))) or 1.0
+    sizes = np.concatenate([own[0], own[1] * fastest])
+    return StateSpace(minimal, matrix, tolerances.CERTAIN * largest, sizes)
+
+
+def _matrix(scene: LinearScene, flow: Flow, steady: Steady, minimal: Minimal) -> FloatArray:
+    size = len(flow.field)
+    moved = (flow.matrix[:, :size] - steady.moving) @ minimal.state
+    moved[:, minimal.states :] += flow.matrix[:, size + 1 :]
+    return minimal.reduced(moved)
+
+
+_SWITCHES = ("less", "less_equal", "sign", "absolute", "minimum", "maximum", "floor")
+
+_ASIDE = 1e-7
+"""How far from the state both sides are looked at, relative to the scene's sizes."""
+
+_JUMP = 1e-3
+"""Relative to their terms: derivatives that differ by more on two sides so near to each other jump."""
+
+_SIDES = 4
+
+
+def refuse_switches(scene: LinearScene, flow: Flow, kept: Sequence[int]) -> None:
+    """Refuse a state at which the derivatives of the equations jump.
+
+    Parameters
+    ----------
+    scene, flow
+        The scene, and its flow at the state.
+    kept
+        Independent constraints.
+
+    Raises
+    ------
+    UsageError
+        If a switch is there; it names the speed whose acceleration has two derivatives.
+    """
+    margins = _margins(scene)
+    if not margins:
+        return
+    program = Program(
+        f"{scene.assembly.flat.name} switches", scene.groups, scene.assembly.parameters, (OutputGroup("at", margins),)
+    )
+    kernel, now = scene.assembly.kernel(program), flow.variation
+    random = np.random.default_rng(5)
+    with np.errstate(all="ignore"):
+        here = np.asarray(kernel(np.array([now.t]), now.q, now.u, now.a, now.multipliers)[0])
+    pace = float(np.max(np.abs(now.u) / scene.sizes, initial=0.0)) or 1.0
+    for _ in range(_SIDES):
+        by = _ASIDE * scene.displacement_sizes * random.uniform(-1.0, 1.0, len(scene.tangents))
+        faster = _ASIDE * pace * scene.sizes * random.uniform(-1.0, 1.0, len(now.u))
+        sides = []
+        try:
+            for sign in (1.0, -1.0):
+                q, u = scene.tangents.moved(now.q, sign * by), now.u + sign * faster
+                there = np.asarray(kernel(np.array([now.t + sign * _ASIDE / pace]), q, u, now.a, now.multipliers)[0])
+                sides.append((there, scene.flow(now.t + sign * _ASIDE / pace, q, u, kept)))
+        except (AtwoodError, ArithmeticError):
+            continue
+        (first, left), (second, right) = sides
+        crossed = (first * second <= 0.0) | (here == 0.0)
+        if not np.any(crossed):
+            continue
+        both = np.abs(left.acceleration) + np.abs(right.acceleration)
+        jump = np.abs(left.acceleration - right.acceleration) - _JUMP * np.max(both, axis=1, initial=0.0)[:, None]
+        worst = int(np.argmax(np.max(jump, axis=1, initial=-1.0)))
+        if jump.size and np.max(jump) > 0.0:
+            raise UsageError(
+                f"a law switches here: {scene.equations.speed_names[worst].name} has another rate on each side",
+                where=scene.assembly.flat.name,
+                advice="Look at a state beside it, where one side holds.",
+            )
+
+
+def _margins(scene: LinearScene) -> tuple[Expression, ...]:
+    """Return what changes its sign where laws switch."""
+    e = scene.equations
+    moving = {*e.coordinates, *e.speeds, e.time}
+    nodes = live([*e.rows, *e.constraint_rows])
+    reached = {symbol.index for symbol in moving}
+    found: dict[Expression, None] = {}
+    for node in nodes:
+        if any(argument.index in reached for argument in node.arguments):
+            reached.add(node.index)
+            if node.operation in _SWITCHES:
+                first = node.arguments[0]
+                found[first if len(node.arguments) == 1 else first - node.arguments[1]] = None
+    return tuple(found)

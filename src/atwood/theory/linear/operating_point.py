@@ -14,8 +14,8 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.late import dataclass, replace
 from atwood.model.compose.composite import Model
+from atwood.model.local.bound import variation_names
 from atwood.model.local.flatten import FlatScene
-from atwood.model.local.parameters import variation_names
 from atwood.numerics.matrices import to_array
 from atwood.numerics.rank import decompose, lost_rank
 from atwood.pipeline import assemble, assemble_flat
@@ -26,20 +26,6 @@ from atwood.simulation.dynamics.redundancy import RankFinding
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.initialization.targets import find_level
 from atwood.theory.linear.variations import LinearScene
-
-__all__ = [
-    "AT",
-    "At",
-    "InputPath",
-    "OperatingPoint",
-    "find_operating_point",
-    "input_paths",
-    "moved_to",
-    "speed_name",
-    "start_at",
-    "values_at",
-]
-
 
 At = Mapping[str, Any] | tuple[Result, float] | None
 """Values by path; a result and a time; or the scene's own start."""

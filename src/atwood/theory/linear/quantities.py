@@ -9,12 +9,9 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import ParameterError, UnsupportedError, suggestion_in_parts
 from atwood.expr import InputGroup, OutputGroup, Program, jacobian, live
-from atwood.theory.linear.maximal import image_of
-from atwood.theory.linear.minimal import Minimal
+from atwood.theory.linear.displacements import Minimal, image_of
 from atwood.theory.linear.operating_point import OperatingPoint
 from atwood.theory.linear.variations import Flow
-
-__all__ = ["output_rows"]
 
 
 def output_rows(point: OperatingPoint, flow: Flow, minimal: Minimal, paths: Sequence[str]) -> FloatArray:

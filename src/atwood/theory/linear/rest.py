@@ -20,11 +20,8 @@ from atwood.numerics.matrices import to_array
 from atwood.numerics.rank import null_space
 from atwood.numerics.solutions import least_norm
 from atwood.simulation.dynamics.balance import Balance, balance_of
-from atwood.theory.linear.minimal import Minimal, find_minimal
+from atwood.theory.linear.displacements import Minimal, find_minimal
 from atwood.theory.linear.variations import Flow, LinearScene
-
-__all__ = ["Rest", "RestSearch", "difference", "slopes_at", "wrapped"]
-
 
 _FAR = 0.5
 """A step moves nothing by more of its size; an angle by so many radians."""

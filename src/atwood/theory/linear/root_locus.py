@@ -19,8 +19,6 @@ from atwood.showing import fitted
 from atwood.theory.linear.linearize import linearize
 from atwood.theory.linear.operating_point import AT
 
-__all__ = ["RootLocus", "root_locus"]
-
 
 @dataclass(frozen=True, eq=False)
 class RootLocus:

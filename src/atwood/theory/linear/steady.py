@@ -20,9 +20,6 @@ from atwood.numerics.rank import null_space
 from atwood.numerics.solutions import least_norm
 from atwood.theory.linear.variations import Flow, LinearScene
 
-__all__ = ["Steady", "find_steady", "pace_of", "still"]
-
-
 _STEADY = 1e-7
 """Relative to the terms that it is made of: how well a motion must be a symmetry at the state.
 

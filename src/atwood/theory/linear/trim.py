@@ -17,7 +17,7 @@ from atwood.numerics.newton import Missing, largest, newton
 from atwood.pipeline import SCENE
 from atwood.showing import fitted
 from atwood.simulation.dynamics.balance import balance_of
-from atwood.theory.linear.minimal import Minimal
+from atwood.theory.linear.displacements import Minimal
 from atwood.theory.linear.operating_point import (
     AT,
     At,
@@ -28,9 +28,6 @@ from atwood.theory.linear.operating_point import (
 )
 from atwood.theory.linear.rest import slopes_at
 from atwood.tolerances import tolerances
-
-__all__ = ["Trim", "trim"]
-
 
 _STEPS, _FAR = 50, 0.5
 """So many steps at most, each of which turns nothing by more, rad."""

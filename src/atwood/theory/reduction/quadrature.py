@@ -17,9 +17,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError, UnsupportedError
 from atwood.late import dataclass
-from atwood.theory.reduction.radial import Radial
-
-__all__ = ["Path", "find_path"]
+from atwood.theory.reduction.one_coordinate import Radial
 
 _FULL = 2.0 * np.pi
 _LEGENDRE = 24

@@ -20,15 +20,11 @@ from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
-from atwood.theory.hamiltonian.points import PointTransformation
-from atwood.theory.reduction.parts import parts_of
+from atwood.theory.hamiltonian.transformations import PointTransformation
+from atwood.theory.reduction.one_coordinate import Radial, parts_of, start_in, transformed_parts
 from atwood.theory.reduction.quadrature import Path, find_path
-from atwood.theory.reduction.radial import Radial
 from atwood.theory.reduction.routhian import Routhian, ignorable_of, routhian_of
-from atwood.theory.reduction.transformed import start_in, transformed_parts
 from atwood.theory.symmetry.quantities import Quantities
-
-__all__ = ["ReducedMotion", "reduced"]
 
 
 @dataclass(frozen=True, eq=False)

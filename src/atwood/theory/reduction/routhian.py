@@ -22,8 +22,6 @@ from atwood.theory.symmetry.proof import Prover
 from atwood.theory.symmetry.quantities import Quantities
 from atwood.topology.orientation_coordinates import Orientation
 
-__all__ = ["Routhian", "ignorable_of", "routhian", "routhian_of"]
-
 _EULER = "euler-zxz"
 
 
@@ -187,7 +185,7 @@ def ignorable_of(scene: Model | Assembly, orientation: str | None) -> tuple[Asse
     UnsupportedError
         If its coordinates are not free, or its energy function is not conserved.
     """
-    from atwood.theory.hamiltonian.checks import refuse_without_hamiltonian
+    from atwood.theory.hamiltonian.legendre import refuse_without_hamiltonian
 
     assembly = assembly_of(scene, orientation=orientation)
     refuse_without_hamiltonian(assembly)

@@ -2,7 +2,7 @@
 
 A motion that starts parallel to a plane stays so if at every place that such motion can reach, whatever the speeds
 parallel to the plane are, no acceleration leads out of it. That is looked at at the start and at places near by, chosen
-at random; what the clock and switches decide is chosen at random too (`atwood.theory.symmetry.generic_switches`), so that a push that
+at random; what the clock and switches decide is chosen at random too (`generic_switches`), so that a push that
 comes later is not overlooked. Where forces are analytic functions of the state, what holds at all places near by holds
 everywhere. The symmetry may be an unstable one: then the least push in space leads away from the plane for good.
 """
@@ -23,11 +23,8 @@ from atwood.numerics.newton import Missing, newton
 from atwood.numerics.rank import decompose, null_space
 from atwood.numerics.solutions import least_norm
 from atwood.simulation.initialization.start import Start, find_start
-from atwood.theory.symmetry.generic_dynamics import Bodies, LooseScene
+from atwood.theory.symmetry.generic import Bodies, LooseScene
 from atwood.tolerances import tolerances
-
-__all__ = ["Symmetry", "find_symmetries"]
-
 
 _NEAR = 1e-12
 """Relative to the scene's sizes: what leads out of the plane by less at places near by, where accelerations are solved

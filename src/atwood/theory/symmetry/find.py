@@ -20,13 +20,21 @@ from atwood.mechanics.outputs.observables import add_up
 from atwood.numerics.solutions import least_norm
 from atwood.simulation.dynamics.orientation_coordinates import COORDINATE_SWITCH
 from atwood.simulation.events.modes import find_event_functions
-from atwood.theory.symmetry.directions import axis_name, axis_text, planar_point, rotations_of, straight_of
-from atwood.theory.symmetry.invariance import about_center, conserved_directions, is_constant, is_kept, readable_basis
+from atwood.theory.symmetry.invariance import (
+    about_center,
+    axis_name,
+    axis_text,
+    conserved_directions,
+    is_constant,
+    is_kept,
+    planar_point,
+    readable_basis,
+    rotations_of,
+    straight_of,
+)
 from atwood.theory.symmetry.proof import Generator, Prover
 from atwood.theory.symmetry.quantities import Quantities
 from atwood.theory.symmetry.states import KEPT, RandomStates, State
-
-__all__ = ["Finding", "Findings", "find_conserved"]
 
 _FEW = 24
 """Up to so many velocities each momentum is looked at; beyond, those whose force is zero as it is written."""

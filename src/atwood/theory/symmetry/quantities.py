@@ -25,8 +25,6 @@ from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
 from atwood.topology.spanning_forest import Attachment
 
-__all__ = ["Motions", "Quantities"]
-
 
 @dataclass(frozen=True)
 class Motions:

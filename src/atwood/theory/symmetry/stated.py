@@ -21,8 +21,6 @@ from atwood.theory.symmetry.proof import Prover
 from atwood.theory.symmetry.quantities import Quantities
 from atwood.theory.symmetry.states import KEPT, RandomStates, State
 
-__all__ = ["Symmetry", "check_symmetry"]
-
 _STATES = 16
 
 
