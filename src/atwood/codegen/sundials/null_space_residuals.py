@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,13 +11,11 @@ from atwood.codegen.llvm.build import Built, build_code, default_options
 from atwood.codegen.llvm.module import Part
 from atwood.codegen.sundials.layout import SundialsLayout, sundials_layout
 from atwood.codegen.sundials.null_space import ATTENTION, FIELDS, LIMIT, RATE, NullSpaceShape, null_space_source
-from atwood.codegen.sundials.residuals import check_groups
+from atwood.codegen.sundials.residuals import EXPORTS, Callbacks, UserData, check_groups
 from atwood.errors import UsageError
 from atwood.expr.core.program import Program
-from atwood.late import dataclass
 
 __all__ = ["NullSpaceCallbacks", "NullSpaceData", "compile_null_space_callbacks"]
-_EXPORTS = ("ida_residual", "ida_jacobian", "ida_weights")
 
 
 def compile_null_space_callbacks(
@@ -66,84 +64,40 @@ def compile_null_space_callbacks(
         Part("jacobian", derivatives, tuple((columns * shape.stack + rows).tolist())),
     ]
     routines = null_space_source(layout or sundials_layout(), shape, sparse)
-    built = build_code(parts, default_options(parts), exports=_EXPORTS, routines=routines, cached=cache)
-    return NullSpaceCallbacks(stack, derivatives, shape, built)
+    built = build_code(parts, default_options(parts), exports=EXPORTS, routines=routines, cached=cache)
+    return NullSpaceCallbacks({"residual": stack, "jacobian": derivatives}, shape, built)
 
 
-class _Pointers(ctypes.Structure):
-    _fields_ = tuple((name, ctypes.c_void_p) for name in FIELDS)
-
-
-@dataclass(frozen=True, eq=False)
-class NullSpaceData:
-    """The user's data of the callbacks of one session; it must live as long as IDA may call.
-
-    Attributes
-    ----------
-    address
-        What IDA is given as the user's data.
-    choice
-        Which coordinates are dependent, as lists of numbers; may be changed between two steps.
-    """
-
-    address: int
-    choice: NDArray[np.int64]
-    _pointers: _Pointers
-    _arrays: dict[str, NDArray[np.generic]]
+class NullSpaceData(UserData):
+    """The user's data of one session, with the choice of dependent coordinates; see `UserData`."""
 
     @property
-    def bytes(self) -> int:
-        """How long the user's data are; they hold nothing but pointers."""
-        return ctypes.sizeof(self._pointers)
-
-    def set_weights(self, relative: ArrayLike, absolute: ArrayLike) -> None:
-        """Make the error weights ``1 / (relative[i] |y[i]| + absolute[i])``."""
-        self._arrays["relative"][:] = relative
-        self._arrays["absolute"][:] = absolute
+    def choice(self) -> NDArray[np.int64]:
+        """Which coordinates are dependent, as lists of numbers; may be changed between two steps."""
+        return self.arrays["choice"]
 
     @property
     def rate(self) -> float:
         """The factor cj of the last Jacobian."""
-        return float(self._arrays["state"][RATE])
+        return float(self.arrays["state"][RATE])
 
     def take_attention(self) -> bool:
         """Return whether a Jacobian found the choice to be a poor one since this was last asked."""
-        state = self._arrays["state"]
+        state = self.arrays["state"]
         found, state[ATTENTION] = bool(state[ATTENTION]), 0.0
         return found
 
 
-class NullSpaceCallbacks:
-    """Residual, Jacobian and error weights as IDA calls them, for any choice of dependent coordinates.
+class NullSpaceCallbacks(Callbacks):
+    """The functions of a mechanism with loops, for any choice of dependent coordinates; see `Callbacks`.
 
-    Residual and Jacobian return 1 (recoverable) where a value is not finite. The weights return -1, at which IDA
-    hands over what it has, where a weight is not positive or the last Jacobian found the choice to be a poor one.
-
-    Parameters
-    ----------
-    stack, derivatives
-        What they are made of.
-    shape
-        How many there are of each.
-    built
-        The code.
-
-    Attributes
-    ----------
-    residual_address, jacobian_address, weights_address
-        The addresses of the functions.
-    from_cache
-        Whether nothing had to be compiled.
+    The weights return -1, at which IDA hands over what it has, also where the last Jacobian found the choice to be a
+    poor one.
     """
 
-    def __init__(self, stack: Program, derivatives: Program, shape: NullSpaceShape, built: Built) -> None:
-        self.programs = {"residual": stack, "jacobian": derivatives}
+    def __init__(self, programs: Mapping[str, Program], shape: NullSpaceShape, built: Built) -> None:
+        super().__init__(programs, shape.size, built)
         self.shape = shape
-        self.built = built
-        self.from_cache = built.from_cache
-        self.residual_address, self.jacobian_address, self.weights_address = (
-            built.code.addresses[name] for name in _EXPORTS
-        )
 
     def bind(self, parameter_values: ArrayLike, choice: ArrayLike, sizes: ArrayLike, limit: float) -> NullSpaceData:
         """Return the user's data for values of the parameters; each run needs its own.
@@ -165,16 +119,13 @@ class NullSpaceCallbacks:
         KernelEvaluationError
             If the number of values is wrong.
         """
-        arrays: dict[str, NDArray[np.generic]] = {}
-        for name, program in self.programs.items():
-            arrays[f"derived_{name}"], arrays["scratch"] = self.built.derive(name, program, parameter_values)
-        chosen = np.array(choice, dtype=np.int64)
-        arrays["choice"] = chosen
-        arrays["relative"], arrays["absolute"] = np.zeros(self.shape.size), np.ones(self.shape.size)
-        arrays["work"], arrays["sizes"] = np.zeros(self.shape.work["end"]), np.array(sizes, dtype=float)
-        arrays["state"] = state = np.zeros(3)
-        state[LIMIT] = limit
-        if chosen.shape != (self.shape.choice["end"],) or arrays["sizes"].shape != (self.shape.speeds,):
+        arrays = self._arrays(parameter_values) | {
+            "choice": np.array(choice, dtype=np.int64),
+            "work": np.zeros(self.shape.work["end"]),
+            "sizes": np.array(sizes, dtype=float),
+            "state": np.zeros(3),
+        }
+        arrays["state"][LIMIT] = limit
+        if arrays["choice"].shape != (self.shape.choice["end"],) or arrays["sizes"].shape != (self.shape.speeds,):
             raise UsageError("the choice or the sizes have another length than the mechanism")
-        pointers = _Pointers(*[arrays[name].ctypes.data for name in FIELDS])
-        return NullSpaceData(ctypes.addressof(pointers), chosen, pointers, arrays)
+        return NullSpaceData(FIELDS, arrays)

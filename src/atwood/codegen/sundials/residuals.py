@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,10 @@ from atwood.codegen.sundials.layout import SundialsLayout, sundials_layout
 from atwood.errors import UsageError
 from atwood.expr.core.program import Program
 
-__all__ = ["IdaCallbacks", "IdaData", "check_groups", "compile_ida_callbacks"]
+__all__ = ["EXPORTS", "Callbacks", "IdaCallbacks", "UserData", "check_groups", "compile_ida_callbacks"]
+
+EXPORTS = ("ida_residual", "ida_jacobian", "ida_weights")
+"""The names of the functions that IDA calls."""
 
 
 def compile_ida_callbacks(
@@ -88,29 +91,35 @@ def compile_ida_callbacks(
     built = build_code(
         parts,
         default_options(parts),
-        exports=("ida_residual", "ida_jacobian", "ida_weights"),
+        exports=EXPORTS,
         routines=callbacks_source(layout, size, form, len(at_rows) if sparse else 0),
         cached=cache,
     )
     index = np.int32 if layout.index_bytes == 4 else np.int64
-    pattern = (at_rows.astype(index), starts.astype(index)) if sparse else (np.empty(0), np.empty(0))
-    return IdaCallbacks(residual, jacobian, size, pattern, built)
+    pattern = {"rows": at_rows.astype(index), "starts": starts.astype(index)}
+    return IdaCallbacks({"residual": residual, "jacobian": jacobian}, size, pattern, built)
 
 
-class IdaData(ctypes.Structure):
-    """The user's data of the callbacks: where each thread has what its functions need.
+class UserData:
+    """The user's data of IDA's functions in one session: pointers to arrays. They must live as long as IDA may call.
 
-    It must live as long as IDA may call; `IdaCallbacks.bind` returns it with its arrays attached.
+    Parameters
+    ----------
+    fields
+        The names of the arrays, in the order of the pointers.
+    arrays
+        The arrays by name, ``relative`` and ``absolute`` among them.
+
+    Attributes
+    ----------
+    address, bytes
+        What IDA is given as the user's data, and how long they are.
     """
 
-    _fields_ = tuple((name, ctypes.c_void_p) for name in FIELDS)
-    arrays: dict[str, NDArray[Any]]
-    """What the pointers point to."""
-
-    @property
-    def address(self) -> int:
-        """What IDA is given as the user's data."""
-        return ctypes.addressof(self)
+    def __init__(self, fields: Sequence[str], arrays: Mapping[str, NDArray[Any]]) -> None:
+        self.arrays = arrays
+        self._pointers = (ctypes.c_void_p * len(fields))(*[arrays[name].ctypes.data for name in fields])
+        self.address, self.bytes = ctypes.addressof(self._pointers), ctypes.sizeof(self._pointers)
 
     def set_weights(self, relative: ArrayLike, absolute: ArrayLike) -> None:
         """Make the error weights ``1 / (relative[i] |y[i]| + absolute[i])``."""
@@ -118,19 +127,17 @@ class IdaData(ctypes.Structure):
         self.arrays["absolute"][:] = absolute
 
 
-class IdaCallbacks:
-    """A residual and a Jacobian as IDA calls them; both return 1 (recoverable) where a value is not finite.
+class Callbacks:
+    """Residual, Jacobian and error weights as IDA calls them.
 
-    With them comes a function for error weights, which returns -1 where a weight is not positive.
+    The first two return 1 (recoverable) where a value is not finite, the last -1 where a weight is not positive.
 
     Parameters
     ----------
-    residual, jacobian
-        What they compute.
+    programs
+        The parts of the module.
     size
         The length of y.
-    pattern
-        The row of each entry of a sparse matrix, and where each column starts.
     built
         The code; its ``failures`` hold what a function in Python raised, which IDA only sees as a missing value.
 
@@ -138,25 +145,35 @@ class IdaCallbacks:
     ----------
     residual_address, jacobian_address, weights_address
         The addresses of the functions.
-    scratch
-        The length of the scratch array.
     from_cache
         Whether nothing had to be compiled.
     """
 
-    def __init__(
-        self, residual: Program, jacobian: Program, size: int, pattern: tuple[NDArray[Any], NDArray[Any]], built: Built
-    ) -> None:
-        self._programs = {"residual": residual, "jacobian": jacobian}
-        self._size, self._pattern = size, pattern
-        self.built = built
-        self.residual_address = built.code.addresses["ida_residual"]
-        self.jacobian_address = built.code.addresses["ida_jacobian"]
-        self.weights_address = built.code.addresses["ida_weights"]
-        self.scratch = built.scratch
+    def __init__(self, programs: Mapping[str, Program], size: int, built: Built) -> None:
+        self._programs, self._size, self.built = programs, size, built
+        self.residual_address, self.jacobian_address, self.weights_address = (
+            built.code.addresses[name] for name in EXPORTS
+        )
         self.from_cache = built.from_cache
 
-    def bind(self, parameter_values: ArrayLike) -> IdaData:
+    def _arrays(self, parameter_values: ArrayLike) -> dict[str, NDArray[Any]]:
+        """Return the arrays of a session that all have: those of the programs, and tolerances."""
+        arrays: dict[str, NDArray[Any]] = {"relative": np.zeros(self._size), "absolute": np.ones(self._size)}
+        for name, program in self._programs.items():
+            arrays[f"derived_{name}"], arrays["scratch"] = self.built.derive(name, program, parameter_values)
+        return arrays
+
+
+class IdaCallbacks(Callbacks):
+    """The functions of a residual and a Jacobian, with the pattern of a sparse matrix; see `Callbacks`."""
+
+    def __init__(
+        self, programs: Mapping[str, Program], size: int, pattern: Mapping[str, NDArray[Any]], built: Built
+    ) -> None:
+        super().__init__(programs, size, built)
+        self._pattern = pattern
+
+    def bind(self, parameter_values: ArrayLike) -> UserData:
         """Return the user's data for values of the parameters; each run needs its own.
 
         Raises
@@ -164,13 +181,7 @@ class IdaCallbacks:
         KernelEvaluationError
             If the number of values is wrong.
         """
-        arrays: dict[str, NDArray[Any]] = dict(zip(("rows", "starts"), self._pattern, strict=True))
-        for name, program in self._programs.items():
-            arrays[f"derived_{name}"], arrays["scratch"] = self.built.derive(name, program, parameter_values)
-        arrays |= {"relative": np.zeros(self._size), "absolute": np.ones(self._size)}
-        data = IdaData(*[arrays[name].ctypes.data for name in FIELDS])
-        data.arrays = arrays
-        return data
+        return UserData(FIELDS, {**self._arrays(parameter_values), **self._pattern})
 
 
 def check_groups(program: Program, inputs: Sequence[int], outputs: int) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from typing import TYPE_CHECKING, Any
@@ -318,7 +317,7 @@ class Plan:
             code.weights_address,
             data.set_weights,
             keep=(code, data),
-            data_bytes=ctypes.sizeof(data),
+            data_bytes=data.bytes,
         )
 
     @property
