@@ -14,6 +14,8 @@ import pytest
 import atwood
 from atwood.codegen.llvm.build import GENERATORS
 
+from ..size import size
+
 SOURCE = Path(atwood.__file__).parent
 TOOLS = {"late.py", "errors.py"}
 """These decide how classes and errors are made, not what is in a routine."""
@@ -118,3 +120,8 @@ def test_a_source_is_named_by_its_files_and_arguments() -> None:
     assert [one.name for one in source.write()] == [one.name for one in write_routines()]
     others = [RoutineSource(module, ("late.py",)), RoutineSource(module, (), (1,)), RoutineSource("codegen.once")]
     assert len({source.key, *(one.key for one in others)}) == 4
+
+
+def test_the_language_of_llvm_is_written_in_one_room() -> None:
+    written = {path.relative_to(SOURCE).as_posix() for path in SOURCE.rglob("*.py") if size(path).llvm}
+    assert written == {f"codegen/llvm/{name}.py" for name in ("module", "routines", "text")}
