@@ -123,9 +123,9 @@ def newton(
         rows = now.units if now.even is None else now.even
         matrix, right = scaled(now.slopes(), scales, rows), now.value / rows
         for off in (largest(right), 0.0) if is_even else (0.0,):
-            step = scales * least_norm(matrix, right, float(is_even), off)
-            far = largest(step / scales)
-            step = step * (longest / far) if far > longest else step
+            units = least_norm(matrix, right, float(is_even), off)  # of the scales, some of which may be zero
+            far = largest(units)
+            step = scales * units * (longest / far if far > longest else 1.0)
             if not halvings:
                 break
             trial, there, left = _nearer(look, moved, place, step, now, min(far, longest), halvings, refused)
