@@ -5,21 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from atwood.arguments import FLAG
+from atwood.checking import CheckReport, check
 from atwood.cli.command import Request, command
 from atwood.cli.errors import FAILED
 from atwood.cli.output import print_json, writer
 from atwood.cli.parts import library_parts, looks_like_a_part
 from atwood.cli.scenes import load_file
 from atwood.errors import UsageError, suggestion
+from atwood.model.compose.composite import Model
+from atwood.model.declare.component import Component
 from atwood.table import table
-
-if TYPE_CHECKING:
-    from atwood.checking import CheckReport
 
 __all__ = ["COMMAND", "check_components"]
 
@@ -36,8 +36,6 @@ def check_components(request: Request) -> None:
     run
         Also run them on a test bench, in both forms: about a second each.
     """
-    from atwood.checking import check
-
     reports = [check(one, run=request.run) for one in _components(request.target)]
     if request.as_json:
         print_json({"ok": all(one.ok for one in reports), "components": [one.to_dict() for one in reports]})
@@ -68,9 +66,6 @@ def _components(target: str) -> list[Any]:
 
 def _defined(module: ModuleType) -> dict[str, Any]:
     """Return the components that a module itself defines: classes, and objects that have values."""
-    from atwood.model.compose.composite import Model
-    from atwood.model.declare.component import Component
-
     found: dict[str, Any] = {}
     for name, value in vars(module).items():
         is_class = isinstance(value, type) and issubclass(value, Component) and value.__module__ == module.__name__

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from atwood.arguments import FILE, FLAG, number, optional, whole
 from atwood.cli.command import Request, command
@@ -11,12 +10,13 @@ from atwood.cli.output import print_json, progress_bar, warn, writer
 from atwood.cli.scenes import bundled_scenes, prepare
 from atwood.errors import AtwoodError, UsageError
 from atwood.late import replace
+from atwood.model.compose.composite import Model
+from atwood.plotting.canvas import check_picture
+from atwood.plotting.comparison_page import check_page, write_page
+from atwood.study import Comparison
 from atwood.study.comparison.compare import TOLERANCES, compare
+from atwood.study.comparison.found import check_rows_file, write_rows
 from atwood.study.comparison.long_runs import compare_long
-
-if TYPE_CHECKING:
-    from atwood.model.compose.composite import Model
-    from atwood.study import Comparison
 
 __all__ = ["COMMAND", "compare_scene"]
 
@@ -60,8 +60,6 @@ def compare_scene(request: Request) -> None:
     if request.save is not None:
         found.save(request.save)
     if request.html is not None:
-        from atwood.plotting.comparison_page import write_page
-
         write_page([found], {}, request.html)
     if request.as_json:
         print_json(found.to_dict())
@@ -109,16 +107,10 @@ def _compared(
 def _check_files(request: Request) -> None:
     """Refuse what contradicts, and files that could not be written, before any work is done."""
     if request.plot is not None:
-        from atwood.plotting.canvas import check_picture
-
         check_picture(request.plot)
     if request.save is not None:
-        from atwood.study.comparison.found import check_rows_file
-
         check_rows_file(request.save)
     if request.html is not None:
-        from atwood.plotting.comparison_page import check_page
-
         check_page(request.html)
     if request.long is not None:
         idle = {"--all": request.all, "--rtol": request.rtols, "--t-end": request.t_end}
@@ -136,8 +128,6 @@ def _check_files(request: Request) -> None:
 
 def _compare_all(request: Request) -> None:
     """Compare the forms of all scenes of the installed libraries, one after another."""
-    from atwood.study.comparison.found import write_rows
-
     found: list[Comparison] = []
     failed: dict[str, str] = {}
     names = list(bundled_scenes())
@@ -158,8 +148,6 @@ def _compare_all(request: Request) -> None:
     if request.save is not None:
         write_rows(found, request.save)
     if request.html is not None:
-        from atwood.plotting.comparison_page import write_page
-
         write_page(found, failed, request.html)
     if request.as_json:
         print_json({"comparisons": [one.to_dict() for one in found], "failed": failed})

@@ -5,15 +5,17 @@ from __future__ import annotations
 import importlib
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from atwood.cli.output import print_json, writer
+from atwood.cli.scenes import bundled_scenes
 from atwood.errors import UsageError, near_matches, suggestion
+from atwood.model.compose.composite import Model
 from atwood.model.compose.serialization import all_libraries
+from atwood.model.declare.component import Component
+from atwood.model.declare.fields import MISSING
+from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.table import table
-
-if TYPE_CHECKING:
-    from atwood.model.declare.component import Component
 
 __all__ = ["is_a_part", "library_parts", "list_parts", "looks_like_a_part", "parts_called", "show_part"]
 
@@ -27,8 +29,6 @@ def looks_like_a_part(text: str) -> bool:
 
 def library_parts() -> dict[str, type[Component]]:
     """Return the parts that the installed libraries offer, by name, in the order of where they are defined."""
-    from atwood.model.declare.component import Component
-
     found: dict[str, type[Component]] = {}
     for library in all_libraries():
         try:
@@ -44,8 +44,6 @@ def library_parts() -> dict[str, type[Component]]:
 
 def is_a_part(text: str) -> bool:
     """Return whether a word means a part: by how it is written, or as a synonym that no scene has for its name."""
-    from atwood.cli.scenes import bundled_scenes
-
     if looks_like_a_part(text):
         return True
     return not text.endswith(".py") and ":" not in text and text not in bundled_scenes() and bool(parts_called(text))
@@ -167,8 +165,6 @@ def _print_part(name: str, kind: type[Component]) -> None:
 
 def _no_such_part(name: str) -> UsageError:
     """Return the error for a name that is no part; it may be the class of a scene."""
-    from atwood.cli.scenes import bundled_scenes
-
     scene = next((scene for scene, kind in bundled_scenes().items() if kind.__name__ == name), "")
     kinds = library_parts()
     known = [*kinds, *(word for kind in kinds.values() for word in _synonyms(kind))]
@@ -206,8 +202,6 @@ def _tables(kind: type[Component]) -> Iterator[tuple[str, list[dict[str, str]]]]
 
 def _own_parts(kind: type[Component]) -> Iterator[dict[str, str]]:
     """Yield the parts of a part that is made of others; their quantities are read as ``part.quantity``."""
-    from atwood.model.compose.composite import Model
-
     if issubclass(kind, Model):
         for name, part in kind().parts.items():
             yield {"name": name, "kind": type(part).__name__, "meaning": _said(type(part))[0]}
@@ -226,9 +220,6 @@ def _quantities(kind: type[Component]) -> Iterator[dict[str, str]]:
 
 def _value(one: Any) -> str:
     """Return the default of a parameter as a reader writes it."""
-    from atwood.model.declare.fields import MISSING
-    from atwood.model.declare.parameter_expressions import ParameterExpression
-
     if one.default is MISSING:
         return "required"
     if one.default is None:

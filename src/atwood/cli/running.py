@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -13,13 +13,11 @@ from atwood.cli.errors import INTERRUPTED
 from atwood.cli.output import print_json, progress_bar, warn
 from atwood.cli.scenes import check_applies, prepare
 from atwood.errors import AtwoodError, UsageError
+from atwood.forms.assembly import Assembly
 from atwood.late import replace
 from atwood.pipeline import assemble, simulate
+from atwood.result.result import Result
 from atwood.stages import watching
-
-if TYPE_CHECKING:
-    from atwood.forms.assembly import Assembly
-    from atwood.result.result import Result
 
 __all__ = ["COMMAND", "degrees_of_freedom", "multiplier_labels", "run_data", "run_scene"]
 
@@ -145,8 +143,6 @@ def _keep_what_came_before(error: AtwoodError, request: Request) -> None:
     files = [str(file) for file in (request.save, request.plot, request.draw) if file is not None]
     if made is None or not files:
         return
-    from atwood.result.result import Result
-
     result = Result(made)
     try:
         _keep(result, request)

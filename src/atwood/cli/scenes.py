@@ -12,14 +12,15 @@ import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from atwood.cli.output import warn
 from atwood.errors import AtwoodError, UsageError, near_matches, suggestion
+from atwood.model.compose.composite import Model
+from atwood.model.compose.scene import Scene
 from atwood.model.compose.serialization import all_libraries, declared_libraries
-
-if TYPE_CHECKING:
-    from atwood.model.compose.composite import Model
+from atwood.model.local.flatten import unit_at
+from atwood.model.values.units import split_quantity
 
 __all__ = ["bundled_scenes", "check_applies", "find_scene", "pairs", "prepare", "warn_of_radians"]
 
@@ -95,8 +96,6 @@ def prepare(text: str, settings: Sequence[str], starts: Sequence[str]) -> tuple[
     settings, starts
         Parameters and start values as ``path=value``.
     """
-    from atwood.model.compose.scene import Scene
-
     scene, name = find_scene(text)
     for path, value in pairs(settings, "--set"):
         scene.set(path, value)
@@ -129,8 +128,6 @@ def check_applies(scene: Model, form: str, level: str, orientation: str = "quate
     UsageError
         If the form has no levels, or the scene no orientations.
     """
-    from atwood.model.compose.scene import Scene
-
     if form == "reduced" and level != "ggl":
         raise UsageError(
             f"the reduced form has no levels, and no {level!r}: its constraints are eliminated",
@@ -159,8 +156,6 @@ def warn_of_radians(scene: Model, path: str, values: Iterable[object], option: s
     option, typed
         Where they were given, and how.
     """
-    from atwood.model.local.flatten import unit_at
-
     owner, _, name = path.rpartition(".")
     if option in ("--set", "--vary"):
         part = scene[owner] if owner else scene
@@ -178,8 +173,6 @@ def warn_of_radians(scene: Model, path: str, values: Iterable[object], option: s
 
 
 def _number_and_unit(value: object) -> tuple[float, str]:
-    from atwood.model.values.units import split_quantity
-
     if isinstance(value, str):
         return split_quantity(value) or (0.0, "?")
     return (float(value), "") if isinstance(value, (int, float)) else (0.0, "?")
@@ -220,8 +213,6 @@ def _only_scene(file: Path) -> tuple[Model, str]:
 
 def _candidates(module: ModuleType) -> Mapping[str, Any]:
     """Return the scenes that a module itself defines."""
-    from atwood.model.compose.scene import Scene
-
     return {
         name: value
         for name, value in vars(module).items()
@@ -245,8 +236,6 @@ def _functions(module: ModuleType) -> list[str]:
 
 
 def _as_scene(value: Any, file: Path, where: str) -> Model:
-    from atwood.model.compose.composite import Model
-
     if callable(value) and not isinstance(value, Model):
         with _placing_errors(file):
             value = value()

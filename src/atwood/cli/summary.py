@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,14 +10,12 @@ from numpy.typing import NDArray
 from atwood.cli.command import Request
 from atwood.cli.output import writer
 from atwood.cli.running import degrees_of_freedom, multiplier_labels
+from atwood.forms.assembly import Assembly
 from atwood.result.about import solver_name
+from atwood.result.result import Result
 from atwood.showing import count_of
 from atwood.stages import STAGES
 from atwood.table import facts, table
-
-if TYPE_CHECKING:
-    from atwood.forms.assembly import Assembly
-    from atwood.result.result import Result
 
 __all__ = ["duration", "main_quantities", "print_summary", "sparkline"]
 

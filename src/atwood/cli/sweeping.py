@@ -16,7 +16,9 @@ from atwood.cli.scenes import check_applies, pairs, prepare, warn_of_radians
 from atwood.errors import UsageError
 from atwood.late import replace
 from atwood.pipeline import assemble
+from atwood.plotting.canvas import check_picture
 from atwood.study import Sweep, sweep
+from atwood.study.sweeps.files import check_sweep_target
 from atwood.table import Table, facts, table
 
 __all__ = ["COMMAND", "sweep_scene"]
@@ -83,12 +85,8 @@ def sweep_scene(request: Request) -> None:
 def _check_files(request: Request) -> None:
     """Refuse files that could not be written before any work is done."""
     if request.save is not None:
-        from atwood.study.sweeps.files import check_sweep_target
-
         check_sweep_target(request.save)
     if request.plot is not None:
-        from atwood.plotting.canvas import check_picture
-
         check_picture(request.plot)
 
 

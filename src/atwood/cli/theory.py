@@ -67,7 +67,7 @@ def theory_command(name: str, module: str, function: str) -> click.Command:
         value = _called(found, scene, asked) if special is None else special(found, scene, asked, request)
         _show(value, name, scene.flat.name, written[0] if written else "", getattr(request, "plot", None))
 
-    run.__doc__ = (special or found).__doc__
+    run.__doc__ = inspect.cleandoc((special or found).__doc__ or "").partition("\n\nParameters\n")[0]
     told = [*([special] if special else []), _show, found]
     names = {"plot": "--bode"} if of == "LinearModel" else {}
     return command(name, run, *told, more=more | own, names=names)
@@ -172,7 +172,7 @@ def _show(value: Any, command: str, scene: str, written: str, picture: Path | No
     python
         Write a module of Python that computes it.
     plot
-        Save a picture (.png, .svg, .pdf): one each, numbered, of several modes.
+        Save a picture (.png, .svg, .pdf); those of several modes are numbered.
     at
         The state, such as rod.angle='180 deg' or wheel.angular_velocity=3: speeds that are not named are zero; the
         scene's own start if not given.

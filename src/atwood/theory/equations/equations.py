@@ -362,11 +362,11 @@ def equations(
     scene
         The scene, or an assembly of it; what contradicts that is refused.
     form
-        ``"reduced"``, as usual: generalized coordinates (Lagrange's equations of the second kind); constraints of
-        closed loops stay, with multipliers. ``"dae"``: every joint is a constraint with a multiplier (of the first
-        kind).
+        Whether constraints are eliminated (``"reduced"``, as usual) or kept (``"dae"``). In generalized coordinates
+        (Lagrange's equations of the second kind) constraints of closed loops stay, with multipliers; in the dae form
+        every joint is a constraint with a multiplier (of the first kind).
     parameters
-        ``"symbolic"``, or ``"values"``: then the numbers are put in.
+        Symbols (``"symbolic"``), or the numbers in their place (``"values"``).
     orientation
         See `atwood.assemble`. With Euler angles L is a function of these and their derivatives; with quaternions the
         velocities are angular velocities in the axes of the body.

@@ -420,7 +420,7 @@ def hamiltonian(
     scene
         The scene, or an assembly of it in the reduced form.
     parameters
-        ``"symbolic"``, or ``"values"``: then the numbers are put in.
+        Symbols (``"symbolic"``), or the numbers in their place (``"values"``).
     orientation
         Euler angles in which orientations in space are; quaternions have no momenta, and ``"euler-zxz"`` takes their
         place.
