@@ -110,8 +110,13 @@ def test_functions_of_theory_are_asked_on_the_command_line(command: str, key: st
         (["solve-start", "simple-pendulum", "--unknown", "bob.mass", "--condition", "bob.mas=1"], 1, "bob.mas"),
         (["bracket", "simple-pendulum", "--f", "1 +", "--g", "p_theta"], 1, "cannot be read"),
         (["phase", "simple-pendulum", "--coordinates", "3"], 1, "--coordinates: '3' is no range"),
+        (["section", "simple-pendulum", "--surface", "rod.angle crosses 0", "--quantity", "rod.angle", "--starts", "3"],
+         1, "Write PATH=VALUE,..."),
+        (["run", "simple-pendulum", "--accuracy", "1"], 1, "--accuracy cannot be 1.0. Give an error between 1e-15"),
+        (["compare", "simple-pendulum", "--max-seconds", "0"], 1, "--max-seconds cannot be 0.0"),
+        (["equilibrium-branches", "simple-pendulum", "--path", "gravity", "--span", "10:9"], 1, "--span cannot be"),
     ],
-)
+)  # fmt: skip
 def test_mistakes_are_answered(arguments: list[str], code: int, said: str) -> None:
     done = CliRunner().invoke(main, arguments, catch_exceptions=False)
     assert done.exit_code == code, done.output

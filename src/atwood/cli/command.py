@@ -15,7 +15,7 @@ from typing import Any
 
 import click
 
-from atwood.arguments import TEXT, Kind, Refused
+from atwood.arguments import TEXT, Kind, Refused, check
 from atwood.cli.errors import reporting_errors
 from atwood.cli.scenes import pairs
 from atwood.errors import UsageError
@@ -30,6 +30,10 @@ _COMMON = {
     "start_values": ("--start", "Start value, such as rod1.angle='30 deg'; =free lets one go that the scene fixes."),
 }
 """Options of all commands that take a scene."""
+
+
+_OR_NONE = ", or None."
+"""What an argument may be in Python alone."""
 
 
 class Request(SimpleNamespace):
@@ -97,7 +101,7 @@ def command(
             if kind.word and key not in (*leave, "scene"):
                 known = table.get(key, (kind, default))
                 table[key] = (known[0], default if known[1] is None else known[1])
-    table |= dict(more or {})
+    table |= more or {}
     told = (run, *functions)
     called_so = {key: f"--{_singular(key) if kind.is_many else key}" for key, (kind, _) in table.items()}
     called_so |= {key: "--starts" for key, option in called_so.items() if option == "--start"} | dict(names or {})
@@ -107,8 +111,19 @@ def command(
     def called(**typed: Any) -> None:
         texts = {key: typed.pop(key) for key in options}
         read = {key: _read(texts[key], kind, option) for key, (kind, option) in options.items()}
-        run(Request(**typed, **read, typed=texts))
+        for key in own:
+            if read[key] is not None:
+                read[key] = check(options[key][0], read[key], options[key][1])
+        try:
+            run(Request(**typed, **read, typed=texts))
+        except UsageError as error:
+            name = error.message.partition(" cannot be ")[0]
+            if error.where not in callers or name not in options:
+                raise
+            message, advice = error.message.replace(name, options[name][1], 1), error.advice.replace(_OR_NONE, ".")
+            raise UsageError(message, advice=advice) from None
 
+    own, callers = dict(more or {}), {one.__qualname__ for one in functions}
     options = {one.name: (table[one.name][0], one.opts[0]) for one in params if one.name in table}
     text = inspect.cleandoc(run.__doc__ or "").partition("\n\nParameters\n")[0]
     return click.Command(
@@ -145,7 +160,8 @@ class _Typed(click.ParamType):  # type: ignore[type-arg]  # generic in the newes
             return _typed(self.kind, value, param.opts[0] if param is not None else "")
         except (Refused, ValueError) as error:
             said = str(error) if isinstance(error, Refused) else ""
-            self.fail(f"{value!r} will not do. {said} Give {self.kind.what}.".replace("  ", " "), param, ctx)
+            advice = f"{said} Give {self.kind.what}.".replace(_OR_NONE, ".").strip()
+            self.fail(f"{value!r} will not do. {advice}", param, ctx)
         except UsageError:
             return value  # it is read again where errors are reported
 
@@ -156,6 +172,14 @@ def _typed(kind: Kind, value: Any, where: str) -> Any:
         return kind.typed(value) if isinstance(value, str) else value
     except UsageError as error:
         raise UsageError(error.message, where=where, advice=error.advice) from None
+
+
+def _typed_again(kind: Kind, value: str, where: str) -> Any:
+    """Return what a kind makes of one of several texts, or refuse it."""
+    try:
+        return _typed(kind, value, where)
+    except (Refused, ValueError):
+        raise UsageError(f"{value!r} will not do", where=where, advice=f"Write {kind.word}.") from None
 
 
 def _option(name: str, kind: Kind, default: Any, told: Sequence[Callable[..., Any]], called: str) -> click.Option:
@@ -190,9 +214,9 @@ def _singular(name: str) -> str:
 def _read(typed: Any, kind: Kind, option: str) -> Any:
     """Return what was typed as a function takes it; nothing of what can be repeated is what is usual."""
     if kind.is_many and "=" in kind.word and "," not in kind.word:
-        return {path: _typed(kind, text, f"{option} {path}") for path, text in pairs(typed, option)} or None
+        return {path: _typed_again(kind, text, f"{option} {path}") for path, text in pairs(typed, option)} or None
     if kind.is_many:
-        return [_typed(kind, one, option) for one in typed] or None
+        return [_typed_again(kind, one, option) for one in typed] or None
     return _typed(kind, typed, option)
 
 
