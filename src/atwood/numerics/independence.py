@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.codegen.rounding import ROUGHNESS
-from atwood.numerics.matrices import Matrix, is_full, scaled, to_array
+from atwood.numerics.matrices import Matrix, is_full, or_one, scaled, to_array
 from atwood.numerics.solutions import least_squares
 from atwood.tolerances import tolerances
 
@@ -76,7 +76,7 @@ def row_scales(jacobian: Matrix, scales: FloatArray, errors: FloatArray) -> Floa
 def trusted_sizes(sizes: FloatArray, errors: FloatArray) -> FloatArray:
     """Return the size of each row from its largest entry, of shape (..., rows); see `row_scales`."""
     rows = np.maximum(sizes, tolerances.TRUSTED * errors)
-    return np.where(rows > 0.0, rows, 1.0)
+    return or_one(rows)
 
 
 def certain(errors: FloatArray, sizes: FloatArray) -> FloatArray:

@@ -18,6 +18,7 @@ __all__ = [
     "from_entries",
     "is_best_full",
     "is_full",
+    "or_one",
     "scaled",
     "to_array",
 ]
@@ -85,6 +86,11 @@ def to_array(matrix: Matrix) -> FloatArray:
     """Return a matrix as an array, whatever its size."""
     found: FloatArray = matrix if is_full(matrix) else matrix.toarray()
     return found
+
+
+def or_one(sizes: FloatArray) -> FloatArray:
+    """Return sizes to divide by: one in place of those that are zero."""
+    return np.where(sizes > 0.0, sizes, 1.0)
 
 
 def scaled(matrix: Matrix, columns: FloatArray, rows: FloatArray | None = None) -> Matrix:

@@ -15,6 +15,7 @@ import numpy as np
 from atwood.arrays import BoolArray, FloatArray, IntArray
 from atwood.clock import within_time
 from atwood.late import dataclass
+from atwood.numerics.matrices import or_one
 from atwood.tolerances import tolerances
 
 __all__ = [
@@ -171,5 +172,5 @@ def open_directions(matrix: FloatArray, errors: Errors = 0.0) -> FloatArray:
         Where they nearly depend on each other: how far they may be off, relative to the size of each.
     """
     sizes = np.linalg.norm(matrix, axis=1, keepdims=True)
-    found = decompose(matrix / np.where(sizes > 0.0, sizes, 1.0), errors, None if errors else len(matrix))
+    found = decompose(matrix / or_one(sizes), errors, None if errors else len(matrix))
     return found.null_space.T

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from atwood.arrays import FloatArray, IndexArray
+from atwood.numerics.matrices import or_one
 
 __all__ = ["Remainders", "Residues", "Samples"]
 
@@ -115,8 +116,7 @@ def _equilibrated(rows: IndexArray, columns: IndexArray, size: int, entries: Flo
         for places in (rows, columns):
             largest = np.zeros(size)
             np.maximum.at(largest, places, np.abs(found))
-            largest[largest == 0.0] = 1.0
-            found /= np.sqrt(largest)[places]
+            found /= np.sqrt(or_one(largest))[places]
     return found
 
 

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import ComplexArray, FloatArray
-from atwood.numerics.matrices import Matrix, is_full
+from atwood.numerics.matrices import Matrix, is_full, or_one
 from atwood.tolerances import tolerances
 
-__all__ = ["least_norm", "least_size", "least_squares"]
+__all__ = ["least_norm", "least_size", "least_squares", "solve_even"]
 
 _Numbers = TypeVar("_Numbers", FloatArray, ComplexArray)
 
@@ -76,6 +76,29 @@ def least_squares(matrix: _Numbers, right: _Numbers) -> _Numbers:
     return np.asarray(np.linalg.lstsq(matrix, right, rcond=None)[0])
 
 
+def solve_even(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    """Return the solution of a square system, with rows and columns scaled alike so that singular means singular.
+
+    Parameters
+    ----------
+    matrix
+        The system, which is as large across as along its diagonal; or a stack of such.
+    right
+        One right-hand side for each, or several as columns.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If one has no solution, or more than one.
+    """
+    if not matrix.size:
+        return np.zeros(right.shape)
+    size = or_one(np.sqrt(np.maximum(np.max(np.abs(matrix), axis=-1), np.max(np.abs(matrix), axis=-2))))
+    columns = right if right.ndim == matrix.ndim else right[..., None]
+    found = np.linalg.solve(matrix / size[..., :, None] / size[..., None, :], columns / size[..., None])
+    return np.asarray((found / size[..., None]).reshape(right.shape))
+
+
 def _check_finite(*arrays: _Numbers) -> None:
     """Refuse what some machines' libraries would work on for ever."""
     if not all(np.isfinite(one).all() for one in arrays):
@@ -102,7 +125,7 @@ def least_size(jacobian: FloatArray, kept: NDArray[np.intp], multipliers: FloatA
         return found
     columns = np.max(np.abs(jacobian[:, kept]), axis=1)
     columns = np.maximum(columns, _FLAT * np.max(columns, axis=1, keepdims=True))
-    even = jacobian / np.where(columns > 0.0, columns, 1.0)[:, None, :]
+    even = jacobian / or_one(columns)[:, None, :]
     rows = np.max(np.abs(even[:, kept]), axis=2)[:, :, None]
     weights = even[:, others] @ np.linalg.pinv(even[:, kept] / rows) / np.swapaxes(rows, 1, 2)
     found[:, kept] = multipliers

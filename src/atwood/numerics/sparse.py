@@ -16,6 +16,7 @@ from scipy.sparse import block_array, csc_array, csr_array, diags_array, eye_arr
 from scipy.sparse.linalg import splu
 
 from atwood.arrays import FloatArray
+from atwood.numerics.matrices import or_one
 
 __all__ = [
     "csr_least_norm",
@@ -195,8 +196,7 @@ def solve_bordered(
     matrix = csc_array(block_array([[mass, -jacobian.T], [jacobian, None]])) if jacobian.shape[0] else csc_array(mass)
     right = np.concatenate([-bias, -gamma])
     large = abs(matrix)
-    size = np.sqrt(np.maximum(large.max(axis=1).toarray(), large.max(axis=0).toarray()).ravel())
-    size[size == 0.0] = 1.0
+    size = or_one(np.sqrt(np.maximum(large.max(axis=1).toarray(), large.max(axis=0).toarray()).ravel()))
     scale = diags_array(1.0 / size)
     balanced = csc_array(scale @ matrix @ scale)
     try:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray, IndexArray
 from atwood.codegen.llvm.elimination import LISTS, elimination_functions
+from atwood.numerics.matrices import or_one
 
 __all__ = ["Augmented", "Borders", "Elimination", "Normal", "Pattern"]
 
@@ -251,8 +252,7 @@ class Normal:
         rows, states = self.whole.shape[0], entries.shape[1]
         kept = np.array(self.kept, dtype=np.intp)
         left_out = np.setdiff1d(np.arange(rows), kept)
-        sizes = self.whole.largest(entries)
-        sizes[sizes == 0.0] = 1.0
+        sizes = or_one(self.whole.largest(entries))
         scaled = entries / sizes[self.whole.rows]
         held = scaled[self._which]
         factors = self._factorise(held)
@@ -377,7 +377,7 @@ class Augmented:
     ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
         """Return the solutions; see `Borders.solve`."""
         share = np.max(np.abs(masses), axis=0, initial=0.0) / np.max(np.abs(jacobian), axis=0, initial=1e-300) ** 2
-        share[share == 0.0] = 1.0
+        share = or_one(share)
         entries = np.zeros((len(self._borders.mass.rows), bias.shape[1]))
         products = jacobian[self._first] * jacobian[self._second]
         entries[self._targets] = share * _sums(products, self._starts, len(self._targets))

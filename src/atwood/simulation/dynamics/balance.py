@@ -23,7 +23,7 @@ from atwood.numerics.matrices import (
     scaled,
 )
 from atwood.numerics.newton import Missing, newton
-from atwood.numerics.solutions import least_norm
+from atwood.numerics.solutions import least_norm, solve_even
 from atwood.simulation.dynamics.columns import mass_at
 from atwood.simulation.dynamics.kinematic_map import KinematicMap, kinematic_map_of
 from atwood.simulation.dynamics.rounding import RowErrors
@@ -252,7 +252,7 @@ def solve_balance(now: BalanceValues, kept: NDArray[np.intp] | None, t: float) -
 
 
 def solve_determined(matrix: FloatArray, right: FloatArray, t: float) -> FloatArray:
-    """Solve a balance of forces, scaled to rows and columns of like size so that singular means singular.
+    """Solve a balance of forces; see `solve_even`.
 
     Parameters
     ----------
@@ -268,14 +268,8 @@ def solve_determined(matrix: FloatArray, right: FloatArray, t: float) -> FloatAr
     SolveError
         If there is no solution, or more than one.
     """
-    if not matrix.size:
-        return np.zeros(right.shape)
-    size = np.sqrt(np.maximum(np.max(np.abs(matrix), axis=-1), np.max(np.abs(matrix), axis=-2)))
-    size[size == 0.0] = 1.0
-    columns = right if right.ndim == matrix.ndim else right[..., None]
     try:
-        scaled = np.linalg.solve(matrix / size[..., :, None] / size[..., None, :], columns / size[..., None])
-        solution: FloatArray = (scaled / size[..., None]).reshape(right.shape)
+        solution = solve_even(matrix, right)
     except np.linalg.LinAlgError:
         raise _undetermined(t) from None
     if not np.all(np.isfinite(solution)):

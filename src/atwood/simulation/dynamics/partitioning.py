@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from atwood.arrays import FloatArray
+from atwood.numerics.matrices import or_one
 
 __all__ = ["POOR", "choose_dependent_coordinates", "review_partitioning"]
 
@@ -36,8 +37,7 @@ def choose_dependent_coordinates(jacobian: FloatArray, scales: FloatArray) -> tu
         Size of each coordinate.
     """
     count = jacobian.shape[0]
-    rows = np.max(np.abs(jacobian * scales), axis=1, initial=0.0)
-    rows[rows == 0.0] = 1.0
+    rows = or_one(np.max(np.abs(jacobian * scales), axis=1, initial=0.0))
     left = jacobian * scales / rows[:, None]
     chosen: list[int] = []
     for _ in range(count):

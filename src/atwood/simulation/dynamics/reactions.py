@@ -21,8 +21,8 @@ from atwood.forms.balance_program import BalanceProgram
 from atwood.forms.kept import Key
 from atwood.forms.places import internal_reactions_of, to_maximal
 from atwood.late import dataclass
-from atwood.numerics.matrices import is_best_full
-from atwood.numerics.solutions import least_size
+from atwood.numerics.matrices import is_best_full, or_one
+from atwood.numerics.solutions import least_size, solve_even
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.columns import masses_at
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
@@ -177,8 +177,7 @@ def _force_sizes(program: BalanceProgram, mass: FloatArray, jacobian: FloatArray
         filled, starts = np.unique(places[order], return_index=True)
         sizes[filled] = np.maximum.reduceat(np.abs(jacobian[order]), starts, axis=0)
     largest = np.max(np.abs(mass), axis=0, initial=0.0)
-    found = largest / np.where(sizes > 0.0, sizes, 1.0)
-    return np.where(found > 0.0, found, 1.0)
+    return or_one(largest / or_one(sizes))
 
 
 def _solved_full(
@@ -205,16 +204,13 @@ def _solved_full(
         matrix[:, :n, n:] = -np.swapaxes(full_jacobian[:, kept], 1, 2)
         matrix[:, n:, :n] = full_jacobian[:, kept]
         right = -np.concatenate([bias[:, part].T, gamma[kept][:, part].T], axis=1)
-        scale = np.sqrt(np.maximum(np.abs(matrix).max(axis=1), np.abs(matrix).max(axis=2))) if size else right
-        scale[scale == 0.0] = 1.0
         try:
-            solution = np.linalg.solve(matrix / scale[:, :, None] / scale[:, None, :], (right / scale)[..., None])
+            solved = solve_even(matrix, right)
         except np.linalg.LinAlgError:
             raise SolveError(
                 "the forces do not determine the accelerations somewhere along the run",
                 advice="The mechanism passes a singular position exactly, or something without mass is free.",
             ) from None
-        solved = solution[..., 0] / scale
         found_a[:, part] = solved[:, :n].T
         found_l[:, part] = solved[:, n:].T
     return found_a, found_l

@@ -16,6 +16,7 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import extent
 from atwood.mechanics.outputs.observables import Observable
 from atwood.model.values.units import parse_unit
+from atwood.numerics.matrices import or_one
 from atwood.simulation.dynamics.floating import FAR, spread
 
 __all__ = [
@@ -228,7 +229,7 @@ def total_masses(assembly: Assembly, rows: FloatArray | None = None) -> FloatArr
         return float(sum(assembly.kernel(_masses(assembly))([assembly.flat.t_start])[0])) or 1.0
     kernel = assembly.compiled(_masses(assembly), vectorized=True).bind(rows.T)
     found = np.sum(kernel(np.full((1, len(rows)), assembly.flat.t_start))[0], axis=0)
-    return np.where(found > 0.0, found, 1.0)
+    return or_one(found)
 
 
 def _masses(assembly: Assembly) -> Program:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.forms.assembly import Assembly
+from atwood.numerics.matrices import or_one
 from atwood.numerics.rank import ranks
 from atwood.numerics.solutions import least_norm
 from atwood.simulation.initialization.system import Conditions
@@ -68,14 +69,10 @@ def meet_positions(
         matrix[:, conditions.rows, conditions.columns] = jacobian.T
         return (values - wanted[:, which]).T, matrix * sizes[which, None, :]
 
-    def rows_of(matrix: FloatArray) -> FloatArray:
-        found = np.max(np.abs(matrix), axis=2)
-        return np.where(found > 0.0, found, 1.0)
-
     met, active = np.zeros(runs, dtype=bool), np.arange(runs)
     residual, matrix = look(q, active)
     for _ in range(_ITERATIONS):
-        rows = rows_of(matrix)
+        rows = or_one(np.max(np.abs(matrix), axis=2))
         size = np.max(np.abs(residual / rows), axis=1)
         met[active[size < tolerances.MET]] = True
         going = (size >= 1e-15) & np.isfinite(size) & np.all(np.isfinite(matrix), axis=(1, 2))
@@ -160,13 +157,12 @@ def meet_speeds(
         moving = np.any(residual != 0.0, axis=1) & np.all(np.isfinite(matrix), axis=(1, 2))
         if not np.any(moving):
             break
-        rows = np.max(np.abs(matrix[moving] * sizes[moving, None, :]), axis=2)
-        rows[rows == 0.0] = 1.0
-        scaled = matrix[moving] * sizes[moving, None, :] / rows[:, :, None]
-        step = least_norm(scaled, (residual[moving] / rows)[:, :, None])
+        scaled = matrix[moving] * sizes[moving, None, :]
+        rows = or_one(np.max(np.abs(scaled), axis=2))
+        step = least_norm(scaled / rows[:, :, None], (residual[moving] / rows)[:, :, None])
         u[moving] -= sizes[moving] * step[:, :, 0]
         residual = look()
     own = np.einsum("rij,rj->ri", np.abs(matrix), np.abs(u)) + np.abs(wanted).T
-    share = np.abs(residual) / np.where(own > 0.0, own, 1.0)
+    share = np.abs(residual) / or_one(own)
     met: NDArray[np.bool_] = np.all(share <= tolerances.MET_SPEEDS, axis=1)
     return met

@@ -9,7 +9,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.numerics.independence import certain, row_scales
-from atwood.numerics.matrices import scaled
+from atwood.numerics.matrices import or_one, scaled
 from atwood.numerics.solutions import least_norm
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.scales import motion_names
@@ -134,11 +134,11 @@ def solve_speeds(
         fastest = float(np.max(np.abs(u / scales), initial=0.0))
         own += certain(errors, rows) * fastest / tolerances.MET_SPEEDS
         own += _least_rates(assembly, level, rows, length, fastest) / tolerances.MET_SPEEDS
-        share = np.abs(residual) / np.where(own > 0.0, own, 1.0)
+        share = np.abs(residual) / or_one(own)
         if not float(np.max(share)) <= tolerances.MET_SPEEDS:
             # What is prescribed rounds as well, also where no speed enters: in rows that hold nothing.
             own += tolerances.CERTAIN * system.errors.of_values(t, q, scales) / tolerances.MET_SPEEDS
-            share = np.abs(residual) / np.where(own > 0.0, own, 1.0)
+            share = np.abs(residual) / or_one(own)
         if not float(np.max(share)) <= tolerances.MET_SPEEDS:
             freedom = freedom_at(assembly, equations, scales, t, q)
             held = contradicted(equations, share[: system.constraints])

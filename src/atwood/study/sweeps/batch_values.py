@@ -20,6 +20,7 @@ from atwood.mechanics.kinematics.mechanism import extent, sizing_parameters
 from atwood.model.declare.component import Component
 from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.local.flatten import flatten
+from atwood.numerics.matrices import or_one
 from atwood.simulation.dynamics.scales import motion_scales, origin_part
 from atwood.simulation.initialization.many import meet_positions, meet_speeds
 from atwood.simulation.initialization.start import find_start
@@ -307,7 +308,7 @@ class StartRows:
             lengths = _moving_lengths(assembly, parameters)
         for given in self._lengths:
             lengths = np.maximum(lengths, np.abs(_of(given, runs)))
-        return np.where(lengths > 0.0, lengths, 1.0)
+        return or_one(lengths)
 
 
 def read_starts(

@@ -17,6 +17,7 @@ from atwood.forms.program import state_groups
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
+from atwood.numerics.matrices import or_one
 from atwood.numerics.newton import Missing, newton
 from atwood.pipeline import SCENE, assembly_of
 from atwood.showing import fitted
@@ -94,10 +95,10 @@ def solve_start(scene: Model | Assembly, *, unknowns: Sequence[str], conditions:
     def look(x: FloatArray) -> Missing:
         missed, slopes = problem.values(problem.assembly(x)) - wanted, problem.slopes(x)
         sizes = np.abs(wanted) + np.abs(slopes) @ np.abs(x)
-        return Missing(missed, np.where(sizes == 0.0, 1.0, sizes), lambda: slopes)
+        return Missing(missed, or_one(sizes), lambda: slopes)
 
     x = problem.begin()
-    scales = np.where(x == 0.0, 1.0, np.abs(x))
+    scales = or_one(np.abs(x))
     x, left = newton(
         look,
         np.add,

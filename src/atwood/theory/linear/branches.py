@@ -13,6 +13,7 @@ from atwood.errors import AtwoodError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
+from atwood.numerics.matrices import or_one
 from atwood.pipeline import SCENE, assemble
 from atwood.ranges import range_of
 from atwood.showing import data_of
@@ -308,7 +309,7 @@ class _Family:
         u = minimal.speed[:, len(minimal.displacements) : minimal.states]
         mass = (u.T @ flow.variation.by["force", "a"] @ u) * own
         size = np.max(np.abs(mass), axis=1, initial=0.0)[:, None]
-        mass = mass / np.where(size > 0.0, size, 1.0)
+        mass = mass / or_one(size)
         a, slopes = np.append(mass @ a[:n], a[n:]), np.vstack([mass @ slopes[:n], slopes[n:]])
         columns = [i for i, k in enumerate(minimal.displacements) if k in self._numbers]
         rows = [i for i in columns if i < len(a)]

@@ -14,6 +14,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.late import dataclass
+from atwood.numerics.matrices import or_one
 from atwood.numerics.newton import Missing, largest, newton
 from atwood.numerics.rank import decompose
 from atwood.tolerances import tolerances
@@ -159,13 +160,8 @@ def _point(problem: Problem, x: FloatArray, p: float, direction: FloatArray) -> 
     matrix = np.hstack([residual.by_x, residual.by_p[:, None]])
     tangent = decompose(matrix).right[-1]
     tangent = tangent if float(tangent @ direction) >= 0.0 else -tangent
-    sign, size = np.linalg.slogdet(np.vstack([_even(matrix), tangent]))
+    sign, size = np.linalg.slogdet(np.vstack([matrix / or_one(np.max(np.abs(matrix), axis=1, keepdims=True)), tangent]))
     return _Point(x, p, tangent, float(sign * np.exp(size / (len(x) + 1))))
-
-
-def _even(matrix: FloatArray) -> FloatArray:
-    sizes = np.max(np.abs(matrix), axis=1, keepdims=True)
-    return np.asarray(matrix / np.where(sizes > 0.0, sizes, 1.0))
 
 
 def _step(problem: Problem, now: _Point, length: float) -> _Point | None:
@@ -184,8 +180,7 @@ def _corrected(problem: Problem, guess: FloatArray, across: FloatArray) -> Float
             raise _Nowhere
         by_p = residual.by_p  # which changes little over a step
         matrix = np.vstack([np.hstack([residual.by_x, residual.by_p[:, None]]), across])
-        rows = np.max(np.abs(matrix), axis=1)
-        rows[rows == 0.0] = 1.0
+        rows = or_one(np.max(np.abs(matrix), axis=1))
         return Missing(np.append(residual.value, across @ (whole - guess)), rows, lambda: matrix)
 
     def moved(whole: FloatArray, step: FloatArray) -> FloatArray:

@@ -13,6 +13,7 @@ from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
+from atwood.numerics.matrices import or_one
 from atwood.numerics.newton import Missing, largest, newton
 from atwood.pipeline import SCENE
 from atwood.showing import fitted
@@ -141,8 +142,7 @@ def _trial(point: OperatingPoint, values: Mapping[str, float], free: set[int]) -
     chosen = [i for i, k in enumerate(minimal.displacements) if k in free]
     matrix = np.column_stack([*gains, slopes[:, chosen]])
     size = largest(slopes) + largest(a) or 1.0
-    scale = np.max(np.abs(matrix), axis=0, initial=0.0)
-    scale[scale == 0.0] = 1.0
+    scale = or_one(np.max(np.abs(matrix), axis=0, initial=0.0))
     missing = Missing(a, np.full(len(a), size), lambda: matrix / scale, np.ones(len(a)))
     return _Trial(point, values, free, minimal, chosen, scale, missing)
 

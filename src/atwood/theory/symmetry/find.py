@@ -17,6 +17,7 @@ from atwood.expr import Expression, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass, replace
 from atwood.mechanics.outputs.observables import add_up
+from atwood.numerics.matrices import or_one
 from atwood.numerics.solutions import least_norm
 from atwood.simulation.dynamics.orientation_coordinates import COORDINATE_SWITCH
 from atwood.simulation.events.modes import find_event_functions
@@ -326,8 +327,7 @@ class _Search:
         if not self._columns or not size:
             return not size
         columns = np.stack(self._columns, axis=1)
-        scales = np.linalg.norm(columns, axis=0)
-        scales[scales == 0.0] = 1.0
+        scales = or_one(np.linalg.norm(columns, axis=0))
         weights = least_norm(columns / scales, centred)
         if (
             float(np.linalg.norm(columns / scales @ weights - centred)) > 1e-8 * size

@@ -31,6 +31,7 @@ from atwood.expr.simplify.polynomial import (
 from atwood.expr.simplify.trigonometry import sum_of_waves, without_squares
 from atwood.late import dataclass
 from atwood.mechanics.outputs.observables import add_up
+from atwood.numerics.matrices import or_one
 from atwood.numerics.solutions import least_norm, least_squares
 from atwood.simulation.dynamics.scales import motion_scales, scene_length
 from atwood.theory.formulas.notation import Notation
@@ -185,8 +186,7 @@ _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 def _fit(rows: FloatArray, values: FloatArray, symbols: Sequence[Expression], size: float) -> Expression | None:
     """Return values as a combination of symbols; None if they are none to so small a share of a size."""
-    scales = np.max(np.abs(rows), axis=0)
-    scales = np.where(scales > 0.0, scales, 1.0)
+    scales = or_one(np.max(np.abs(rows), axis=0))
     weights = least_norm(rows / scales, values) / scales
     if np.max(np.abs(rows @ weights - values), initial=0.0) > _FITTED * size:
         return None
