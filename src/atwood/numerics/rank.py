@@ -91,7 +91,9 @@ def significant(values: FloatArray, errors: Errors = None) -> BoolArray:
     return np.asarray(values > (float(np.linalg.norm(errors)) if isinstance(errors, np.ndarray) else errors))
 
 
-def decompose(matrix: FloatArray, errors: Errors = None, rank: int | None = None) -> Decomposition:
+def decompose(
+    matrix: FloatArray, errors: Errors = None, rank: int | None = None, is_whole: bool = True
+) -> Decomposition:
     """Return the singular value decomposition of a matrix, with its rank.
 
     Parameters
@@ -102,13 +104,15 @@ def decompose(matrix: FloatArray, errors: Errors = None, rank: int | None = None
         How far it may be off.
     rank
         The rank, where that is decided already.
+    is_whole
+        Whether null spaces are asked for; of many rows and few columns the rest is known without.
 
     Raises
     ------
     numpy.linalg.LinAlgError
         If an entry is not finite.
     """
-    left, values, right = within_time(lambda: np.linalg.svd(matrix))
+    left, values, right = within_time(lambda: np.linalg.svd(matrix, full_matrices=is_whole))
     return Decomposition(left, values, right, int(np.sum(significant(values, errors))) if rank is None else rank)
 
 
@@ -139,8 +143,7 @@ def null_space(matrix: FloatArray, errors: Errors = None, rank: int | None = Non
 
 def span(matrix: FloatArray, errors: Errors = None) -> FloatArray:
     """Return an orthonormal basis, as columns, of what the columns of a matrix span; see `decompose`."""
-    vectors, values, _ = np.linalg.svd(matrix, full_matrices=False)
-    return np.asarray(vectors[:, significant(values, errors)])
+    return decompose(matrix, errors, is_whole=False).range
 
 
 def is_clear(rows: FloatArray) -> bool:

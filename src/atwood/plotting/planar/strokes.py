@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from atwood.arrays import FloatArray
+from atwood.numerics.rank import decompose
 from atwood.plotting.canvas import COLOURS, GREY, INK
 from atwood.plotting.planar.geometry import Picture, Shape, hanging
 
@@ -101,7 +102,7 @@ class Pen:
         if np.max(np.ptp(base, axis=0)) > 1e-6 * self.picture.extent:
             return None
         middle = rider.mean(axis=0)
-        _, _, axes = np.linalg.svd(rider - middle, full_matrices=False)
+        axes = decompose(rider - middle, is_whole=False).right
         along, aside = ((rider - middle) @ axis for axis in axes)
         if np.ptp(along) < 1e-9 * self.picture.extent or np.ptp(aside) > 1e-3 * self.picture.extent:
             return None

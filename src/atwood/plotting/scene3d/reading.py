@@ -9,6 +9,8 @@ from typing import Literal
 
 import numpy as np
 
+from atwood.numerics.newton import largest
+from atwood.numerics.rank import decompose
 from atwood.arrays import FloatArray
 from atwood.expr import Expression, depends_on, is_zero
 from atwood.forms.quantities import state_program
@@ -32,6 +34,9 @@ from atwood.result.result import Result
 
 JoiningKind = Literal["hinge", "ball", "cross", "slide", "plane", "curve"]
 TieKind = Literal["rod", "rope", "spring", "damper"]
+
+_STRAIGHT = 1e-6
+"""Of the way that is seen: what leaves a straight line by less is on it, as runs are known to their tolerance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -456,7 +461,6 @@ def _seen_axis(reading: Reading, a: int, b: int) -> FloatArray:
     """Return the direction in which node b moves as seen from node a, where it stays on a straight line; else zero."""
     seen = seen_from(reading, a, b)
     spread = seen - seen.mean(axis=0)
-    sizes, axes = np.linalg.svd(spread, full_matrices=False)[1:]
-    straight = sizes[0] > 0.0 and (len(sizes) < 2 or sizes[1] <= 1e-6 * sizes[0])
-    found: FloatArray = axes[0] if straight else np.zeros(3)
-    return found
+    way = largest(spread)
+    found = decompose(spread / (way or 1.0), np.full(len(spread), _STRAIGHT), is_whole=False)
+    return found.right[0] if found.rank == 1 else np.zeros(3)
