@@ -9,8 +9,6 @@ from typing import Literal
 
 import numpy as np
 
-from atwood.numerics.newton import largest
-from atwood.numerics.rank import decompose
 from atwood.arrays import FloatArray
 from atwood.expr import Expression, depends_on, is_zero
 from atwood.forms.quantities import state_program
@@ -21,6 +19,8 @@ from atwood.model.declare.contributions import BodyInertia
 from atwood.model.local.parts import LocalJoint, LocalPart
 from atwood.model.values.outline import Outline
 from atwood.model.values.rotation import FreeRotation, Rotation, as_rotation
+from atwood.numerics.newton import largest
+from atwood.numerics.rank import decompose
 from atwood.plotting.shapes.meshes import (
     depends,
     holds_distance,
