@@ -28,14 +28,11 @@ from atwood.forms.loops.assur_groups import Loops
 from atwood.forms.loops.branches import Place
 from atwood.forms.loops.closed_form import ClosedForm, closed_form
 from atwood.late import dataclass, replace
+from atwood.simulation.problem.closed_loops_many import AGREES, ASIDE, CLEAR, ManyBranches
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import misses_of
 
 __all__ = [
-    "AGREES",
-    "ASIDE",
-    "CLEAR",
-    "TURN",
     "Solved",
     "can_be_solved",
     "levels",
@@ -56,9 +53,6 @@ _START = 0.15
 _LEAVE = 0.25
 """Where this is left of the distance from a dead centre, another choice is looked for."""
 
-CLEAR = 0.003
-"""A choice of which so much is left in a whole turn meets no dead centre."""
-
 _AMPLE = 0.5
 """Of several independent coordinates, among which none turns fully for all others, a choice so far is good enough."""
 
@@ -68,15 +62,6 @@ _LARGEST = 4000
 _MOST, _FEWEST, _WORK = 60, 3, 120
 """So many choices of independent coordinates are tried at most; of mechanisms of many coordinates fewer, down to the
 second number: the third divided by the number of coordinates. Each costs formulas for the whole mechanism."""
-
-TURN = 144
-"""In so many positions of a whole turn it is seen whether there is a dead centre."""
-
-AGREES = 1e-7
-"""Formulas that miss a position by more, in units of the scene's sizes, are not those of its branch."""
-
-ASIDE = 0.05
-"""By so many of their sizes independent coordinates are moved to see whether formulas are right near by, too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -289,10 +274,12 @@ def on_branch(plan: Plan, form: ClosedForm, t: float, q: FloatArray, u: FloatArr
     t, q, u
         An admissible state.
     """
-    branches = _branches(plan.assembly, form, t, q)
-    if branches is None:
+    assembly, many = plan.assembly, ManyBranches(form, plan.assembly)
+    values, found = many.branches(np.array([t]), q[None], assembly.parameter_values[None])
+    if not found[0]:
         return None
-    solved = Solved(form, plan.assembly, branches)
+    branches = values[0, len(assembly.parameters) :].tolist()
+    solved = Solved(form, assembly, dict(zip(form.loops.branches, branches, strict=True)))
     y = solved.reduced(np.concatenate([q, u]))
     try:
         margin = min(_margins(solved, t, y), default=1.0)
@@ -304,20 +291,11 @@ def on_branch(plan: Plan, form: ClosedForm, t: float, q: FloatArray, u: FloatArr
     misses = np.abs(made[: len(q)] - q) / plan.coordinate_sizes
     if not (np.all(misses <= AGREES) and _holds(plan, solved, t, y)):
         return None
-    least, steepest = _least(solved, t, y)
+    least, steepest = (float(one[0]) for one in many.least(t, y[None], values))
     if not (margin > _START or least):
         return None
     is_clear = least > steepest and not any(dependencies(form.watched.results, [plan.assembly.reduced.time]))
     return replace(solved, margin=margin, least=least, is_clear=is_clear)
-
-
-def _branches(assembly: Assembly, form: ClosedForm, t: float, q: FloatArray) -> dict[Expression, float] | None:
-    """Return the values of the branches at an admissible position; None where formulas do not lead to it."""
-    try:
-        values, conditions = assembly.kernel(form.branches)([t], q)
-    except KernelEvaluationError:
-        return None
-    return dict(zip(form.loops.branches, values, strict=True)) if all(one > 0.0 for one in conditions) else None
 
 
 def _margins(solved: Solved, t: float, y: FloatArray) -> Sequence[float]:
@@ -339,23 +317,6 @@ def _holds(plan: Plan, solved: Solved, t: float, y: FloatArray) -> bool:
         return False
     misses = misses_of(plan, np.full(len(states), t), *plan.program.split(np.array(states).T))
     return bool(np.all(misses[0] <= AGREES) and np.all(misses[1] * plan.scales.time <= AGREES))
-
-
-def _least(solved: Solved, t: float, y: FloatArray) -> tuple[float, float]:
-    """Return what is left of the distance from a dead centre in a whole turn of the only independent coordinate.
-
-    The second number is the most by which it changes from one position that was looked at to the next.
-    """
-    loops = solved.form.loops
-    names = solved.assembly.reduced.names
-    if not loops.margins or len(loops.independent) > 1 or names[loops.independent[0]].unit != "rad":
-        return 0.0, 0.0
-    angles = y[0] + np.linspace(0.0, math.tau, TURN + 1)
-    with np.errstate(all="ignore"):
-        found = solved.kernel(solved.form.watched, vectorized=True)([[t]], angles[None, :], np.array([[y[1]]]))[0]
-    margins = found[: len(loops.margins)]
-    least = float(np.min(margins))  # not a number where the loop does not close
-    return (least, float(np.max(np.abs(np.diff(margins))))) if least > CLEAR else (0.0, 0.0)
 
 
 def levels(solved: Solved) -> tuple[float, float]:

@@ -14,9 +14,20 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.loops.closed_form import ClosedForm
 from atwood.late import dataclass
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales
-from atwood.simulation.problem.closed_loops import AGREES, ASIDE, CLEAR, TURN
 
-__all__ = ["ManyBranches"]
+__all__ = ["AGREES", "ASIDE", "CLEAR", "ManyBranches"]
+
+CLEAR = 0.003
+"""A choice of which so much is left in a whole turn meets no dead centre."""
+
+TURN = 144
+"""In so many positions of a whole turn it is seen whether there is a dead centre."""
+
+AGREES = 1e-7
+"""Formulas that miss a position by more, in units of the scene's sizes, are not those of its branch."""
+
+ASIDE = 0.05
+"""By so many of their sizes independent coordinates are moved to see whether formulas are right near by, too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +73,7 @@ class ManyBranches:
         lengths, time
             Extent of the scene, m, and time in which something happens, s, of each run.
         """
-        values, found = self._branches(t, q, parameters)
+        values, found = self.branches(np.full(len(q), t), q, parameters)
         if not np.any(found):
             return values, found
         free = list(self.form.loops.independent)
@@ -72,18 +83,27 @@ class ManyBranches:
         with np.errstate(all="ignore"):
             places, _ = self.states(np.full(len(y), t), y, values)
             found &= np.all(np.abs(places.T - q) / sizes <= AGREES, axis=1)
-            found &= self._hold(t, y, values, sizes, moving_sizes, time) & self._are_clear(t, y, values)
+            found &= self._hold(t, y, values, sizes, moving_sizes, time)
+            least, steepest = self.least(t, y, values)
+            found &= least > steepest
         return values, found
 
-    def _branches(self, t: float, q: FloatArray, parameters: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-        """Return parameters and branches, and where conditions for these hold."""
+    def branches(self, t: FloatArray, q: FloatArray, parameters: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """Return parameters and branches of admissible positions, and to which of these formulas may lead.
+
+        Parameters
+        ----------
+        t, q
+            Times and coordinates, of shape (runs,) and (runs, number).
+        parameters
+            Their values, shape (runs, number).
+        """
         with np.errstate(all="ignore"):
-            branches, conditions = self._call(self.form.branches, parameters, np.full(len(q), t), q.T)
-        known, found = len(self.assembly.parameters), np.ones(len(q), dtype=bool)
-        values = np.empty((len(q), known + len(self.form.loops.branches)))
-        values[:, :known], values[:, known:] = parameters, branches.T
-        if len(conditions):
-            found &= np.all(conditions > 0.0, axis=0)
+            branches, conditions = self._call(self.form.branches, parameters, t, q.T)
+        values = np.concatenate([parameters, np.reshape(branches, (-1, len(q))).T], axis=1)
+        found: NDArray[np.bool_] = np.isfinite(values).all(axis=1) & np.all(
+            np.reshape(conditions, (-1, len(q))) > 0.0, axis=0
+        )
         return values, found
 
     def _hold(
@@ -110,20 +130,33 @@ class ManyBranches:
                 holds &= good | ~is_there
         return holds
 
-    def _are_clear(self, t: float, y: FloatArray, values: FloatArray) -> NDArray[np.bool_]:
-        """Return where no dead centre is met in a whole turn of the independent angle."""
-        count, runs = len(self.form.loops.margins), len(y)
-        if not count:
-            return np.zeros(runs, dtype=bool)
+    def least(self, t: float, y: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return what is left of the distance from a dead centre in a whole turn of the only independent coordinate.
+
+        The second is the most by which it changes from one position that was looked at to the next. Both are zero where
+        a dead centre is met, a loop does not close, or no angle turns.
+
+        Parameters
+        ----------
+        t, y
+            The time, and independent coordinates and speeds, of shape (runs, number).
+        values
+            Of parameters and branches, shape (runs, number).
+        """
+        loops, runs = self.form.loops, len(y)
+        count, names = len(loops.margins), self.assembly.reduced.names
+        if not count or len(loops.independent) > 1 or names[loops.independent[0]].unit != "rad":
+            return np.zeros(runs), np.zeros(runs)
         turn = np.linspace(0.0, 2.0 * np.pi, TURN + 1)
         angles = (y[:, :1] + turn[None, :]).ravel()
         own, speeds = np.repeat(values, len(turn), axis=0), np.repeat(y[:, 1], len(turn))
-        ahead, _ = self._call(self.form.watched, own, np.full(len(angles), t), angles[None, :], speeds[None, :])
-        margins = ahead[:count].reshape(count, runs, len(turn))
-        least = np.min(margins, axis=(0, 2))
-        steepest = np.max(np.abs(np.diff(margins, axis=2)), axis=(0, 2))
-        clear: NDArray[np.bool_] = (least > CLEAR) & (least > steepest)
-        return clear
+        with np.errstate(all="ignore"):
+            ahead, _ = self._call(self.form.watched, own, np.full(len(angles), t), angles[None, :], speeds[None, :])
+            margins = ahead[:count].reshape(count, runs, len(turn))
+            least = np.min(margins, axis=(0, 2))
+            steepest = np.max(np.abs(np.diff(margins, axis=2)), axis=(0, 2))
+        is_met = ~(least > CLEAR)  # also where the loop does not close
+        return np.where(is_met, 0.0, least), np.where(is_met, 0.0, steepest)
 
     def _call(self, program: Program, values: FloatArray, t: FloatArray, *groups: FloatArray) -> tuple[FloatArray, ...]:
         kernel = self.assembly.compiled(program, vectorized=True).bind(values.T)
