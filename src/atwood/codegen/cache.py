@@ -18,8 +18,6 @@ from pathlib import Path
 
 from atwood.late import dataclass
 
-__all__ = ["Cache", "cache_directory", "default_cache", "make_key"]
-
 _MAGIC = b"atwood cache 1\n"
 _SUFFIX = ".kernel"
 _CHECKSUM = 32

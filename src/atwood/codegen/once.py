@@ -7,8 +7,6 @@ import threading
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
-__all__ = ["once"]
-
 P = ParamSpec("P")
 T = TypeVar("T")
 

@@ -18,9 +18,6 @@ from atwood.arrays import FloatArray
 from atwood.expr.core.analysis import live
 from atwood.expr.core.graph import Expression
 
-__all__ = ["ROUGHNESS", "WAYS", "RoughProgram", "roughly"]
-
-
 WAYS = 8
 """In how many ways everything is rounded."""
 

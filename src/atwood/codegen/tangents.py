@@ -5,8 +5,6 @@ A function that is convex within a step lies above its tangents at both ends.
 
 from __future__ import annotations
 
-__all__ = ["FULL", "SECANT", "STEEP"]
-
 SECANT = 2.0**-10
 """Slopes are taken over this share of a width."""
 

@@ -21,9 +21,6 @@ from atwood.codegen.python.backend import compile_program
 from atwood.errors import KernelEvaluationError, UsageError
 from atwood.expr.core.program import Program
 
-__all__ = ["NativeKernel", "NativeProgram", "compile_native"]
-
-
 _KERNEL = ctypes.CFUNCTYPE(ctypes.c_int, *[c_void_p] * 4)
 
 

@@ -33,8 +33,6 @@ from atwood.expr.core.program import Program
 from atwood.late import dataclass
 from atwood.stages import stage
 
-__all__ = ["GENERATORS", "Built", "Failures", "build_code", "default_options", "hash_of_generators"]
-
 _GENERATOR = 1
 """Counts changes to the generated code that do not show in `GENERATORS`."""
 

@@ -22,8 +22,6 @@ from atwood.codegen.routines.language import Routine
 from atwood.codegen.routines.source import RoutineSource
 from atwood.expr.core.program import Program
 
-__all__ = ["ColumnKernel", "ColumnProgram", "compile_columns", "write_routines"]
-
 _COLUMNS = ctypes.CFUNCTYPE(None, *[c_void_p] * 5, c_int64)
 
 

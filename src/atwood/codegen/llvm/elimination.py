@@ -18,8 +18,6 @@ from atwood.codegen.routines.kinds import ADDRESS, INTEGER
 from atwood.codegen.routines.language import Operand, Routine, Value
 from atwood.codegen.routines.source import RoutineSource
 
-__all__ = ["LISTS", "elimination_functions", "write_routines"]
-
 LISTS = ("pivot", "begins", "others", "below", "starts", "first", "second", "changed")
 """The lists of places, in the order in which their addresses are given.
 

@@ -24,16 +24,6 @@ from llvmlite import binding
 
 from atwood.errors import UnsupportedError
 
-__all__ = [
-    "LoadedCode",
-    "compile_text",
-    "find_symbol",
-    "load_code",
-    "require_symbols",
-    "sincos_name",
-    "target_description",
-]
-
 _lock = threading.Lock()
 _numbers = itertools.count()
 _LOADS = 200

@@ -13,18 +13,6 @@ from atwood.expr.core.graph import Expression
 from atwood.expr.core.program import Program
 from atwood.late import dataclass
 
-__all__ = [
-    "LARGEST_UNROLLED",
-    "Body",
-    "Layout",
-    "MatrixKey",
-    "Unit",
-    "lay_out",
-    "main_body",
-    "matrix_key",
-    "prologue_body",
-]
-
 LARGEST_UNROLLED = 3
 """Linear systems up to this size are eliminated in registers; larger ones by a loop over the scratch array."""
 

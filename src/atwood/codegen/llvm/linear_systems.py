@@ -15,8 +15,6 @@ from atwood.codegen.llvm.text import Writer, literal
 from atwood.expr.core.graph import Expression
 from atwood.late import dataclass
 
-__all__ = ["Solver"]
-
 
 @dataclass(frozen=True)
 class _Factors:

@@ -27,8 +27,6 @@ from atwood.expr.core.operations import ExternalFunction
 from atwood.expr.core.program import Program
 from atwood.late import dataclass
 
-__all__ = ["CodeOptions", "ModuleText", "Part", "write_module"]
-
 _ARGUMENTS = (
     "ptr noalias readonly %inputs, ptr noalias readonly %derived, ptr noalias %scratch, ptr noalias readonly %outputs"
 )

@@ -13,8 +13,6 @@ from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBE
 from atwood.codegen.routines.language import Routine, Value
 from atwood.codegen.routines.tree import Block, Branch, Call, Instruction, Jump, Loop
 
-__all__ = ["print_routines"]
-
 _TYPES: dict[Kind, str] = {NUMBER: "double", INTEGER: "i64", CODE: "i32", BOOLEAN: "i1", ADDRESS: "ptr"}
 _CONVERTED: dict[Kind, str] = {CODE: "sext", INTEGER: "trunc"}
 _FLOATING = {"add": "fadd", "subtract": "fsub", "multiply": "fmul", "divide": "fdiv"}

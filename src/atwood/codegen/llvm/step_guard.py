@@ -19,8 +19,6 @@ from atwood.codegen.routines.language import Routine
 from atwood.codegen.routines.source import RoutineSource
 from atwood.expr.core.program import Program
 
-__all__ = ["GuardCode", "GuardData", "compile_guard", "write_routines"]
-
 _GUARD = ctypes.CFUNCTYPE(c_int, c_double, c_void_p, c_void_p, c_double, c_void_p, c_void_p, c_void_p)
 
 

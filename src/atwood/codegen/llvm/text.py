@@ -16,8 +16,6 @@ from atwood.expr.core.graph import Expression
 from atwood.expr.core.operations import ExternalFunction
 from atwood.late import dataclass
 
-__all__ = ["LIBRARY_FUNCTIONS", "Needs", "Writer", "has_code", "literal"]
-
 LIBRARY_FUNCTIONS: Mapping[str, tuple[str, int]] = {
     "sin": ("sin", 1),
     "cos": ("cos", 1),

@@ -7,8 +7,6 @@ from math import nan
 from atwood.codegen.routines.kinds import ADDRESS, INTEGER, Lanes
 from atwood.codegen.routines.language import Routine, Value
 
-__all__ = ["write_elimination"]
-
 _WIDTH = 4
 
 

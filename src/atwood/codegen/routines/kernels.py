@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from atwood.codegen.routines.kinds import ADDRESS
 from atwood.codegen.routines.language import Routine, Value
 
-__all__ = ["addresses", "call_kernel", "place_of"]
-
 
 def addresses(r: Routine, places: Sequence[Value]) -> Value:
     """Return an array of this call's own that holds addresses."""

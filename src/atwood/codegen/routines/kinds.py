@@ -6,8 +6,6 @@ from typing import NamedTuple, TypeAlias
 
 from atwood.late import dataclass
 
-__all__ = ["ADDRESS", "BOOLEAN", "CODE", "INTEGER", "NUMBER", "Kind", "Lanes", "Scalar"]
-
 
 class Scalar(NamedTuple):
     """A kind of one value.

@@ -14,8 +14,6 @@ from typing import Any
 from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER, Kind, Lanes
 from atwood.codegen.routines.tree import Block, Branch, Call, Instruction, Jump, Loop
 
-__all__ = ["Operand", "Record", "Routine", "Value", "Variable"]
-
 
 class Value:
     """A value of the routine that is being written.

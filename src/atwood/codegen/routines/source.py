@@ -14,8 +14,6 @@ from atwood.late import dataclass
 if TYPE_CHECKING:
     from atwood.codegen.routines.language import Routine
 
-__all__ = ["RoutineSource"]
-
 _PACKAGE = Path(__file__).parents[2]
 
 

@@ -9,8 +9,6 @@ from atwood.late import dataclass
 if TYPE_CHECKING:
     from atwood.codegen.routines.language import Value
 
-__all__ = ["Block", "Branch", "Call", "Instruction", "Jump", "Loop"]
-
 
 class Instruction(NamedTuple):
     """An operation on values; `result` is None where it has none."""

@@ -28,8 +28,6 @@ from atwood.errors import UsageError
 from atwood.expr.core.program import Program
 from atwood.late import dataclass
 
-__all__ = ["EVENTS_PLACE", "EventCode", "EventData", "compile_events", "write_routines"]
-
 EVENTS_PLACE = 31
 """Which of the pointers of IDA's user data leads to the data of the events."""
 

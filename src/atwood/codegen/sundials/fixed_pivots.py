@@ -19,8 +19,6 @@ from atwood.codegen.routines.source import RoutineSource
 from atwood.codegen.sundials.ida_routines import array_of
 from atwood.codegen.sundials.layout import SundialsLayout, sundials_layout
 
-__all__ = ["AGAIN", "SLOTS", "fixed_pivots_addresses", "write_routines"]
-
 SLOTS = (
     *("starts", "middles", "indices", "targets", "target_starts", "rows", "columns"),
     *("positions", "by_row", "row_starts", "row_columns"),

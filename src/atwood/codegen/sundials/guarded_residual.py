@@ -24,8 +24,6 @@ from atwood.codegen.sundials.ida_routines import RESIDUAL, array_of
 from atwood.codegen.sundials.layout import SundialsLayout, sundials_layout
 from atwood.errors import UsageError
 
-__all__ = ["guarded_residual", "write_routines"]
-
 _PLACE = EVENTS_PLACE - 1
 """Which of the pointers of IDA's user data leads to what is remembered here."""
 

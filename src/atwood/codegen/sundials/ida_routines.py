@@ -10,17 +10,6 @@ from atwood.codegen.routines.language import Record, Routine, Value
 from atwood.codegen.routines.source import RoutineSource
 from atwood.codegen.sundials.layout import SundialsLayout
 
-__all__ = [
-    "FIELDS",
-    "JACOBIAN",
-    "RESIDUAL",
-    "array_of",
-    "callbacks_source",
-    "index_kind",
-    "write_routines",
-    "write_weights",
-]
-
 FIELDS = ("derived_residual", "derived_jacobian", "scratch", "relative", "absolute", "rows", "starts")
 """The pointers of the user's data, in order; the last two lead to the pattern of a sparse matrix."""
 

@@ -16,8 +16,6 @@ from typing import Any
 from atwood.errors import UnsupportedError
 from atwood.late import dataclass
 
-__all__ = ["SundialsLayout", "layout_for", "sundials_layout"]
-
 
 @dataclass(frozen=True)
 class SundialsLayout:

@@ -17,12 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 from atwood.codegen.llvm.build import Built, build_code, default_options
 from atwood.codegen.llvm.module import Part
 from atwood.codegen.routines.source import RoutineSource
-from atwood.codegen.sundials.lookout_routines import AT, CAPACITY, CARRIED, FIELDS, LISTS, NOTICED, PAUSED, STATE, Shape
+from atwood.codegen.sundials.lookout_routines import AT, CAPACITY, CARRIED, FIELDS, LISTS, STATE, Shape
 from atwood.errors import UsageError
 from atwood.expr.core.program import Program
 from atwood.late import dataclass
-
-__all__ = ["NOTICED", "PAUSED", "LookoutCode", "LookoutData", "Pace", "compile_lookout", "slope_lists"]
 
 _LOOK = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, *[ctypes.c_void_p] * 3)
 

@@ -11,20 +11,6 @@ from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBE
 from atwood.codegen.routines.language import Record, Routine, Value
 from atwood.late import dataclass
 
-__all__ = [
-    "AT",
-    "CAPACITY",
-    "CARRIED",
-    "FIELDS",
-    "LISTS",
-    "NOTICED",
-    "PAUSED",
-    "STATE",
-    "UNREADABLE",
-    "Shape",
-    "write_routines",
-]
-
 NOTICED = 98
 """The flag of `LookoutCode.drive` where somebody should look at what was noted; IDA has none of this number."""
 

@@ -26,8 +26,6 @@ from atwood.codegen.sundials.ida_routines import JACOBIAN, RESIDUAL, array_of, i
 from atwood.codegen.sundials.layout import SundialsLayout
 from atwood.late import dataclass
 
-__all__ = ["ATTENTION", "FIELDS", "LIMIT", "RATE", "NullSpaceShape", "null_space_source", "write_routines"]
-
 FIELDS = (
     "derived_residual",
     "derived_jacobian",

@@ -15,8 +15,6 @@ from atwood.codegen.sundials.residuals import EXPORTS, Callbacks, UserData, chec
 from atwood.errors import UsageError
 from atwood.expr.core.program import Program
 
-__all__ = ["NullSpaceCallbacks", "NullSpaceData", "compile_null_space_callbacks"]
-
 
 def compile_null_space_callbacks(
     stack: Program,

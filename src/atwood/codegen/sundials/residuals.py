@@ -16,8 +16,6 @@ from atwood.codegen.sundials.layout import SundialsLayout, sundials_layout
 from atwood.errors import UsageError
 from atwood.expr.core.program import Program
 
-__all__ = ["EXPORTS", "Callbacks", "IdaCallbacks", "UserData", "check_groups", "compile_ida_callbacks"]
-
 EXPORTS = ("ida_residual", "ida_jacobian", "ida_weights")
 """The names of the functions that IDA calls."""
 
