@@ -97,3 +97,12 @@ def test_places_need_be_no_vectors() -> None:
 
     found, _ = newton(look, lambda z, step: z * np.exp(1j * step[0]), 1.0 + 0.0j, ONE, steps=5, met=1e-12)
     assert found == pytest.approx(np.exp(1j))
+
+
+def test_an_unknown_whose_scale_is_zero_is_held() -> None:
+    look, _ = counted(lambda x: np.array([x[0] * x[1] - 6.0]), lambda x: np.array([[x[1], x[0]]]))
+    with np.errstate(all="raise"):
+        found, left = newton(look, np.add, np.array([1.0, 3.0]), np.array([1.0, 0.0]), steps=9, met=1e-12, longest=0.5)
+    assert found == pytest.approx([2.0, 3.0])
+    assert found[1] == 3.0
+    assert left.miss < 1e-12
