@@ -11,7 +11,7 @@ from atwood.mechanics.dynamics.equations import Equations
 
 __all__ = ["as_by_hand"]
 
-_LARGEST = 12
+_MOST_COORDINATES = 12
 """Up to so many coordinates equations are rewritten; beyond, the recursion is shorter than any closed form."""
 
 
@@ -27,7 +27,7 @@ def as_by_hand(equations: Equations, parameters: Sequence[Expression], rows: Seq
     rows
         The rows, with their values.
     """
-    if len(equations.coordinates) > _LARGEST or equations.solved_speeds:
+    if len(equations.coordinates) > _MOST_COORDINATES or equations.solved_speeds:
         return list(rows)
     angles = [q for q, c in zip(equations.coordinates, equations.names, strict=True) if c.unit == "rad"]
     read = tuple(rows), tuple(angles), parameters
