@@ -19,7 +19,7 @@ from atwood import UsageError
 from atwood.codegen import cache as disk
 from atwood.files import check_directory, check_readable, write_atomically
 from atwood.forms import derived
-from atwood.result.formats import packed
+from atwood.result.formats import npz as packed
 from atwood.solids import read_stl
 from atwood_library import Table
 from atwood_library.scenes import DoublePendulum, SimplePendulum

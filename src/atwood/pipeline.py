@@ -30,8 +30,7 @@ from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
 from atwood.forms.dae import check_level
 from atwood.forms.reassembly import modes_of
-from atwood.forms.source import Source
-from atwood.forms.starting import with_constants_of_start
+from atwood.forms.starting import Source, with_constants_of_start
 from atwood.late import replace
 from atwood.mechanics.read import LineSigns, read_mechanism
 from atwood.model.compose.composite import Model
@@ -369,7 +368,7 @@ def _solve_to(
     """Run an assembly, with tolerances for the accuracy that was asked for, if any; see `accurate_run`."""
     if accuracy is None:
         return raised_where_too_tight(lambda given: _solve(assembly, given, clock), assembly, options), None, ""
-    from atwood.result.accurate import accurate_run
+    from atwood.result.second_run import accurate_run
     from atwood.simulation.events.sampling import refuse_updates
 
     refuse_updates(assembly)

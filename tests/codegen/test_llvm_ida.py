@@ -11,7 +11,7 @@ from atwood.codegen.sundials.layout import SundialsLayout, layout_for, sundials_
 from atwood.errors import KernelEvaluationError, UsageError
 from atwood.integrators.compiled_functions import NativeCallbacks
 from atwood.integrators.ida import library as sundials_library, native as ida_native
-from atwood.integrators.ida.signatures import JACOBIAN, RESIDUAL, WEIGHTS
+from atwood.integrators.ida.callbacks import JACOBIAN, RESIDUAL, WEIGHTS
 from atwood.integrators.protocol import ImplicitProblem, SolverOptions
 from atwood.pipeline import assemble
 from atwood_library.scenes import Chain, DoublePendulum, SimplePendulum

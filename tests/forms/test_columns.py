@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from atwood import simulate
-from atwood.forms import derivative
+from atwood.forms import program as derivative
 from atwood.pipeline import assemble
-from atwood.simulation.dynamics.balance import balance_of
-from atwood.simulation.dynamics.columns import columns_of, masses_at
+from atwood.simulation.dynamics.balance import balance_of, columns_of, masses_at
 from atwood_library.scenes import Chain
 
 from ..helpers.nets import spring_net

@@ -6,7 +6,7 @@ import pytest
 
 from atwood.expr import Graph, cos, sin
 from atwood.forms.loops.branches import Place
-from atwood.forms.loops.constraint_shapes import ConstraintShapes
+from atwood.forms.loops.roots import ConstraintShapes
 
 
 @pytest.fixture

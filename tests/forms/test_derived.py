@@ -158,7 +158,7 @@ def test_what_derives_is_in_the_sources_that_the_key_covers(name, monkeypatch):
             sys.setprofile(None)
 
     monkeypatch.setattr(accelerations, "derive_once", watched)
-    monkeypatch.setattr("atwood.forms.by_hand.derive_once", watched)
+    monkeypatch.setattr("atwood.forms.derived.derive_once", watched)
     _ = assembly.reduced, assembly.maximal, assembly.parameters
     acceleration_program(assembly)
     files = {Path(file) for file in ran if str(PACKAGE) in file}

@@ -13,7 +13,7 @@ from scipy.special import ellipj, ellipk
 
 from atwood import simulate
 from atwood.errors import UsageError
-from atwood.integrators.composition.coefficients import ORDERS as COMPOSITIONS
+from atwood.integrators.composition.steps import ORDERS as COMPOSITIONS
 from atwood.integrators.embedded.native import CompiledStepper
 from atwood.integrators.embedded.tableau import Tableau
 from atwood.integrators.explicit_problem import ExplicitProblem

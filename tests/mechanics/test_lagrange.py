@@ -7,8 +7,8 @@ import pytest
 
 from atwood.arrays import FloatArray
 from atwood.forms.quantities import energy_program, known_program
-from atwood.mechanics.outputs.power import applied_power
-from atwood.result.accounts import POWER
+from atwood.mechanics.outputs.part_power import applied_power
+from atwood.result.energy import POWER
 from atwood.simulation.dynamics.reactions import accelerations_and_multipliers, maximal_state
 from atwood_library.scenes import SCENES
 

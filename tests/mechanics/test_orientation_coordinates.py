@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from atwood.expr import Graph, evaluate, jvp
-from atwood.mechanics.kinematics.orientation_coordinates import (
+from atwood.mechanics.kinematics.orientation import (
     BASES,
     orientation_axes,
     orientation_margin,

@@ -10,8 +10,7 @@ import pytest
 from atwood import Component, Scene
 from atwood.errors import StartError
 from atwood.pipeline import assemble, simulate
-from atwood.simulation.initialization.assembly_branch import wrongly_turned
-from atwood.simulation.initialization.closure_error import find_closure_errors
+from atwood.simulation.initialization.closure_error import find_closure_errors, wrongly_turned
 from atwood.simulation.initialization.report import report_initialization
 from atwood.simulation.initialization.start import find_start
 from atwood_library import (

@@ -7,8 +7,8 @@ import pytest
 
 from atwood import Load, Scalar, Scene, Vector, assemble, event, force, signal, simulate
 from atwood.simulation.dynamics.scales import motion_scales
+from atwood.simulation.initialization.positions import unwound
 from atwood.simulation.initialization.start import find_start
-from atwood.simulation.initialization.whole_turns import unwound
 from atwood_library import Gear, Ground, Pivot, RigidBody
 
 FORMS = ("reduced", "dae")

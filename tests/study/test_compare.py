@@ -13,7 +13,7 @@ from atwood.pipeline import simulate
 from atwood.result.result import Result
 from atwood.simulation.problem.options import how_solved
 from atwood.study import Comparison, compare
-from atwood.study.comparison.verdict import judge
+from atwood.study.comparison.found import judge
 from atwood_library import Ground, Mass1D, PointMass, Rod, Rope, Spring
 from atwood_library.scenes import SCENES
 

@@ -15,8 +15,6 @@ import click
 from atwood.cli.errors import FAILED
 from atwood.errors import near_matches
 
-__all__ = ["main", "theory_functions"]
-
 _COMMANDS = {
     "check": ("atwood.cli.checking", "Check components of one's own."),
     "compare": ("atwood.cli.comparing", "Compare what each form costs for which error."),

@@ -21,8 +21,6 @@ from atwood.model.compose.composite import Model
 from atwood.model.declare.component import Component
 from atwood.table import table
 
-__all__ = ["COMMAND", "check_components"]
-
 
 def check_components(request: Request) -> None:
     """Check the components of TARGET as the parts of the library are checked.

@@ -14,8 +14,6 @@ from rich.text import Text
 from atwood.cli.output import Writer
 from atwood.table import WIDTH, Table
 
-__all__ = ["ColourWriter", "bar"]
-
 
 class ColourWriter(Writer):
     """Writes with rich; where there is no terminal, as wide as a pipe."""

@@ -20,8 +20,6 @@ from atwood.cli.errors import reporting_errors
 from atwood.cli.scenes import pairs
 from atwood.errors import UsageError
 
-__all__ = ["SCENE_HELP", "Request", "command", "documented", "first_sentence", "kinds_of"]
-
 SCENE_HELP = """SCENE is the name of a scene of an installed library (see `atwood list`), or FILE.py:NAME, where NAME
 is a Scene class, a scene, or a function that returns one."""
 

@@ -18,8 +18,6 @@ from atwood.study.comparison.compare import TOLERANCES, compare
 from atwood.study.comparison.found import check_rows_file, write_rows
 from atwood.study.comparison.long_runs import compare_long
 
-__all__ = ["COMMAND", "compare_scene"]
-
 
 def compare_scene(request: Request) -> None:
     """Run SCENE in both forms, at several tolerances, against a far more accurate reference.

@@ -9,8 +9,6 @@ from atwood.result.part_energy import PartEnergies, PartEnergy
 from atwood.showing import count_of
 from atwood.table import table
 
-__all__ = ["print_energies"]
-
 _MOST = 40
 """Rows of the table."""
 

@@ -12,8 +12,6 @@ import click
 
 from atwood.errors import AtwoodError
 
-__all__ = ["FAILED", "INTERRUPTED", "reporting_errors"]
-
 FAILED = 1
 """Exit code when a scene, or what was asked of it, is not sound."""
 

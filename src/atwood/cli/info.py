@@ -8,8 +8,6 @@ from atwood.cli.output import print_json, writer
 from atwood.cli.parts import is_a_part, show_part
 from atwood.cli.scenes import prepare
 
-__all__ = ["COMMAND", "show_info"]
-
 
 def show_info(request: Request) -> None:
     """Say what SCENE is made of: bodies, joints, freedom, constraints, and what its equations cost.

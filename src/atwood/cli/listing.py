@@ -9,8 +9,6 @@ from atwood.cli.parts import list_parts
 from atwood.cli.scenes import bundled_scenes
 from atwood.table import facts
 
-__all__ = ["COMMAND", "list_scenes"]
-
 
 def list_scenes(request: Request) -> None:
     """List the scenes of the installed libraries, or the parts that they are made of.

@@ -14,8 +14,6 @@ import click
 
 from atwood.table import WIDTH, Table
 
-__all__ = ["Writer", "print_json", "progress_bar", "strict", "warn", "writer"]
-
 
 def print_json(data: Mapping[str, Any]) -> None:
     """Write strict JSON to standard output.

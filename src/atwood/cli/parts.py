@@ -17,8 +17,6 @@ from atwood.model.declare.fields import MISSING
 from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.table import table
 
-__all__ = ["is_a_part", "library_parts", "list_parts", "looks_like_a_part", "parts_called", "show_part"]
-
 _EVERYWHERE = ("line", "plane", "space")
 
 

@@ -19,8 +19,6 @@ from atwood.pipeline import assemble, simulate
 from atwood.result.result import Result
 from atwood.stages import watching
 
-__all__ = ["COMMAND", "degrees_of_freedom", "multiplier_labels", "run_data", "run_scene"]
-
 _OF_ASSEMBLY = ("form", "level", "orientation")
 
 

@@ -22,8 +22,6 @@ from atwood.model.compose.serialization import all_libraries, declared_libraries
 from atwood.model.local.flatten import unit_at
 from atwood.model.values.units import split_quantity
 
-__all__ = ["bundled_scenes", "check_applies", "find_scene", "pairs", "prepare", "warn_of_radians"]
-
 
 def bundled_scenes() -> dict[str, type[Model]]:
     """Return the scenes of all installed libraries by name.

@@ -17,8 +17,6 @@ from atwood.showing import count_of
 from atwood.stages import STAGES
 from atwood.table import facts, table
 
-__all__ = ["duration", "main_quantities", "print_summary", "sparkline"]
-
 _ROWS = 16
 _NARROWEST, _WIDEST = 9, 32  # of a small picture of a curve
 _BARS = "▁▂▃▄▅▆▇█"

@@ -21,8 +21,6 @@ from atwood.study import Sweep, sweep
 from atwood.study.sweeps.files import check_sweep_target
 from atwood.table import Table, facts, table
 
-__all__ = ["COMMAND", "sweep_scene"]
-
 _ROWS, _COLUMNS, _REASONS = 16, 8, 5
 """So many runs, quantities and reasons are shown."""
 

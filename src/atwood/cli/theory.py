@@ -28,8 +28,6 @@ from atwood.table import Shown, table
 from atwood.theory.hamiltonian.hamiltonian import read_hamiltonian
 from atwood.theory.linear import equilibria, equilibrium_branches
 
-__all__ = ["theory_command"]
-
 _WRITTEN = ("latex", "markdown", "python")
 """Methods of results that write them down, each an option."""
 

@@ -49,7 +49,6 @@ from atwood.mechanics.dynamics.equations import Equations
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
 
-__all__ = ["AccelerationProgram", "Method", "acceleration_program", "accelerations_of"]
 
 _ACCELERATIONS: Key[AccelerationProgram | None] = Key("accelerations")
 

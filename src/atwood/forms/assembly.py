@@ -17,15 +17,15 @@ from atwood.errors import UsageError
 from atwood.expr import Expression, Program
 from atwood.expr.core.relations import Relation, values_just_after
 from atwood.forms.balance_program import BalanceProgram, RatesProgram, balance_program, rates_program
-from atwood.forms.by_hand import as_by_hand
 from atwood.forms.dae import dae_form, keep_constraints
+from atwood.forms.derived import as_by_hand
 from atwood.forms.kept import Kept, Key
 from atwood.forms.places import with_reactions
 from atwood.forms.program import FormProgram
 from atwood.forms.reassembly import follow, other_mode, with_flat
 from atwood.forms.reduced import reduced_form
 from atwood.forms.shared import MAXIMAL, REDUCED, REGULAR, Shared
-from atwood.forms.source import Source, no_start_quantity
+from atwood.forms.starting import Source, no_start_quantity
 from atwood.late import dataclass, replace
 from atwood.mechanics.build import build_equations
 from atwood.mechanics.dynamics.equations import Equations
@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from atwood.codegen.llvm.columns import ColumnKernel, ColumnProgram
     from atwood.forms.sides.taken_out import Sides
 
-__all__ = ["Assembly", "FormName"]
 
 FormName = Literal["reduced", "dae"]
 Coordinates = Literal["reduced", "regular", "dae"]
@@ -120,7 +119,7 @@ class Assembly:
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        from atwood.forms.restoring import recipe
+        from atwood.forms.reassembly import recipe
 
         return recipe(self)
 
@@ -396,5 +395,5 @@ class Assembly:
 
     def _observe(self, equations: Equations) -> Mapping[str, Observable]:
         # The Lagrangian is made of assemblies, and looked up when a momentum is wanted.
-        momenta = lambda: import_module("atwood.forms.lagrangian.momenta").momenta_of(self, equations)  # noqa: E731
+        momenta = lambda: import_module("atwood.forms.lagrangian.of_assembly").momenta_of(self, equations)  # noqa: E731
         return observe(self.mechanism, equations, self.reactions, self.shared.lock, momenta)

@@ -9,13 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.expr import Expression, OutputGroup, Program, SparseMatrix, jacobian, jvp, substitute
-from atwood.forms.derivative import directions, is_too_long
-from atwood.forms.program import rates_are_speeds, state_groups
+from atwood.forms.program import directions, is_too_long, rates_are_speeds, state_groups
 from atwood.late import dataclass, replace
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.topology.orientation_coordinates import OrientationCoordinates
-
-__all__ = ["BalanceProgram", "RatesProgram", "balance_program", "rates_program"]
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from atwood.errors import UnsupportedError, UsageError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, substitute, vjp
 from atwood.forms.accelerations import solve_symmetric
 from atwood.forms.assembly import Assembly
-from atwood.forms.by_hand import as_by_hand
+from atwood.forms.derived import as_by_hand
 from atwood.forms.kept import Key
 from atwood.forms.lagrangian import Lagrangian, lagrangian_along_speeds
 from atwood.forms.loops.closed_form import ClosedForm, in_terms_of_independent
@@ -26,15 +26,6 @@ from atwood.forms.program import rates_are_speeds
 from atwood.integrators.methods import EXPLICIT, IDA, advise
 from atwood.late import dataclass
 from atwood.topology.spanning_forest import Coordinate
-
-__all__ = [
-    "CanonicalPrograms",
-    "SeparablePrograms",
-    "canonical_programs",
-    "closed_canonical_programs",
-    "is_canonical",
-    "separable_programs",
-]
 
 _CANONICAL: Key[CanonicalPrograms] = Key("canonical equations")
 _CLOSED: Key[CanonicalPrograms] = Key("canonical equations with solved loops")

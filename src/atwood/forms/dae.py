@@ -10,8 +10,6 @@ from atwood.forms.program import FormProgram, Level, either_sign, kinematic_rows
 from atwood.late import replace
 from atwood.mechanics.dynamics.equations import Equations
 
-__all__ = ["LEVELS", "check_level", "dae_form", "keep_constraints"]
-
 LEVELS: tuple[Level, ...] = ("ggl", "index1", "index1-projected")
 
 _TINY = 1e-300

@@ -23,8 +23,8 @@ from atwood.codegen.cache import default_cache, make_key
 from atwood.errors import UnsupportedError
 from atwood.expr import Expression, Graph
 from atwood.expr.core.operations import BINARY, UNARY
-
-__all__ = ["SOURCES", "derivation_key", "derive_once", "hash_of_sources"]
+from atwood.expr.simplify.collect import collect
+from atwood.mechanics.dynamics.equations import Equations
 
 _FORMAT = 1
 """Counts changes to what an entry holds."""
@@ -158,3 +158,27 @@ def _written(data: Any) -> bytes | None:
 
 def _relations(graph: Graph) -> int:
     return 0 if graph.relations is None else len(graph.relations.found)
+
+
+_MOST_COORDINATES = 12
+"""Up to so many coordinates equations are rewritten; beyond, the recursion is shorter than any closed form."""
+
+
+def as_by_hand(equations: Equations, parameters: Sequence[Expression], rows: Sequence[Expression]) -> list[Expression]:
+    """Return rows rewritten with fewer operations, for scenes of the size that one would do by hand.
+
+    Parameters
+    ----------
+    equations
+        Whose rows they are.
+    parameters
+        Symbols that keep their values for a run.
+    rows
+        The rows, with their values.
+    """
+    if len(equations.coordinates) > _MOST_COORDINATES or equations.solved_speeds:
+        return list(rows)
+    angles = [q for q, c in zip(equations.coordinates, equations.names, strict=True) if c.unit == "rad"]
+    read = tuple(rows), tuple(angles), parameters
+    _, found = derive_once("rows", equations.graph, read, lambda: ("", collect(list(rows), angles, parameters)))
+    return found

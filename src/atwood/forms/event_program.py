@@ -14,8 +14,6 @@ from atwood.forms.places import internal_reactions_of, to_maximal
 from atwood.forms.program import state_groups
 from atwood.mechanics.dynamics.equations import Equations
 
-__all__ = ["event_program"]
-
 _LARGEST = 120
 """More unknowns than these are not solved for densely at every step."""
 

@@ -14,7 +14,6 @@ from atwood.mechanics.outputs.internal_reactions import InternalReactions, inter
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
 
-__all__ = ["TO_MAXIMAL", "internal_reactions_of", "to_maximal", "with_reactions"]
 
 _INTERNAL: Key[InternalReactions | None] = Key("reactions inside bodies")
 TO_MAXIMAL: Key[Program] = Key("maximal coordinates in terms of generalized ones")

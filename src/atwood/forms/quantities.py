@@ -15,14 +15,6 @@ from atwood.mechanics.outputs.observables import Observable, energies
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
 
-__all__ = [
-    "coordinate_program",
-    "energy_program",
-    "find_observables",
-    "known_program",
-    "observer",
-    "state_program",
-]
 
 _OBSERVER: Key[Program] = Key("quantities")
 _ENERGIES: Key[Program] = Key("energies")

@@ -24,19 +24,6 @@ from atwood.model.values.vector import Vector
 from atwood.stages import stage
 from atwood.topology.line_signs import find_line_signs
 
-__all__ = [
-    "DECIDED",
-    "MAXIMAL",
-    "REDUCED",
-    "REGULAR",
-    "Shared",
-    "Slot",
-    "decided_alike",
-    "decisions_of",
-    "find_slots",
-    "with_values_of",
-]
-
 REDUCED: Key[Equations] = Key("equations in generalized coordinates")
 REGULAR: Key[Equations] = Key("the same with quaternions")
 MAXIMAL: Key[Equations] = Key("equations in maximal coordinates")

@@ -11,8 +11,6 @@ from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError
 from atwood.late import dataclass
 
-__all__ = ["GuardedResidual", "Lookout", "NativeCallbacks", "StepGuard"]
-
 
 @dataclass(frozen=True, eq=False)
 class NativeCallbacks:

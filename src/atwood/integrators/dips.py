@@ -13,8 +13,6 @@ from math import sqrt
 from atwood.codegen.tangents import FULL, STEEP
 from atwood.late import dataclass
 
-__all__ = ["Point", "find_dip", "may_dip"]
-
 _HALF = 0.5
 _MOST = 200
 """A step is read at no more places than these: what then is left is a touch, not a passage."""

@@ -29,8 +29,6 @@ from atwood.integrators.dips import Point, find_dip, may_dip
 from atwood.integrators.protocol import JUST_HAPPENED, ImplicitProblem, Values
 from atwood.late import dataclass
 
-__all__ = ["EventLocator", "Root", "State"]
-
 State = tuple[float, FloatArray, FloatArray]
 Interpolant = Callable[[float], State]
 

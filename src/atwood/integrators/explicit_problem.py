@@ -23,20 +23,6 @@ from atwood.late import dataclass
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventData
 
-__all__ = [
-    "CALM",
-    "LOOSEST",
-    "MET",
-    "STEPS",
-    "STIFF",
-    "CompiledRates",
-    "Counts",
-    "ExplicitProblem",
-    "Outcome",
-    "Stepper",
-    "absolute_tolerances",
-    "no_interpolation",
-]
 
 MET = 1e-8
 """A step of Newton's method that moves nothing by more of its size leaves misses of the square of that: rounding."""

@@ -21,8 +21,6 @@ from atwood.integrators.explicit_problem import ExplicitProblem, Outcome, Steppe
 from atwood.integrators.protocol import Budget, ImplicitProblem, SolverOptions, Statistics, Status, StepResult
 from atwood.integrators.session import Session, copied
 
-__all__ = ["ExplicitSession", "Leave"]
-
 FIRST_CHUNK, LARGEST_CHUNK = 4000, 100_000
 """So many steps are taken before limits are looked at: at first, for one unknown, and at most."""
 

@@ -21,7 +21,6 @@ from atwood.late import dataclass, names_of
 if TYPE_CHECKING:
     from atwood.integrators.ensemble.batch import BatchPlaces
 
-__all__ = ["COUNTED", "NativeStepper", "Routines", "routines_of"]
 
 COUNTED = len(names_of(Counts))
 """So many counts follow each other in the memory of a session, from its steps on."""

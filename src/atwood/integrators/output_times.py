@@ -7,8 +7,6 @@ from collections.abc import Callable
 from atwood.codegen.routines.kinds import ADDRESS, INTEGER
 from atwood.codegen.routines.language import Operand, Record, Routine, Value
 
-__all__ = ["SAMPLE_ARGUMENTS", "write_sample"]
-
 SAMPLE_ARGUMENTS = {"times": ADDRESS, "wanted": INTEGER, "ys": ADDRESS, "yps": ADDRESS}
 """What the routine takes behind its session."""
 

@@ -22,20 +22,6 @@ from atwood.tolerances import tolerances
 if TYPE_CHECKING:
     from atwood.numerics.fixed_pivots import FixedPivots
 
-__all__ = [
-    "JUST_HAPPENED",
-    "Budget",
-    "ChoosePivots",
-    "FloatArray",
-    "ImplicitProblem",
-    "IndexArray",
-    "LinearSolver",
-    "SolverOptions",
-    "Statistics",
-    "Status",
-    "StepResult",
-    "choose_linear_solver",
-]
 
 Values: TypeAlias = Sequence[float] | FloatArray
 ChoosePivots: TypeAlias = "Callable[[Sequence[FloatArray]], FixedPivots | None]"

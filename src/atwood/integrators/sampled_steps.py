@@ -9,8 +9,6 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.integrators.compiled_functions import StepGuard
 
-__all__ = ["GRID", "SAMPLES", "SampledSteps"]
-
 SAMPLES = 16
 """Into so many parts a step is divided where functions of the motion are looked at."""
 

@@ -16,8 +16,6 @@ from atwood.integrators.compiled_functions import Lookout
 from atwood.integrators.event_location import EventLocator, Root, State
 from atwood.integrators.protocol import Budget, Statistics, Status, StepResult
 
-__all__ = ["Session", "copied"]
-
 _T = TypeVar("_T")
 
 

@@ -21,10 +21,7 @@ from atwood.mechanics.dynamics.inertia import Masses, add_masses, check_masses
 from atwood.mechanics.kinematics.mechanism import (
     Derivation,
     Mechanism,
-    check_closures,
     derivation_of,
-    extent,
-    make_gravity,
 )
 from atwood.mechanics.kinematics.motion import Motion, Movement, motion_in_plane, motion_in_space
 from atwood.mechanics.kinematics.orientation import body_offsets
@@ -33,8 +30,6 @@ from atwood.model.declare.component import bind
 from atwood.model.local.parts import LocalConstraint, LocalState, multiplier_symbol
 from atwood.model.values.vector import Vector
 from atwood.topology.spanning_forest import Coordinate, SpanningForest
-
-__all__ = ["Mechanism", "build_equations", "check_closures", "extent", "make_gravity", "resolve_signals"]
 
 
 def build_equations(mechanism: Mechanism, forest: SpanningForest) -> Equations:

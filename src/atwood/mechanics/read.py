@@ -32,8 +32,6 @@ from atwood.topology.bodies import Bodies, find_bodies
 from atwood.topology.graph import MechanismGraph, build_graph
 from atwood.topology.line_signs import find_line_signs
 
-__all__ = ["LineSigns", "read_mechanism"]
-
 LineSigns = Mapping[tuple[str, str, str], float]
 """On a line, the sign of each length: of (part, one connector, the other)."""
 

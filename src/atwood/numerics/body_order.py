@@ -20,8 +20,6 @@ from numpy.typing import NDArray
 from atwood.arrays import IndexArray
 from atwood.late import dataclass
 
-__all__ = ["Stage", "elimination_stages"]
-
 
 @dataclass(frozen=True)
 class Stage:

@@ -19,8 +19,6 @@ from atwood.late import dataclass
 from atwood.numerics.body_order import Stage
 from atwood.numerics.remainders import Remainders, Residues, Samples
 
-__all__ = ["FixedPivots", "fix_pivots"]
-
 _DIAGONAL, _ANYWHERE = 1e-4, 0.1
 """Which share of the largest in its column a pivot must be, in its own row and in another one."""
 

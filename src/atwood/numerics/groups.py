@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from atwood.numerics.rank import is_clear
 
-__all__ = ["independent_by_groups"]
-
 
 def independent_by_groups(matrix: Any, groups: NDArray[np.intp]) -> bool:
     """Return whether groups of rows can be taken away, one after another, that are independent of all that is left.

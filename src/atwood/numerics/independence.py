@@ -21,16 +21,6 @@ from atwood.numerics.matrices import Matrix, is_full, or_one, scaled, to_array
 from atwood.numerics.solutions import least_squares
 from atwood.tolerances import tolerances
 
-__all__ = [
-    "certain",
-    "independent_rows",
-    "review_rows",
-    "row_scales",
-    "row_sizes",
-    "trusted_sizes",
-]
-
-
 _LEVEL = 0.03
 """Of rows that are independent of those chosen, the first is chosen of which this share of the largest is left.
 

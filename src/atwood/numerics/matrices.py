@@ -11,18 +11,6 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 
-__all__ = [
-    "LARGEST_FULL",
-    "LARGEST_FULL_OF_MANY",
-    "Matrix",
-    "from_entries",
-    "is_best_full",
-    "is_full",
-    "or_one",
-    "scaled",
-    "to_array",
-]
-
 Matrix: TypeAlias = Any
 """An array of shape (rows, columns), or for large scenes a `scipy.sparse.csr_array`."""
 

@@ -18,8 +18,6 @@ from atwood.late import dataclass
 from atwood.numerics.matrices import Matrix, scaled
 from atwood.numerics.solutions import least_norm
 
-__all__ = ["Missing", "largest", "newton"]
-
 _Place = TypeVar("_Place")
 
 _MUCH = 0.5

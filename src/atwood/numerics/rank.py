@@ -18,21 +18,6 @@ from atwood.late import dataclass
 from atwood.numerics.matrices import or_one
 from atwood.tolerances import tolerances
 
-__all__ = [
-    "Decomposition",
-    "Errors",
-    "decompose",
-    "is_clear",
-    "lost_rank",
-    "null_space",
-    "open_directions",
-    "rank",
-    "ranks",
-    "significant",
-    "singular_values",
-    "span",
-]
-
 Errors: TypeAlias = float | FloatArray | None
 """How far a matrix may be off: a number bounds the 2-norm of all that may be wrong in it, an array the length of what
 may be wrong in each row, or each entry. None for a matrix that is known to rounding alone: `tolerances.RANK` of it."""

@@ -10,8 +10,6 @@ import numpy as np
 from atwood.arrays import FloatArray, IndexArray
 from atwood.numerics.matrices import or_one
 
-__all__ = ["Remainders", "Residues", "Samples"]
-
 _PRIME = 2**31 - 1
 _ROUNDING = 1e-6
 """What is less than this share of the terms it is a sum of may be nothing but rounding."""

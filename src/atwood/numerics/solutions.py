@@ -11,8 +11,6 @@ from atwood.arrays import ComplexArray, FloatArray
 from atwood.numerics.matrices import Matrix, is_full, or_one
 from atwood.tolerances import tolerances
 
-__all__ = ["least_norm", "least_size", "least_squares", "solve_even"]
-
 _Numbers = TypeVar("_Numbers", FloatArray, ComplexArray)
 
 _UNCLEAR = 1e-4

@@ -18,20 +18,6 @@ from scipy.sparse.linalg import splu
 from atwood.arrays import FloatArray
 from atwood.numerics.matrices import or_one
 
-__all__ = [
-    "csr_least_norm",
-    "csr_made_of",
-    "csr_of",
-    "csr_row_sizes",
-    "csr_scaled",
-    "free_columns",
-    "massless_directions",
-    "rows_are_independent",
-    "smallest_direction",
-    "solve_bordered",
-]
-
-
 _SHARE = 1e-10
 """What is added to the normal equations, relative to their largest diagonal entry."""
 

@@ -20,9 +20,6 @@ from atwood.arrays import FloatArray, IndexArray
 from atwood.codegen.llvm.elimination import LISTS, elimination_functions
 from atwood.numerics.matrices import or_one
 
-__all__ = ["Augmented", "Borders", "Elimination", "Normal", "Pattern"]
-
-
 _SHARE = 1e-13
 """What is added to the diagonal of normal equations, relative to its largest entry."""
 

@@ -13,8 +13,7 @@ from atwood.errors import UsageError
 from atwood.files import write_atomically
 from atwood.plotting.canvas import need_matplotlib
 from atwood.plotting.plots.precision import plot_comparison, style_of
-from atwood.study.comparison.found import RELATIVE, Comparison, write_rows
-from atwood.study.comparison.verdict import cost_at
+from atwood.study.comparison.found import RELATIVE, Comparison, cost_at, write_rows
 
 _ERRORS = (1e-3, 1e-6, 1e-9)
 """Errors whose costs stand in the table of all scenes."""

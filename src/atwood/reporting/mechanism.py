@@ -10,8 +10,8 @@ import numpy as np
 from atwood.arguments import optional, takes
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
-from atwood.mechanics.constraints.frobenius import integrable_together
 from atwood.mechanics.constraints.idle_spin import IDLE_SPIN
+from atwood.mechanics.constraints.pfaffian import integrable_together
 from atwood.model.compose.composite import Model
 from atwood.numerics.independence import row_scales
 from atwood.numerics.matrices import scaled, to_array
@@ -42,16 +42,6 @@ from atwood.simulation.problem.preparation import make_plan
 from atwood.simulation.problem.problem import Plan
 from atwood.table import Shown, Table
 from atwood.tolerances import tolerances
-
-__all__ = [
-    "BodyEntry",
-    "DroppedPart",
-    "JointEntry",
-    "MechanismReport",
-    "MergedPart",
-    "ParameterEntry",
-    "report",
-]
 
 
 @dataclass(frozen=True)

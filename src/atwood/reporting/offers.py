@@ -29,9 +29,6 @@ from atwood.simulation.initialization.start import Start, find_start, own_state
 from atwood.simulation.problem.preparation import make_plan
 from atwood.theory.symmetry.dimension import Symmetry, find_symmetries
 
-__all__ = ["Offer", "find_offers"]
-
-
 _SAME = 1e-8
 """Relative to the scene's sizes: how well place, speed and acceleration at the start must agree in both spaces."""
 

@@ -16,20 +16,6 @@ from atwood.model.local.parts import LocalPart
 from atwood.topology.graph import Joint
 from atwood.topology.spanning_forest import SpanningForest
 
-__all__ = [
-    "BodyEntry",
-    "DroppedPart",
-    "JointEntry",
-    "MergedPart",
-    "ParameterEntry",
-    "list_bodies",
-    "list_dropped",
-    "list_joints",
-    "list_merged",
-    "list_parameters",
-    "list_ties",
-]
-
 
 @dataclass(frozen=True)
 class BodyEntry:

@@ -13,7 +13,6 @@ from atwood.table import Table, facts, table
 if TYPE_CHECKING:
     from atwood.reporting.mechanism import MechanismReport
 
-__all__ = ["described", "overview", "parameters", "shorten", "title"]
 
 _SHOWN = 12
 """Of a long list, so many are named."""

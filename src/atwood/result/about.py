@@ -11,8 +11,6 @@ import numpy as np
 from atwood.errors import AtwoodError
 from atwood.result.result import Result
 
-__all__ = ["describe_all", "describe_run", "solver_name", "versions"]
-
 
 def versions() -> dict[str, str]:
     """Return the versions of what a run depends on."""

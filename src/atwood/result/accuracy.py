@@ -12,10 +12,8 @@ from atwood.arrays import FloatArray
 from atwood.forms.assembly import Assembly
 from atwood.integrators.methods import METHODS
 from atwood.late import dataclass
-from atwood.result.witness import needed_error
+from atwood.result.second_run import needed_error
 from atwood.simulation.run.made import Run
-
-__all__ = ["Accuracy", "compared_paths", "difference", "estimate_accuracy"]
 
 _LOST = 0.1
 """Errors beyond this share of the scene's size are no longer those of the same motion."""

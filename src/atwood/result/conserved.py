@@ -10,8 +10,6 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.late import dataclass
 
-__all__ = ["ConservedLedger", "ConservedValues"]
-
 
 @dataclass(frozen=True, eq=False)
 class ConservedValues:

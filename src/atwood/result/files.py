@@ -36,12 +36,10 @@ from atwood.result.formats.companion import read_with_companion, write_with_comp
 from atwood.result.formats.dataset import Dataset, json_text
 from atwood.result.formats.matlab import read_matlab, write_matlab
 from atwood.result.formats.netcdf import read_netcdf, write_netcdf
-from atwood.result.formats.packed import check_unpacked
+from atwood.result.formats.npz import check_unpacked
 from atwood.result.result import Result
 from atwood.result.trajectories import Trajectories
 from atwood.showing import count_of, listed
-
-__all__ = ["SavedResult", "load_result", "save_result", "write_trajectories"]
 
 
 @dataclass(frozen=True, eq=False)

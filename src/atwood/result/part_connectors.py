@@ -14,8 +14,6 @@ from atwood.model.local.joint_coordinates import find_joint_coordinate_uses
 from atwood.topology.bodies import Body
 from atwood.topology.graph import WORLD, Joint, connected_groups
 
-__all__ = ["Connectors", "Ends"]
-
 Ends = tuple[str, str]
 """Path of a part and the name of one of its connectors."""
 

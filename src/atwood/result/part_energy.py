@@ -20,7 +20,6 @@ from atwood.table import Shown, Table, table
 if TYPE_CHECKING:
     from atwood.result.files import SavedResult
 
-__all__ = ["PartEnergies", "PartEnergy"]
 
 _BALANCED = 1e-3
 """Of the energy that is exchanged: by less a part may fail to balance, and a constraint may put in, unnamed."""

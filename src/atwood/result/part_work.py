@@ -26,8 +26,6 @@ from atwood.simulation.dynamics.scales import motion_scales, multiplier_sizes, s
 from atwood.simulation.run.made import Run
 from atwood.simulation.run.record import SegmentRecord
 
-__all__ = ["find_part_energies"]
-
 _ENERGIES: Key[Program] = Key("energies by part")
 _POWERS: Key[PartPowers] = Key("powers by part")
 _IMPULSES: Key[PartPowers] = Key("powers of impulses by part")

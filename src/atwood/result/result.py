@@ -18,8 +18,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import find_observables
 from atwood.integrators.protocol import Statistics
 from atwood.model.declare.quantities import PATHS, Quantity
-from atwood.result.accounts import account
-from atwood.result.energy import EnergyLedger
+from atwood.result.energy import EnergyLedger, account
 from atwood.result.segment_quantities import SegmentQuantities
 from atwood.result.trajectories import Trajectories
 from atwood.result.work import find_ledger
@@ -41,8 +40,6 @@ if TYPE_CHECKING:
     from atwood.result.conserved import ConservedLedger
     from atwood.result.turns import TurnCounter
     from atwood.simulation.singular.crossing import SingularCrossing
-
-__all__ = ["Result"]
 
 
 _LONGER = "Give it more time; or assemble the scene first, and hand the assembly to several runs."

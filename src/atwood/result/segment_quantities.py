@@ -12,8 +12,6 @@ from atwood.forms.quantities import find_observables, observer
 from atwood.simulation.dynamics.reactions import ReactionSolver
 from atwood.simulation.run.record import SegmentRecord
 
-__all__ = ["SegmentQuantities"]
-
 
 class SegmentQuantities:
     """The quantities of one segment of a run, computed when they are asked for.

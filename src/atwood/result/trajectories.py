@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from atwood.result.formats.dataset import Dataset
 
-__all__ = ["Group", "Trajectories", "output_number"]
-
 
 def output_number(index: int, count: int) -> int:
     """Return the number of an output time, or refuse one that there is not."""
@@ -124,7 +122,7 @@ class Trajectories(Shown, Mapping[str, FloatArray]):
         UsageError
             If pandas is not installed (``pip install 'atwood[data]'``).
         """
-        from atwood.result.formats.tables import needed
+        from atwood.result.formats.dataset import needed
 
         pandas, columns = needed("pandas"), self.table(paths)
         table = pandas.DataFrame(columns, index=pandas.Index(self.time, name="time"))
@@ -150,7 +148,7 @@ class Trajectories(Shown, Mapping[str, FloatArray]):
         UsageError
             If xarray is not installed (``pip install 'atwood[data]'``).
         """
-        from atwood.result.formats.tables import to_xarray
+        from atwood.result.formats.dataset import to_xarray
 
         return to_xarray(self.as_dataset(paths))
 

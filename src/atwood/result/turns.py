@@ -11,14 +11,12 @@ import warnings
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
-from atwood.result.angles import unwrap
 from atwood.result.segment_quantities import SegmentQuantities
 from atwood.simulation.run.made import Run
 from atwood.simulation.run.record import SegmentRecord
-
-__all__ = ["TurnCounter"]
 
 _CHANGE = 1.0
 """rad: rates may change so much times the distance of samples, or an angle is not continued by them."""
@@ -120,7 +118,7 @@ class TurnCounter:
 
     def _finely(self, factor: int, time: FloatArray) -> Run | None:
         """Return the same run with so many times the samples; None if there is none."""
-        from atwood.simulation.run.retrace import run_again
+        from atwood.simulation.run.made import run_again
 
         if factor * len(time) > _MOST:
             return None
@@ -154,3 +152,39 @@ def _places(own: Sequence[SegmentRecord], finer: Sequence[SegmentRecord]) -> lis
         found += (before + np.searchsorted(other.time, one.time)).tolist()
         before += len(other.time)
     return found
+
+
+def unwrap(
+    values: NDArray[np.float64],
+    start: float | None,
+    time: NDArray[np.float64] | None = None,
+    rate: NDArray[np.float64] | None = None,
+) -> NDArray[np.float64]:
+    """Return an angle without jumps by whole turns.
+
+    With its rate at the samples, also more than half a turn from sample to sample is counted.
+
+    Parameters
+    ----------
+    values
+        Samples, each within one turn, rad.
+    start
+        What the angle was said to be at the start, which fixes the number of whole turns; none if not given.
+    time, rate
+        Times of the samples and rate of the angle there; without them, what turns fast is counted wrong.
+    """
+    if not len(values):
+        return values
+    steps = np.diff(values)
+    steps = np.where(np.isnan(steps), steps, np.remainder(steps + np.pi, 2.0 * np.pi) - np.pi)
+    if time is not None and rate is not None:
+        spans = np.diff(time)
+        with np.errstate(invalid="ignore"):
+            expected = 0.5 * (rate[1:] + rate[:-1]) * spans
+            # Where the rate jumps, as near the pole of Euler angles, it says nothing of what lies between.
+            is_steady = np.isfinite(expected) & (np.abs(np.diff(rate)) * spans < np.pi)
+        steps = steps + 2.0 * np.pi * np.where(is_steady, np.round((expected - steps) / (2.0 * np.pi)), 0.0)
+    smooth: NDArray[np.float64] = values[0] + np.concatenate([[0.0], np.cumsum(steps)])
+    if start is not None:
+        smooth = smooth + 2.0 * np.pi * np.round((start - smooth[0]) / (2.0 * np.pi))
+    return smooth

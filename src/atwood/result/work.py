@@ -12,26 +12,13 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.clock import Clock, TimeIsUp, check_time
 from atwood.late import dataclass, replace
-from atwood.result.accounts import power_into
-from atwood.result.energy import EnergyLedger, Piece, make_ledger
+from atwood.result.energy import EnergyLedger, Piece, make_ledger, power_into
 from atwood.result.segment_quantities import SegmentQuantities
 from atwood.simulation.run.made import Run
 from atwood.simulation.run.record import SegmentRecord
 
 if TYPE_CHECKING:
     from atwood.result.part_energy import PartEnergies
-
-__all__ = [
-    "StepSamples",
-    "find_ledger",
-    "integral_in_steps",
-    "integral_of_samples",
-    "joined_times",
-    "ledger_of_samples",
-    "nodes_between",
-    "nodes_in_steps",
-    "samples_in_steps",
-]
 
 
 _CLEAR, _PART = 0.01, 0.1
@@ -224,7 +211,7 @@ def samples_in_steps(run: Run, times: Sequence[FloatArray], count: int) -> list[
     count
         So many points in each step.
     """
-    from atwood.simulation.run.retrace import run_again, times_of_steps
+    from atwood.simulation.run.made import run_again, times_of_steps
 
     steps = times_of_steps(run)
     grids = [joined_times(one, steps) for one in times]

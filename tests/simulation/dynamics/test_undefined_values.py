@@ -12,8 +12,8 @@ import atwood
 from atwood import Component, Expression, Load, Point, Scalar, Scene, Vector, connector, force
 from atwood.expr import Graph
 from atwood.model.declare.laws import constraint, dissipation, potential
-from atwood.simulation.dynamics import undefined_values
-from atwood.simulation.dynamics.undefined_values import (
+from atwood.simulation.dynamics import numerical_failure as undefined_values
+from atwood.simulation.dynamics.numerical_failure import (
     UndefinedValue,
     find_undefined_value,
     states_ahead,

@@ -13,8 +13,7 @@ from atwood.errors import KernelEvaluationError
 from atwood.numerics.matrices import LARGEST_FULL
 from atwood.simulation.initialization import loop_closure
 from atwood.simulation.initialization.loop_closure import Nearest, closest, closest_of_all, places_around, units_of_rows
-from atwood.simulation.initialization.system import System
-from atwood.simulation.initialization.targets import sort_targets
+from atwood.simulation.initialization.system import System, sort_targets
 from atwood_library.scenes import DoublePendulum, FourBar, UniversalShaft
 
 Function = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]

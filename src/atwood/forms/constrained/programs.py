@@ -26,8 +26,6 @@ from atwood.late import dataclass, names_of
 from atwood.mechanics.dynamics.augmented import SymmetricSystem, back_substitute, eliminate, fill_of
 from atwood.mechanics.dynamics.equations import Equations
 
-__all__ = ["ConstrainedProgram", "constrained_program"]
-
 _LARGEST_FILL = 60_000
 """More products than these are left to a loop when the program runs."""
 

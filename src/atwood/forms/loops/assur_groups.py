@@ -8,7 +8,7 @@ and G. S. Soh, Geometric Design of Linkages, 2nd edition, Springer 2011, section
 links are in line: a dead centre.
 
 The form is recognised by its coefficients, which follow from derivatives at x = y = 0, and by comparing it with the
-constraint at other places: what is left must be rounding (`atwood.mechanics.constraints.certainty`).
+constraint at other places: what is left must be rounding (`atwood.mechanics.constraints.elimination`).
 """
 
 from __future__ import annotations
@@ -22,15 +22,11 @@ import numpy as np
 from atwood.errors import AtwoodError
 from atwood.expr import Expression, atan2, cos, depends_on, evaluate, hypot, jacobian, jvp, sin
 from atwood.forms.loops.branches import ClosedLoops, Group, Heading, Place
-from atwood.forms.loops.constraint_shapes import ConstraintShapes
-from atwood.forms.loops.harmonics import Wave, sum_of_waves, waves_of
 from atwood.forms.loops.planar_groups import two_unknowns
-from atwood.forms.loops.roots import Vector, one_unknown
+from atwood.forms.loops.roots import ConstraintShapes, Vector, Wave, one_unknown, sum_of_waves, waves_of
 from atwood.forms.loops.spatial_groups import three_unknowns
-from atwood.mechanics.constraints.certainty import rounds_to_zero
+from atwood.mechanics.constraints.elimination import rounds_to_zero
 from atwood.mechanics.dynamics.equations import Equations
-
-__all__ = ["Loops"]
 
 _LEAST = 1e-9
 """Nearer to a dead centre, as the square of a sine, a group is there at every position: it has a double root."""

@@ -10,8 +10,6 @@ from dataclasses import field
 from atwood.expr import Expression, absolute, floor, sign, substitute
 from atwood.late import dataclass, replace
 
-__all__ = ["ClosedLoops", "Group", "Heading", "Place"]
-
 _WHOLE = 1e-3
 """An angle that is not so near to the formula's but for whole turns is not on its branch."""
 

@@ -28,8 +28,6 @@ from atwood.forms.loops.branches import ClosedLoops, Group
 from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 
-__all__ = ["ClosedForm", "closed_form", "in_terms_of_independent"]
-
 Matrix = dict[tuple[int, int], Expression]
 
 

@@ -18,13 +18,10 @@ from typing import TYPE_CHECKING
 
 from atwood.expr import Expression, atan2, cos, jvp, sin, sqrt, substitute
 from atwood.forms.loops.branches import Group
-from atwood.forms.loops.harmonics import at, harmonics
-from atwood.forms.loops.roots import Root, Vector, arm_margin, dot, total
+from atwood.forms.loops.roots import Root, Vector, arm_margin, at, dot, harmonics, total
 
 if TYPE_CHECKING:
     from atwood.forms.loops.assur_groups import Loops
-
-__all__ = ["two_unknowns"]
 
 
 def two_unknowns(loops: Loops, ks: tuple[int, ...], unknowns: tuple[int, ...]) -> tuple[Group, ...]:

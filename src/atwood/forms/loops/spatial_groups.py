@@ -22,14 +22,12 @@ from typing import TYPE_CHECKING
 
 from atwood.expr import Expression, cos, evaluate, jvp, sin, substitute
 from atwood.forms.loops.branches import Group
-from atwood.forms.loops.harmonics import at, harmonics
-from atwood.forms.loops.roots import Vector, dot, solved_for, total
+from atwood.forms.loops.roots import Vector, at, dot, harmonics, solved_for, total
 from atwood.late import dataclass
 
 if TYPE_CHECKING:
     from atwood.forms.loops.assur_groups import Loops
 
-__all__ = ["three_unknowns"]
 
 _QUARTERS = (0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi)
 

@@ -26,7 +26,6 @@ from atwood.mechanics.dynamics.equations import Equations
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
 
-__all__ = ["Sides", "guards", "has_sides", "in_pieces"]
 
 _WALLED: Key[frozenset[int] | None] = Key("relations of what moves that stay in the laws")
 _SIDES: Key[Sides] = Key("relations of what moves, taken out")

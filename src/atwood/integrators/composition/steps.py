@@ -1,20 +1,29 @@
-"""Steps of a composition, for one scene and one order.
+"""Steps of a symmetric composition as machine code, for one scene and one order.
 
 A step of second order is half a step along the velocities, one along the forces there, and half a step along the new
-velocities; half steps that follow each other are one. Increments are added with compensation.
+velocities; half steps that follow each other are one. Increments are added with compensation. A symmetric composition
+with steps ``g_i h`` has the order 4 if ``sum g_i = 1`` and ``sum g_i^3 = 0``; higher ones ask for more (Hairer, Lubich
+and Wanner, Geometric Numerical Integration, section V.3).
 """
 
 from __future__ import annotations
 
+from typing import Final
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.codegen.llvm.build import build_code, default_options
+from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.codegen.routines.kernels import call_kernel, place_of
 from atwood.codegen.routines.kinds import ADDRESS, NUMBER
 from atwood.codegen.routines.language import Routine, Value
 from atwood.codegen.routines.source import RoutineSource
-from atwood.integrators.composition.coefficients import steps_of
+from atwood.expr import Program
 from atwood.integrators.gauss.fixed_steps import FILES, copy_numbers, interpolate, judge, run, sample
-from atwood.integrators.gauss.layout import Layout, Memory, open_routine
-
-__all__ = ["composition_source", "write_routines"]
+from atwood.integrators.gauss.layout import POINTERS, Layout, Memory, open_routine
+from atwood.integrators.gauss.native import bind_functions
+from atwood.integrators.gauss.steps import FUNCTIONS
 
 
 def composition_source(layout: Layout, order: int) -> RoutineSource:
@@ -22,7 +31,7 @@ def composition_source(layout: Layout, order: int) -> RoutineSource:
 
     They are those of `atwood.integrators.gauss.steps`, on the same memory.
     """
-    files = ("integrators/composition/coefficients.py", *FILES)
+    files = ("integrators/composition/steps.py", *FILES)
     return RoutineSource("integrators.composition.steps", files, (layout, order))
 
 
@@ -135,3 +144,60 @@ def _speeds(layout: Layout) -> Routine:
     copy_numbers(r, out.at(n), m.at("main.F"), n)
     r.give(0)
     return r
+
+
+ORDERS: Final = (2, 4, 6, 8)
+"""The orders there are."""
+
+_SUZUKI = 1.0 / (4.0 - 4.0 ** (1.0 / 3.0))
+
+_FIRST_HALF = {
+    2: (),
+    4: (_SUZUKI, _SUZUKI),
+    6: (0.39216144400731413928, 0.33259913678935943860, -0.70624617255763935981, 0.08221359629355080023),
+    8: (
+        *(0.13020248308889008088, 0.56116298177510838456, -0.38947496264484728641, 0.15884190655515560090),
+        *(-0.39590389413323757734, 0.18453964097831570709, 0.25837438768632204729, 0.29501172360931029887),
+    ),
+}
+"""Suzuki's five steps of order 4, and of order 6 and 8 the nine and seventeen of Kahan and Li (1997)."""
+
+
+def steps_of(order: int) -> tuple[float, ...]:
+    """Return the steps of a composition, as shares of the whole."""
+    half = _FIRST_HALF[order]
+    return (*half, 1.0 - 2.0 * sum(half), *half[::-1])
+
+
+class CompiledComposition:
+    """The equations of a separable H with the steps of a composition, for any parameter values and any step.
+
+    Parameters
+    ----------
+    forces
+        Program of (t, q) with p'.
+    velocities
+        Program of p with q'.
+    order
+        Of the method, one of `atwood.integrators.composition.steps.ORDERS`.
+    """
+
+    def __init__(self, forces: Program, velocities: Program, order: int) -> None:
+        n = len(forces.inputs[1].symbols)
+        self.order, self.layout = order, Layout(n, n, 1, False, False)
+        parts = [Part("kernel", forces), Part("flow", velocities)]
+        options = CodeOptions(level=2, sincos=default_options(parts).sincos)
+        routines = composition_source(self.layout, order)
+        self._built = build_code(parts, options, exports=FUNCTIONS, routines=routines)
+        self.functions = bind_functions(self._built)
+        self._programs = {"kernel": forces, "flow": velocities}
+
+    def memory(self, parameter_values: FloatArray) -> tuple[FloatArray, tuple[object, ...]]:
+        """Return the array of a session, and what it leads to."""
+        found = [self._built.derive(name, one, parameter_values) for name, one in self._programs.items()]
+        memory = np.zeros(self.layout.places["end"])
+        pointers = memory[: len(POINTERS)].view(np.uint64)
+        for name, (derived, scratch) in zip(("derived", "derived_2"), found, strict=True):
+            pointers[POINTERS.index(name)] = derived.ctypes.data
+            pointers[POINTERS.index("scratch")] = scratch.ctypes.data
+        return memory, (self._built, found)

@@ -12,8 +12,6 @@ from atwood.codegen.routines.language import Routine, Value
 from atwood.integrators.embedded.memory import LANES, Memory, open_routine
 from atwood.integrators.embedded.tableau import Tableau
 
-__all__ = ["slopes", "weighted", "write_dense_output"]
-
 
 def write_dense_output(pair: Tableau) -> list[Routine]:
     """Write the routines that read a solution within the last step."""

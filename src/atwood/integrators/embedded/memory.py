@@ -8,8 +8,6 @@ from atwood.codegen.routines.kinds import ADDRESS, CODE, INTEGER, NUMBER, Kind, 
 from atwood.codegen.routines.language import Record, Routine, Value
 from atwood.integrators.embedded.tableau import Tableau
 
-__all__ = ["COUNTS", "LANES", "NUMBERS", "POINTERS", "Memory", "open_routine"]
-
 LANES = 4
 """How many unknowns a loop works on at a time; rows are padded to a multiple of it with finite numbers."""
 

@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventData
     from atwood.integrators.ensemble.batch import BatchPlaces
 
-__all__ = ["CompiledAccelerations", "CompiledStepper", "OwnRates"]
 
 _RATES = ctypes.CFUNCTYPE(c_int, c_double, c_void_p, c_void_p, c_void_p)
 _PROJECTION = ctypes.CFUNCTYPE(c_int, c_double, c_void_p, c_void_p)

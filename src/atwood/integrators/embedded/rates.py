@@ -1,14 +1,21 @@
-"""Rates of a mechanism and its projection onto constraints, as functions that an explicit method calls."""
+"""Rates and accelerations of a mechanism and its projection onto constraints, as functions for embedded pairs."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from atwood.codegen.llvm.build import build_code, default_options
+from atwood.codegen.llvm.module import Part
 from atwood.codegen.routines.kernels import call_kernel, place_of
 from atwood.codegen.routines.kinds import ADDRESS, CODE, NUMBER
 from atwood.codegen.routines.language import Routine
 from atwood.codegen.routines.source import RoutineSource
-from atwood.integrators.explicit_problem import MET, STEPS
-
-__all__ = ["rates_source", "write_routines"]
+from atwood.errors import UnsupportedError
+from atwood.expr.core.program import Program
+from atwood.integrators.explicit_problem import MET, STEPS, CompiledRates
 
 
 def rates_source(coordinates: int, speeds: int, given: bool, projects: bool = False) -> RoutineSource:
@@ -69,3 +76,56 @@ def _project(coordinates: int, speeds: int) -> Routine:
             r.give(0)
     r.give(r.value(1, CODE))
     return r
+
+
+class CompiledConstraints:
+    """Accelerations and projections as compiled functions, for any parameter values.
+
+    Parameters
+    ----------
+    accelerations, projection
+        See `atwood.forms.constrained.programs.ConstrainedProgram`.
+
+    Raises
+    ------
+    UnsupportedError
+        If a program calls functions in Python.
+    """
+
+    def __init__(self, accelerations: Program, projection: Program) -> None:
+        for program in (accelerations, projection):
+            if any(node.operation == "external" for node in program.nodes):
+                raise UnsupportedError(
+                    "a program that calls functions in Python has no compiled rates", where=program.name
+                )
+        parts = [Part("kernel", accelerations), Part("nearer", projection)]
+        _, q, u = (len(group.symbols) for group in accelerations.inputs)
+        self.programs, self.room = (accelerations, projection), q + 2 * u
+        routines = rates_source(q, u, given=len(accelerations.outputs) == 2, projects=True)
+        self._built = build_code(parts, default_options(parts), exports=["rates", "project"], routines=routines)
+
+    def bind(self, parameter_values: ArrayLike, projects: bool = True) -> Callable[[], CompiledRates]:
+        """Compute once what depends on parameters alone; return what gives each session functions of its own.
+
+        Parameters
+        ----------
+        parameter_values
+            The values in the order of the programs' parameters.
+        projects
+            Whether there are constraints to be met.
+        """
+        addresses, room = self._built.code.addresses, 5 + self._built.scratch
+        named = zip(("kernel", "nearer"), self.programs, strict=True)
+        derived = [self._built.derive(name, program, parameter_values)[0] for name, program in named]
+
+        def rates() -> CompiledRates:
+            # The pointers to derived values, scratch and room of each function, and then scratch and room themselves.
+            own = np.empty(room + self.room)
+            data = own.ctypes.data
+            first, second = (one.ctypes.data for one in derived)
+            own[:5].view(np.uint64)[:] = first, data + 40, second, data + 40, data + 8 * room
+            keep = (self._built, derived, own)
+            project = addresses["project"] if projects else 0
+            return CompiledRates(addresses["rates"], data, keep, project, data + 16)
+
+        return rates

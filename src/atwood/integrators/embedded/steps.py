@@ -18,8 +18,6 @@ from atwood.integrators.embedded.tableau import Tableau
 from atwood.integrators.explicit_problem import CALM, STIFF
 from atwood.integrators.output_times import SAMPLE_ARGUMENTS, write_sample
 
-__all__ = ["APART", "GROWTH", "RETREAT", "SAFETY", "SHRINKAGE", "write_routines"]
-
 SAFETY = 0.9
 GROWTH, SHRINKAGE = 6.0, 3.0
 """A step is at most so many times longer or shorter than the one before."""

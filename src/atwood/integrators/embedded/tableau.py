@@ -7,8 +7,6 @@ from functools import cached_property
 
 from atwood.late import dataclass
 
-__all__ = ["Tableau"]
-
 
 @dataclass(frozen=True, eq=False)
 class Tableau:

@@ -18,8 +18,6 @@ from atwood.codegen.routines.source import RoutineSource
 from atwood.integrators.ensemble.code import FIELDS
 from atwood.late import dataclass
 
-__all__ = ["ENDS", "Batch", "BatchPlaces"]
-
 ENDS = {0: "reached", 1: "step limit", 2: "too small", 3: "no value between", 4: "no rates"}
 """How a run can end."""
 

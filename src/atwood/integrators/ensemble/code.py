@@ -8,8 +8,6 @@ from __future__ import annotations
 from atwood.codegen.routines.kinds import ADDRESS, CODE, INTEGER, NUMBER
 from atwood.codegen.routines.language import Record, Routine, Value, Variable
 
-__all__ = ["FIELDS", "write_routines"]
-
 FIELDS = (
     "begin",  # int begin(session, double t, const double *start); 0 unless there are no finite rates
     "sample",  # int sample(session, const double *times, long wanted, double *values, double *rates)

@@ -9,8 +9,6 @@ from atwood.codegen.routines.language import Operand, Routine, Value
 from atwood.integrators.gauss.layout import Layout, Memory, open_routine
 from atwood.integrators.output_times import SAMPLE_ARGUMENTS, write_sample
 
-__all__ = ["FILES", "copy_numbers", "interpolate", "judge", "run", "sample"]
-
 FILES = ("integrators/gauss/fixed_steps.py", "integrators/gauss/layout.py", "integrators/output_times.py")
 """On these the routines here depend."""
 

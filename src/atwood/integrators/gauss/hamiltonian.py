@@ -12,8 +12,6 @@ from atwood.late import dataclass
 if TYPE_CHECKING:
     from atwood.integrators.gauss.layout import Layout
 
-__all__ = ["CompiledMethod", "Hamiltonian"]
-
 
 class CompiledMethod(Protocol):
     """A method with fixed steps, for any parameter values and any step."""

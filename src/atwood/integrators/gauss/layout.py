@@ -9,8 +9,6 @@ from atwood.codegen.routines.kinds import ADDRESS, INTEGER, NUMBER, Kind
 from atwood.codegen.routines.language import Record, Routine, Value
 from atwood.late import dataclass
 
-__all__ = ["COUNTS", "NUMBERS", "POINTERS", "Layout", "Memory", "open_routine"]
-
 POINTERS = ("derived", "scratch", "rates", "rates_data", "derived_2", "guard", "guard_data")
 NUMBERS = ("t", "t_old", "stop", "step", "origin")
 COUNTS = ("limit", "steps", "failures", "evaluations", "undefined", "filled", "since")

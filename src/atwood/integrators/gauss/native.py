@@ -22,8 +22,6 @@ from atwood.integrators.gauss.layout import COUNTS, NUMBERS, POINTERS, Layout
 from atwood.integrators.gauss.steps import FUNCTIONS, gauss_source
 from atwood.integrators.protocol import SolverOptions
 
-__all__ = ["CompiledGauss", "GaussStepper", "bind_functions"]
-
 _UNLIMITED = 2**62
 _CALM, _SHORTEST = 8, 1e-12
 """After so many good steps one that was divided is made longer again; none is shorter than such a share."""

@@ -19,8 +19,6 @@ from atwood.integrators.gauss.fixed_steps import FILES, copy_numbers, interpolat
 from atwood.integrators.gauss.layout import Layout, Memory, open_routine
 from atwood.integrators.gauss.tableau import Tableau, tableau
 
-__all__ = ["FUNCTIONS", "gauss_source", "write_routines"]
-
 FUNCTIONS = ("run", "interpolate", "sample", "begin", "trial", "speeds")
 
 _ULP = 2.0**-53

@@ -13,8 +13,6 @@ from decimal import Decimal, localcontext
 from functools import cache
 from typing import NamedTuple
 
-__all__ = ["ORDERS", "Tableau", "tableau"]
-
 ORDERS = (2, 4, 6, 8, 10, 12)
 """The orders there are."""
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Iterable
-from ctypes import c_double, c_int32, c_int64, c_void_p
+from ctypes import CFUNCTYPE, c_double, c_int, c_int32, c_int64, c_void_p
 from math import inf
 from typing import Any
 
@@ -19,18 +19,8 @@ from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError
 from atwood.integrators.event_location import State
 from atwood.integrators.ida.library import SundialsLibrary
-from atwood.integrators.ida.signatures import JACOBIAN, RESIDUAL, WEIGHTS
 from atwood.integrators.protocol import ImplicitProblem, LinearSolver
 from atwood.late import dataclass
-
-__all__ = [
-    "Record",
-    "address",
-    "explain",
-    "jacobian_function",
-    "residual_function",
-    "weight_function",
-]
 
 NO_VALUE = (KernelEvaluationError, ArithmeticError)
 """What a function raises where it has no value."""
@@ -282,3 +272,13 @@ def explain(problem: ImplicitProblem, record: Record, states: Iterable[State]) -
             record.note(t, f"the residual of equation {equation} is {values[equation]}", equation)
             break
     record.undefined = undefined
+
+
+RESIDUAL = CFUNCTYPE(c_int, c_double, *[c_void_p] * 4)
+"""Time, y, y', the result, the user's data."""
+
+JACOBIAN = CFUNCTYPE(c_int, c_double, c_double, *[c_void_p] * 8)
+"""Time, cj, y, y', the residual, the matrix, the user's data, three vectors."""
+
+WEIGHTS = CFUNCTYPE(c_int, *[c_void_p] * 3)
+"""The vector y, the weights, the user's data."""

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from atwood.integrators.ida.library import SundialsLibrary
     from atwood.integrators.protocol import ChoosePivots
 
-__all__ = ["FixedSolver"]
 
 _MEND = CFUNCTYPE(c_int)
 _SOLVE = CFUNCTYPE(c_int, c_void_p, c_void_p)

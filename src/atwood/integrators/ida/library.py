@@ -1,7 +1,9 @@
-"""The SUNDIALS libraries that the scikit-sundae wheel ships, opened without importing scikit-sundae.
+"""The SUNDIALS libraries that the scikit-sundae wheel ships, opened without importing scikit-sundae, and kept quiet.
 
 Nothing about them is taken for granted: the folder is searched for, the version is asked of the library, and the
 width of its indices is read from scikit-sundae's settings and checked against what the library does.
+scikit-sundae prints what IDA has to say about a failure.  The drivers say it themselves, in the answer they hand
+back, and standard output belongs to the user.
 """
 
 from __future__ import annotations
@@ -12,15 +14,15 @@ import os
 import re
 import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from ctypes import POINTER, c_double, c_int, c_int32, c_int64, c_long, c_void_p
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from atwood.errors import AtwoodError
 from atwood.integrators.ida.sparse import BY_COLUMNS, OneAtATime, SparseSolver
-
-__all__ = ["SundialsLibrary", "SundialsMissing", "available", "library", "why_not"]
 
 OLDEST = 7
 """The first major version with the calls that are used here."""
@@ -355,3 +357,48 @@ def why_not() -> str:
     except SundialsMissing as error:
         return str(error)
     return ""
+
+
+class _Forwarding:
+    """A text stream that passes everything on except IDA's own messages."""
+
+    def __init__(self, stream: Any) -> None:
+        self.stream = stream
+        self._skip = threading.local()
+
+    def write(self, text: str) -> int:
+        if text.startswith("\n[IDA") and ", Error: " in text:
+            self._skip.newline = True
+            return len(text)
+        if text == "\n" and getattr(self._skip, "newline", False):
+            self._skip.newline = False
+            return 1
+        return cast("int", self.stream.write(text))
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.stream, name)
+
+
+_forwarding_lock = threading.Lock()
+_forwarding_depth = 0
+_forwarding: _Forwarding | None = None
+
+
+@contextmanager
+def without_solver_messages() -> Iterator[None]:
+    """Keep IDA's messages off the standard output; shared by all sessions that are advancing."""
+    global _forwarding, _forwarding_depth
+    with _forwarding_lock:
+        _forwarding_depth += 1
+        if _forwarding_depth == 1 and sys.stdout is not None:
+            _forwarding = _Forwarding(sys.stdout)
+            sys.stdout = cast("Any", _forwarding)
+    try:
+        yield
+    finally:
+        with _forwarding_lock:
+            _forwarding_depth -= 1
+            if _forwarding_depth == 0 and _forwarding is not None:
+                if sys.stdout is cast("Any", _forwarding):
+                    sys.stdout = _forwarding.stream
+                _forwarding = None

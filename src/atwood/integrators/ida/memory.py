@@ -15,9 +15,8 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.integrators.compiled_functions import Lookout
-from atwood.integrators.ida.callbacks import Record
+from atwood.integrators.ida.callbacks import JACOBIAN, Record
 from atwood.integrators.ida.library import SundialsLibrary
-from atwood.integrators.ida.signatures import JACOBIAN
 from atwood.integrators.ida.sparse import SparseSolver
 from atwood.integrators.protocol import ChoosePivots
 from atwood.late import dataclass
@@ -25,7 +24,6 @@ from atwood.late import dataclass
 if TYPE_CHECKING:
     from atwood.integrators.ida.fixed import FixedSolver
 
-__all__ = ["ONE_STEP", "ROOT_RETURN", "STOPPED_BY_WEIGHTS", "TOO_MUCH_WORK", "TO_TIME", "Counts", "IdaMemory"]
 
 TO_TIME, ONE_STEP = 1, 2
 """What `IdaMemory.solve` does: go on until a time is reached or passed, or take one step."""

@@ -23,7 +23,7 @@ from atwood.errors import KernelEvaluationError, UsageError
 from atwood.integrators.compiled_functions import Lookout
 from atwood.integrators.event_location import EventLocator, Root, State
 from atwood.integrators.ida.callbacks import Record, explain
-from atwood.integrators.ida.library import available, library, why_not
+from atwood.integrators.ida.library import library
 from atwood.integrators.ida.memory import ONE_STEP, ROOT_RETURN, STOPPED_BY_WEIGHTS, TO_TIME, TOO_MUCH_WORK, Counts
 from atwood.integrators.ida.pace import FIRST_CHUNK, Pace, first_chunk
 from atwood.integrators.ida.setup import IdaTuning, prepare
@@ -41,8 +41,6 @@ from atwood.integrators.protocol import (
 from atwood.integrators.session import Session, copied
 from atwood.interrupts import InterruptLater
 from atwood.late import replace
-
-__all__ = ["IdaTuning", "NativeSession", "available", "open_session", "why_not"]
 
 NO_EVENT_VALUE = -10
 """IDA's flag when the event functions did not return 0."""

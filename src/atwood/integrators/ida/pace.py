@@ -10,8 +10,6 @@ from atwood.integrators.event_location import ROUNDING
 from atwood.integrators.ida.sundae import STALLED_STEPS
 from atwood.late import dataclass
 
-__all__ = ["FIRST_CHUNK", "Pace", "first_chunk"]
-
 MOMENT = 0.02
 """IDA is left alone for about so long, in seconds."""
 

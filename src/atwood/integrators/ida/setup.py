@@ -14,8 +14,6 @@ from atwood.integrators.ida.memory import IdaMemory
 from atwood.integrators.protocol import ImplicitProblem, LinearSolver, SolverOptions
 from atwood.late import dataclass
 
-__all__ = ["FIXED_NEWTON", "LOOSE_NEWTON", "TIGHT_NEWTON", "IdaTuning", "measured_tuning", "prepare"]
-
 LOOSE_NEWTON, TIGHT_NEWTON, FIXED_NEWTON = 0.33, 0.01, 0.1
 """IDA's own choice of the Newton coefficient, that for problems with multipliers, and for large ones of them."""
 

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from atwood.integrators.ida.library import SundialsLibrary
 
-__all__ = ["BY_COLUMNS", "OneAtATime", "SparseSolver"]
 
 BY_COLUMNS = 0
 """SUNDIALS' CSC_MAT."""

@@ -10,9 +10,6 @@ from atwood.arrays import FloatArray
 from atwood.errors import StartError, UsageError
 from atwood.integrators.event_location import State
 
-__all__ = ["checked_state", "is_finite"]
-
-
 _FEW = 64
 """So many numbers are added up before NumPy has begun."""
 

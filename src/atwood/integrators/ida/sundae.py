@@ -26,7 +26,7 @@ import numpy as np
 from atwood.arrays import FloatArray, IndexArray
 from atwood.errors import KernelEvaluationError, UsageError
 from atwood.integrators.event_location import ROUNDING, EventLocator, Root, State
-from atwood.integrators.ida.quiet import without_solver_messages
+from atwood.integrators.ida.library import without_solver_messages
 from atwood.integrators.ida.states import checked_state
 from atwood.integrators.protocol import (
     Budget,
@@ -39,8 +39,6 @@ from atwood.integrators.protocol import (
 )
 from atwood.integrators.session import Session, copied
 from atwood.late import dataclass, replace
-
-__all__ = ["SundaeSession", "open_session"]
 
 NO_VALUE = (KernelEvaluationError, ArithmeticError)
 """What a function raises where it has no value."""

@@ -11,8 +11,6 @@ from __future__ import annotations
 from atwood.integrators.embedded.tableau import Tableau
 from atwood.integrators.methods.record import explicit_pair
 
-__all__ = ["EXPLICIT"]
-
 TABLEAU = Tableau(
     order=8,
     dense_order=7,

@@ -10,8 +10,6 @@ from atwood.integrators.methods.record import Method, Task
 if TYPE_CHECKING:
     from atwood.integrators.session import Session
 
-__all__ = ["IDA", "IDA_SUNDAE"]
-
 
 def _open_native(task: Task) -> Session:
     from atwood.integrators.ida.native import NativeSession

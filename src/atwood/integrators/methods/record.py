@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from atwood.integrators.session import Session
     from atwood.integrators.taylor.problem import TaylorProblem
 
-__all__ = ["LEAST", "Method", "Task", "explicit_pair", "open_pair"]
 
 LEAST = 1e-15
 """The least relative tolerance: a few times the relative error of one operation."""

@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from atwood.integrators.explicit_session import ExplicitSession
     from atwood.integrators.gauss.hamiltonian import CompiledMethod, Hamiltonian
 
-__all__ = ["COMPOSITION", "GAUSS"]
 
 _ORDER = 8
 """The order unless another one is asked for: it costs least at most tolerances."""
@@ -25,7 +24,7 @@ def _gauss(given: Hamiltonian, order: int) -> CompiledMethod:
 
 
 def _composition(given: Hamiltonian, order: int) -> CompiledMethod:
-    from atwood.integrators.composition.native import CompiledComposition
+    from atwood.integrators.composition.steps import CompiledComposition
 
     if order not in COMPOSITION.orders:
         raise UsageError(

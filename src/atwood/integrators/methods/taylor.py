@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from atwood.integrators.explicit_session import ExplicitSession
     from atwood.integrators.taylor.native import CompiledStepper
 
-__all__ = ["TAYLOR"]
-
 
 def _stepper(task: Task) -> CompiledStepper:
     from atwood.integrators.taylor.native import CompiledStepper

@@ -10,8 +10,6 @@ from __future__ import annotations
 from atwood.integrators.embedded.tableau import Tableau
 from atwood.integrators.methods.record import explicit_pair
 
-__all__ = ["TSITOURAS"]
-
 TABLEAU = Tableau(
     order=5,
     dense_order=4,

@@ -9,8 +9,6 @@ from atwood.codegen.routines.language import Routine, Value
 from atwood.integrators.taylor.memory import LANES, STRIDE
 from atwood.integrators.taylor.problem import HIGHEST
 
-__all__ = ["write_convolutions"]
-
 _CHAINS = 4
 """Sums that the terms of a convolution are spread over, so that additions do not wait for each other."""
 

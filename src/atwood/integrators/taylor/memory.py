@@ -13,8 +13,6 @@ from atwood.codegen.routines.kinds import ADDRESS, CODE, INTEGER, NUMBER, Kind, 
 from atwood.codegen.routines.language import Operand, Record, Routine, Value
 from atwood.integrators.taylor.problem import HIGHEST
 
-__all__ = ["COUNTS", "LANES", "NUMBERS", "POINTERS", "ROWS", "STRIDE", "WIDTH", "Memory", "open_routine", "positions"]
-
 WIDTH = 4
 """How many unknowns a loop works on at a time; rows are padded to a multiple of it with finite numbers."""
 

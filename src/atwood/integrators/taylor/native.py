@@ -40,7 +40,6 @@ from atwood.late import replace
 if TYPE_CHECKING:
     from atwood.integrators.ensemble.batch import BatchPlaces
 
-__all__ = ["CompiledRecurrences", "CompiledStepper"]
 
 _PACKED = (0, 1, 2)
 """The groups of results of the program of an order whose rows lie in blocks: left, right and squares."""

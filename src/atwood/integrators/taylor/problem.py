@@ -25,23 +25,6 @@ if TYPE_CHECKING:
     from atwood.expr.series.taylor import TaylorPrograms
     from atwood.integrators.taylor.native import CompiledRecurrences
 
-__all__ = [
-    "DEFECT",
-    "FACTOR",
-    "FLOOR",
-    "HIGHEST",
-    "LOWEST",
-    "REACH",
-    "RETREAT",
-    "RETRIES",
-    "SMALLER",
-    "WATCHED",
-    "TaylorProblem",
-    "choose_order",
-    "logarithm",
-    "power_of_two",
-    "share_of_radius",
-]
 
 LOWEST, HIGHEST = 5, 28
 """The orders that are used."""

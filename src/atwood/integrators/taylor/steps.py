@@ -15,8 +15,6 @@ from atwood.integrators.taylor.convolutions import write_convolutions
 from atwood.integrators.taylor.memory import LANES, STRIDE, WIDTH, Memory, open_routine
 from atwood.integrators.taylor.problem import HIGHEST, LOWEST, PARTS, RETREAT, RETRIES, SMALLER, WATCHED
 
-__all__ = ["write_routines"]
-
 _REACHED, _USED_UP, _TOO_SMALL, _NO_VALUE, _NO_RATES = range(5)
 """How a routine ends."""
 

@@ -1,4 +1,4 @@
-"""What constraints leave to be solved: those that are linear are used up, those that nothing can change are checked."""
+"""Constraints that are linear are eliminated, and those that nothing can change are checked, beyond rounding."""
 
 from __future__ import annotations
 
@@ -6,18 +6,17 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
+from atwood.codegen.rounding import ROUGHNESS, RoughProgram, roughly
 from atwood.errors import TopologyError
 from atwood.expr import Expression, affine_coefficients, depends_on, evaluate, substitute
-from atwood.mechanics.constraints.certainty import rounds_to_zero
 from atwood.mechanics.constraints.values import Values
 from atwood.mechanics.dynamics.inertia import Masses
 from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide, extent
 from atwood.model.local.parts import LocalConstraint, LocalPart
 from atwood.tolerances import tolerances
 from atwood.topology.spanning_forest import SpanningForest
-
-__all__ = ["SOLVED", "check_held", "drop_closed", "eliminate_linear"]
 
 
 def check_held(
@@ -170,3 +169,30 @@ def _check_closed(where: str, value: Expression, is_length: bool, mechanism: Mec
             advice="Two fixed parts contradict each other, or a length does not fit between them: change a length "
             "or a position.",
         )
+
+
+def rounds_to_zero(
+    expressions: Sequence[Expression],
+    parameters: Mapping[Expression, float],
+    place: Mapping[Expression, float] | None = None,
+) -> NDArray[np.bool_]:
+    """Return which expressions are no larger than what rounding could have made of them.
+
+    Parameters
+    ----------
+    expressions
+        Of one graph.
+    parameters
+        Symbols that keep their values, with these.
+    place
+        All other symbols that they depend on, with theirs.
+    """
+    where = place or {}
+    if all(one.is_constant for one in expressions):
+        return np.array([one.is_zero for one in expressions], dtype=bool)
+    at = np.array(list(where.values()))
+    rough = RoughProgram((tuple(parameters), tuple(where)), list(expressions))
+    ways = rough(np.array(list(parameters.values())), at[:, None] * roughly(len(at)))
+    numbers = np.abs(evaluate(expressions, {**parameters, **where}))
+    spread = np.maximum(np.ptp(ways, axis=1), ROUGHNESS * numbers)  # not finite next to a place without a value
+    return np.array((numbers <= tolerances.CERTAIN * spread) & np.isfinite(spread), dtype=bool)

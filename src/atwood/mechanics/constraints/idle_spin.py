@@ -24,9 +24,6 @@ from atwood.model.local.parts import LocalConnector, LocalConstraint, LocalPart
 from atwood.model.values.rotation import from_axes
 from atwood.model.values.vector import Vector, cross, dot, norm
 
-__all__ = ["IDLE_SPIN", "hold_idle_spins", "idle_speeds"]
-
-
 IDLE_SPIN = Law(
     "constraint",
     "idle_spin",

@@ -22,8 +22,6 @@ from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide
 from atwood.mechanics.kinematics.motion import Movement
 from atwood.model.local.parts import multiplier_symbol
 
-__all__ = ["BALANCES", "balance_knots", "linear_knots"]
-
 BALANCES = {"force_balance": "N", "torque_balance": "N*m"}
 """Names of these constraints and units of their multipliers; they miss by what would have to move to bring balance."""
 

@@ -24,8 +24,6 @@ from atwood.mechanics.dynamics.equations import Constraint, Equations
 from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.model.local.parts import multiplier_symbol
 
-__all__ = ["known_multipliers", "with_known"]
-
 _ITERATIONS = 6
 """Each step squares the error; from a friction of half the normal force on, this many reach that of rounding."""
 

@@ -37,8 +37,6 @@ from atwood.mechanics.kinematics.motion import Motion, Movement
 from atwood.model.local.parts import LocalConstraint
 from atwood.topology.spanning_forest import SpanningForest
 
-__all__ = ["Taken", "integrated", "take_up", "without_idle_spins"]
-
 OnVelocities = Sequence[tuple[str, LocalConstraint]]
 
 

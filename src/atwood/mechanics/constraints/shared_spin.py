@@ -21,8 +21,6 @@ from atwood.model.local.parts import LocalPart
 from atwood.model.values.rotation import Rotation
 from atwood.numerics.rank import null_space
 
-__all__ = ["Axis", "spinning_together"]
-
 _NONE = 1e-9
 """Relative to the terms that cancel: a change that is rounding."""
 

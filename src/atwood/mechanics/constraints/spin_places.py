@@ -17,8 +17,6 @@ from atwood.model.values.rotation import FREE, as_rotation
 if TYPE_CHECKING:
     from atwood.mechanics.constraints.shared_spin import Axis
 
-__all__ = ["Place", "places_of"]
-
 
 @dataclass(frozen=True, eq=False)
 class Place:

@@ -27,16 +27,6 @@ from atwood.model.local.parts import LocalConstraint, LocalPart
 from atwood.model.values.vector import Vector, cross
 from atwood.topology.spanning_forest import SpanningForest
 
-__all__ = [
-    "LeftOver",
-    "Values",
-    "constraint_values",
-    "find_constraints",
-    "holds_velocities",
-    "levels",
-    "velocity_levels",
-]
-
 Values = list[tuple[str, LocalConstraint, Expression]]
 """Constraints with the path of their part and an expression: their value, or their multiplier."""
 

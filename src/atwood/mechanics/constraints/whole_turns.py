@@ -15,8 +15,6 @@ from atwood.expr import Expression, affine_coefficients, evaluate, live
 from atwood.mechanics.constraints.values import Values
 from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide
 
-__all__ = ["without_whole_turns"]
-
 _Place = tuple[Expression | None, Expression]
 """An angle, or none in the world, and by how much another one is ahead of it."""
 

@@ -14,17 +14,6 @@ from atwood.expr import Expression, Graph, live
 from atwood.expr.core import algebra
 from atwood.late import dataclass
 
-__all__ = [
-    "Step",
-    "SymmetricSystem",
-    "back_substitute",
-    "difference",
-    "eliminate",
-    "fill_of",
-    "minimum_degree",
-    "place_differences",
-]
-
 Tidy = Callable[[list[Expression]], list[Expression]]
 Place = tuple[int, int]
 

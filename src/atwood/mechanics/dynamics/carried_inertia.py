@@ -18,8 +18,6 @@ from atwood.model.values.vector import ZERO, Vector
 from atwood.topology.bodies import Bodies
 from atwood.topology.graph import MechanismGraph
 
-__all__ = ["CarriedInertia", "inertia_asked_for"]
-
 
 @dataclass(frozen=True)
 class _Share:

@@ -13,18 +13,14 @@ from atwood.expr import Expression, Graph, Scalar, jvp, substitute, vjp
 from atwood.late import dataclass
 from atwood.mechanics.dynamics.forces import Forces, Site, constraint_forces, local_map, part_forces
 from atwood.mechanics.dynamics.inertia import Masses, tensor_of, turned_tensor
-from atwood.mechanics.kinematics.body_points import body_point_of
 from atwood.mechanics.kinematics.mechanism import Constant, Decision
 from atwood.mechanics.kinematics.orientation import inertial_torque, torque_components
-from atwood.mechanics.kinematics.positions import BodyShape, Kinematics
+from atwood.mechanics.kinematics.positions import BodyShape, Kinematics, body_point_of
 from atwood.model.declare.contributions import BodyInertia
 from atwood.model.local.parts import LocalConstraint, LocalPart, LocalState
 from atwood.model.values.vector import cross
 from atwood.topology.orientation_coordinates import OrientationCoordinates
 from atwood.topology.spanning_forest import Coordinate, SpanningForest
-
-__all__ = ["Constraint", "Equations", "Integral", "balance_rows", "inertia_forces"]
-
 
 Lifted = tuple[Mapping[int, tuple[Expression, ...]], Mapping[int, tuple[Expression, ...]]]
 """Accelerations less that of free fall, of nodes and of reference points."""

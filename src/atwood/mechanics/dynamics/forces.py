@@ -20,8 +20,6 @@ from atwood.model.values.vector import Vector, cross, dot
 from atwood.topology.bodies import Bodies
 from atwood.topology.graph import MechanismGraph
 
-__all__ = ["Forces", "Site", "constraint_forces", "local_map", "part_forces"]
-
 
 @dataclass
 class Forces:

@@ -19,19 +19,6 @@ from atwood.solids.properties import symmetric_part, verify_moments
 from atwood.topology.bodies import Bodies
 from atwood.topology.graph import MechanismGraph
 
-__all__ = [
-    "CoupledMass",
-    "Masses",
-    "RigidMass",
-    "add_masses",
-    "check_masses",
-    "check_tensors",
-    "shifted_tensor",
-    "sum_vectors",
-    "tensor_of",
-    "turned_tensor",
-]
-
 
 @dataclass(frozen=True)
 class RigidMass:

@@ -25,26 +25,6 @@ from atwood.topology.graph import WORLD, Joint, MechanismGraph
 if TYPE_CHECKING:
     from atwood.mechanics.kinematics.positions import Placements
 
-__all__ = [
-    "Connector",
-    "Constant",
-    "Decision",
-    "Derivation",
-    "Mechanism",
-    "check_closures",
-    "decide",
-    "decided_near",
-    "derivation_of",
-    "discrete_states_of",
-    "extent",
-    "find_origin",
-    "from_start",
-    "make_gravity",
-    "origin_at",
-    "sizing_parameters",
-    "started_at",
-    "world_position",
-]
 
 T = TypeVar("T")
 

@@ -8,7 +8,7 @@ from typing import Protocol
 from atwood.expr import Expression, jvp, substitute
 from atwood.late import dataclass, replace
 from atwood.mechanics.kinematics.mechanism import Mechanism
-from atwood.mechanics.kinematics.orientation_coordinates import orientation_rates
+from atwood.mechanics.kinematics.orientation import orientation_rates
 from atwood.mechanics.kinematics.positions import (
     BodyShape,
     Components,
@@ -21,8 +21,6 @@ from atwood.mechanics.kinematics.positions import (
 from atwood.mechanics.kinematics.spatial import Course, move_in_space
 from atwood.topology.orientation_coordinates import OrientationCoordinates
 from atwood.topology.spanning_forest import Coordinate, SpanningForest
-
-__all__ = ["Motion", "Movement", "motion_in_plane", "motion_in_space"]
 
 Lifted = tuple[dict[int, Components], dict[int, Components]]
 Solution = Mapping[Expression, Expression]

@@ -1,6 +1,8 @@
-"""Positions, velocities and accelerations of every node, as expressions of the coordinates.
+"""Positions, velocities and accelerations of nodes and of other points of bodies, as expressions of the coordinates.
 
-One recursion gives positions and orientations; velocities and accelerations are its forward derivatives.
+One recursion gives positions and orientations; velocities and accelerations are its forward derivatives. A joint that
+leaves every rotation free may say its displacement in terms of the axes of its frames: the centre of a disc that rolls
+is the higher, the more upright the disc is.
 """
 
 from __future__ import annotations
@@ -10,18 +12,16 @@ from dataclasses import field
 from typing import Any
 
 from atwood.errors import UnsupportedError
-from atwood.expr import Expression, Graph, Scalar, affine_coefficients, jvp, live, substitute
+from atwood.expr import Expression, Graph, Scalar, affine_coefficients, depends_on, jvp, live, substitute
 from atwood.late import dataclass
-from atwood.mechanics.kinematics.orientation import NodeTurn, rotate
-from atwood.model.local.parts import LocalPart
-from atwood.model.values.rotation import Axes
+from atwood.mechanics.kinematics.orientation import NodeTurn, node_axes, rotate
+from atwood.model.local.parts import LocalJoint, LocalPart
+from atwood.model.values.rotation import Axes, from_axes
 from atwood.model.values.space import Space
-from atwood.model.values.vector import Vector
+from atwood.model.values.vector import Vector, cross
 from atwood.topology.bodies import Bodies, Body
 from atwood.topology.graph import WORLD, Joint, MechanismGraph
 from atwood.topology.spanning_forest import Attachment, SpanningForest
-
-__all__ = ["BodyShape", "Kinematics", "Placements", "differentiate", "lifted_accelerations", "place", "shapes"]
 
 Components = tuple[Expression, ...]
 
@@ -348,3 +348,116 @@ def lifted_accelerations(
     values = iter(substitute(second, dict.fromkeys([*origin, *drift], 0.0)))
     nodes = {i: tuple(next(values) for _ in p) for i, p in placements.positions.items()}
     return nodes, {i: tuple(next(values) for _ in p) for i, p in placements.references.items()}
+
+
+Turned = tuple[Axes, Vector, Vector]
+"""Axes of a frame, its angular velocity and its angular acceleration, all in world axes."""
+
+
+def reads_axes(joint: LocalJoint) -> bool:
+    """Return whether a joint's displacement depends on how its frames are turned."""
+    symbols = [component for axes in joint.axes for axis in axes for component in axis]
+    shift = [s for s in joint.placement.displacement if isinstance(s, Expression)]
+    return bool(symbols) and any(depends_on(s, symbols) for s in shift)
+
+
+def displaced(
+    graph: Graph,
+    joint: LocalJoint,
+    ends: Sequence[Turned],
+    moves: Mapping[Expression, tuple[Expression, Expression, Expression]],
+) -> tuple[Vector, Vector, Vector]:
+    """Return the displacement of a joint and its first two time derivatives, in the axes that it is given in.
+
+    Parameters
+    ----------
+    graph
+        Where expressions live.
+    joint
+        The joint, on local symbols.
+    ends
+        How frames a and b are turned.
+    moves
+        Each of its coordinates with its derivatives.
+    """
+    first: dict[Expression, Expression | float] = {}
+    more: dict[Expression, Expression | float] = {}
+    known: dict[Expression, Expression] = {}
+    for symbol, (value, rate, second) in moves.items():
+        going, changing = graph.symbol(f"{symbol.name}'"), graph.symbol(f"{symbol.name}''")
+        first[symbol], more[going] = going, changing
+        known.update({symbol: value, going: rate, changing: second})
+    for end, (axes, (turned, spin, spin_rate)) in enumerate(zip(joint.axes, ends, strict=True)):
+        w, alpha = (Vector(*(graph.symbol(f"{joint.law.name} {kind}{end}.{c}") for c in "xyz")) for kind in "wa")
+        more.update(zip(w, alpha, strict=True))
+        for local, actual in zip(axes, turned, strict=True):
+            first.update(zip(local, cross(w, local), strict=True))
+            known.update(zip(local, (graph.convert(c) for c in actual), strict=True))
+        known.update(zip((*w, *alpha), (graph.convert(c) for c in (*spin, *spin_rate)), strict=True))
+    shift = [graph.convert(value) for value in joint.placement.displacement]
+    rates = jvp(shift, first)
+    seconds = jvp(rates, {**first, **more})
+    placed = substitute([*shift, *rates, *seconds], known)
+    return Vector(*placed[0:3]), Vector(*placed[3:6]), Vector(*placed[6:9])
+
+
+@dataclass(frozen=True)
+class BodyPoint:
+    """An arm that a body carries, along the free components in world axes.
+
+    Attributes
+    ----------
+    position
+        The arm, m.
+    velocity, acceleration
+        Of its end against its beginning.
+    """
+
+    position: tuple[Scalar, ...]
+    velocity: tuple[Scalar, ...]
+    acceleration: tuple[Scalar, ...]
+
+
+def body_point_of(kinematics: Kinematics, body: int, turn: NodeTurn, vector: Vector, space: Space) -> BodyPoint:
+    """Return an arm that is given in the axes of a node.
+
+    Parameters
+    ----------
+    kinematics
+        How bodies move; a body without an orientation has the world's axes.
+    body
+        The body of the node.
+    turn
+        How the node is turned from its body.
+    vector
+        The arm, m.
+    space
+        What the scene lives in.
+    """
+    placements = kinematics.placements
+    spin = kinematics.angular_velocities.get(body, ())
+    spin_rate = kinematics.angular_accelerations.get(body, ())
+    if space.is_spatial:
+        return _arm_in_space(kinematics, body, turn, vector, spin, spin_rate)
+    axes = node_axes(placements.angles.get(body), None, turn)
+    arm = space.components(vector if axes is None else from_axes(axes, vector))
+    still = (0.0,) * len(arm)
+    if space.is_line or not spin:
+        return BodyPoint(arm, still, still)
+    w, alpha = spin[0], spin_rate[0]
+    velocity = (-w * arm[1], w * arm[0])
+    acceleration = (-alpha * arm[1] - w * w * arm[0], alpha * arm[0] - w * w * arm[1])
+    return BodyPoint(arm, velocity, acceleration)
+
+
+def _arm_in_space(
+    kinematics: Kinematics, body: int, turn: NodeTurn, vector: Vector, spin: Components, spin_rate: Components
+) -> BodyPoint:
+    axes = kinematics.placements.axes.get(body)
+    if axes is None:
+        return BodyPoint(tuple(vector), (0.0,) * 3, (0.0,) * 3)
+    arm = rotate(vector, turn)
+    w, alpha = Vector(*spin), Vector(*spin_rate)
+    velocity = cross(w, arm)
+    acceleration = cross(alpha, arm) + cross(w, velocity)
+    return BodyPoint(*(tuple(from_axes(axes, one)) for one in (arm, velocity, acceleration)))

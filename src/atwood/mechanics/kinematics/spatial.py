@@ -12,15 +12,23 @@ from typing import TypeAlias
 
 from atwood.expr import Expression, Graph, Scalar, jvp, substitute
 from atwood.late import dataclass
-from atwood.mechanics.kinematics.joint_shift import Turned, displaced, reads_axes
 from atwood.mechanics.kinematics.orientation import (
     Quaternion,
     node_quaternions,
+    orientation_axes,
+    orientation_quaternion,
     quaternion_product,
     rotation_quaternion,
 )
-from atwood.mechanics.kinematics.orientation_coordinates import orientation_axes, orientation_quaternion
-from atwood.mechanics.kinematics.positions import BodyShape, Components, Kinematics, Placements
+from atwood.mechanics.kinematics.positions import (
+    BodyShape,
+    Components,
+    Kinematics,
+    Placements,
+    Turned,
+    displaced,
+    reads_axes,
+)
 from atwood.model.values.rotation import (
     IDENTITY,
     Axes,
@@ -38,8 +46,6 @@ from atwood.model.values.vector import Vector, cross
 from atwood.topology.bodies import Bodies, Body
 from atwood.topology.graph import Joint
 from atwood.topology.spanning_forest import Attachment, SpanningForest
-
-__all__ = ["Course", "move_in_space"]
 
 _STILL = Vector(0.0, 0.0, 0.0)
 

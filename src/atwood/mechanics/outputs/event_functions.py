@@ -16,9 +16,6 @@ from atwood.model.declare.component import bind
 from atwood.model.declare.law import Law
 from atwood.model.returned import call_law, finite_scalar
 
-__all__ = ["UPDATE", "EventFunction", "list_event_functions"]
-
-
 UPDATE = "update"
 """Target of an event that changes states of its part, and no mode."""
 

@@ -22,14 +22,6 @@ from atwood.model.values.vector import Vector, cross
 from atwood.topology.bodies import Body
 from atwood.topology.graph import Joint
 
-__all__ = [
-    "InternalReactions",
-    "add_inertia",
-    "add_reactions",
-    "internal_reaction_program",
-    "multipliers_by_part",
-]
-
 
 @dataclass(frozen=True)
 class InternalReactions:

@@ -12,9 +12,9 @@ from atwood.mechanics.dynamics.carried_inertia import CarriedInertia
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import in_joint_coordinates, local_map, rate_symbol
 from atwood.mechanics.dynamics.inertia import tensor_of, turned_tensor
-from atwood.mechanics.kinematics.body_points import body_point_of
 from atwood.mechanics.kinematics.mechanism import Mechanism, world_position
 from atwood.mechanics.kinematics.orientation import NodeTurn, node_axes, spin_in_world
+from atwood.mechanics.kinematics.positions import body_point_of
 from atwood.model.declare.component import Binding
 from atwood.model.declare.connectors import Frame, JointCoordinate, Motion
 from atwood.model.declare.contributions import BodyInertia
@@ -22,8 +22,6 @@ from atwood.model.local.parts import LocalPart
 from atwood.model.values.rotation import from_axes, to_axes
 from atwood.model.values.space import FIXED_AXES
 from atwood.model.values.vector import Vector, dot
-
-__all__ = ["Observable", "Reaction", "add_up", "energies", "list_reactions", "make_binding", "part_energies", "take"]
 
 
 @dataclass(frozen=True)

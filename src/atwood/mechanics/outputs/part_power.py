@@ -2,7 +2,8 @@
 
 A part exerts the force F on whatever is connected at a node that moves with v, and so takes in the power ``-F . v``
 there; its inertia is one of these forces (d'Alembert; Goldstein, section 1.4). What comes in through all of its
-connectors is the rate of its energy, but for what its laws add or remove.
+connectors is the rate of its energy, but for what its laws add or remove. Kinetic energy is ``1/2 w . M w`` with masses
+that are constant; loads, dampers, and potentials that change with time have powers and no potential.
 """
 
 from __future__ import annotations
@@ -10,18 +11,18 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import Literal
 
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jvp, substitute
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, Scalar, depends_on, jvp, substitute
 from atwood.late import dataclass, replace
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import Forces, in_joint_coordinates, local_map, part_forces
+from atwood.mechanics.dynamics.inertia import tensor_of, turned_tensor
 from atwood.mechanics.kinematics.mechanism import Mechanism
+from atwood.mechanics.kinematics.positions import body_point_of
 from atwood.mechanics.outputs.internal_reactions import add_inertia, add_reactions, multipliers_by_part
 from atwood.mechanics.outputs.observables import part_energies
 from atwood.model.local.moving_mass import inertial_energy
 from atwood.model.local.parts import LocalPart
-
-__all__ = ["Flow", "PartPowers", "part_energy_program", "part_powers"]
 
 
 @dataclass(frozen=True)
@@ -177,3 +178,114 @@ def _explicit_rate(
     for slope in jvp(placed, directions):
         total = total + substitute([slope], mapping)[0]
     return total
+
+
+def applied_power(mechanism: Mechanism, equations: Equations) -> Expression:
+    """Return the power, W, that loads, dampers and what changes with time put into the scene.
+
+    What changes with time: potentials, Lagrangians, and mass, which takes its energy along.
+
+    Constraints that move with time (drives) are left out: their power is minus their multiplier times the explicit
+    time derivative of the constraint.
+
+    Parameters
+    ----------
+    mechanism
+        The mechanism.
+    equations
+        Its equations in one form.
+    """
+    graph, kinematics = equations.graph, equations.kinematics
+    signals = resolve_signals(mechanism, equations.site, kinematics, equations.read)
+    forces = Forces(graph)
+    total = graph.constant(0.0)
+    for local in mechanism.locals_.values():
+        mapping = {**local_map(equations.site, local, kinematics), **signals}
+        alone = replace(local, potentials=(), lagrangians=())
+        part_forces(equations.site, alone, kinematics, mapping, forces)
+        changing = [*local.potentials, *(-value for value in local.lagrangians)]
+        space = mechanism.space.name
+        changing += [graph.convert(inertial_energy(one, mechanism.gravity, space)) for one in local.varying]
+        placed, _ = in_joint_coordinates(local, kinematics, changing)
+        for slope in jvp(placed, {mechanism.time: 1.0}) if placed else ():
+            total = total + substitute([slope], mapping)[0]
+    for node, force in forces.on_nodes.items():
+        for f, v in zip(force, kinematics.velocities[node], strict=True):
+            total = total + f * v
+    for body, torque in forces.on_bodies.items():
+        for c, w in zip(torque, kinematics.angular_velocities.get(body, ()), strict=False):
+            total = total + c * w
+    for symbol, force_on_joint in forces.on_joints.items():
+        total = total + force_on_joint * kinematics.joint_rates[symbol]
+    return total
+
+
+def switched_energy(mechanism: Mechanism, equations: Equations) -> Expression:
+    """Return the energy, J, of the potentials that act in some modes only, which comes and goes with these.
+
+    Parameters
+    ----------
+    mechanism
+        The mechanism.
+    equations
+        Its equations in one form.
+    """
+    kinematics = equations.kinematics
+    signals = resolve_signals(mechanism, equations.site, kinematics, equations.read)
+    total = equations.graph.constant(0.0)
+    for local in mechanism.locals_.values():
+        mapping = {**local_map(equations.site, local, kinematics), **signals}
+        for value in in_joint_coordinates(local, kinematics, local.switched)[0]:
+            total = total + substitute([value], mapping)[0]
+    return total
+
+
+@dataclass(frozen=True, eq=False)
+class MovingMass:
+    """Velocities that share a matrix of masses.
+
+    Attributes
+    ----------
+    part
+        Whose they are.
+    axis
+        Number of the world axis that they are along; -1 for the angular velocity in the axes of a body.
+    velocities
+        Components, m/s or rad/s.
+    masses
+        The matrix M, row by row, kg or kg m^2.
+    """
+
+    part: str
+    axis: int
+    velocities: Sequence[Expression]
+    masses: Sequence[Sequence[Expression]]
+
+
+def moving_masses(mechanism: Mechanism, equations: Equations) -> list[MovingMass]:
+    """Return all that has kinetic energy, as material points and rigid bodies."""
+    graph, kinematics, site = mechanism.table.graph, equations.kinematics, equations.site
+    axes = range(len(mechanism.space.components(mechanism.gravity)))
+    found: list[MovingMass] = []
+
+    def add(part: str, axis: int, velocities: Sequence[Scalar], masses: Sequence[Sequence[Scalar]]) -> None:
+        rows = [[graph.convert(m) for m in row] for row in masses]
+        found.append(MovingMass(part, axis, [graph.convert(v) for v in velocities], rows))
+
+    for path, local in mechanism.locals_.items():
+        for one in local.point_inertias:
+            nodes = [site.node(path, point.name) for point in one.points]
+            for k in axes:
+                add(path, k, [kinematics.velocities[node][k] for node in nodes], one.masses)
+        for body in local.body_inertias:
+            node = site.node(path, body.frame.name)
+            index, turn = site.bodies.body_of[node], site.node_turns[node]
+            arm = body_point_of(kinematics, index, turn, body.center_of_mass, mechanism.space)
+            for k in axes:
+                add(path, k, [kinematics.velocities[node][k] + arm.velocity[k]], [[body.mass]])
+            spin = kinematics.angular_velocities.get(index, ())
+            if len(spin) == 3:
+                add(path, -1, spin, [tuple(column) for column in turned_tensor(tensor_of(path, body), turn)])
+            elif spin:
+                add(path, -1, spin, [[body.moment]])
+    return found

@@ -24,8 +24,6 @@ from atwood.model.returned import call_law, law_value, not_evaluated, one_scalar
 from atwood.model.values.vector import Vector
 from atwood.showing import count_of
 
-__all__ = ["MOMENTUM", "Observables", "Reader", "observe"]
-
 MOMENTUM = "p:"
 """What the path of a momentum begins with, before that of its coordinate."""
 

@@ -8,15 +8,13 @@ from atwood.expr import Expression, Scalar, jvp
 from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.inertia import tensor_of, turned_tensor
-from atwood.mechanics.kinematics.body_points import body_point_of
 from atwood.mechanics.kinematics.mechanism import Mechanism, world_position
+from atwood.mechanics.kinematics.positions import body_point_of
 from atwood.mechanics.outputs.observables import Observable, take
 from atwood.model.declare.contributions import BodyInertia
 from atwood.model.local.parts import LocalPart
 from atwood.model.values.rotation import Axes, from_axes
 from atwood.model.values.vector import ZERO, Vector, cross, dot
-
-__all__ = ["Totals", "add_totals", "energy_rate", "observe_totals", "part_totals"]
 
 
 @dataclass(frozen=True)

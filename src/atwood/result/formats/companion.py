@@ -16,8 +16,6 @@ from typing import Any
 from atwood.files import write_atomically
 from atwood.result.formats.dataset import json_text
 
-__all__ = ["read_with_companion", "write_with_companion"]
-
 _REPLACING = Lock()
 """Threads that save one file replace it and what is beside it one after another."""
 

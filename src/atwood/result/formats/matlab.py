@@ -11,9 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.result.formats.dataset import Dataset, Variable, json_text, unique_name
-from atwood.result.formats.packed import check_unpacked
-
-__all__ = ["read_matlab", "write_matlab"]
+from atwood.result.formats.npz import check_unpacked
 
 _LONGEST = 63
 """Letters of a name in MATLAB."""

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from atwood.result.formats.dataset import Dataset, Variable, json_text, unique_name
 
-__all__ = ["read_netcdf", "write_netcdf"]
-
 
 def write_netcdf(data: Dataset, file: Path, checksum: str) -> None:
     """Write arrays; text becomes arrays of characters.

@@ -1,9 +1,10 @@
-"""Numbers from the balance of forces: accelerations and multipliers, projection, rank."""
+"""Numbers from the balance of forces: accelerations and multipliers, projection, rank, and columns of full matrices."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,18 +25,9 @@ from atwood.numerics.matrices import (
 )
 from atwood.numerics.newton import Missing, newton
 from atwood.numerics.solutions import least_norm, solve_even
-from atwood.simulation.dynamics.columns import mass_at
 from atwood.simulation.dynamics.kinematic_map import KinematicMap, kinematic_map_of
 from atwood.simulation.dynamics.rounding import RowErrors
 from atwood.tolerances import tolerances
-
-__all__ = [
-    "Balance",
-    "BalanceValues",
-    "balance_of",
-    "solve_balance",
-    "solve_determined",
-]
 
 
 @dataclass(frozen=True)
@@ -282,3 +274,55 @@ def _undetermined(t: float) -> SolveError:
         f"at t = {t:.6g} the forces do not determine the accelerations",
         advice="Something without mass is free to move here, or the mechanism is in a singular position.",
     )
+
+
+_CHUNK = 128
+"""Columns that are worked on at once."""
+
+
+def columns_of(kernel: BoundKernel, size: int, *groups: Any) -> FloatArray:
+    """Return the matrix of which a program gives the product with a direction, its last input.
+
+    Parameters
+    ----------
+    kernel
+        The program, vectorized.
+    size
+        Number of columns.
+    *groups
+        Its other inputs, for one state.
+    """
+    state = [np.asarray(group, dtype=float)[:, None] for group in groups]
+    unit = np.eye(size)
+    parts = [kernel(*state, unit[:, i : i + _CHUNK])[0] for i in range(0, size, _CHUNK)]
+    return np.concatenate(parts, axis=1)
+
+
+def mass_at(assembly: Assembly, form: FormName, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
+    """Return a mass matrix that is not written out, at one state."""
+    program = assembly.balance(form)
+    assert program.mass_product is not None
+    return columns_of(assembly.kernel(program.mass_product, vectorized=True), program.speeds, [t], q, u)
+
+
+def masses_at(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray) -> FloatArray:
+    """Return mass matrices in generalized coordinates that are not written out, shape (states, number, number).
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    t, q, u
+        States, of shape (1 or states,) and (states, number).
+    values
+        Values of the parameters, of shape (parameters,), or (parameters, states) where they differ.
+    """
+    program = assembly.balance("reduced")
+    assert program.mass_product is not None
+    code = assembly.compiled(program.mass_product, vectorized=True)
+    times = np.broadcast_to(np.ravel(t), (len(q),))
+    found = np.empty((len(q), program.speeds, program.speeds))
+    for i in range(len(q)):
+        kernel = code.bind(values if values.ndim == 1 else values[:, i])
+        found[i] = columns_of(kernel, program.speeds, times[i : i + 1], q[i], u[i])
+    return found

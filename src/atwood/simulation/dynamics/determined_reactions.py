@@ -17,8 +17,6 @@ from atwood.simulation.dynamics.redundancy import find_rank
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.tolerances import tolerances
 
-__all__ = ["check_read_reactions"]
-
 _TRIALS = 3
 """So many multipliers at random are tried."""
 

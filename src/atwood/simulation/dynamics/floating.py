@@ -17,8 +17,6 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.mechanics.dynamics.equations import Equations
 
-__all__ = ["FAR", "seen_from_afar", "spread"]
-
 FAR = 10.0
 """A group that is farther away than so many of its extents is measured from a place that moves with it."""
 

@@ -20,8 +20,6 @@ from atwood.forms.balance_program import RatesProgram
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.numerics.solutions import least_squares
 
-__all__ = ["KinematicMap", "best_rough_orientation", "kinematic_map_of", "orientations", "reference_coordinates"]
-
 
 class KinematicMap:
     """How the coordinates of one form move: ``q' = B u + b``.

@@ -8,8 +8,6 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.quantities import coordinate_program
 
-__all__ = ["actual_line_signs", "line_signs_differ"]
-
 _POSITIONS: Key[Program] = Key("positions of nodes on the line")
 
 LineSigns = dict[tuple[str, str, str], float]

@@ -15,23 +15,12 @@ from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.mechanics.kinematics.orientation_coordinates import (
+from atwood.mechanics.kinematics.orientation import (
     FARTHEST_COSINE,
     orientation_margin,
 )
 from atwood.mechanics.outputs.event_functions import EventFunction
 from atwood.topology.orientation_coordinates import Orientation, OrientationCoordinates
-
-__all__ = [
-    "COORDINATE_SWITCH",
-    "CoordinateSwitch",
-    "from_regular",
-    "longest_step",
-    "own_names",
-    "switch_coordinates",
-    "switch_functions",
-    "to_regular",
-]
 
 Reassemble = Callable[[Mapping[str, str], Mapping[tuple[str, str, str], float], Orientation], Assembly]
 

@@ -12,9 +12,6 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.numerics.matrices import or_one
 
-__all__ = ["POOR", "choose_dependent_coordinates", "review_partitioning"]
-
-
 POOR = 1.5
 """A choice is poor where an independent coordinate moves a dependent one by so many times as much.
 

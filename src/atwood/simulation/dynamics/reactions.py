@@ -23,16 +23,13 @@ from atwood.forms.places import internal_reactions_of, to_maximal
 from atwood.late import dataclass
 from atwood.numerics.matrices import is_best_full, or_one
 from atwood.numerics.solutions import least_size, solve_even
-from atwood.simulation.dynamics.balance import balance_of
-from atwood.simulation.dynamics.columns import masses_at
+from atwood.simulation.dynamics.balance import balance_of, masses_at
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.redundancy import RankFinding, find_rank, kept_along
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales, multiplier_sizes, scene_length
 
 if TYPE_CHECKING:
     from atwood.simulation.dynamics.sparse_states import States
-
-__all__ = ["BalanceAlong", "ReactionSolver", "accelerations_and_multipliers", "accelerations_at", "maximal_state"]
 
 
 _CHUNK = 4_000_000

@@ -19,9 +19,6 @@ from atwood.numerics.rank import is_clear, lost_rank, open_directions, singular_
 from atwood.simulation.dynamics.balance import Balance
 from atwood.tolerances import tolerances
 
-__all__ = ["RankFinding", "find_rank", "kept_along", "review_kept"]
-
-
 _STEPS = (1e-2, 3e-2, 3e-2)
 """How far away the positions are that are asked, relative to the scene's sizes."""
 

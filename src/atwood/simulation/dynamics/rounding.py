@@ -21,8 +21,6 @@ from atwood.forms.kept import Key
 from atwood.simulation.dynamics.kinematic_map import KinematicMap
 from atwood.tolerances import tolerances
 
-__all__ = ["RowErrors"]
-
 _ROUGH: Key[RoughProgram] = Key("program in rough arithmetic")
 
 

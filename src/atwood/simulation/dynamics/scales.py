@@ -19,22 +19,6 @@ from atwood.model.values.units import parse_unit
 from atwood.numerics.matrices import or_one
 from atwood.simulation.dynamics.floating import FAR, spread
 
-__all__ = [
-    "Scales",
-    "coordinate_scales",
-    "find_scales",
-    "find_times",
-    "is_length",
-    "motion_names",
-    "motion_scales",
-    "multiplier_sizes",
-    "origin_part",
-    "scene_length",
-    "size_of",
-    "total_masses",
-]
-
-
 Sizes: TypeAlias = "FloatArray | float"
 """Of one scene, or of many."""
 

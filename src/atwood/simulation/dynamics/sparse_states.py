@@ -10,9 +10,6 @@ from atwood.errors import SolveError
 from atwood.forms.balance_program import BalanceProgram
 from atwood.numerics.sparse_batch import Augmented, Borders, Normal, Pattern
 
-__all__ = ["States"]
-
-
 _CHUNK = 8_000_000
 """Numbers that are worked on at once."""
 

@@ -33,8 +33,6 @@ from atwood.simulation.events.mode_change import (
 from atwood.simulation.events.modes import EventRecord
 from atwood.tolerances import tolerances
 
-__all__ = ["jumped", "pass_time_event"]
-
 _MOTION_SWITCHES: Key[bool] = Key("whether prescribed motion switches")
 
 

@@ -31,9 +31,6 @@ from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales
 from atwood.simulation.events.modes import EventRecord
 from atwood.tolerances import tolerances
 
-__all__ = ["LetsGo", "enter_mode", "generalized_speeds", "generalized_state", "plastic_impact"]
-
-
 _REACTION_EVENTS: Key[tuple[EventFunction, ...]] = Key("event functions that read reactions")
 
 

@@ -1,4 +1,4 @@
-"""Events and modes: what is watched, and how a state is taken into another mode.
+"""Events and modes: what is watched, by which margins, and how a state is taken into another mode.
 
 An event maps (mode, q, u) to (mode, q, u). States pass between modes through maximal coordinates, which both share.
 """
@@ -16,7 +16,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.quantities import known_program
 from atwood.integrators.protocol import StepResult
-from atwood.late import dataclass
+from atwood.late import dataclass, replace
 from atwood.mechanics.outputs.event_functions import UPDATE, EventFunction, list_event_functions
 from atwood.simulation.dynamics.orientation_coordinates import (
     COORDINATE_SWITCH,
@@ -30,7 +30,6 @@ from atwood.simulation.problem.problem import Plan
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventCode, EventData
 
-__all__ = ["MARGIN", "EventProbe", "EventRecord", "find_event_functions", "margins_at_start"]
 
 _EVENT_FUNCTIONS: Key[tuple[EventFunction, ...]] = Key("event functions")
 _NEEDS: Key[_Needs] = Key("what event functions read")
@@ -317,3 +316,45 @@ class EventProbe:
 
     def _record(self, t: float, function: EventFunction) -> EventRecord:
         return EventRecord(t, function.part, function.law, function.message, function.target, function.impact)
+
+
+_SHORT = 1e-6
+"""Share of the time since the mode began in which the rate of an event is read."""
+
+_LONGEST = 0.1
+"""Share of that time by which an event may be brought forward, by one Euler step back."""
+
+
+def without_margin(
+    values: Callable[[float, FloatArray], FloatArray], shift: FloatArray, step: StepResult, began: float
+) -> StepResult:
+    """Return an event at the time at which its value was zero.
+
+    What starts at zero has to pass it by ten times the tolerance, lest errors of a step set it off.
+    Where it comes from the other side, and crosses the margin in a small part of the time since the mode began,
+    there is no doubt, and the margin would only make the event late, and what follows later still.
+
+    Parameters
+    ----------
+    values, shift
+        ``values(t, y)``: the events of the mode with what is added to those that start at zero.
+    step
+        Where the solver stopped at an event.
+    began
+        When the mode began, s.
+    """
+    fired = [i for i, sign in enumerate(step.events) if sign]
+    since = step.t - began
+    if len(fired) != 1 or not shift[fired[0]] or not since > 0.0:
+        return step
+    number, margin = fired[0], float(shift[fired[0]])
+
+    def value(earlier: float) -> float:
+        return float(values(step.t - earlier, step.y - earlier * step.yp)[number]) - margin
+
+    now, short = value(0.0), _SHORT * since
+    rate = (now - value(short)) / short
+    if rate * margin >= 0.0 or not abs(now) < _LONGEST * since * abs(rate):
+        return step
+    earlier = now / rate
+    return replace(step, t=step.t - earlier, y=step.y - earlier * step.yp)

@@ -22,8 +22,6 @@ from atwood.model.declare.law import Law
 if TYPE_CHECKING:
     from atwood.simulation.events.update_inputs import UpdateInputs
 
-__all__ = ["Sampler", "Updated", "find_sampler"]
-
 
 _ROUNDING = 16.0
 """Times that are so many units of rounding apart are one moment."""

@@ -19,8 +19,6 @@ from atwood.late import dataclass, replace
 from atwood.mechanics.outputs.event_functions import EventFunction
 from atwood.simulation.problem.problem import Plan
 
-__all__ = ["SIDE", "Found", "find_sides", "layers", "plain_sides", "side_functions"]
-
 SIDE = "side"
 """Target of the event that a relation of what moves changes."""
 

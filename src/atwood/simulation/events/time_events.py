@@ -22,8 +22,6 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.late import dataclass
 
-__all__ = ["Schedule", "find_schedule"]
-
 _RELATION: Key[Program] = Key("relation of functions of time")
 _RATE_OF_RELATION: Key[list[Expression]] = Key("its derivative")
 

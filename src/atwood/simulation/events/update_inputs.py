@@ -17,9 +17,6 @@ from atwood.forms.program import state_groups
 from atwood.late import dataclass
 from atwood.mechanics.build import resolve_signals
 
-__all__ = ["UpdateInputs", "update_inputs_of"]
-
-
 _BOUND_KERNELS: Key[dict[bytes, BoundKernel]] = Key("what updates read, with parameters")
 
 

@@ -16,12 +16,8 @@ from atwood.numerics.independence import independent_rows
 from atwood.numerics.matrices import scaled
 from atwood.simulation.initialization.closure_error import ClosureError, find_closure_errors
 from atwood.simulation.initialization.loop_closure import Nearest, closest, closest_of_all, units_of_rows
-from atwood.simulation.initialization.system import System
-from atwood.simulation.initialization.targets import Level, Target, as_said
+from atwood.simulation.initialization.system import Level, System, Target, as_said
 from atwood.tolerances import tolerances
-
-__all__ = ["Failed", "contradiction", "explain_positions", "far_from_guess", "freedom_at", "wrong_way_round"]
-
 
 _SHOWN = 6
 

@@ -13,9 +13,6 @@ from atwood.numerics.solutions import least_norm
 from atwood.simulation.initialization.system import Conditions
 from atwood.tolerances import tolerances
 
-__all__ = ["meet_positions", "meet_speeds"]
-
-
 _ITERATIONS = 60
 """So many steps are tried."""
 

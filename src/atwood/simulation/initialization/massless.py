@@ -14,8 +14,6 @@ from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.scales import motion_names
 
-__all__ = ["check_massless_directions"]
-
 _APART = 1e8
 """Masses that differ by less do not explain why inertia is lost."""
 

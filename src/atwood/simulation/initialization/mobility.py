@@ -24,9 +24,6 @@ from atwood.simulation.dynamics.scales import is_length, motion_scales, scene_le
 from atwood.simulation.initialization.start import Start, maximal_state
 from atwood.tolerances import tolerances
 
-__all__ = ["Immobile", "check_prescribed", "find_immobile", "refuse_immobile"]
-
-
 _SHOWN = 4
 
 _PRESCRIBED: Key[Program] = Key("prescribed")

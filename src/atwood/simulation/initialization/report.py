@@ -30,13 +30,9 @@ from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.closure_error import ClosureError, find_closure_errors
 from atwood.simulation.initialization.start import Start
-from atwood.simulation.initialization.system import System
-from atwood.simulation.initialization.targets import Level, sort_targets
+from atwood.simulation.initialization.system import Level, System, sort_targets
 from atwood.table import Table, table
 from atwood.tolerances import tolerances
-
-__all__ = ["GuessMet", "InitializationReport", "MovedBody", "report_initialization"]
-
 
 _SHARE = 0.2
 """What moves a body by less than this share of what the first one does is not named."""

@@ -14,11 +14,8 @@ from atwood.numerics.solutions import least_norm
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.scales import motion_names
 from atwood.simulation.initialization.errors import contradicted, contradiction, freedom_at
-from atwood.simulation.initialization.system import System, counted
-from atwood.simulation.initialization.targets import Level, said
+from atwood.simulation.initialization.system import Level, System, counted, said
 from atwood.tolerances import tolerances
-
-__all__ = ["solve_speeds"]
 
 _KNOWN = 1e-6
 """Rounding of what is prescribed counts where it is no larger share of what moves."""

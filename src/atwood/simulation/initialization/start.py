@@ -19,16 +19,18 @@ from atwood.forms.starting import starting
 from atwood.late import dataclass, replace
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of, reference_coordinates
 from atwood.simulation.dynamics.line_signs import actual_line_signs, line_signs_differ
-from atwood.simulation.dynamics.numerical_failure import is_numerical, numerical_failure
+from atwood.simulation.dynamics.numerical_failure import (
+    ADVICE_AT_START,
+    is_numerical,
+    numerical_failure,
+    undefined_value_at,
+)
 from atwood.simulation.dynamics.orientation_coordinates import Reassemble, from_regular, own_names, switch_coordinates
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales, scene_length
-from atwood.simulation.dynamics.undefined_values import ADVICE_AT_START, undefined_value_at
 from atwood.simulation.initialization.positions import solve_positions
 from atwood.simulation.initialization.speeds import solve_speeds
-from atwood.simulation.initialization.targets import sort_targets
+from atwood.simulation.initialization.system import sort_targets
 from atwood.tolerances import tolerances
-
-__all__ = ["Start", "find_places", "find_start", "maximal_state", "own_state", "settle", "start_with_line_signs"]
 
 
 @dataclass(frozen=True)

@@ -29,31 +29,6 @@ from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.tolerances import tolerances
 from atwood.topology.orientation_coordinates import ORIENTATIONS
 
-__all__ = [
-    "ACCURACY",
-    "ATOL",
-    "CONDITIONS",
-    "FORM",
-    "FORMS",
-    "LEVEL",
-    "LIMITS",
-    "MONITOR",
-    "NAME",
-    "NOMINAL",
-    "ORDER",
-    "ORIENTATION",
-    "OUTPUTS",
-    "PROGRESS",
-    "RTOL",
-    "SAMPLES",
-    "SOLVER",
-    "STRUCTURE",
-    "T_END",
-    "check_span",
-    "refuse_idle_settings",
-    "refuse_two_accuracies",
-]
-
 FORMS = ("reduced", "dae")
 
 _LONGEST, _SHORTEST = 1e30, 1e-30

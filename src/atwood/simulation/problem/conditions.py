@@ -14,8 +14,6 @@ from atwood.late import dataclass
 from atwood.mechanics.outputs.event_functions import EventFunction
 from atwood.model.values.units import parse_quantity, parse_unit
 
-__all__ = ["Condition", "Quantities", "condition_functions", "conditions_of"]
-
 _CONDITIONS: Key[tuple[EventFunction, ...]] = Key("event functions of conditions")
 
 _DIRECTIONS = {"crosses": 0, "rises above": 1, "falls below": -1}

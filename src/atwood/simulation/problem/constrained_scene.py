@@ -26,9 +26,8 @@ from atwood.simulation.problem.problem import Plan
 from atwood.topology.graph import connected_groups
 
 if TYPE_CHECKING:
-    from atwood.integrators.embedded.constrained import CompiledConstraints
+    from atwood.integrators.embedded.rates import CompiledConstraints
 
-__all__ = ["constrained_problem"]
 
 _PROGRAM: Key[ConstrainedProgram] = Key("accelerations and projections")
 _COMPILED: Key[CompiledConstraints | None] = Key("machine code of accelerations and projections")
@@ -148,6 +147,6 @@ def _code(program: ConstrainedProgram) -> CompiledConstraints | None:
     """Return the machine code; None where there is none."""
     if any(node.operation == "external" for node in (*program.accelerations.nodes, *program.projection.nodes)):
         return None
-    from atwood.integrators.embedded.constrained import CompiledConstraints
+    from atwood.integrators.embedded.rates import CompiledConstraints
 
     return CompiledConstraints(program.accelerations, program.projection)

@@ -27,8 +27,6 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import in_joint_coordinates, local_map
 from atwood.model.local.parts import LocalPart
 
-__all__ = ["Curved", "find_curved", "find_external", "is_needed", "watched_program"]
-
 _CURVED: Key[tuple[Curved, ...]] = Key("functions that may change fast")
 
 _EXTERNAL: Key[tuple[Expression, ...]] = Key("functions in Python in laws")

@@ -13,8 +13,6 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.numerics.body_order import elimination_stages
 from atwood.numerics.fixed_pivots import FixedPivots, fix_pivots
 
-__all__ = ["pivots_of"]
-
 
 def pivots_of(equations: Equations, program: FormProgram, samples: Sequence[FloatArray] = ()) -> FixedPivots | None:
     """Return how the matrix ``dF/dy + cj dF/dy'`` of the dae form is eliminated; None if its pattern forbids it.

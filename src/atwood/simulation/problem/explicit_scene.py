@@ -17,7 +17,6 @@ from atwood.integrators.protocol import Values
 if TYPE_CHECKING:
     from atwood.integrators.embedded.native import CompiledAccelerations, OwnRates
 
-__all__ = ["compiled_rates", "explicit_problem", "explicit_problem_of", "first_order", "own_rates"]
 
 _EXTERNAL: Key[bool] = Key("whether accelerations call functions in Python")
 _COMPILED: Key[CompiledAccelerations] = Key("machine code of accelerations")

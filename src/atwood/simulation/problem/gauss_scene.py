@@ -19,8 +19,6 @@ from atwood.integrators.gauss.hamiltonian import CompiledMethod, Hamiltonian
 from atwood.integrators.methods import IDA, advise
 from atwood.simulation.problem.closed_loops import Solved
 
-__all__ = ["hamiltonian"]
-
 _COMPILED: Key[CompiledMethod] = Key("compiled symplectic method")
 
 

@@ -15,8 +15,6 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.model.values.units import parse_quantity, parse_si_unit
 from atwood.simulation.dynamics.scales import motion_names
 
-__all__ = ["read_nominal", "with_nominal"]
-
 
 def read_nominal(assembly: Assembly, given: Mapping[str, Any] | None) -> dict[str, float]:
     """Return nominal sizes in SI units.

@@ -19,8 +19,6 @@ from atwood.model.declare.component import bind
 from atwood.model.local.parts import LocalPart
 from atwood.model.values.vector import Vector
 
-__all__ = ["announce", "find_not_compilable"]
-
 _NOT_COMPILABLE: Key[str] = Key("what cannot be compiled")
 
 _PLAIN = ("potential", "dissipation", "force", "inertia", "lagrangian", "derivative")

@@ -19,8 +19,6 @@ from atwood.tolerances import tolerances
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly
 
-__all__ = ["RunOptions", "Samples", "how_solved", "sample_times", "sizes_of"]
-
 
 def how_solved(form: str, level: str, solvers: Iterable[str]) -> str:
     """Return form and solver in words, ``"dae (ggl), IDA"``, with each solver where it was changed on the way.

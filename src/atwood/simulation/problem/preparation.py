@@ -15,18 +15,15 @@ from atwood.numerics.matrices import to_array
 from atwood.simulation.dynamics.balance import balance_of, solve_balance
 from atwood.simulation.dynamics.determined_reactions import check_read_reactions
 from atwood.simulation.dynamics.floating import seen_from_afar
+from atwood.simulation.dynamics.numerical_failure import ADVICE_AT_START, undefined_value_at
 from atwood.simulation.dynamics.redundancy import RankFinding, find_rank
 from atwood.simulation.dynamics.scales import coordinate_scales, find_scales, motion_scales
-from atwood.simulation.dynamics.undefined_values import ADVICE_AT_START, undefined_value_at
 from atwood.simulation.initialization.massless import check_massless_directions
 from atwood.simulation.problem.not_compilable import announce, find_not_compilable
 
 if TYPE_CHECKING:
     pass
 from atwood.simulation.problem.problem import Plan, dependent_speeds_of, kept_rows
-
-__all__ = ["make_plan", "pack_state", "plan_of_run"]
-
 
 _PLAN: Key[Plan] = Key("plan")
 

@@ -21,8 +21,7 @@ from atwood.integrators.methods import Method
 from atwood.integrators.protocol import ImplicitProblem, LinearSolver
 from atwood.late import dataclass, replace
 from atwood.numerics.matrices import to_array
-from atwood.simulation.dynamics.balance import Balance, balance_of
-from atwood.simulation.dynamics.columns import columns_of
+from atwood.simulation.dynamics.balance import Balance, balance_of, columns_of
 from atwood.simulation.dynamics.partitioning import choose_dependent_coordinates, review_partitioning
 from atwood.simulation.dynamics.redundancy import RankFinding, review_kept
 from atwood.simulation.dynamics.scales import Scales
@@ -32,11 +31,10 @@ if TYPE_CHECKING:
     from atwood.codegen import IdaCallbacks
     from atwood.codegen.sundials.null_space_residuals import NullSpaceCallbacks
     from atwood.expr import Program
-    from atwood.forms.null_space import NullSpaceProgram
+    from atwood.forms.reduced import NullSpaceProgram
     from atwood.numerics.fixed_pivots import FixedPivots
     from atwood.simulation.problem.native_null_space import CompiledNullSpace
 
-__all__ = ["Plan", "dependent_speeds_of", "kept_rows"]
 
 _IDA: Key[IdaCallbacks] = Key("machine code for IDA")
 _PIVOTS: Key[FixedPivots | None] = Key("elimination with fixed pivots")
@@ -367,7 +365,7 @@ def _restored(
 
 
 def _null_space_program(assembly: Assembly, kept: tuple[int, ...]) -> NullSpaceProgram:
-    from atwood.forms.null_space import null_space_program
+    from atwood.forms.reduced import null_space_program
 
     equations = keep_constraints(assembly.own_equations, kept)
     return null_space_program(f"{assembly.flat.name} (reduced)", equations, assembly.parameters, assembly.rows)

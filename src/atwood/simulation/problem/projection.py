@@ -24,16 +24,6 @@ from atwood.tolerances import tolerances
 if TYPE_CHECKING:
     from atwood.numerics.sparse_batch import Normal
 
-__all__ = [
-    "ConstraintsAt",
-    "Projected",
-    "constraints_at",
-    "misses_of",
-    "nearly_projected",
-    "project_safely",
-    "project_states",
-]
-
 
 _NORMAL: Key[Normal] = Key("normal equations of the constraints")
 

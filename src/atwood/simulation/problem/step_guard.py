@@ -21,7 +21,6 @@ from atwood.simulation.problem.curved_laws import find_curved, find_external, is
 if TYPE_CHECKING:
     from atwood.forms.loops.closed_form import ClosedForm
 
-__all__ = ["step_guard"]
 
 _SHORTEST = 1e-13
 """Relative to the run: steps that are no longer are taken as they are, and what lasts no longer is a moment."""

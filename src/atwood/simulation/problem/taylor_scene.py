@@ -22,7 +22,6 @@ from atwood.integrators.taylor.problem import REACH, TaylorProblem
 if TYPE_CHECKING:
     from atwood.integrators.taylor.native import CompiledRecurrences
 
-__all__ = ["recurrences", "recurrences_of", "taylor_problem"]
 
 _BRANCHES: Key[bool] = Key("whether a branch could be without a value")
 _RECURRENCES: Key[TaylorPrograms] = Key("recurrences")

@@ -28,17 +28,6 @@ from atwood.simulation.run.stiffness import Stiffness, can_be_stiff, find_stiffn
 if TYPE_CHECKING:
     from atwood.simulation.problem.closed_loops import Solved
 
-__all__ = [
-    "ASKED",
-    "Choice",
-    "check_solver",
-    "choose",
-    "dead_centre",
-    "describe_choices",
-    "implicit_solver",
-    "stiffness_of",
-    "turned_stiff",
-]
 
 ASKED = "as asked for"
 

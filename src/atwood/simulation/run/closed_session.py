@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventCode
     from atwood.simulation.run.session import SolverRequest
 
-__all__ = ["ClosedLoopSession"]
 
 _BETTER = 2.0
 """Another choice takes over where it is so many times as far from a dead centre."""

@@ -1,7 +1,12 @@
-"""A run that has been made."""
+"""The record of a run and of its segments, and the same run made once more to look between its samples.
+
+Samples change nothing in a run, and runs are deterministic: so the states between the samples of a run, which nobody
+kept, are found by making it again.
+"""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from typing import TYPE_CHECKING, Any
@@ -9,22 +14,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from atwood.arrays import FloatArray
+from atwood.errors import AtwoodError, SolveError
 from atwood.forms.assembly import Assembly
 from atwood.integrators.protocol import Statistics
 from atwood.late import dataclass, replace
 from atwood.simulation.dynamics.orientation_coordinates import (
     CoordinateSwitch,
 )
-from atwood.simulation.events.modes import EventRecord
+from atwood.simulation.events.modes import EventProbe, EventRecord
 from atwood.simulation.initialization.start import Start
-from atwood.simulation.problem.options import RunOptions
+from atwood.simulation.problem.options import RunOptions, Samples
+from atwood.simulation.problem.problem import Plan
 from atwood.simulation.run.choice import Choice, describe_choices
 from atwood.simulation.run.record import SegmentRecord
+from atwood.simulation.run.session import KeptSession
 
 if TYPE_CHECKING:
     from atwood.simulation.singular.crossing import SingularCrossing
-
-__all__ = ["Run", "as_asked", "run_out_of_time"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,3 +131,148 @@ def run_out_of_time(assembly: Assembly, start: Start | None, options: RunOptions
     """
     message = f"the limit of {options.max_seconds:g} s was used up before the start was found"
     return Run(assembly, (), (), Statistics(), "time_limit", message, start, options, ())
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """What one stretch is to be.
+
+    Attributes
+    ----------
+    plan, probe
+        The scene in its mode, and what is watched.
+    options
+        What the run was asked for.
+    choice
+        What solves it, at first.
+    samples
+        Samples, of which the last is its end.
+    first_shown
+        Whether the start is an output.
+    spent
+        What the run has cost before.
+    kept
+        The session of an explicit method that the run has opened before.
+    """
+
+    plan: Plan
+    probe: EventProbe
+    options: RunOptions
+    choice: Choice
+    samples: Samples
+    first_shown: bool
+    spent: Statistics
+    kept: KeptSession
+
+    @property
+    def end(self) -> float:
+        """Where it ends if nothing happens before."""
+        return float(self.samples.times[-1])
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """How a stretch ended.
+
+    Attributes
+    ----------
+    t
+        When.
+    status, message
+        Why: ``"finished"``, ``"event"``, or as in `atwood.simulation.run.made.Run`.
+    statistics
+        What it cost.
+    event
+        The event that ended it.
+    choices
+        What solved it, one after the other.
+    error
+        What went wrong, where that names a part.
+    noted
+        Events on the way that change nothing.
+    together
+        Further events at the end that change states.
+    handed
+        What the next stretch in this mode is to know of the events.
+    sides
+        Numbers of the relations of what moves that change at its end.
+    """
+
+    t: float
+    status: str
+    message: str
+    statistics: Statistics
+    choices: tuple[Choice, ...]
+    event: EventRecord | None = None
+    error: SolveError | None = None
+    noted: tuple[EventRecord, ...] = ()
+    together: tuple[EventRecord, ...] = ()
+    handed: tuple[int, ...] = ()
+    sides: tuple[int, ...] = ()
+
+
+def shortest_mode(plan: Plan, options: RunOptions, began: float) -> float:
+    """Return a time within which only errors, and margins of events, change a mode and change it back, s.
+
+    Parameters
+    ----------
+    plan
+        The scene in its mode.
+    options
+        What the run was asked for.
+    began
+        When it began, s.
+    """
+    margin = min(20.0 * options.relative_tolerance, 1e-5) * plan.scales.time
+    return max(1e-9 * (options.t_end - began), margin)
+
+
+_SAME = 1e-9
+"""Of the scene's sizes: projections of many states at once round as their number has it, and the solver not at all."""
+
+_WHOLE = ("finished", "stopped", "failed")
+"""How a run ends by itself; otherwise it is made again with as many steps as it came to."""
+
+
+def times_of_steps(run: Run) -> FloatArray:
+    """Return the times between which the solver of a run took one step, in order; they cost as much as the run."""
+    times: list[float] = []
+    _repeat(run, np.zeros(0), times.append)
+    return np.unique(times)
+
+
+def run_again(run: Run, between: FloatArray) -> Run | None:
+    """Return the same run with more samples, or None if it comes out otherwise.
+
+    Parameters
+    ----------
+    run
+        A run.
+    between
+        Times of the samples that come on top.
+    """
+    found = _repeat(run, between, None)
+    if found is None or len(found.segments) != len(run.segments):
+        return None
+    for one, other in zip(run.segments, found.segments, strict=True):
+        places = np.minimum(np.searchsorted(other.time, one.time), len(other.time) - 1)
+        if not np.array_equal(other.time[places], one.time):
+            return None
+        apart = np.abs(other.coordinates[:, places] - one.coordinates) / one.plan.coordinate_sizes[:, None]
+        if not np.max(apart, initial=0.0) < _SAME:
+            return None
+    return found
+
+
+def _repeat(run: Run, between: FloatArray, on_step: Callable[[float], object] | None) -> Run | None:
+    if run.again is None:
+        return None
+    limit = run.options.max_steps if run.status in _WHOLE else run.statistics.steps
+    options = replace(run.options, progress=None, max_steps=limit, on_step=on_step)
+    try:
+        with warnings.catch_warnings():  # they have been said before
+            warnings.simplefilter("ignore")
+            return run.again(options, between)
+    except AtwoodError as error:
+        found: Run | None = getattr(error, "run", None)
+        return found

@@ -7,10 +7,8 @@ import numpy as np
 from atwood.clock import TimeIsUp, check_time
 from atwood.integrators.protocol import Statistics
 from atwood.simulation.events.modes import EventRecord
-from atwood.simulation.run.outcome import Outcome, Segment
+from atwood.simulation.run.made import Outcome, Segment
 from atwood.simulation.run.record import Recorder
-
-__all__ = ["follow"]
 
 
 def follow(segment: Segment, recorder: Recorder, t: float) -> Outcome:

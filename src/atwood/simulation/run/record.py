@@ -19,8 +19,6 @@ from atwood.simulation.problem.projection import misses_of, project_safely, proj
 if TYPE_CHECKING:
     from atwood.simulation.singular.crossing import SingularCrossing
 
-__all__ = ["Recorder", "SegmentRecord"]
-
 
 _PENDING = 512
 """So many states of the solver are projected together, at most."""

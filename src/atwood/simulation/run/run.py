@@ -33,8 +33,7 @@ from atwood.simulation.problem.options import RunOptions, Samples, sample_times
 from atwood.simulation.problem.preparation import plan_of_run
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.run.choice import Choice, check_solver, choose
-from atwood.simulation.run.made import Run, as_asked, run_out_of_time
-from atwood.simulation.run.outcome import Outcome, Segment, shortest_mode
+from atwood.simulation.run.made import Outcome, Run, Segment, as_asked, run_out_of_time, shortest_mode
 from atwood.simulation.run.record import Recorder, SegmentRecord
 from atwood.simulation.run.segment import run_segment
 from atwood.simulation.run.session import KeptSession
@@ -42,9 +41,6 @@ from atwood.simulation.run.sides_of_run import SidesOfRun
 from atwood.simulation.run.tolerances import allowed
 from atwood.stages import stage
 from atwood.topology.orientation_coordinates import Orientation
-
-__all__ = ["choice_at_start", "run"]
-
 
 _CHATTER = 50
 """So many changes of mode without time passing end a run."""

@@ -16,19 +16,23 @@ from atwood.integrators.methods import AUTO, Method
 from atwood.integrators.protocol import Budget, Statistics, Status, StepResult
 from atwood.integrators.session import Session
 from atwood.late import replace
-from atwood.simulation.dynamics.numerical_failure import is_numerical, numerical_failure
+from atwood.simulation.dynamics.numerical_failure import (
+    find_undefined_value,
+    is_numerical,
+    numerical_failure,
+    states_ahead,
+)
 from atwood.simulation.dynamics.orientation_coordinates import (
     COORDINATE_SWITCH,
 )
 from atwood.simulation.dynamics.redundancy import RankFinding
-from atwood.simulation.dynamics.undefined_values import find_undefined_value, states_ahead
 from atwood.simulation.events.modes import EventRecord
 from atwood.simulation.events.sides import SIDE
 from atwood.simulation.problem.preparation import pack_state
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import project_safely
 from atwood.simulation.run.choice import dead_centre, stiffness_of, turned_stiff
-from atwood.simulation.run.outcome import Outcome, Segment
+from atwood.simulation.run.made import Outcome, Segment
 from atwood.simulation.run.record import Recorder
 from atwood.simulation.run.session import SolverRequest, open_session
 from atwood.simulation.run.tolerances import too_tight
@@ -37,7 +41,6 @@ if TYPE_CHECKING:
     from atwood.simulation.singular.crossing import SingularCrossing
     from atwood.simulation.singular.monitor import SingularityMonitor
 
-__all__ = ["run_segment"]
 
 _BLOCKS = 50
 """Progress is told about so many times."""
@@ -184,7 +187,7 @@ class _Runner:
             self.recorder.settle()
             return self._ended(self.segment.end, "finished", "")
         if step_result.status is Status.EVENT:
-            from atwood.simulation.events.margins import without_margin
+            from atwood.simulation.events.modes import without_margin
 
             probe, split = self.segment.probe, self.segment.plan.program.split
             step_result = without_margin(lambda t, y: probe.values(t, *split(y)), probe.shift, step_result, self.began)

@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from atwood.integrators.taylor.problem import TaylorProblem
     from atwood.simulation.problem.closed_loops import Solved
 
-__all__ = ["KeptSession", "SolverRequest", "equations_of", "open_session"]
-
 
 @dataclass(frozen=True, eq=False)
 class SolverRequest:

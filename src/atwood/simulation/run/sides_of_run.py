@@ -16,8 +16,6 @@ from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.run.record import SegmentRecord
 
-__all__ = ["SidesOfRun"]
-
 _ASIDE = 1e-12
 """Of the scene's time: so far from a switch, on the side that a stretch is on, the states at its ends are recorded."""
 

@@ -24,8 +24,6 @@ from atwood.forms.kept import Key
 from atwood.integrators.protocol import Values
 from atwood.late import dataclass
 
-__all__ = ["Stiffness", "can_be_stiff", "find_stiff_rows", "find_stiffness", "present_time"]
-
 RATIO = 300.0
 """A decay that is so many times as fast as anything else is left to an implicit method."""
 

@@ -9,9 +9,6 @@ from atwood.integrators.protocol import StepResult
 from atwood.simulation.dynamics.scales import motion_names, motion_scales
 from atwood.simulation.problem.problem import Plan
 
-__all__ = ["explain_stuck", "failed"]
-
-
 _LATER, _AT_START = (
     "Look at what came before: the error's `run`.",
     "Nothing came before: look at what acts at the start, or try a first_step far shorter than it takes to set in.",

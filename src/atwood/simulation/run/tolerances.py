@@ -15,8 +15,6 @@ from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.made import Run
 from atwood.simulation.run.session import SolverRequest, open_session
 
-__all__ = ["allowed", "raised_where_too_tight", "too_tight"]
-
 _TIGHT = 1e-9
 """Failures at larger tolerances have other causes than rounding."""
 

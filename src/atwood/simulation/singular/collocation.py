@@ -22,8 +22,6 @@ from atwood.simulation.dynamics.reactions import accelerations_at
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import ProjectedStates, nearly_projected, project_safely, project_states
 
-__all__ = ["Arc", "Path", "find_arc", "follow"]
-
 States: TypeAlias = tuple[FloatArray, FloatArray]
 """Coordinates and speeds, each of shape (number, times)."""
 

@@ -1,7 +1,9 @@
-"""Singular positions that a run passed through, or came close to.
+"""Singular positions that a run passed through, came close to, or came to rest in.
 
 Where all bars of a row of parallelograms lie in one line some constraints follow from the others, and how the
-mechanism goes on is not determined by where it is. Its motion until then goes on smoothly in one way only.
+mechanism goes on is not determined by where it is. Its motion until then goes on smoothly in one way only. A motion
+that reaches the place with little speed would turn back a little before or behind it for another energy. So it is told
+apart from one that passes, and from one that turns back clearly, by more than what its errors can change.
 """
 
 from __future__ import annotations
@@ -19,11 +21,12 @@ from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.simulation.events.modes import EventProbe
 from atwood.simulation.problem.problem import Plan
+from atwood.simulation.singular.collocation import Arc
+from atwood.simulation.singular.rank_measure import RankMeasure
 
 if TYPE_CHECKING:
     from atwood.simulation.singular.collocation import Path
 
-__all__ = ["SingularCrossing", "events_on", "stuck_at"]
 
 _PIECES = 8
 """In so many pieces a path is searched for events."""
@@ -149,3 +152,76 @@ def events_on(path: Path, plan: Plan, probe: EventProbe) -> Root | None:
     times = np.linspace(path.start, path.end, _PIECES + 1).tolist()
     found = (locator.search(one, other, at) for one, other in pairwise(times))
     return next((root for root in found if root is not None), None)
+
+
+_ENERGIES, _PLACES = 30.0, 300.0
+"""Times the tolerance: what a run's errors may change, of energies and of places, relative to their sizes."""
+
+_LEAST = 1e-7
+"""At tighter tolerances the same; rank is judged to be lost within 1e-5."""
+
+
+def is_slow(plan: Plan, arc: Arc, t: float, fastest: float, tolerance: float) -> bool:
+    """Return whether a motion has so little energy at a time that errors could have it turn back.
+
+    Parameters
+    ----------
+    plan
+        The scene in its mode.
+    arc
+        The motion.
+    t
+        When.
+    fastest
+        The largest speed about then, in units of the scene's sizes; those of the arc count too.
+    tolerance
+        The relative tolerance of the run.
+    """
+    here, *ends = np.max(np.abs(arc.at(np.array([t, arc.start, arc.end]))[1]) / plan.sizes[:, None], axis=0).tolist()
+    return bool(here**2 < max(_ENERGIES * tolerance, _LEAST) * max(fastest, *ends) ** 2)
+
+
+def slowest(t: FloatArray, speeds: FloatArray, sizes: FloatArray) -> float | None:
+    """Return when a motion is slowest between some times; None where it is at their ends.
+
+    Parameters
+    ----------
+    t, speeds
+        Times equally far from each other, and speeds of shape (number, times).
+    sizes
+        The size of each speed.
+    """
+    square = np.sum((speeds / sizes[:, None]) ** 2, axis=0)
+    least = int(np.argmin(square))
+    if least in (0, len(t) - 1):
+        return None
+    before, here, after = square[least - 1 : least + 2].tolist()
+    bend = before - 2.0 * here + after
+    share = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
+    return float(t[least] + share * (t[1] - t[0]))
+
+
+def rests_at(plan: Plan, measure: RankMeasure, arc: Arc, far: float, fastest: float, tolerance: float) -> float | None:
+    """Return when an arc comes to rest so close to a singular position that errors decide on what follows; else None.
+
+    Parameters
+    ----------
+    plan
+        The scene in its mode.
+    measure
+        How near states are to a singular position.
+    arc
+        A motion.
+    far
+        The measure elsewhere.
+    fastest
+        See `is_slow`.
+    tolerance
+        The relative tolerance of the run.
+    """
+    times = np.linspace(arc.start, arc.end, 65)
+    rest = slowest(times, arc.at(times)[1], plan.sizes)
+    if rest is None:
+        return None
+    near = measure.at(np.array([rest]), arc.at(np.array([rest]))[0])[0] < max(_PLACES * tolerance, _LEAST) * far
+    return rest if near and is_slow(plan, arc, rest, fastest, tolerance) else None

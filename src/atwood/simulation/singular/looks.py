@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from atwood.codegen.sundials.lookout import LookoutCode, LookoutData
 from atwood.late import dataclass
 
-__all__ = ["Look", "as_lookout", "compiled_looks", "cubic", "going_on", "stride_from"]
-
 _LOOKOUT: Key[LookoutCode] = Key("machine code of the singularity monitor")
 
 _MOVE = 0.3

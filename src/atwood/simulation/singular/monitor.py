@@ -22,8 +22,6 @@ from atwood.simulation.singular.rank_measure import zero_ahead
 from atwood.simulation.singular.ways import WaysOver
 from atwood.tolerances import tolerances
 
-__all__ = ["SingularityMonitor", "singularity_monitor_of"]
-
 _REVIEW = 8
 """So many looks are judged together where they are not compiled."""
 

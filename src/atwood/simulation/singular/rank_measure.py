@@ -20,8 +20,6 @@ from atwood.simulation.problem.projection import ConstraintsAt, constraints_at
 from atwood.simulation.singular.collocation import Arc
 from atwood.tolerances import tolerances
 
-__all__ = ["Loss", "RankMeasure", "find_crossing", "find_loss", "nearly_lost", "zero_ahead"]
-
 _UNEVEN = 0.5
 """By so large a share steps on both sides of a zero may differ."""
 

@@ -12,12 +12,9 @@ from atwood.errors import AtwoodError, SolveError
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import project_safely, project_states
 from atwood.simulation.singular.collocation import Arc, Path, find_arc, follow
-from atwood.simulation.singular.crossing import SingularCrossing, stuck_at
+from atwood.simulation.singular.crossing import SingularCrossing, is_slow, rests_at, slowest, stuck_at
 from atwood.simulation.singular.looks import Look, cubic, stride_from
 from atwood.simulation.singular.rank_measure import RankMeasure, find_crossing, find_loss, nearly_lost
-from atwood.simulation.singular.rest import is_slow, rests_at, slowest
-
-__all__ = ["WaysOver"]
 
 _CLOSE = 0.05
 """Only where the measure is so small on a finer look, relative to the largest so far, is a way over it looked for."""

@@ -24,8 +24,7 @@ from atwood.progress import told
 from atwood.result.result import Result
 from atwood.simulation.problem.arguments import FORM, FORMS, LEVEL, LIMITS, NAME, PROGRESS, RTOL, T_END, check_span
 from atwood.simulation.run.choice import implicit_solver
-from atwood.study.comparison.environment import environment
-from atwood.study.comparison.found import Comparison, ComparisonRow
+from atwood.study.comparison.found import Comparison, ComparisonRow, environment
 from atwood.study.comparison.reference import (
     Assembled,
     Reference,
@@ -34,8 +33,6 @@ from atwood.study.comparison.reference import (
     scaled_difference,
     table_at,
 )
-
-__all__ = ["compare"]
 
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 """Relative tolerances at which solvers are compared unless others are given: from a look at a motion to a reference."""

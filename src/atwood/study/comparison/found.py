@@ -1,27 +1,31 @@
-"""What a comparison found: a row for each run, in text, as data, in files and as pictures."""
+"""A comparison: a row for each run, where it was measured, a verdict in one line, data, files and pictures."""
 
 from __future__ import annotations
 
 import csv
 import io
+import math
 import os
-from collections.abc import Mapping, Sequence
+import platform
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field
+from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from atwood.arguments import FILE, takes
 from atwood.errors import UsageError
 from atwood.files import check_directory
 from atwood.late import dataclass, names_of
+from atwood.result.about import versions
 from atwood.result.formats.companion import write_with_companion
 from atwood.showing import count_of, data_of, fitted
 from atwood.simulation.problem.options import how_solved
 from atwood.study.comparison.reference import Reference
-from atwood.study.comparison.verdict import judge
 from atwood.table import Shown, Table, table
-
-__all__ = ["RELATIVE", "Comparison", "ComparisonRow", "check_rows_file", "write_rows"]
 
 RELATIVE = (
     "Errors and constraint drifts are relative to the size of the scene, or in rad; energy drifts to what it exchanges."
@@ -224,3 +228,125 @@ def check_rows_file(file: str | os.PathLike[str]) -> Path:
         raise UsageError(f"the suffix {target.suffix!r} is not known", where=str(file), advice="Use .csv.")
     check_directory(target)
     return target
+
+
+_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
+
+
+def environment() -> dict[str, str]:
+    """Return processor, system, versions, BLAS, threads and date, in words."""
+    now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+    return {**_lasting(), "threads": _threads(), "load": _load(), "date": now}
+
+
+@cache
+def _lasting() -> dict[str, str]:
+    found = versions()
+    python = found.pop("python")
+    return {
+        "processor": _processor(),
+        "system": f"{platform.system()} {platform.release()}",
+        "python": f"{platform.python_implementation()} {python}",
+        "versions": ", ".join(f"{name} {number}" for name, number in [*found.items(), ("llvm", _llvm())]),
+        "blas": _blas(),
+    }
+
+
+def _processor() -> str:
+    """Return the name of the processor, and how many of them may be used."""
+    name = platform.processor() or platform.machine()
+    table = Path("/proc/cpuinfo")
+    if table.is_file():
+        lines = (line.partition(":") for line in table.read_text(encoding="utf-8", errors="replace").splitlines())
+        name = next((value.strip() for key, _, value in lines if key.strip() == "model name"), name)
+    return f"{name}, {platform.machine()}"
+
+
+def _threads() -> str:
+    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    given = ", ".join(f"{name}={os.environ[name]}" for name in _THREADS if name in os.environ)
+    return f"runs in one thread of {usable}; BLAS: {given or 'as it chooses'}"
+
+
+def _load() -> str:
+    """Return how busy the machine was in the last minute; figures taken beside other work mean little."""
+    return f"{os.getloadavg()[0]:.1f} over the last minute" if hasattr(os, "getloadavg") else "unknown"
+
+
+def _llvm() -> str:
+    from llvmlite import binding
+
+    return ".".join(map(str, binding.llvm_version_info))
+
+
+def _blas() -> str:
+    import numpy as np
+
+    told: Any = np.show_config(mode="dicts")
+    found = told.get("Build Dependencies", {}).get("blas", {}) if isinstance(told, dict) else {}
+    return " ".join(str(found[key]) for key in ("name", "version") if found.get(key)) or "unknown"
+
+
+def judge(rows: Iterable[tuple[str, float | None, float | None]]) -> str:
+    """Return which form is cheapest at an error that all reach, and by how much.
+
+    Parameters
+    ----------
+    rows
+        Label, error and time of each run.
+    """
+    curves: dict[str, list[tuple[float, float]]] = {}
+    for label, error, wall in rows:
+        if error is not None and wall:
+            curves.setdefault(label, []).append((max(error, 1e-16), wall))
+    if len(curves) < 2:
+        return "There is nothing to compare." if not curves else f"Only {next(iter(curves))} gave an answer."
+    span = _common_errors(curves)
+    if span is None:
+        return "The forms reach no error in common: look at the rows."
+    target = 10.0 ** round(math.log10(span))
+    found = ((cost_at(points, target), label) for label, points in curves.items())
+    costs = sorted((cost, label) for cost, label in found if cost is not None)
+    (least, best), (most, _worst) = costs[0], costs[-1]
+    if most < 1.15 * least:
+        return f"For an error of {target:.0e} all cost the same, {_said(least)}."
+    rest = ", ".join(f"{label} {_said(cost)}" for cost, label in costs[1:])
+    return f"For an error of {target:.0e}, {best} takes {_said(least)}; {rest}: up to {most / least:.1f} times as long."
+
+
+def _common_errors(curves: dict[str, list[tuple[float, float]]]) -> float | None:
+    """Return an error that as many curves as possible reach, at least two of them."""
+    candidates = sorted({10.0 ** round(math.log10(error)) for points in curves.values() for error, _ in points})
+    counted = [(sum(_reaches(points, error) for points in curves.values()), error) for error in candidates]
+    most = max(count for count, _ in counted)
+    if most < 2:
+        return None
+    shared = [error for count, error in counted if count == most]
+    return shared[len(shared) // 2]
+
+
+def _reaches(points: list[tuple[float, float]], error: float) -> bool:
+    """Return whether an error lies between the smallest and the largest of a curve, or nearly so."""
+    errors = [one for one, _ in points]
+    return min(errors) / 3.0 <= error <= 3.0 * max(errors)
+
+
+def cost_at(points: list[tuple[float, float]], error: float) -> float | None:
+    """Return the time at an error, between the runs by logarithms; None if they do not come near it.
+
+    Parameters
+    ----------
+    points
+        Error and time of each run.
+    error
+        The error.
+    """
+    if not _reaches(points, error):
+        return None
+    ordered = sorted(points)
+    errors, walls = (np.log([point[i] for point in ordered]) for i in (0, 1))
+    return float(np.exp(np.interp(math.log(error), errors, walls)))
+
+
+def _said(seconds: float) -> str:
+    return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"

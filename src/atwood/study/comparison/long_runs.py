@@ -24,11 +24,9 @@ from atwood.result.result import Result
 from atwood.showing import fitted, plain
 from atwood.simulation.problem.arguments import LIMITS, NAME, PROGRESS
 from atwood.simulation.problem.options import how_solved
-from atwood.study.comparison.environment import environment
+from atwood.study.comparison.found import environment
 from atwood.table import Shown, Table, table
 from atwood.theory.symmetry import conserved
-
-__all__ = ["LongComparison", "LongRow", "compare_long"]
 
 _WINDOW = 50
 """Samples in the period before each mark."""

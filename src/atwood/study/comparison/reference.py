@@ -18,8 +18,6 @@ from atwood.pipeline import simulate
 from atwood.result.accuracy import compared_paths
 from atwood.result.result import Result
 
-__all__ = ["Assembled", "Reference", "find_reference", "run_form", "scaled_difference", "table_at"]
-
 Assembled = Callable[[str, str], Assembly]
 """Gives a scene in a form and at a level of the constraints."""
 

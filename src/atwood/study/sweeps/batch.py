@@ -30,9 +30,6 @@ from atwood.study.sweeps.runs import Records, SweepRequest, shared_work
 from atwood.study.sweeps.sizes import absolute_tolerances, are_stiff, have_inertia, time_scales
 from atwood.study.sweeps.waves import Waves
 
-__all__ = ["run_batches", "why_not_batched"]
-
-
 _PIECE, _NUMBERS = 2_000, 2_000_000
 """So many runs are prepared together at most, and so many numbers handed out by them."""
 

@@ -24,12 +24,9 @@ from atwood.numerics.matrices import or_one
 from atwood.simulation.dynamics.scales import motion_scales, origin_part
 from atwood.simulation.initialization.many import meet_positions, meet_speeds
 from atwood.simulation.initialization.start import find_start
-from atwood.simulation.initialization.system import Conditions, start_conditions
-from atwood.simulation.initialization.targets import Level, sort_targets
+from atwood.simulation.initialization.system import Conditions, Level, sort_targets, start_conditions
 from atwood.study.sweeps.cases import Axis
 from atwood.study.sweeps.runs import SweepRequest
-
-__all__ = ["ParameterRows", "StartRows", "read_starts"]
 
 
 class ParameterRows:

@@ -12,13 +12,11 @@ from numpy.typing import NDArray
 
 from atwood.arguments import show
 from atwood.errors import UsageError
-from atwood.forms.source import change_scene
+from atwood.forms.starting import change_scene
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.compose.scene import Scene
 from atwood.model.local.flatten import flatten
-
-__all__ = ["COMBINATIONS", "Axis", "Cases", "make_cases"]
 
 COMBINATIONS = ("grid", "list")
 

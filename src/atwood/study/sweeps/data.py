@@ -9,11 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.result.formats.dataset import Dataset, Variable, unique_name
-from atwood.result.formats.tables import needed
+from atwood.result.formats.dataset import Dataset, Variable, needed, unique_name
 from atwood.study.sweeps.result import Sweep, SweepStatistics
-
-__all__ = ["about_sweep", "as_dataset", "as_table", "from_dataset", "from_parts", "labels"]
 
 _OWN = ("run", "time", "end_time", "status", "steps")
 """What stands beside the quantities of a sweep."""

@@ -30,8 +30,6 @@ from atwood.result.formats.npz import read_npz, write_npz
 from atwood.study.sweeps.data import about_sweep, as_dataset, from_dataset, from_parts, labels
 from atwood.study.sweeps.result import Sweep
 
-__all__ = ["check_sweep_target", "load_sweep", "save_sweep"]
-
 
 @takes(sweep=instance("a Sweep", Sweep), file=FILE)
 def save_sweep(sweep: Sweep, file: str | os.PathLike[str]) -> Path:

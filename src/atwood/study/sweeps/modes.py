@@ -21,15 +21,12 @@ from atwood.late import dataclass, replace
 from atwood.mechanics.outputs.event_functions import EventFunction
 from atwood.simulation.dynamics.orientation_coordinates import COORDINATE_SWITCH
 from atwood.simulation.dynamics.scales import size_of, total_masses
-from atwood.simulation.events.margins import without_margin
-from atwood.simulation.events.modes import MARGIN, EventProbe, EventRecord, margins_at_start
+from atwood.simulation.events.modes import MARGIN, EventProbe, EventRecord, margins_at_start, without_margin
 from atwood.simulation.problem.explicit_scene import own_rates
 from atwood.simulation.problem.preparation import make_plan
 from atwood.simulation.run.choice import choose
 from atwood.study.sweeps.motions import OpenTree, task_of
 from atwood.study.sweeps.runs import SweepRequest
-
-__all__ = ["SweepMode", "find_mode"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,11 +24,10 @@ from atwood.integrators.methods import Method, Task
 from atwood.integrators.protocol import SolverOptions
 from atwood.late import dataclass, replace
 from atwood.mechanics.outputs.event_functions import EventFunction
-from atwood.simulation.dynamics.columns import masses_at
+from atwood.simulation.dynamics.balance import masses_at
 from atwood.simulation.dynamics.reactions import accelerations_at
 from atwood.simulation.initialization.start import find_start
-from atwood.simulation.problem.closed_loops import Solved, solve_at
-from atwood.simulation.problem.closed_loops_many import ManyBranches
+from atwood.simulation.problem.closed_loops import ManyBranches, Solved, solve_at
 from atwood.simulation.problem.explicit_scene import compiled_rates, explicit_problem, explicit_problem_of
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.problem.preparation import make_plan
@@ -36,8 +35,6 @@ from atwood.simulation.problem.step_guard import step_guard
 from atwood.simulation.problem.taylor_scene import taylor_problem
 from atwood.simulation.run.choice import choose
 from atwood.study.sweeps.runs import SweepRequest
-
-__all__ = ["ClosedLoops", "Motion", "OpenTree", "Way", "find_way", "open_places", "task_of"]
 
 
 class Motion(Protocol):

@@ -15,8 +15,6 @@ from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.reactions import ReactionSolver
 from atwood.study.sweeps.motions import Motion
 
-__all__ = ["read_quantities", "reads"]
-
 
 def reads(assembly: Assembly, paths: Sequence[str], symbols: Sequence[Expression]) -> bool:
     """Return whether a quantity depends on any of some symbols."""

@@ -19,8 +19,6 @@ from atwood.model.declare.quantities import PATH
 from atwood.showing import count_of, data_of, listed
 from atwood.table import Shown, Table, facts
 
-__all__ = ["Sweep", "SweepStatistics"]
-
 
 @dataclass(frozen=True)
 class SweepStatistics:
@@ -236,7 +234,7 @@ class Sweep(Shown):
         UsageError
             If xarray is not installed (``pip install 'atwood[data]'``).
         """
-        from atwood.result.formats.tables import to_xarray
+        from atwood.result.formats.dataset import to_xarray
         from atwood.study.sweeps.data import as_dataset
 
         return to_xarray(as_dataset(self))

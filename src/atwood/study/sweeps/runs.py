@@ -24,9 +24,6 @@ from atwood.result.result import Result
 from atwood.simulation.problem.options import RunOptions
 from atwood.study.sweeps.cases import Cases
 
-__all__ = ["Records", "SweepRequest", "expand_paths", "run_in_processes", "run_one_by_one", "shared_work"]
-
-
 _STRUCTURES = 8
 """So many structures are kept at hand; sweeps over counts have several."""
 

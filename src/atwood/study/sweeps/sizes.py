@@ -14,8 +14,6 @@ from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.stiffness import can_be_stiff, find_stiff_rows
 from atwood.study.sweeps.motions import Motion
 
-__all__ = ["absolute_tolerances", "are_stiff", "have_inertia", "time_scales"]
-
 
 def time_scales(
     motion: Motion,

@@ -45,9 +45,6 @@ from atwood.study.sweeps.result import Sweep, SweepStatistics
 from atwood.study.sweeps.runs import Records, SweepRequest, expand_paths, run_in_processes, run_one_by_one
 from atwood.tolerances import tolerances
 
-__all__ = ["Sweep", "SweepStatistics", "sweep"]
-
-
 _TRIALS = 20
 """If none of so many runs can be assembled, none is tried."""
 

@@ -29,8 +29,6 @@ from atwood.study.sweeps.readout import read_quantities
 from atwood.study.sweeps.runs import Records, SweepRequest
 from atwood.study.sweeps.sizes import absolute_tolerances, are_stiff, have_inertia, time_scales
 
-__all__ = ["Waves"]
-
 _CHATTER = 20
 """A run with so many stretches in a row that hardly last is left to be made, and judged, by itself."""
 

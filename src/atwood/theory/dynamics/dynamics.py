@@ -16,17 +16,15 @@ from atwood.arrays import FloatArray
 from atwood.errors import SolveError, UnsupportedError, UsageError, suggestion_in_parts
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, jvp, substitute
 from atwood.forms.assembly import Assembly
-from atwood.forms.derivative import is_too_long
 from atwood.forms.kept import Key
 from atwood.forms.places import to_maximal
-from atwood.forms.program import state_groups
+from atwood.forms.program import is_too_long, state_groups
 from atwood.late import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.model.compose.composite import Model
 from atwood.numerics.independence import independent_rows
 from atwood.pipeline import SCENE, assembly_of
-from atwood.simulation.dynamics.balance import BalanceValues, balance_of, solve_balance
-from atwood.simulation.dynamics.columns import mass_at
+from atwood.simulation.dynamics.balance import BalanceValues, balance_of, mass_at, solve_balance
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.start import Start, find_start
 from atwood.simulation.problem.arguments import FORM, ORIENTATION

@@ -24,7 +24,7 @@ from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.orientation_coordinates import to_regular
 from atwood.simulation.dynamics.redundancy import RankFinding
 from atwood.simulation.initialization.start import find_start
-from atwood.simulation.initialization.targets import find_level
+from atwood.simulation.initialization.system import find_level
 from atwood.theory.linear.variations import LinearScene
 
 At = Mapping[str, Any] | tuple[Result, float] | None

@@ -28,8 +28,7 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.numerics.independence import independent_rows
 from atwood.numerics.matrices import from_entries, to_array
 from atwood.numerics.solutions import least_norm
-from atwood.simulation.dynamics.balance import BalanceValues, balance_of, solve_balance
-from atwood.simulation.dynamics.columns import mass_at
+from atwood.simulation.dynamics.balance import BalanceValues, balance_of, mass_at, solve_balance
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.dynamics.scales import motion_scales
