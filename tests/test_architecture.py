@@ -2,6 +2,7 @@
 
 import ast
 import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -121,3 +122,14 @@ def test_rooms_are_as_large_as_the_documentation_states() -> None:
         if any(np.greater(measured(one), bounds[room]))
     }
     assert not grown, f"lines of code, files, names; measured and stated: {grown}"
+
+
+def test_files_that_documents_name_exist() -> None:
+    named = re.compile(r"`([a-z_0-9]+(?:/[a-z_0-9]+)+\.py)`")
+    missing = {
+        f"{page.name}: {name}"
+        for page in (*(ROOT / "docs").glob("*.md"), ROOT / "README.md", ROOT / "CONTRIBUTING.md")
+        for name in named.findall(page.read_text(encoding="utf-8"))
+        if not any((place / name).is_file() for place in (SOURCE, ROOT / "library" / "atwood_library", ROOT))
+    }
+    assert not missing

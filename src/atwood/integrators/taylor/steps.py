@@ -1,6 +1,6 @@
 """Steps of the Taylor-series method, for any system.
 
-The routines take the steps of `atwood.integrators.taylor.reference`.  What they know of a system comes in through
+The tests have the same steps in NumPy.  What the routines know of a system comes in through
 addresses of the two compiled programs of its recurrences, so that they are compiled once and kept.
 """
 
