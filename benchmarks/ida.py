@@ -20,7 +20,7 @@ from by_hand_runs import IdaRun, tuned
 from mechanisms import Mechanism, chain, double_pendulum, pendulum
 from timing import best_of, options, print_table, ratio, save
 
-from atwood.integrators.ida import native as ida_native, sundae as ida_sundae
+from atwood.integrators.ida import library as sundials_library, sundae as ida_sundae
 from atwood.integrators.protocol import Status
 
 GOAL, GOAL_PYTHON = 1.2, 8.0
@@ -121,8 +121,8 @@ def measure(mechanism: Mechanism, rtol: float, chosen: Any) -> dict[str, Any]:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Measure and print."""
     chosen = options(__doc__, arguments)
-    if not ida_native.available():
-        print(f"nothing to measure: {ida_native.why_not()}")
+    if not sundials_library.available():
+        print(f"nothing to measure: {sundials_library.why_not()}")
         return
     if by_hand.compiler() is None:
         print("no C compiler: nothing by hand to compare with")

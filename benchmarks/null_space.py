@@ -14,7 +14,7 @@ from typing import Any
 from timing import best_of, options, print_table, ratio, save
 
 from atwood import Scene, simulate
-from atwood.integrators.ida import native as ida_native, sundae as ida_sundae
+from atwood.integrators.ida import library as sundials_library, native as ida_native, sundae as ida_sundae
 from atwood.integrators.protocol import Budget, SolverOptions, Statistics, Status
 from atwood.simulation.problem.preparation import make_plan, pack_state
 from atwood.simulation.problem.problem import Plan
@@ -107,8 +107,8 @@ def measure(name: str, rtol: float, repeat: int) -> dict[str, Any]:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Measure and print."""
     chosen = options(__doc__, arguments)
-    if not ida_native.available():
-        print(f"nothing to measure: {ida_native.why_not()}")
+    if not sundials_library.available():
+        print(f"nothing to measure: {sundials_library.why_not()}")
         return
     names = list(CASES)[: 1 if chosen.quick else None]
     tolerances = (1e-6,) if chosen.quick else (1e-6, 1e-8)

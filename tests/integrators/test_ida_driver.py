@@ -16,7 +16,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from atwood.errors import KernelEvaluationError, StartError, UsageError
-from atwood.integrators.ida import native as ida_native, sundae as ida_sundae
+from atwood.integrators.ida import library as sundials_library, native as ida_native, sundae as ida_sundae
 from atwood.integrators.protocol import (
     Budget,
     ImplicitProblem,
@@ -36,8 +36,8 @@ open_session = DRIVERS["scikit-sundae"]
 @pytest.fixture(autouse=True, params=DRIVERS)
 def driver(request: Any, monkeypatch: Any) -> str:
     """Each test runs with each driver."""
-    if request.param == "native" and not ida_native.available():
-        pytest.skip(ida_native.why_not())
+    if request.param == "native" and not sundials_library.available():
+        pytest.skip(sundials_library.why_not())
     monkeypatch.setitem(globals(), "open_session", DRIVERS[request.param])
     return str(request.param)
 

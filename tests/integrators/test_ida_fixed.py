@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from atwood.codegen.sundials.fixed_pivots import SLOTS, fixed_pivots_addresses
-from atwood.integrators.ida import native as ida_native
+from atwood.integrators.ida import library as sundials_library, native as ida_native
 from atwood.integrators.ida.callbacks import Record
 from atwood.integrators.ida.fixed import FixedSolver, table_layout
 from atwood.integrators.ida.library import library
@@ -21,7 +21,7 @@ from atwood_library import scenes
 
 from ..helpers.runs import Prepared, packed, prepare
 
-pytestmark = pytest.mark.skipif(not ida_native.available(), reason=ida_native.why_not() or "available")
+pytestmark = pytest.mark.skipif(not sundials_library.available(), reason=sundials_library.why_not() or "available")
 
 SETUP = CFUNCTYPE(c_int, c_void_p, c_void_p)
 SOLVE = CFUNCTYPE(c_int, c_void_p, c_void_p, c_void_p, c_void_p, c_double)

@@ -28,7 +28,7 @@ from atwood_library.scenes import DoublePendulum
 
 from ..helpers.runs import packed, prepare
 
-pytestmark = pytest.mark.skipif(not ida_native.available(), reason=ida_native.why_not() or "available")
+pytestmark = pytest.mark.skipif(not sundials_library.available(), reason=sundials_library.why_not() or "available")
 
 GRAVITY = 9.81
 TIGHT = SolverOptions(relative_tolerance=1e-9, absolute_tolerances=1e-11)
@@ -172,7 +172,7 @@ def resident_kilobytes() -> int:
 
 class TestLibrary:
     def test_it_is_found_without_importing_scikit_sundae(self) -> None:
-        script = "from atwood.integrators.ida import native; print(native.available(), 'sksundae' in sys.modules)"
+        script = "from atwood.integrators.ida import library; print(library.available(), 'sksundae' in sys.modules)"
         path = str(Path(sundials_library.__file__).parents[3])
         done = subprocess.run(
             [sys.executable, "-c", f"import sys; sys.path.insert(0, {path!r}); {script}"],
@@ -187,13 +187,13 @@ class TestLibrary:
         assert found is sundials_library.library()
         assert found.version >= (7, 0, 0)
         assert found.index_type in (ctypes.c_int32, ctypes.c_int64)
-        assert ida_native.why_not() == ""
+        assert sundials_library.why_not() == ""
 
     def test_a_missing_package_is_a_reason_and_no_crash(self, monkeypatch: Any) -> None:
         monkeypatch.setattr(sundials_library, "_found", None)
         monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-        assert not ida_native.available()
-        assert "not installed" in ida_native.why_not()
+        assert not sundials_library.available()
+        assert "not installed" in sundials_library.why_not()
         with pytest.raises(sundials_library.SundialsMissing):
             ida_native.open_session(oscillator(), TIGHT, 0.0, np.zeros(2), np.zeros(2))
 
@@ -203,11 +203,11 @@ class TestLibrary:
         monkeypatch.setattr(sundials_library, "_package_folder", lambda: package)
         monkeypatch.setattr(sundials_library.sys, "prefix", str(tmp_path))
         monkeypatch.setattr(sundials_library, "_found", None)
-        assert "no SUNDIALS libraries" in ida_native.why_not()
+        assert "no SUNDIALS libraries" in sundials_library.why_not()
         for name in ("libsundials_core.so", "libsundials_ida.so"):
             (package / name).write_bytes(b"not a library")
         monkeypatch.setattr(sundials_library, "_found", None)
-        assert "cannot be opened" in ida_native.why_not()
+        assert "cannot be opened" in sundials_library.why_not()
 
     @pytest.mark.parametrize(
         ("folder", "names"),

@@ -13,13 +13,13 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from atwood import Model, Result, SolveError, simulate
-from atwood.integrators.ida import memory, native
+from atwood.integrators.ida import library as sundials_library, memory, native
 from atwood.integrators.ida.memory import IdaMemory
 from atwood.integrators.ida.native import NativeSession
 from atwood.integrators.protocol import StepResult
 from atwood_library.scenes import Bricard, FourBar, SliderCrank
 
-pytestmark = pytest.mark.skipif(not native.available(), reason=native.why_not() or "available")
+pytestmark = pytest.mark.skipif(not sundials_library.available(), reason=sundials_library.why_not() or "available")
 
 
 @pytest.fixture
