@@ -349,4 +349,4 @@ class ExplicitSession(Session):
         """Return the end of a run that is to be left to an implicit method, or has used up a limit."""
         if self._leave is not None and self._leaves():
             return self._stopped(Status.STIFF, "steps are kept short by stability alone")
-        return self._exceeded(self._stepper.counts.steps)
+        return self._exceeded(lambda: self._stepper.counts.steps)

@@ -145,12 +145,12 @@ class Session(ABC):
         """Take no longer steps from now on than this, nor than the options allow, where they can be limited."""
         return
 
-    def _exceeded(self, steps: int) -> StepResult | None:
+    def _exceeded(self, steps: Callable[[], int]) -> StepResult | None:
         """Return the end of a run that has used up a limit."""
         budget = self.budget
         if budget.poll is not None:
             budget.poll(self._here[0])
-        if budget.max_steps is not None and steps >= budget.max_steps:
+        if budget.max_steps is not None and steps() >= budget.max_steps:
             return self._stopped(Status.STEP_LIMIT, f"the limit of {budget.max_steps} steps was used up")
         if budget.wall_seconds is not None and time.perf_counter() - self._opened >= budget.wall_seconds:
             return self._stopped(Status.TIME_LIMIT, f"the limit of {budget.wall_seconds:g} s was used up")

@@ -238,7 +238,7 @@ class NativeSession(Session):
                 return self._arrive(t_out)
             if by_steps:
                 self._here = self._end_of_step()
-            limit = self._exceeded(self._steps())
+            limit = self._exceeded(self._steps)
             if limit is not None:
                 return limit
             failure = self._step() if by_steps or self._is_first else self._stride(t_out)

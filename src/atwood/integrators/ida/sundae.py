@@ -175,7 +175,7 @@ class SundaeSession(Session):
                 self._here = self._interpolate(t_out)
                 return StepResult(*copied(self._here), Status.REACHED, self._no_events)
             self._here = self._newest
-            limit = self._exceeded(self._steps)
+            limit = self._exceeded(lambda: self._steps)
             if limit is not None:
                 return limit
             failure = self._step()
