@@ -6,7 +6,7 @@ import reprlib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-__all__ = ["brief", "count_of", "data_of", "field_text", "fitted", "listed", "plain"]
+__all__ = ["brief", "count_of", "data_of", "duration", "field_text", "fitted", "listed", "plain"]
 
 LINES, WIDTH = 10, 110
 """What a `repr` may take, in lines and columns."""
@@ -70,6 +70,11 @@ def listed(names: Iterable[object], shown: int = 6) -> str:
     if len(every) <= shown + 1:
         return ", ".join(every)
     return f"{', '.join(every[:shown])} and {len(every) - shown} more"
+
+
+def duration(seconds: float) -> str:
+    """Return a time as a reader says it, in milliseconds where it is short."""
+    return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
 
 
 def data_of(value: object, *names: str) -> dict[str, Any]:

@@ -74,6 +74,10 @@ class Table:
         """Return the rows as text, numbers to six digits."""
         return [[_written(cell) for cell in row] for row in self.rows]
 
+    def _rows(self) -> list[list[str]]:
+        """Return the rows as text, below headings where there are some."""
+        return [*([[one.heading for one in self.columns]] if self.has_headings else []), *self.cells()]
+
     def lines(self, width: int = WIDTH) -> list[str]:
         """Return headings and rows as lines of text; cells are never cut, and only sentences are wrapped.
 
@@ -82,7 +86,7 @@ class Table:
         width
             Columns of the text, which sentences keep to.
         """
-        rows = [*([[one.heading for one in self.columns]] if self.has_headings else []), *self.cells()]
+        rows = self._rows()
         if not rows:
             return []
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
@@ -123,16 +127,14 @@ class Table:
             headings = "".join(f"<th>{html.escape(one.heading)}</th>" for one in self.columns)
             lines.append(f"<thead><tr>{headings}</tr></thead>")
         aligned = [one.align for one in self.columns]
-        rows = ("".join(map(cell, row, aligned)) for row in self.rows)
-        body = (f"<tr>{row}</tr>" for row in rows)
+        body = (f"<tr>{''.join(map(cell, row, aligned))}</tr>" for row in self.rows)
         notes = [f"<p>{html.escape(' '.join(self.notes))}</p>"] if self.notes else []
         return "\n".join([*lines, "<tbody>", *body, "</tbody></table>", *notes, "</div>"])
 
     def latex(self) -> str:
         """Return it as a ``tabular`` of LaTeX."""
         sides = "".join("r" if one.align == ">" else "l" for one in self.columns)
-        rows = [*([[one.heading for one in self.columns]] if self.has_headings else []), *self.cells()]
-        body = [" & ".join(map(_escaped, row)) + r" \\" for row in rows]
+        body = [" & ".join(map(_escaped, row)) + r" \\" for row in self._rows()]
         if self.has_headings:
             body.insert(1, r"\hline")
         return "\n".join([rf"\begin{{tabular}}{{{sides}}}", *body, r"\end{tabular}"])

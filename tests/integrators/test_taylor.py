@@ -23,14 +23,13 @@ from atwood.integrators.taylor.problem import (
     TaylorProblem,
     choose_order,
     logarithm,
-    power_of_two,
 )
 from atwood.pipeline import assemble
 from atwood.simulation.problem.taylor_scene import recurrences
 from atwood_library import Force, Ground, PointMass, Slider, Spring
 from atwood_library.scenes import SCENES, Atwood, Chain, DoublePendulum
 
-from .taylor_reference import ReferenceStepper
+from .taylor_reference import ReferenceStepper, power_of_two
 
 Kind = Literal["compiled", "reference"]
 Scalars = Sequence[Any]

@@ -13,7 +13,7 @@ from atwood.cli.running import degrees_of_freedom, multiplier_labels
 from atwood.forms.assembly import Assembly
 from atwood.result.about import solver_name
 from atwood.result.result import Result
-from atwood.showing import count_of
+from atwood.showing import count_of, duration
 from atwood.stages import STAGES
 from atwood.table import facts, table
 
@@ -134,11 +134,6 @@ def _energy(result: Result) -> str:
     first, last = (0.0 if abs(e) <= ledger.uncertainty else e for e in (ledger.total[0], ledger.total[-1]))
     work = f", work {ledger.work[-1] - ledger.work[0]:.6g} J" if np.any(ledger.work) else ""
     return f"{first:.6g} J to {last:.6g} J{work}; {ledger.describe()}"
-
-
-def duration(seconds: float) -> str:
-    """Return a time as a reader says it, in milliseconds where it is short."""
-    return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
 
 
 def _clean(value: float, values: NDArray[np.float64]) -> float:

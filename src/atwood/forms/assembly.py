@@ -22,7 +22,7 @@ from atwood.forms.derived import as_by_hand
 from atwood.forms.kept import Kept, Key
 from atwood.forms.places import with_reactions
 from atwood.forms.program import FormProgram
-from atwood.forms.reassembly import follow, other_mode, with_flat
+from atwood.forms.reassembly import follow, other_mode, recipe, with_flat
 from atwood.forms.reduced import reduced_form
 from atwood.forms.shared import MAXIMAL, REDUCED, REGULAR, Shared
 from atwood.forms.starting import Source, no_start_quantity
@@ -119,8 +119,6 @@ class Assembly:
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        from atwood.forms.reassembly import recipe
-
         return recipe(self)
 
     def __repr__(self) -> str:

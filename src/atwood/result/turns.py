@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.result.segment_quantities import SegmentQuantities
-from atwood.simulation.run.made import Run
+from atwood.simulation.run.made import Run, run_again
 from atwood.simulation.run.record import SegmentRecord
 
 _CHANGE = 1.0
@@ -118,8 +118,6 @@ class TurnCounter:
 
     def _finely(self, factor: int, time: FloatArray) -> Run | None:
         """Return the same run with so many times the samples; None if there is none."""
-        from atwood.simulation.run.made import run_again
-
         if factor * len(time) > _MOST:
             return None
         if factor not in self._finer:

@@ -14,7 +14,7 @@ from atwood.clock import Clock, TimeIsUp, check_time
 from atwood.late import dataclass, replace
 from atwood.result.energy import EnergyLedger, Piece, make_ledger, power_into
 from atwood.result.segment_quantities import SegmentQuantities
-from atwood.simulation.run.made import Run
+from atwood.simulation.run.made import Run, run_again, times_of_steps
 from atwood.simulation.run.record import SegmentRecord
 
 if TYPE_CHECKING:
@@ -211,8 +211,6 @@ def samples_in_steps(run: Run, times: Sequence[FloatArray], count: int) -> list[
     count
         So many points in each step.
     """
-    from atwood.simulation.run.made import run_again, times_of_steps
-
     steps = times_of_steps(run)
     grids = [joined_times(one, steps) for one in times]
     nodes = [nodes_between(grid, count) for grid in grids]

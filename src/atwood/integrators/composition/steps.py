@@ -20,7 +20,7 @@ from atwood.codegen.routines.kinds import ADDRESS, NUMBER
 from atwood.codegen.routines.language import Routine, Value
 from atwood.codegen.routines.source import RoutineSource
 from atwood.expr import Program
-from atwood.integrators.gauss.fixed_steps import FILES, copy_numbers, interpolate, judge, run, sample
+from atwood.integrators.gauss.fixed_steps import FILES, copy_numbers, interpolate, judge, run, sample, unless_found
 from atwood.integrators.gauss.layout import POINTERS, Layout, Memory, open_routine
 from atwood.integrators.gauss.native import bind_functions
 from atwood.integrators.gauss.steps import FUNCTIONS
@@ -39,12 +39,6 @@ def write_routines(layout: Layout, order: int) -> list[Routine]:
     """Write the routines; see `composition_source`."""
     parts = [_drift(layout), _kick(layout), _compose(layout, steps_of(order)), _begin(layout)]
     return [*parts, judge(layout), _run(layout), _trial(layout), _speeds(layout), interpolate(layout), sample(layout)]
-
-
-def _unless_found(r: Routine, code: Value, given: int = 1) -> None:
-    """Return where a call failed."""
-    with r.when(code != 0):
-        r.give(given)
 
 
 def _velocities(r: Routine, m: Memory, momenta: Value) -> Value:
@@ -66,7 +60,7 @@ def _add(r: Routine, m: Memory, y: Value, rest: Value, amount: Value, count: int
 def _drift(layout: Layout) -> Routine:
     """Move the coordinates along the velocities."""
     r, m, (y, rest, amount) = open_routine(layout, "drift", {"y": ADDRESS, "rest": ADDRESS, "amount": NUMBER})
-    _unless_found(r, _velocities(r, m, y.at(layout.coordinates)))
+    unless_found(r, _velocities(r, m, y.at(layout.coordinates)))
     _add(r, m, y, rest, amount, layout.coordinates)
     r.give(0)
     return r
@@ -79,7 +73,7 @@ def _kick(layout: Layout) -> Routine:
     n, time = layout.coordinates, place_of(r, t)
     m.counts.evaluations = m.counts.evaluations + 1
     derived, scratch = m.pointers.derived, m.pointers.scratch
-    _unless_found(r, call_kernel(r, "kernel", [time, y], derived, scratch, [m.at("main.F")]))
+    unless_found(r, call_kernel(r, "kernel", [time, y], derived, scratch, [m.at("main.F")]))
     _add(r, m, y.at(n), rest.at(n), amount, n)
     r.give(0)
     return r
@@ -92,11 +86,11 @@ def _compose(layout: Layout, steps: tuple[float, ...]) -> Routine:
     before, done = 0.0, 0.0
     for step in (*steps, 0.0):
         share = 0.5 * (before + step)
-        _unless_found(r, r.call("drift", m.session, y, rest, h * share))
+        unless_found(r, r.call("drift", m.session, y, rest, h * share))
         done, before = done + share, step
         if step == 0.0:
             break
-        _unless_found(r, r.call("kick", m.session, y, rest, t + h * done, h * step))
+        unless_found(r, r.call("kick", m.session, y, rest, t + h * done, h * step))
     r.give(0)
     return r
 
@@ -130,7 +124,7 @@ def _trial(layout: Layout) -> Routine:
     rest = m.at("aside.L")
     with r.count(layout.size) as i:
         target[i], rest[i] = source[i], 0.0
-    _unless_found(r, r.call("compose", m.session, target, rest, t, h), 3)
+    unless_found(r, r.call("compose", m.session, target, rest, t, h), 3)
     r.give(0)
     return r
 
@@ -139,7 +133,7 @@ def _speeds(layout: Layout) -> Routine:
     """Write coordinates and velocities; 1 where there are none."""
     r, m, (_, y, out) = open_routine(layout, "speeds", {"t": NUMBER, "y": ADDRESS, "out": ADDRESS}, exported=True)
     n = layout.coordinates
-    _unless_found(r, _velocities(r, m, y.at(n)))
+    unless_found(r, _velocities(r, m, y.at(n)))
     copy_numbers(r, out, y, n)
     copy_numbers(r, out.at(n), m.at("main.F"), n)
     r.give(0)

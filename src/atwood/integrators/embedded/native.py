@@ -1,7 +1,7 @@
 """Embedded pairs as machine code: no Python runs between outputs.
 
 The code of the steps is the same for all problems of a pair and comes from the cache after the first time.  What a
-problem adds is the compiled right-hand side, which is made here from a program of accelerations.
+problem adds is the compiled right-hand side (`atwood.integrators.embedded.rates`).
 """
 
 from __future__ import annotations
@@ -16,18 +16,13 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from atwood.arrays import FloatArray
-from atwood.codegen.llvm.build import build_code, default_options
-from atwood.codegen.llvm.module import Part
 from atwood.codegen.once import once
 from atwood.codegen.routines.source import RoutineSource
-from atwood.errors import KernelEvaluationError, UnsupportedError
-from atwood.expr import Program
+from atwood.errors import KernelEvaluationError
 from atwood.integrators.compiled_functions import Lookout
 from atwood.integrators.embedded.memory import COUNTS, LANES, NUMBERS, POINTERS
-from atwood.integrators.embedded.rates import rates_source
 from atwood.integrators.embedded.tableau import Tableau
 from atwood.integrators.explicit_problem import (
     CompiledRates,
@@ -36,7 +31,6 @@ from atwood.integrators.explicit_problem import (
 )
 from atwood.integrators.native_stepper import COUNTED, NativeStepper, Routines, routines_of
 from atwood.integrators.protocol import SolverOptions
-from atwood.late import dataclass
 
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventData
@@ -46,85 +40,6 @@ if TYPE_CHECKING:
 _RATES = ctypes.CFUNCTYPE(c_int, c_double, c_void_p, c_void_p, c_void_p)
 _PROJECTION = ctypes.CFUNCTYPE(c_int, c_double, c_void_p, c_void_p)
 _GUARDS = ctypes.CFUNCTYPE(c_int, *[c_double, c_void_p, c_void_p] * 2, c_void_p)
-
-
-class CompiledAccelerations:
-    """A program of accelerations as a compiled right-hand side, for any parameter values.
-
-    Parameters
-    ----------
-    program
-        A program of (t, q, u) with the accelerations, and before them the rates of the coordinates unless these are
-        the speeds.
-
-    Raises
-    ------
-    UnsupportedError
-        If the program calls functions in Python.
-    """
-
-    def __init__(self, program: Program) -> None:
-        if any(node.operation == "external" for node in program.nodes):
-            raise UnsupportedError("a program that calls functions in Python has no compiled rates", where=program.name)
-        part = Part("kernel", program)
-        _, q, u = (len(group.symbols) for group in program.inputs)
-        self.program, self.size = program, q + u
-        routines = rates_source(q, u, given=len(program.outputs) == 2)
-        self._built = build_code([part], default_options([part]), exports=["rates"], routines=routines)
-        self._prologue = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)(self._built.code.addresses["kernel_prologue"])
-
-    def bind(self, parameter_values: ArrayLike) -> Callable[[], CompiledRates]:
-        """Compute once what depends on parameters alone; return what gives each session rates of its own.
-
-        Parameters
-        ----------
-        parameter_values
-            The values in the order of the program's parameters.
-        """
-        derived, scratch = self._built.derive("kernel", self.program, parameter_values)
-        function, place, room = self._built.code.addresses["rates"], derived.ctypes.data, 2 + len(scratch)
-
-        def rates() -> CompiledRates:
-            # The pointers to derived values and scratch, and then the scratch itself.
-            own = np.empty(room)
-            data = own.ctypes.data
-            own.view(np.int64)[:2] = place, data + 16
-            return CompiledRates(function, data, (self._built, derived, own))
-
-        return rates
-
-    def open(self) -> OwnRates:
-        """Return rates of a session whose parameters can be changed between its runs."""
-        # The pointers to derived values and scratch, then the derived values and the scratch themselves.
-        count = len(self.program.prologue)
-        own = np.empty(2 + count + self._built.scratch)
-        data = own.ctypes.data
-        own[:2].view(np.uint64)[:] = derived, scratch = data + 16, data + 16 + 8 * count
-        rates = CompiledRates(self._built.code.addresses["rates"], data, (self._built, own))
-        return OwnRates(rates, self._built.code.addresses["kernel_prologue"], derived, scratch)
-
-    def fill(self, own: OwnRates, parameter_values: ArrayLike) -> None:
-        """Give rates of a session their parameters."""
-        values = np.array(parameter_values, dtype=np.float64)
-        self._prologue(values.ctypes.data, own.derived, own.scratch)
-
-
-@dataclass(frozen=True)
-class OwnRates:
-    """Compiled rates with a place for their parameters.
-
-    Attributes
-    ----------
-    rates
-        The rates; they have values once the prologue was called.
-    prologue, derived, scratch
-        Address of the function that computes what depends on parameters alone, and of its two arrays.
-    """
-
-    rates: CompiledRates
-    prologue: int
-    derived: int
-    scratch: int
 
 
 class CompiledStepper(NativeStepper):

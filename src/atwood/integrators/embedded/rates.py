@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable
+from ctypes import c_void_p
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +18,7 @@ from atwood.codegen.routines.source import RoutineSource
 from atwood.errors import UnsupportedError
 from atwood.expr.core.program import Program
 from atwood.integrators.explicit_problem import MET, STEPS, CompiledRates
+from atwood.late import dataclass
 
 
 def rates_source(coordinates: int, speeds: int, given: bool, projects: bool = False) -> RoutineSource:
@@ -78,13 +81,16 @@ def _project(coordinates: int, speeds: int) -> Routine:
     return r
 
 
-class CompiledConstraints:
-    """Accelerations and projections as compiled functions, for any parameter values.
+class CompiledAccelerations:
+    """Accelerations as a compiled right-hand side, with a projection onto constraints or without, for any parameters.
 
     Parameters
     ----------
-    accelerations, projection
-        See `atwood.forms.constrained.programs.ConstrainedProgram`.
+    program
+        A program of (t, q, u) with the accelerations, and before them the rates of the coordinates unless these are
+        the speeds.
+    projection
+        A step onto the constraints; see `atwood.forms.constrained.programs.ConstrainedProgram`.
 
     Raises
     ------
@@ -92,17 +98,19 @@ class CompiledConstraints:
         If a program calls functions in Python.
     """
 
-    def __init__(self, accelerations: Program, projection: Program) -> None:
-        for program in (accelerations, projection):
-            if any(node.operation == "external" for node in program.nodes):
-                raise UnsupportedError(
-                    "a program that calls functions in Python has no compiled rates", where=program.name
-                )
-        parts = [Part("kernel", accelerations), Part("nearer", projection)]
-        _, q, u = (len(group.symbols) for group in accelerations.inputs)
-        self.programs, self.room = (accelerations, projection), q + 2 * u
-        routines = rates_source(q, u, given=len(accelerations.outputs) == 2, projects=True)
-        self._built = build_code(parts, default_options(parts), exports=["rates", "project"], routines=routines)
+    def __init__(self, program: Program, projection: Program | None = None) -> None:
+        self._programs = {"kernel": program} | ({} if projection is None else {"nearer": projection})
+        for one in self._programs.values():
+            if any(node.operation == "external" for node in one.nodes):
+                raise UnsupportedError("a program that calls functions in Python has no compiled rates", where=one.name)
+        parts = [Part(name, one) for name, one in self._programs.items()]
+        _, q, u = (len(group.symbols) for group in program.inputs)
+        given, projects = len(program.outputs) == 2, projection is not None
+        self._room = q + 2 * u if projects else 0
+        routines = rates_source(q, u, given, projects)
+        exports = ["rates", "project"] if projects else ["rates"]
+        self._built = build_code(parts, default_options(parts), exports=exports, routines=routines)
+        self._prologue = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)(self._built.code.addresses["kernel_prologue"])
 
     def bind(self, parameter_values: ArrayLike, projects: bool = True) -> Callable[[], CompiledRates]:
         """Compute once what depends on parameters alone; return what gives each session functions of its own.
@@ -114,18 +122,53 @@ class CompiledConstraints:
         projects
             Whether there are constraints to be met.
         """
-        addresses, room = self._built.code.addresses, 5 + self._built.scratch
-        named = zip(("kernel", "nearer"), self.programs, strict=True)
-        derived = [self._built.derive(name, program, parameter_values)[0] for name, program in named]
+        addresses = self._built.code.addresses
+        derived = [self._built.derive(name, one, parameter_values)[0] for name, one in self._programs.items()]
+        project = addresses["project"] if projects and self._room else 0
+        head = 5 if self._room else 2
+        room = head + self._built.scratch
 
         def rates() -> CompiledRates:
             # The pointers to derived values, scratch and room of each function, and then scratch and room themselves.
-            own = np.empty(room + self.room)
+            own = np.empty(room + self._room)
             data = own.ctypes.data
-            first, second = (one.ctypes.data for one in derived)
-            own[:5].view(np.uint64)[:] = first, data + 40, second, data + 40, data + 8 * room
+            scratch = data + 8 * head
+            pointers = [place for one in derived for place in (one.ctypes.data, scratch)]
+            own[:head].view(np.uint64)[:] = [*pointers, data + 8 * room][:head]
             keep = (self._built, derived, own)
-            project = addresses["project"] if projects else 0
-            return CompiledRates(addresses["rates"], data, keep, project, data + 16)
+            return CompiledRates(addresses["rates"], data, keep, project, data + 16 if project else 0)
 
         return rates
+
+    def open(self) -> OwnRates:
+        """Return rates of a session whose parameters can be changed between its runs."""
+        # The pointers to derived values and scratch, then the derived values and the scratch themselves.
+        count = len(self._programs["kernel"].prologue)
+        own = np.empty(2 + count + self._built.scratch)
+        data = own.ctypes.data
+        own[:2].view(np.uint64)[:] = derived, scratch = data + 16, data + 16 + 8 * count
+        rates = CompiledRates(self._built.code.addresses["rates"], data, (self._built, own))
+        return OwnRates(rates, self._built.code.addresses["kernel_prologue"], derived, scratch)
+
+    def fill(self, own: OwnRates, parameter_values: ArrayLike) -> None:
+        """Give rates of a session their parameters."""
+        values = np.array(parameter_values, dtype=np.float64)
+        self._prologue(values.ctypes.data, own.derived, own.scratch)
+
+
+@dataclass(frozen=True)
+class OwnRates:
+    """Compiled rates with a place for their parameters.
+
+    Attributes
+    ----------
+    rates
+        The rates; they have values once the prologue was called.
+    prologue, derived, scratch
+        Address of the function that computes what depends on parameters alone, and of its two arrays.
+    """
+
+    rates: CompiledRates
+    prologue: int
+    derived: int
+    scratch: int

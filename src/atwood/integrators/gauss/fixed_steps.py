@@ -13,6 +13,12 @@ FILES = ("integrators/gauss/fixed_steps.py", "integrators/gauss/layout.py", "int
 """On these the routines here depend."""
 
 
+def unless_found(r: Routine, code: Value, given: int = 1) -> None:
+    """Return where a call failed."""
+    with r.when(code != 0):
+        r.give(given)
+
+
 def copy_numbers(r: Routine, target: Value, source: Value, count: int) -> None:
     """Copy numbers one by one: the arrays may be one."""
     with r.count(count) as i:

@@ -15,7 +15,7 @@ from atwood.codegen.routines.kernels import call_kernel, place_of
 from atwood.codegen.routines.kinds import ADDRESS, CODE, INTEGER, NUMBER
 from atwood.codegen.routines.language import Routine, Value
 from atwood.codegen.routines.source import RoutineSource
-from atwood.integrators.gauss.fixed_steps import FILES, copy_numbers, interpolate, judge, run, sample
+from atwood.integrators.gauss.fixed_steps import FILES, copy_numbers, interpolate, judge, run, sample, unless_found
 from atwood.integrators.gauss.layout import Layout, Memory, open_routine
 from atwood.integrators.gauss.tableau import Tableau, tableau
 
@@ -54,12 +54,6 @@ def _weighted(weights: Sequence[float], values: Sequence[Value]) -> Value:
     return total
 
 
-def _unless_found(r: Routine, code: Value, given: int = 1) -> None:
-    """Return where a call failed."""
-    with r.when(code != 0):
-        r.give(given)
-
-
 def _evaluate(layout: Layout) -> Routine:
     """Evaluate the equations at the Y of a work area: F, and speeds from those at `guess`."""
     r, m, (w, t, guess) = open_routine(layout, "evaluate", {"w": ADDRESS, "t": NUMBER, "guess": ADDRESS})
@@ -84,7 +78,7 @@ def _stage(layout: Layout, method: Tableau, j: int) -> Routine:
     guess, per_size = w.at(layout.within("U") + j * layout.speeds), m.at("per_size")
     with r.count(n) as i:
         place[i] = y[i] + _weighted(method.shares[j], [w[i + k * n] for k in range(layout.stages)])
-    _unless_found(r, r.call("evaluate", m.session, w, t + h * method.nodes[j], guess))
+    unless_found(r, r.call("evaluate", m.session, w, t + h * method.nodes[j], guess))
     weight = h * method.weights[j]
     with r.count(n) as i:
         new, old = weight * f[i], increments[i]
@@ -106,7 +100,7 @@ def _solve(layout: Layout) -> Routine:
     with r.count(_SWEEPS):
         delta[0], coarse[0] = 0.0, 0.0
         for j in range(layout.stages):
-            _unless_found(r, r.call(f"stage{j}", m.session, w, y, t, h, delta, coarse))
+            unless_found(r, r.call(f"stage{j}", m.session, w, y, t, h, delta, coarse))
         now = delta[0]
         with r.when(now <= _ULP):
             r.give(0)
@@ -125,7 +119,7 @@ def _flat(layout: Layout, method: Tableau) -> Routine:
     f = w.at(layout.within("F"))
     copy_numbers(r, w.at(layout.within("Y")), y, layout.size)
     last = w.at(layout.within("U") + (layout.stages - 1) * layout.speeds)
-    _unless_found(r, r.call("evaluate", m.session, w, t, last))
+    unless_found(r, r.call("evaluate", m.session, w, t, last))
     with r.count(layout.size) as i:
         increment = h * f[i]
         for j, weight in enumerate(method.weights):
@@ -167,7 +161,7 @@ def _speeds(layout: Layout) -> Routine:
     guess, speeds = w.at(layout.within("U")), w.at(layout.within("V" if layout.has_speeds else "F"))
     copy_numbers(r, w.at(layout.within("Y")), y, 2 * n)
     for _ in range(_NEWTON if layout.takes_speeds else 1):
-        _unless_found(r, r.call("evaluate", m.session, w, t, guess))
+        unless_found(r, r.call("evaluate", m.session, w, t, guess))
         if layout.takes_speeds:
             copy_numbers(r, guess, w.at(layout.within("V")), layout.speeds)
     copy_numbers(r, out, y, n)
@@ -181,7 +175,7 @@ def _begin(layout: Layout) -> Routine:
     r, m, _ = open_routine(layout, "begin", exported=True)
     y, w, t = m.at("y"), m.at("main.L"), m.numbers.t
     rest, y_old, scales = m.at("rest"), m.at("y_old"), w.at(layout.within("scale"))
-    _unless_found(r, r.call("flat", m.session, w, y, t, m.numbers.step))
+    unless_found(r, r.call("flat", m.session, w, y, t, m.numbers.step))
     with r.count(layout.size) as i:
         rest[i], y_old[i] = 0.0, y[i]
         scale = r.size(y[i])
@@ -200,7 +194,7 @@ def _run(layout: Layout) -> Routine:
             r.call("ahead", w, result=None)
         code = r.variable(r.call("solve", m.session, w, y, t, h), CODE)
         with r.when(code.now != 0):  # from a poor guess the iteration may lead where the equations have no value
-            _unless_found(r, r.call("flat", m.session, w, y, t, h), 2)
+            unless_found(r, r.call("flat", m.session, w, y, t, h), 2)
             code.now = r.call("solve", m.session, w, y, t, h)
         return code.now
 
@@ -222,7 +216,7 @@ def _trial(layout: Layout) -> Routine:
         for j in range(layout.stages):
             copy_numbers(r, w.at(begin + j * count), own.at(begin + (layout.stages - 1) * count), count)
     for name in ("flat", "solve"):
-        _unless_found(r, r.call(name, m.session, w, source, t, h), 3)
+        unless_found(r, r.call(name, m.session, w, source, t, h), 3)
     with r.count(layout.size) as i:
         total = w[i]
         for j in range(1, layout.stages):

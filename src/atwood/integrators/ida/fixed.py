@@ -18,6 +18,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.codegen.sundials.fixed_pivots import AGAIN, SLOTS, fixed_pivots_addresses
+from atwood.integrators.ida.callbacks import address
 from atwood.late import dataclass
 from atwood.numerics.fixed_pivots import FixedPivots
 
@@ -70,7 +71,7 @@ def table_layout(library: SundialsLibrary) -> TableLayout:
     vector = library.N_VMake_Serial(1, ctypes.addressof(number), context)
     matrix = library.SUNDenseMatrix(1, 1, context)
     solver = library.SUNLinSol_Dense(vector, matrix, context)
-    wanted = {key: _address(getattr(library, name)) for key, name in _NAMES.items()}
+    wanted = {key: address(getattr(library, name)) for key, name in _NAMES.items()}
     found = None
     for word, place in enumerate((c_void_p * _WORDS).from_address(solver)):
         if word and place not in (None, context.value):
@@ -86,10 +87,6 @@ def table_layout(library: SundialsLibrary) -> TableLayout:
     if found is None:
         raise LookupError("SUNDIALS' dense solver has other functions than its library")
     return found
-
-
-def _address(function: Any) -> int:
-    return ctypes.cast(function, c_void_p).value or 0
 
 
 class FixedSolver:
@@ -127,7 +124,7 @@ class FixedSolver:
         self._vectors = {name: np.zeros(pivots.size) for name in ("right", "work", "found")} | {"probe": signs}
         self._block = (c_int64 * len(SLOTS))()
         self._put({name: one.ctypes.data for name, one in self._vectors.items()})
-        self._put({name: _address(one) for name, one in zip(("mend", "solve"), self._functions, strict=True)})
+        self._put({name: address(one) for name, one in zip(("mend", "solve"), self._functions, strict=True)})
         self._follow(pivots)
         self.matrix: int = library.SUNDenseMatrix(len(pivots.positions), 1, context)
         self.solver: int = library.SUNLinSolNewEmpty(context)
@@ -135,9 +132,9 @@ class FixedSolver:
             raise MemoryError("SUNLinSolNewEmpty failed")
         layout = table_layout(library)
         table = c_void_p.from_address(self.solver + layout.table).value or 0
-        kind = {"type": _address(library.SUNLinSolGetType_Dense)}
-        for key, address in (kind | dict(fixed_pivots_addresses())).items():
-            c_void_p.from_address(table + layout.slots[key]).value = address
+        kind = {"type": address(library.SUNLinSolGetType_Dense)}
+        for key, place in (kind | dict(fixed_pivots_addresses())).items():
+            c_void_p.from_address(table + layout.slots[key]).value = place
         c_void_p.from_address(self.solver).value = ctypes.addressof(self._block)
 
     def free(self) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from atwood.errors import UnsupportedError, UsageError
 from atwood.integrators.methods.record import Method, Task
@@ -59,33 +59,31 @@ def _open(task: Task, is_split: bool) -> ExplicitSession:
     return ExplicitSession(problem, task.settings, stepper, task.t, task.y, task.budget, end=task.end)
 
 
-GAUSS = Method(
-    key="gauss",
-    title="Gauss, symplectic",
-    citation="E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd ed., Springer 2006, II.1.3, VIII.6",
+_symplectic: Any = partial(
+    Method,
     kind="hamiltonian",
-    orders=(2, 4, 6, 8, 10, 12),
-    open=partial(_open, is_split=False),
     nodes_in_step=6,
-    reach=8.0,
     steps_seen=0.5,
     steps_unseen=10.0,
     loosest_tolerance=1.0,
-    judged_tolerance=1e-11,
     default_order=_ORDER,
 )
 
-COMPOSITION = Method(
-    key="composition",
-    title="composition, symplectic",
-    citation="E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd ed., Springer 2006, V.3",
-    kind="hamiltonian",
+GAUSS: Method = _symplectic(
+    "gauss",
+    "Gauss, symplectic",
+    "E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd ed., Springer 2006, II.1.3, VIII.6",
+    orders=(2, 4, 6, 8, 10, 12),
+    open=partial(_open, is_split=False),
+    reach=8.0,
+    judged_tolerance=1e-11,
+)
+
+COMPOSITION: Method = _symplectic(
+    "composition",
+    "composition, symplectic",
+    "E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd ed., Springer 2006, V.3",
     orders=(2, 4, 6, 8),
     open=partial(_open, is_split=True),
-    nodes_in_step=6,
     reach=6.0,
-    steps_seen=0.5,
-    steps_unseen=10.0,
-    loosest_tolerance=1.0,
-    default_order=_ORDER,
 )

@@ -14,7 +14,7 @@ section 3.  Three things differ:
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import ceil, exp, frexp, inf, ldexp, log
+from math import ceil, exp, frexp, inf, log
 from typing import TYPE_CHECKING
 
 from atwood.arrays import FloatArray
@@ -107,10 +107,3 @@ def logarithm(value: float) -> float:
         return -1023.0
     mantissa, exponent = frexp(value)
     return 2.0 * mantissa + (exponent - 2)
-
-
-def power_of_two(value: float) -> float:
-    """Return a power of two, good enough for a step."""
-    whole = int(value // 1.0)
-    part = value - whole
-    return ldexp(1.0 + part * (0.6602 + 0.3398 * part), whole)

@@ -7,7 +7,7 @@ velocity along the axis is zero. This constraint needs no force, so that all the
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import partial
 
 import numpy as np
@@ -16,7 +16,7 @@ from atwood.arrays import FloatArray
 from atwood.expr import Expression, Scalar, depends_on, evaluate, is_zero, jacobian, substitute
 from atwood.late import dataclass, replace
 from atwood.mechanics.dynamics.inertia import RigidMass, add_masses
-from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide, derivation_of
+from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide, derivation_of, place_of_largest
 from atwood.mechanics.kinematics.motion import Movement
 from atwood.mechanics.kinematics.orientation import NodeTurn, body_offsets
 from atwood.model.declare.law import ConstraintOptions, Law
@@ -75,16 +75,12 @@ def idle_speeds(derivation: Derivation, state: Movement) -> dict[Expression, Exp
         if not even:
             return None
         columns = sorted(even)
-        chosen = columns[decide(derivation, partial(_largest, tuple(even[c] for c in columns)))]
+        chosen = columns[decide(derivation, partial(place_of_largest, tuple(even[c] for c in columns)))]
         speed = speeds[chosen]
         value = -substitute([rate], {speed: graph.zero})[0] / even[chosen]
         solved = dict(zip(solved, substitute(list(solved.values()), {speed: value}), strict=True))
         solved[speed] = value
     return solved
-
-
-def _largest(coefficients: Sequence[Expression], mechanism: Mechanism) -> int:
-    return int(np.argmax(np.abs(evaluate(list(coefficients), mechanism.known_at_start()))))
 
 
 def hold_idle_spins(mechanism: Mechanism) -> Mechanism:

@@ -13,12 +13,12 @@ from functools import partial
 import numpy as np
 
 from atwood.errors import AtwoodError
-from atwood.expr import Expression, depends_on, evaluate, jacobian, jvp, live, substitute
+from atwood.expr import Expression, depends_on, jacobian, jvp, live, substitute
 from atwood.expr.core.analysis import dependents
 from atwood.mechanics.constraints.pfaffian import Places
 from atwood.mechanics.constraints.values import Values
 from atwood.mechanics.dynamics.equations import Constraint, constraint_levels
-from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide
+from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide, place_of_largest
 from atwood.mechanics.kinematics.motion import Movement
 from atwood.model.local.parts import multiplier_symbol
 
@@ -133,7 +133,7 @@ def _balances(
         left = jacobian([joined], light)
         if not left.entries:
             continue
-        pivot = decide(derivation, partial(_largest, tuple(left.entries)))
+        pivot = decide(derivation, partial(place_of_largest, tuple(left.entries)))
         symbol = light[left.columns[pivot]]
         value = -substitute([joined], {symbol: joined.graph.zero})[0] / left.entries[pivot]
         solved = dict(zip(solved, substitute(list(solved.values()), {symbol: value}), strict=True))
@@ -154,10 +154,6 @@ def _without_inertia(rows: Sequence[Expression], state: Movement) -> list[int]:
     heavy = dependents(live(rows), state.accelerations)
     light = [k for k, row in enumerate(rows) if row.index not in heavy]
     return light if len(light) < len(rows) else []
-
-
-def _largest(coefficients: Sequence[Expression], mechanism: Mechanism) -> int:
-    return int(np.argmax(np.abs(evaluate(list(coefficients), mechanism.known_at_start()))))
 
 
 def _slope(derivation: Derivation, state: Movement, force: Expression, own: Expression) -> Expression | None:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import field
 from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
 
 from atwood.errors import TopologyError
 from atwood.expr import Expression, Scalar, evaluate
@@ -172,6 +174,11 @@ def decide(derivation: Derivation, how: Callable[[Mechanism], T]) -> T:
     outcome = how(derivation)
     derivation.decided.append(Decision(how, outcome))
     return outcome
+
+
+def place_of_largest(values: Sequence[Expression], mechanism: Mechanism) -> int:
+    """Return which of some values is the largest at the start, to be decided by."""
+    return int(np.argmax(np.abs(evaluate(list(values), mechanism.known_at_start()))))
 
 
 def from_start(derivation: Derivation, name: str, form: str, value: Expression) -> Expression:

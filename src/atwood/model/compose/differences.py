@@ -85,10 +85,11 @@ def take_snapshot(model: Model) -> Snapshot:
 def _walk(component: Component, path: str) -> Iterator[tuple[str, Any]]:
     yield path, component
     for name, child in component._children().items():
-        yield from _walk(child, _join(path, name))
+        yield from _walk(child, join_path(path, name))
 
 
-def _join(path: str, name: str) -> str:
+def join_path(path: str, name: str) -> str:
+    """Return the path of something inside a component."""
     return f"{path}.{name}" if path else name
 
 
@@ -108,11 +109,11 @@ def _compare(model: Model, path: str, base: Snapshot, base_path: str, difference
     _compare_starts(model, path, base.starts.get(base_path, {}), differences)
     for name, given in model._attached.items():
         named = list(named_parts({name: given}))
-        if all(_join(base_path, full) not in base.parts for full, _ in named):
-            differences.added[_join(path, name)] = given
+        if all(join_path(base_path, full) not in base.parts for full, _ in named):
+            differences.added[join_path(path, name)] = given
             continue
         for full, part in named:
-            own, own_base = _join(path, full), _join(base_path, full)
+            own, own_base = join_path(path, full), join_path(base_path, full)
             token, settings, snapshot = base.parts[own_base]
             if part._token is not token:
                 differences.replaced[own] = part
@@ -203,7 +204,7 @@ def check_end(model: Component, path: str, other: str) -> None:
     except UsageError:
         raise ConnectError(
             f"it is connected with {other} and would no longer be there",
-            where=_join(model.path, path),
+            where=join_path(model.path, path),
             advice="Connections cannot be taken away; make the model anew.",
         ) from None
 

@@ -25,8 +25,8 @@ from atwood.errors import AtwoodError, UsageError, suggestion
 from atwood.files import check_readable, write_atomically
 from atwood.model.compose.composite import Model
 from atwood.model.compose.connection_rules import find_end
-from atwood.model.compose.differences import REMOVED
-from atwood.model.compose.written import CHANGES, find_class, join_path, write_component
+from atwood.model.compose.differences import REMOVED, join_path
+from atwood.model.compose.written import CHANGES, find_class, write_component
 from atwood.model.declare.component import Component
 from atwood.model.declare.fields import FieldReference
 from atwood.model.declare.function_values import read_function

@@ -9,7 +9,7 @@ from typing import Any
 from atwood.errors import AtwoodError, UsageError, suggestion
 from atwood.model.compose.composite import Model
 from atwood.model.compose.connection_rules import Parts
-from atwood.model.compose.differences import Differences, find_differences
+from atwood.model.compose.differences import Differences, find_differences, join_path
 from atwood.model.declare.component import Component
 from atwood.model.declare.fields import FieldReference
 from atwood.model.declare.function_values import Function
@@ -105,11 +105,6 @@ def _class_name(cls: type[Component], path: str) -> str:
             advice="Write the class at the outer level of a module, not inside a function.",
         )
     return name
-
-
-def join_path(path: str, name: str) -> str:
-    """Return the path of something inside a component."""
-    return f"{path}.{name}" if path else name
 
 
 def find_class(name: Any, where: str) -> type[Component]:

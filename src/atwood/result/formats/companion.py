@@ -24,18 +24,19 @@ def _beside(file: Path) -> Path:
     return file.with_name(f"{file.name}.json")
 
 
-def _digest(data: Any) -> str:
+def digest(data: Any) -> str:
+    """Return the SHA-256 of plain data, whatever the order of its names."""
     return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
 
 
 def _write(file: Path, entries: list[dict[str, Any]]) -> None:
-    text = json.dumps({"of": file.name, "contents": entries, "checksum": _digest(entries)})
+    text = json.dumps({"of": file.name, "contents": entries, "checksum": digest(entries)})
     write_atomically(_beside(file), lambda part: part.write_text(text + "\n", encoding="utf-8"))
 
 
 def _read(file: Path) -> list[dict[str, Any]]:
     data = json.loads(_beside(file).read_text(encoding="utf-8"))
-    if data["checksum"] != _digest(data["contents"]):
+    if data["checksum"] != digest(data["contents"]):
         raise ValueError(f"the checksum in {_beside(file).name} is that of other contents")
     found: list[dict[str, Any]] = data["contents"]
     return found

@@ -26,11 +26,11 @@ from atwood.simulation.problem.problem import Plan
 from atwood.topology.graph import connected_groups
 
 if TYPE_CHECKING:
-    from atwood.integrators.embedded.rates import CompiledConstraints
+    from atwood.integrators.embedded.rates import CompiledAccelerations
 
 
 _PROGRAM: Key[ConstrainedProgram] = Key("accelerations and projections")
-_COMPILED: Key[CompiledConstraints | None] = Key("machine code of accelerations and projections")
+_COMPILED: Key[CompiledAccelerations | None] = Key("machine code of accelerations and projections")
 _LIGHT: Key[tuple[int, ...]] = Key("what has no inertia of its own")
 
 _LEAST = 1e-9
@@ -143,10 +143,10 @@ def _compiled(plan: Plan, program: ConstrainedProgram, values: FloatArray) -> Ca
     return lambda: bound()()
 
 
-def _code(program: ConstrainedProgram) -> CompiledConstraints | None:
+def _code(program: ConstrainedProgram) -> CompiledAccelerations | None:
     """Return the machine code; None where there is none."""
     if any(node.operation == "external" for node in (*program.accelerations.nodes, *program.projection.nodes)):
         return None
-    from atwood.integrators.embedded.rates import CompiledConstraints
+    from atwood.integrators.embedded.rates import CompiledAccelerations
 
-    return CompiledConstraints(program.accelerations, program.projection)
+    return CompiledAccelerations(program.accelerations, program.projection)

@@ -15,7 +15,7 @@ from atwood.integrators.explicit_problem import CompiledRates, ExplicitProblem
 from atwood.integrators.protocol import Values
 
 if TYPE_CHECKING:
-    from atwood.integrators.embedded.native import CompiledAccelerations, OwnRates
+    from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
 
 
 _EXTERNAL: Key[bool] = Key("whether accelerations call functions in Python")
@@ -96,7 +96,7 @@ def first_order(kernel: BoundKernel, coordinates: int) -> Callable[[float, Float
 
 def compiled_rates(assembly: Assembly, found: AccelerationProgram) -> CompiledAccelerations:
     """Return the accelerations of a scene as machine code, for any parameter values."""
-    from atwood.integrators.embedded.native import CompiledAccelerations
+    from atwood.integrators.embedded.rates import CompiledAccelerations
 
     return assembly.shared.get(_COMPILED, lambda: CompiledAccelerations(found.program), found)
 

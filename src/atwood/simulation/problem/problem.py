@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
-from atwood.codegen import BoundKernel
+from atwood.codegen import BoundKernel, compile_ida_callbacks
 from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly
 from atwood.forms.dae import keep_constraints
@@ -289,8 +289,6 @@ class Plan:
 
     def compiled(self, linear_solver: LinearSolver) -> NativeCallbacks:
         """Return residual and Jacobian as machine code, for one session."""
-        from atwood.codegen import compile_ida_callbacks
-
         program = self.program
         code = self.assembly.shared.get(
             _IDA,

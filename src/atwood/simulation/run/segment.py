@@ -26,7 +26,7 @@ from atwood.simulation.dynamics.orientation_coordinates import (
     COORDINATE_SWITCH,
 )
 from atwood.simulation.dynamics.redundancy import RankFinding
-from atwood.simulation.events.modes import EventRecord
+from atwood.simulation.events.modes import EventRecord, without_margin
 from atwood.simulation.events.sides import SIDE
 from atwood.simulation.problem.preparation import pack_state
 from atwood.simulation.problem.problem import Plan
@@ -187,8 +187,6 @@ class _Runner:
             self.recorder.settle()
             return self._ended(self.segment.end, "finished", "")
         if step_result.status is Status.EVENT:
-            from atwood.simulation.events.modes import without_margin
-
             probe, split = self.segment.probe, self.segment.plan.program.split
             step_result = without_margin(lambda t, y: probe.values(t, *split(y)), probe.shift, step_result, self.began)
             self.recorder.rewind(step_result.t)

@@ -25,7 +25,7 @@ from atwood.simulation.problem.step_guard import step_guard
 
 if TYPE_CHECKING:
     from atwood.forms.loops.closed_form import ClosedForm
-    from atwood.integrators.embedded.native import CompiledAccelerations, OwnRates
+    from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
     from atwood.integrators.gauss.hamiltonian import Hamiltonian
     from atwood.integrators.taylor.problem import TaylorProblem
     from atwood.simulation.problem.closed_loops import Solved

@@ -22,7 +22,7 @@ from atwood.files import check_directory
 from atwood.late import dataclass, names_of
 from atwood.result.about import versions
 from atwood.result.formats.companion import write_with_companion
-from atwood.showing import count_of, data_of, fitted
+from atwood.showing import count_of, data_of, duration, fitted
 from atwood.simulation.problem.options import how_solved
 from atwood.study.comparison.reference import Reference
 from atwood.table import Shown, Table, table
@@ -309,9 +309,10 @@ def judge(rows: Iterable[tuple[str, float | None, float | None]]) -> str:
     costs = sorted((cost, label) for cost, label in found if cost is not None)
     (least, best), (most, _worst) = costs[0], costs[-1]
     if most < 1.15 * least:
-        return f"For an error of {target:.0e} all cost the same, {_said(least)}."
-    rest = ", ".join(f"{label} {_said(cost)}" for cost, label in costs[1:])
-    return f"For an error of {target:.0e}, {best} takes {_said(least)}; {rest}: up to {most / least:.1f} times as long."
+        return f"For an error of {target:.0e} all cost the same, {duration(least)}."
+    rest = ", ".join(f"{label} {duration(cost)}" for cost, label in costs[1:])
+    times = f"up to {most / least:.1f} times as long"
+    return f"For an error of {target:.0e}, {best} takes {duration(least)}; {rest}: {times}."
 
 
 def _common_errors(curves: dict[str, list[tuple[float, float]]]) -> float | None:
@@ -346,7 +347,3 @@ def cost_at(points: list[tuple[float, float]], error: float) -> float | None:
     ordered = sorted(points)
     errors, walls = (np.log([point[i] for point in ordered]) for i in (0, 1))
     return float(np.exp(np.interp(math.log(error), errors, walls)))
-
-
-def _said(seconds: float) -> str:
-    return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"

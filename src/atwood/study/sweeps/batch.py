@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.forms.sides.taken_out import has_sides
-from atwood.integrators.ensemble.batch import BatchPlaces
+from atwood.integrators.ensemble.batch import Batch, BatchPlaces
 from atwood.integrators.methods import AUTO, METHODS
 from atwood.late import dataclass
 from atwood.simulation.events.modes import find_event_functions
@@ -134,8 +134,6 @@ class _Batches:
 
     def work(self, runs: NDArray[np.intp], stop: threading.Event) -> int:
         """Make the runs of one piece; return how many are done."""
-        from atwood.integrators.ensemble.batch import Batch
-
         ready = self._prepare(runs)
         if not len(ready.runs):
             return 0

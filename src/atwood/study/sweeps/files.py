@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from atwood.arguments import FILE, instance, takes
 from atwood.errors import UsageError
 from atwood.files import check_directory, read_checked, write_atomically
-from atwood.result.formats.companion import read_with_companion, write_with_companion
+from atwood.result.formats.companion import digest, read_with_companion, write_with_companion
 from atwood.result.formats.dataset import Dataset, Variable
 from atwood.result.formats.matlab import read_matlab, write_matlab
 from atwood.result.formats.netcdf import read_netcdf, write_netcdf
@@ -130,11 +130,7 @@ def _meanings(quantities: list[Variable]) -> dict[str, str]:
 
 def _write_json(sweep: Sweep, file: Path) -> None:
     data = {**sweep.to_dict(), "meanings": dict(sweep.meanings)}
-    file.write_text(json.dumps({**data, "checksum": _digest(data)}, allow_nan=False) + "\n", encoding="utf-8")
-
-
-def _digest(data: Mapping[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
+    file.write_text(json.dumps({**data, "checksum": digest(data)}, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def _read_json(file: Path) -> Sweep:
@@ -142,7 +138,7 @@ def _read_json(file: Path) -> Sweep:
     checksum = data.pop("checksum", None)
     if checksum is None and "meanings" in data:
         raise ValueError("its checksum is missing")
-    if checksum is not None and checksum != _digest(data):
+    if checksum is not None and checksum != digest(data):
         raise ValueError("its checksum is that of other contents")
     return _from_dict(data, data.get("meanings", {}))
 

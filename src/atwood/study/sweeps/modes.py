@@ -14,7 +14,7 @@ from atwood.expr import Program
 from atwood.forms.assembly import Assembly
 from atwood.forms.shared import decisions_of
 from atwood.forms.sides.taken_out import has_sides
-from atwood.integrators.embedded.native import CompiledAccelerations, OwnRates
+from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
 from atwood.integrators.explicit_session import ExplicitSession
 from atwood.integrators.protocol import Budget, Statistics, Status, StepResult
 from atwood.late import dataclass, replace

@@ -18,7 +18,7 @@ from atwood.codegen.sundials.events import EventData
 from atwood.errors import AtwoodError
 from atwood.forms.accelerations import AccelerationProgram, accelerations_of
 from atwood.forms.assembly import Assembly
-from atwood.integrators.embedded.native import OwnRates
+from atwood.integrators.embedded.rates import OwnRates
 from atwood.integrators.ensemble.batch import BatchPlaces
 from atwood.integrators.methods import Method, Task
 from atwood.integrators.protocol import SolverOptions

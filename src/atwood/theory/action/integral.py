@@ -355,8 +355,6 @@ def _made(pieces: list[_Piece], ends: list[_End]) -> Action:
 
 def _rougher(piece: _Piece) -> float:
     """Return the integral of L by the polynomials through every second point, which errs more."""
-    from numpy.polynomial import legendre
-
     count = piece.nodes.times.shape[1]
     points = legendre.leggauss(count)[0]
     chosen = np.arange(0, count, 2)

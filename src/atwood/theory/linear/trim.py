@@ -9,7 +9,7 @@ import numpy as np
 
 from atwood.arguments import PATHS, takes
 from atwood.arrays import FloatArray
-from atwood.errors import SolveError
+from atwood.errors import ParameterError, SolveError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.late import dataclass
 from atwood.model.compose.composite import Model
@@ -176,8 +176,6 @@ def _value_columns(point: OperatingPoint) -> dict[str, list[str]]:
 
 
 def _free_numbers(point: OperatingPoint, free: Sequence[str]) -> set[int]:
-    from atwood.errors import ParameterError, suggestion
-
     names = list(point.scene.tangents.names)
     for path in free:
         if path not in names:
