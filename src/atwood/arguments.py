@@ -91,20 +91,7 @@ class Kind:
 
 
 def takes(error: type[AtwoodError] = UsageError, /, **kinds: Kind) -> Callable[[_F], _F]:
-    """Check the arguments of a function before it is called; defaults are taken as they are.
-
-    Parameters
-    ----------
-    error
-        Class of the errors.
-    **kinds
-        What each argument may be, except ``self`` and ``cls``.
-
-    Raises
-    ------
-    TypeError
-        Where the function is declared, if an argument of it has no kind.
-    """
+    """Check the arguments of a function before it is called; defaults are taken as they are."""
 
     def decorate(function: _F) -> _F:
         declared = inspect.signature(function).parameters.values()
@@ -142,13 +129,7 @@ def takes(error: type[AtwoodError] = UsageError, /, **kinds: Kind) -> Callable[[
 
 
 def command(name: str) -> Callable[[_F], _F]:
-    """Say how the command of a function is called, where it is not called as the function.
-
-    Parameters
-    ----------
-    name
-        The command, which is found where this is written.
-    """
+    """Say how the command of a function is called, where it is not called as the function."""
     return lambda function: function
 
 

@@ -74,31 +74,14 @@ def time_left() -> float:
 
 
 def check_time() -> None:
-    """Look at the clock.
-
-    Raises
-    ------
-    TimeIsUp
-        If the time is used up.
-    """
+    """Look at the clock."""
     end = _deadline.get()
     if end != inf and time.perf_counter() >= end:
         raise TimeIsUp
 
 
 def within_time(work: Callable[[], T]) -> T:
-    """Return what a function gives that cannot look at the clock: it is left to itself where the time is used up.
-
-    Parameters
-    ----------
-    work
-        Goes on in a thread of its own if it takes too long; nobody waits for it, but the end of the process.
-
-    Raises
-    ------
-    TimeIsUp
-        If the time is used up.
-    """
+    """Return what a function gives that cannot look at the clock: it is left to itself where the time is used up."""
     if _deadline.get() == inf:
         return work()
     made: list[T] = []

@@ -109,35 +109,12 @@ class UnsupportedError(AtwoodError):
 
 
 def is_about(error: AtwoodError, path: str) -> bool:
-    """Return whether an error is about a component or something inside it: ``rod1`` is not ``rod10``.
-
-    Parameters
-    ----------
-    error
-        The error.
-    path
-        The component.
-    """
+    """Return whether an error is about a component or something inside it: ``rod1`` is not ``rod10``."""
     return error.where == path or error.where.startswith(f"{path}.")
 
 
 def near_matches(word: str, choices: Iterable[str], n: int = 3) -> list[str]:
-    """Return the choices that look most like a word, best first.
-
-    Parameters
-    ----------
-    word
-        What was written.
-    choices
-        What exists.
-    n
-        The largest number of matches to return.
-
-    Returns
-    -------
-    list of str
-        At most `n` of the choices, as they are spelled there.  Upper and lower case count as equal.
-    """
+    """Return the choices that look most like a word, best first."""
     spellings: dict[str, list[str]] = {}
     for choice in choices:
         same = spellings.setdefault(choice.casefold(), [])
@@ -150,21 +127,7 @@ def near_matches(word: str, choices: Iterable[str], n: int = 3) -> list[str]:
 
 
 def suggestion(word: str, choices: Iterable[str]) -> str:
-    """Return a hint for a name that does not exist.
-
-    Parameters
-    ----------
-    word
-        What was written.
-    choices
-        What exists.
-
-    Returns
-    -------
-    str
-        ``"Did you mean 'mass'?"`` where something looks alike; else a list of what exists where that is
-        short; else an empty string.
-    """
+    """Return a hint for a name that does not exist."""
     known = list(dict.fromkeys(choices))
     close = near_matches(word, known)
     if close:
@@ -178,17 +141,7 @@ _SHORT_LIST = 12
 
 
 def suggestion_in_parts(path: str, known: Iterable[str], verb: str = "has") -> str:
-    """Return a hint for a quantity that does not exist: what looks alike in its part, or what that part has.
-
-    Parameters
-    ----------
-    path
-        What was written.
-    known
-        The paths of the quantities there are.
-    verb
-        What the part does with them, as in "hinge has angle, force.x/y/z".
-    """
+    """Return a hint for a quantity that does not exist: what looks alike in its part, or what that part has."""
     choices, part = list(known), path
     own = [name for name in choices if name.startswith(f"{part}.")]
     while not own and "." in part:

@@ -17,18 +17,7 @@ T = TypeVar("T")
 
 
 def check_directory(target: Path) -> None:
-    """Refuse a file in a directory that does not exist.
-
-    Parameters
-    ----------
-    target
-        The file that is to be written.
-
-    Raises
-    ------
-    UsageError
-        If its directory is missing or closed, or it is a directory itself, a pipe or a device.
-    """
+    """Refuse a file in a directory that does not exist."""
     try:
         if not target.parent.is_dir():
             raise UsageError("there is no such directory", where=str(target.parent), advice="Make it first.")
@@ -38,18 +27,7 @@ def check_directory(target: Path) -> None:
 
 
 def check_readable(source: Path) -> None:
-    """Refuse a file that does not exist.
-
-    Parameters
-    ----------
-    source
-        The file that is to be read.
-
-    Raises
-    ------
-    UsageError
-        If there is none, or it is a directory, or a pipe or a device, which would be waited for.
-    """
+    """Refuse a file that does not exist."""
     try:
         _refuse_others(source)
         if not source.is_file():
@@ -66,24 +44,7 @@ def _refuse_others(file: Path) -> None:
 
 
 def read_checked(source: Path, read: Callable[[Path], T], what: str, advice: str) -> T:
-    """Read a file that Atwood saved.
-
-    Parameters
-    ----------
-    source
-        The file.
-    read
-        Reads it; of a damaged file it may raise anything.
-    what
-        What the file is to hold, in a word.
-    advice
-        What to do about a damaged one.
-
-    Raises
-    ------
-    UsageError
-        If there is no such file, or it holds something else.
-    """
+    """Read a file that Atwood saved."""
     check_readable(source)
     try:
         return read(source)
@@ -103,18 +64,6 @@ def write_atomically(target: Path, write: Callable[[Path], object]) -> None:
     Whoever is stopped in between leaves what was there before. It is written in a directory that nobody else can write
     to, under a name that nobody can foresee; so of several who write one file at once the last one stays, whole. A file
     that was there before gives it its permissions. A link is replaced by the file, and what it leads to stays.
-
-    Parameters
-    ----------
-    target
-        The file.
-    write
-        Writes to the path it is given.
-
-    Raises
-    ------
-    UsageError
-        If it cannot be written; nothing is left behind then.
     """
     check_directory(target)
     try:

@@ -128,19 +128,7 @@ def assemble_flat(
     modes: Mapping[str, str] | None = None,
     line_signs: LineSigns | None = None,
 ) -> Assembly:
-    """Assemble a scene that has been taken apart into leaves.
-
-    Parameters
-    ----------
-    flat
-        The scene.
-    form, level, orientation
-        See `assemble`.
-    modes
-        Mode of each part that has modes; the usual one where it is not given.
-    line_signs
-        On a line, the sign of lengths; as far as start values tell if not given.
-    """
+    """Assemble a scene that has been taken apart into leaves."""
     check_orientation(orientation, form, flat.space)
     check_level(level, form)
     all_modes = modes_of(flat) | dict(modes or {})
@@ -154,22 +142,7 @@ def assemble_flat(
 
 
 def assembly_of(scene: Model | Assembly, name: str | None = None, **asked: str | None) -> Assembly:
-    """Return an assembly as it is, or assemble a scene as was asked for.
-
-    Parameters
-    ----------
-    scene
-        The scene, or an assembly of it.
-    name
-        What to call the scene.
-    **asked
-        `form`, `level` and `orientation`; see `assemble`. None is what an assembly has, or as usual.
-
-    Raises
-    ------
-    UsageError
-        If what was asked for contradicts the assembly.
-    """
+    """Return an assembly as it is, or assemble a scene as was asked for."""
     given = {key: value for key, value in asked.items() if value is not None}
     if not isinstance(scene, Assembly):
         return assemble(scene, name=name, **given)

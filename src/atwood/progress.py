@@ -23,17 +23,7 @@ _BAR = 24
 def told(
     progress: Progress, name: str, say: Callable[..., tuple[float, str]]
 ) -> Iterator[Callable[..., object] | None]:
-    """Yield what is to be called on the way: what was given, or what writes the line; None if nothing is.
-
-    Parameters
-    ----------
-    progress
-        What was given.
-    name
-        What takes long.
-    say
-        Returns, from what the function is called with, the share that is done and where it is in words.
-    """
+    """Yield what is to be called on the way: what was given, or what writes the line; None if nothing is."""
     if not isinstance(progress, bool):
         yield progress
         return

@@ -14,14 +14,7 @@ _LARGEST = 10_000_000
 
 
 def values_of(text: str) -> list[Any]:
-    """Return the values that a text stands for.
-
-    Parameters
-    ----------
-    text
-        ``"0.5:2:16"``: 16 values, evenly from 0.5 to 2; ``"0:90:10deg"``: the same in a unit; ``"1,2,5 kg"``: a list,
-        in which a unit at its end holds for all numbers without one.
-    """
+    """Return the values that a text stands for."""
     found = _RANGE.match(text)
     if found is not None:
         import numpy as np

@@ -16,32 +16,13 @@ _FIELD = 72
 
 
 def brief(value: object, names: Iterable[str]) -> str:
-    """Return the `repr` of a value with fields, with long fields cut short: ``Start(time=0.0, ...)``.
-
-    Parameters
-    ----------
-    value
-        The value.
-    names
-        Its fields.
-
-    Returns
-    -------
-    str
-        What a terminal shows in ten lines at most.
-    """
+    """Return the `repr` of a value with fields, with long fields cut short: ``Start(time=0.0, ...)``."""
     said = ", ".join(f"{name}={field_text(getattr(value, name))}" for name in names)
     return fitted(f"{type(value).__name__}({said})")
 
 
 def fitted(text: str) -> str:
-    """Return a text as it is if a terminal shows it in ten lines; else its beginning.
-
-    Parameters
-    ----------
-    text
-        One line or several.
-    """
+    """Return a text as it is if a terminal shows it in ten lines; else its beginning."""
     lines = text.split("\n")
     if sum(max(1, -(-len(line) // WIDTH)) for line in lines) <= LINES:
         return text
@@ -57,15 +38,7 @@ def count_of(number: int, one: str, many: str = "") -> str:
 
 
 def listed(names: Iterable[object], shown: int = 6) -> str:
-    """Return names with commas; of a long list the first ones, and how many follow.
-
-    Parameters
-    ----------
-    names
-        The names.
-    shown
-        So many are named.
-    """
+    """Return names with commas; of a long list the first ones, and how many follow."""
     every = [str(name) for name in names]
     if len(every) <= shown + 1:
         return ", ".join(every)
@@ -83,13 +56,7 @@ def data_of(value: object, *names: str) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """Return a value as plain data: numbers, texts, lists and dictionaries, as JSON knows them.
-
-    Parameters
-    ----------
-    value
-        Data, arrays, expressions, or a value with fields.
-    """
+    """Return a value as plain data: numbers, texts, lists and dictionaries, as JSON knows them."""
     if value is None or isinstance(value, (str, bool, int, float)):
         return value
     if isinstance(value, complex):

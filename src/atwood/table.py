@@ -79,13 +79,7 @@ class Table:
         return [*([[one.heading for one in self.columns]] if self.has_headings else []), *self.cells()]
 
     def lines(self, width: int = WIDTH) -> list[str]:
-        """Return headings and rows as lines of text; cells are never cut, and only sentences are wrapped.
-
-        Parameters
-        ----------
-        width
-            Columns of the text, which sentences keep to.
-        """
+        """Return headings and rows as lines of text; cells are never cut, and only sentences are wrapped."""
         rows = self._rows()
         if not rows:
             return []
@@ -161,30 +155,12 @@ class Table:
 
 
 def table(headings: Iterable[str], rows: Iterable[Iterable[Any]], title: str = "", notes: Iterable[str] = ()) -> Table:
-    """Return a table whose columns are told by their headings.
-
-    Parameters
-    ----------
-    headings
-        Such as ``"growth, 1/s>"``: name, unit after a comma, and ``>`` or ``~`` for the alignment of `Column`.
-    rows
-        The cells.
-    title, notes
-        See `Table`.
-    """
+    """Return a table whose columns are told by their headings."""
     return Table(tuple(map(_column, headings)), tuple(map(tuple, rows)), title, tuple(notes))
 
 
 def facts(rows: Iterable[tuple[str, str]], title: str = "", notes: Iterable[str] = ()) -> Table:
-    """Return a table of labels and sentences.
-
-    Parameters
-    ----------
-    rows
-        Label and sentence of each fact.
-    title, notes
-        See `Table`.
-    """
+    """Return a table of labels and sentences."""
     return table(("", "~"), rows, title, notes)
 
 

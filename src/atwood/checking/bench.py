@@ -178,15 +178,7 @@ class Rail(Component):
 
 
 def on_bench(trial: Trial, name: str = "part") -> Scene:
-    """Return a scene in which a component has a body on each of its connectors, near where a trial has them.
-
-    Parameters
-    ----------
-    trial
-        The component in a random state.
-    name
-        What to call it there.
-    """
+    """Return a scene in which a component has a body on each of its connectors, near where a trial has them."""
     space, component = trial.space, trial.component.copy()
     line = tuple(space.line) if space.line is not None else (1.0, 0.0, 0.0)
     scene = Scene(space=space.name, gravity=3.0, line_axis=line)

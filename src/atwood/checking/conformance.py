@@ -180,13 +180,7 @@ LENGTH_OF_RUN = 0.05
 
 
 def wrong_runs(trials: list[Trial]) -> Iterator[Finding | None]:
-    """Yield what is wrong with a run in both forms, or None; a note where no start was found.
-
-    Parameters
-    ----------
-    trials
-        The component in random states; the first that it can start from is taken.
-    """
+    """Yield what is wrong with a run in both forms, or None; a note where no start was found."""
     space, reason = trials[0].space.name, ""
     if space == "line" and any(isinstance(one, Shaft) for one in trials[0].component.connectors().values()):
         return  # on a line nothing turns

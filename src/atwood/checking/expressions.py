@@ -28,15 +28,7 @@ TOLERANCE = 1e-5
 
 
 def wrong_on_expressions(trial: Trial, mode: str) -> Iterator[Finding | None]:
-    """Yield, for each energy and load, how expressions differ from numbers, or None.
-
-    Parameters
-    ----------
-    trial
-        The component in a random state.
-    mode
-        Its mode.
-    """
+    """Yield, for each energy and load, how expressions differ from numbers, or None."""
     if any(isinstance(one, JointCoordinate) for one in trial.component.connectors().values()):
         return  # what takes hold of a joint is read with the joint: in scenes
     acting = [law for law in trial.component._laws.values() if law.holds_in(trial.space.name) and law.acts_in(mode)]
@@ -123,15 +115,7 @@ def _finding(laws: Sequence[Law], what: str, space: str) -> Finding:
 
 
 def wrong_updates(trial: Trial, mode: str) -> Iterator[Finding | None]:
-    """Yield, for each update law, what is wrong with what it returns, or None.
-
-    Parameters
-    ----------
-    trial
-        The component in a random state.
-    mode
-        Its mode.
-    """
+    """Yield, for each update law, what is wrong with what it returns, or None."""
     for law in trial.component.laws("update"):
         if law.holds_in(trial.space.name) and law.acts_in(mode):
             specs = trial.component.state_specs()

@@ -25,15 +25,7 @@ Wrench = NDArray[np.float64]
 
 
 def wrong_forces(trial: Trial, mode: str) -> Iterator[Finding | None]:
-    """Yield, for each comparison of forces and energies, what is wrong, or None.
-
-    Parameters
-    ----------
-    trial
-        The component in a random state.
-    mode
-        Its mode.
-    """
+    """Yield, for each comparison of forces and energies, what is wrong, or None."""
     acting = [law for law in trial.component._laws.values() if law.holds_in(trial.space.name) and law.acts_in(mode)]
     for law in acting:
         try:
@@ -79,13 +71,7 @@ def ways(trial: Trial, name: str) -> int:
 
 
 def load_forces(trial: Trial, law: Law) -> Wrench:
-    """Return the loads of a law as forces on each connector along its ways to move.
-
-    Raises
-    ------
-    Unknown
-        If it has none there, or returns something else.
-    """
+    """Return the loads of a law as forces on each connector along its ways to move."""
     try:
         loads = list(getattr(in_motion(trial), law.name)())
         totals: dict[str, tuple[Vector, Vector]] = {}

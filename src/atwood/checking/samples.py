@@ -24,18 +24,7 @@ class Sample:
 
 
 def samples_of(given: Component | type[Component]) -> Iterator[Sample]:
-    """Yield a component as it is given, with other numbers, and with each value of each choice.
-
-    Parameters
-    ----------
-    given
-        A component; of a class, one with its defaults.
-
-    Raises
-    ------
-    UsageError
-        If a class needs a text, such as the path of a file, which nobody can guess.
-    """
+    """Yield a component as it is given, with other numbers, and with each value of each choice."""
     cls = given if isinstance(given, type) else type(given)
     specs, base = cls.parameter_specs(), _base(given)
     yield Sample(cls(**base), full=False)

@@ -47,15 +47,7 @@ class Units:
 
 
 def wrong_units(trial: Trial, mode: str) -> Iterator[Finding | None]:
-    """Yield, for each law, what is wrong with its units, or None.
-
-    Parameters
-    ----------
-    trial
-        The component in a random state.
-    mode
-        Its mode.
-    """
+    """Yield, for each law, what is wrong with its units, or None."""
     for law in type(trial.component)._laws.values():
         if not (law.holds_in(trial.space.name) and law.acts_in(mode)):
             continue

@@ -28,11 +28,6 @@ def check_components(request: Request) -> None:
     TARGET is FILE.py for all components that the file defines, FILE.py:NAME for one, or the name of a library's part.
     Units of laws, joints against constraints, forces against energies, observables, both forms, all spaces. The exit
     code is 1 if something is wrong.
-
-    Parameters
-    ----------
-    run
-        Also run them on a test bench, in both forms: about a second each.
     """
     reports = [check(one, run=request.run) for one in _components(request.target)]
     if request.as_json:

@@ -63,27 +63,7 @@ def command(
     more: Mapping[str, tuple[Kind, Any]] | None = None,
     names: Mapping[str, str] | None = None,
 ) -> click.Command:
-    """Return the command that runs with what was asked for.
-
-    Parameters
-    ----------
-    name
-        The command.
-    run
-        Gets what was asked for. Its docstring is the help of the command, and says what is not said of arguments yet.
-    *functions
-        Whose arguments are options; where they have an argument in common, the first one's table counts.
-    argument
-        ``"scene"``, with parameters and start values that can be set, or another, or empty.
-    is_required
-        Whether it must be given.
-    leave
-        Arguments that are no options.
-    more
-        Further options: their kinds and defaults.
-    names
-        Options that are not called as the arguments.
-    """
+    """Return the command that runs with what was asked for."""
     params: list[click.Parameter] = []
     if argument:
         params.append(click.Argument([argument], required=is_required))

@@ -20,27 +20,7 @@ from atwood.study.comparison.long_runs import compare_long
 
 
 def compare_scene(request: Request) -> None:
-    """Run SCENE in both forms, at several tolerances, against a far more accurate reference.
-
-    Parameters
-    ----------
-    rtols
-        Relative tolerance.  [default: 1e-4 to 1e-10]
-    max_seconds
-        Give up a run after so many seconds.
-    plot
-        Save a work-precision diagram; the suffix says how (.png, .svg, .pdf).
-    save
-        Save all figures, and on what they were measured (.csv).
-    long
-        Compare instead how energy and what else is conserved drift over so many periods, by method.
-    all
-        Compare all scenes of the installed libraries, one after another.
-    html
-        Write a page with tables and pictures within it, and all figures as CSV, to this directory.
-    progress
-        Show progress where there is a terminal.
-    """
+    """Run SCENE in both forms, at several tolerances, against a far more accurate reference."""
     _check_files(request)
     if request.all:
         _compare_all(request)

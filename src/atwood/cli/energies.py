@@ -17,15 +17,7 @@ _NOTHING = 1e-7
 
 
 def print_energies(parts: PartEnergies, out: Writer) -> None:
-    """Show what each component gained from start to end, and where it came from.
-
-    Parameters
-    ----------
-    parts
-        The energies of a run.
-    out
-        Writes.
-    """
+    """Show what each component gained from start to end, and where it came from."""
     shown = {path: parts[path] for path in (*parts, *parts.models)}
     nothing = max(_NOTHING, 3.0 * parts.max_error) * parts.exchanged
     found = {path: cells for path, one in shown.items() if (cells := _cells(one, nothing))}

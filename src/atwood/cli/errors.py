@@ -22,13 +22,7 @@ P = ParamSpec("P")
 
 
 def reporting_errors(function: Callable[P, Any]) -> Callable[P, None]:
-    """Wrap a command so that its errors are shown without a traceback.
-
-    Parameters
-    ----------
-    function
-        The command; with its option ``as_json``, errors go to standard output as JSON too.
-    """
+    """Wrap a command so that its errors are shown without a traceback."""
 
     @functools.wraps(function)
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> None:

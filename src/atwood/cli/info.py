@@ -14,13 +14,6 @@ def show_info(request: Request) -> None:
 
     With the name of a part, such as Pivot, or what textbooks or Modelica call it, such as Revolute: its connectors,
     parameters, inputs and quantities.
-
-    Parameters
-    ----------
-    moved
-        Show in full what the start moved from where it was guessed.
-    orientation
-        Coordinates of orientations in space: quaternion, or Euler angles such as euler-zyz.
     """
     if is_a_part(request.scene):
         show_part(request.scene, request.as_json, bool(request.settings or request.start_values or request.moved))

@@ -11,13 +11,7 @@ from atwood.table import facts
 
 
 def list_scenes(request: Request) -> None:
-    """List the scenes of the installed libraries, or the parts that they are made of.
-
-    Parameters
-    ----------
-    parts
-        List the parts instead: bodies, joints, forces, sensors.
-    """
+    """List the scenes of the installed libraries, or the parts that they are made of."""
     if request.parts:
         list_parts(request.as_json)
         return

@@ -16,13 +16,7 @@ from atwood.table import WIDTH, Table
 
 
 def print_json(data: Mapping[str, Any]) -> None:
-    """Write strict JSON to standard output.
-
-    Parameters
-    ----------
-    data
-        Plain data; numbers that are not finite become null.
-    """
+    """Write strict JSON to standard output."""
     import json
 
     click.echo(json.dumps(strict(data), indent=2, allow_nan=False))
@@ -93,17 +87,7 @@ def warn(text: str) -> None:
 def progress_bar(
     wanted: bool, name: str, share: Callable[..., tuple[float, str]]
 ) -> Iterator[Callable[..., object] | None]:
-    """Show a progress bar on standard error while something goes on, if there is a terminal.
-
-    Parameters
-    ----------
-    wanted
-        Whether to show one at all.
-    name
-        What goes on.
-    share
-        Returns how much is done, and what that is in words, for what a function gives its argument `progress`.
-    """
+    """Show a progress bar on standard error while something goes on, if there is a terminal."""
     if not (wanted and sys.stderr.isatty()):
         yield None
         return

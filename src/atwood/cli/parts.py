@@ -52,11 +52,6 @@ def parts_called(name: str) -> dict[str, type[Component]]:
 
     Of a name with dots, such as ``Modelica.Mechanics.Rotational.Components.Spring``, and of synonyms with dots, the
     shorter has to be the end of the longer. Of several parts those are meant that agree in most of it.
-
-    Parameters
-    ----------
-    name
-        The name of a class, or a synonym, which may be written in small letters and in several words.
     """
     kinds = library_parts()
     if name in kinds:
@@ -88,13 +83,7 @@ def _plain(name: str) -> str:
 
 
 def list_parts(as_json: bool) -> None:
-    """Show the parts of the installed libraries, with one line each.
-
-    Parameters
-    ----------
-    as_json
-        Whether to write JSON.
-    """
+    """Show the parts of the installed libraries, with one line each."""
     parts = library_parts()
     if as_json:
         rows = ((name, _said(kind)[0], list(_synonyms(kind))) for name, kind in parts.items())
@@ -109,22 +98,7 @@ def list_parts(as_json: bool) -> None:
 
 
 def show_part(name: str, as_json: bool, changed: bool = False) -> None:
-    """Show what a part has: connectors, parameters, inputs, and the quantities that results have of it.
-
-    Parameters
-    ----------
-    name
-        The name of its class, or what textbooks or Modelica call it.
-    as_json
-        Whether to write JSON.
-    changed
-        Whether options were given that only a scene has.
-
-    Raises
-    ------
-    UsageError
-        If no library has such a part, or something of it is to be changed.
-    """
+    """Show what a part has: connectors, parameters, inputs, and the quantities that results have of it."""
     found = parts_called(name)
     if not found:
         raise _no_such_part(name)

@@ -23,47 +23,7 @@ _OF_ASSEMBLY = ("form", "level", "orientation")
 
 
 def run_scene(request: Request) -> None:
-    """Simulate SCENE, and show where it ends and how accurate that is.
-
-    Parameters
-    ----------
-    max_steps
-        Stop after so many steps.
-    max_seconds
-        Stop after so many seconds.
-    max_step
-        The largest step, s.
-    first_step
-        The first step, s.
-    order
-        Order of gauss and composition.
-    step
-        Step of gauss and composition, s.
-    structure
-        Nothing needs to move: it is a truss.
-    until
-        Stop where a quantity passes a value, as 'rod1.angle crosses 30 deg' (or rises above, falls below).
-    record
-        Note when that happens, and go on.
-    nominal
-        Size beside which errors of a quantity are small, such as slider.displacement='1 mm'.
-    conserved
-        Show by how much what the scene conserves drifts along the run.
-    energy
-        Energy as a whole, or by component and connector: shown, with --json, in the file of --save, and as --plot.
-    timings
-        Show what each stage from the scene to the motion took.
-    plot
-        Save a plot; the suffix says how (.png, .svg, .pdf).
-    draw
-        Save a picture of the mechanism (.png, .svg, .pdf), or its motion (.gif).
-    view
-        From where a scene in space is drawn: azimuth and elevation, degrees.  [30,20]
-    save
-        Save all trajectories (.nc, .npz, .mat or .csv).
-    progress
-        Show progress where there is a terminal.
-    """
+    """Simulate SCENE, and show where it ends and how accurate that is."""
     _check_files(request)
     with watching():  # from the scene on
         result = _run(request)
@@ -182,15 +142,7 @@ def _draw(result: Result, file: Path, view: str | None) -> None:
 
 
 def run_data(result: Result, request: Request) -> dict[str, Any]:
-    """Return a run as plain data.
-
-    Parameters
-    ----------
-    result
-        The run.
-    request
-        What was asked for.
-    """
+    """Return a run as plain data."""
     from atwood.result.about import describe_run
 
     data = describe_run(result)
@@ -221,25 +173,13 @@ def run_data(result: Result, request: Request) -> dict[str, Any]:
 
 
 def degrees_of_freedom(result: Result) -> int:
-    """Return the degrees of freedom of the scene at its start.
-
-    Parameters
-    ----------
-    result
-        The run.
-    """
+    """Return the degrees of freedom of the scene at its start."""
     plan = result.first_plan
     return len(plan.assembly.own_equations.speeds) - plan.finding.rank
 
 
 def multiplier_labels(result: Result) -> list[str]:
-    """Return the constraints whose multipliers are in the solver's vector, by label.
-
-    Parameters
-    ----------
-    result
-        The run.
-    """
+    """Return the constraints whose multipliers are in the solver's vector, by label."""
     assembly: Assembly = result.assembly
     plan = result.first_plan
     if assembly.form == "reduced":

@@ -24,13 +24,7 @@ from atwood.model.values.units import split_quantity
 
 
 def bundled_scenes() -> dict[str, type[Model]]:
-    """Return the scenes of all installed libraries by name.
-
-    Raises
-    ------
-    UsageError
-        If a library cannot be loaded.
-    """
+    """Return the scenes of all installed libraries by name."""
     found: dict[str, type[Model]] = {}
     for scenes in _scenes_of(all_libraries()):
         for name in scenes:
@@ -54,18 +48,7 @@ def _scenes_of(libraries: Iterable[str]) -> Iterator[Mapping[str, type[Model]]]:
 
 
 def find_scene(text: str) -> tuple[Model, str]:
-    """Return a scene and what to call it.
-
-    Parameters
-    ----------
-    text
-        The name of a scene of a library, or ``file.py:name``.
-
-    Raises
-    ------
-    UsageError
-        If there is no such scene, or the file cannot be read.
-    """
+    """Return a scene and what to call it."""
     file, colon, name = text.rpartition(":")
     if colon and file.endswith(".py"):
         return _scene_in_file(Path(file), name), name
@@ -85,15 +68,7 @@ def find_scene(text: str) -> tuple[Model, str]:
 
 
 def prepare(text: str, settings: Sequence[str], starts: Sequence[str]) -> tuple[Model, str]:
-    """Return a scene with its parameters and start values changed, and what to call it.
-
-    Parameters
-    ----------
-    text
-        See `find_scene`.
-    settings, starts
-        Parameters and start values as ``path=value``.
-    """
+    """Return a scene with its parameters and start values changed, and what to call it."""
     scene, name = find_scene(text)
     for path, value in pairs(settings, "--set"):
         scene.set(path, value)
@@ -112,20 +87,7 @@ def prepare(text: str, settings: Sequence[str], starts: Sequence[str]) -> tuple[
 
 
 def check_applies(scene: Model, form: str, level: str, orientation: str = "quaternion") -> None:
-    """Refuse what was asked for on the command line and would change nothing.
-
-    Parameters
-    ----------
-    scene
-        The scene.
-    form, level, orientation
-        See `atwood.assemble`.
-
-    Raises
-    ------
-    UsageError
-        If the form has no levels, or the scene no orientations.
-    """
+    """Refuse what was asked for on the command line and would change nothing."""
     if form == "reduced" and level != "ggl":
         raise UsageError(
             f"the reduced form has no levels, and no {level!r}: its constraints are eliminated",
@@ -141,19 +103,7 @@ def check_applies(scene: Model, form: str, level: str, orientation: str = "quate
 
 
 def warn_of_radians(scene: Model, path: str, values: Iterable[object], option: str, typed: str) -> None:
-    """Say that an angle without a unit is in radians, where it is beyond a turn, as degrees mostly are.
-
-    Parameters
-    ----------
-    scene
-        The scene.
-    path
-        Of a parameter, or of a start value.
-    values
-        Numbers, or texts with or without a unit.
-    option, typed
-        Where they were given, and how.
-    """
+    """Say that an angle without a unit is in radians, where it is beyond a turn, as degrees mostly are."""
     owner, _, name = path.rpartition(".")
     if option in ("--set", "--vary"):
         part = scene[owner] if owner else scene

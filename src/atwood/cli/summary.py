@@ -23,15 +23,7 @@ _BARS = "▁▂▃▄▅▆▇█"
 
 
 def print_summary(result: Result, request: Request) -> None:
-    """Show a run.
-
-    Parameters
-    ----------
-    result
-        The run.
-    request
-        What was asked for.
-    """
+    """Show a run."""
     out = writer()
     out.show(facts(_facts(result), f"{result.assembly.flat.name}, {result.method}"))
     out.line()
@@ -146,11 +138,6 @@ def main_quantities(result: Result) -> list[str]:
 
     Of a body with coordinates of its orientation its spin is shown, since no result has those coordinates themselves.
     Where something does not move comes last.
-
-    Parameters
-    ----------
-    result
-        The run.
     """
     assembly = result.assembly
     names = [name for name in _shown_coordinates(assembly) if name in result]
@@ -176,15 +163,7 @@ def _shown_coordinates(assembly: Assembly) -> list[str]:
 
 
 def sparkline(values: NDArray[np.float64], width: int = 24) -> str:
-    """Return a small picture of a curve as text.
-
-    Parameters
-    ----------
-    values
-        The curve.
-    width
-        Number of characters.
-    """
+    """Return a small picture of a curve as text."""
     finite = values[np.isfinite(values)]
     if not finite.size:
         return ""

@@ -26,33 +26,7 @@ _ROWS, _COLUMNS, _REASONS = 16, 8, 5
 
 
 def sweep_scene(request: Request) -> None:
-    """Simulate SCENE with many parameters and starts, and show where the runs end.
-
-    Parameters
-    ----------
-    vary
-        Values of a parameter: rod1.length=0.5:2:16 (from, to, how many), or mass2='1,2,5 kg'.
-    start
-        Values of a start value, such as rod1.angle=0:90:10deg.
-    combine
-        Every value with every other, or the first of each, the second of each, and so on.
-    quantities
-        What to keep, such as bob2.position.x; the coordinates if not given.
-    outputs
-        Number of output times; the end alone if not given.
-    max_steps
-        Stop a run after so many steps.
-    max_seconds
-        Stop a run after so many seconds.
-    threads
-        How many threads share the runs.  [default: all processors]
-    plot
-        Save a picture of the ends; the suffix says how (.png, .svg, .pdf).
-    save
-        Save all quantities of all runs (.nc, .npz, .mat, .csv or .json).
-    progress
-        Show progress where there is a terminal.
-    """
+    """Simulate SCENE with many parameters and starts, and show where the runs end."""
     _check_files(request)
     varied = {"--vary": request.vary or {}, "--vary-start": request.start or {}}
     if not any(varied.values()):

@@ -98,13 +98,6 @@ def _equations(function: Callable[..., Any], scene: Assembly, asked: dict[str, A
     """Write the equations of motion of SCENE: Lagrange's equations, with symbols as in a textbook.
 
     In space, --orientation euler-zxz gives them in Euler angles; else angular velocities are in the axes of the body.
-
-    Parameters
-    ----------
-    values
-        Put the values of parameters in place of their symbols.
-    hamiltonian
-        Write the Hamiltonian and the momenta instead.
     """
     if request.values:
         asked["parameters"] = "values"
@@ -116,15 +109,7 @@ def _equations(function: Callable[..., Any], scene: Assembly, asked: dict[str, A
 
 
 def _equilibria(function: Callable[..., Any], scene: Assembly, asked: dict[str, Any], request: Request) -> Any:
-    """Find the equilibria of SCENE, and whether they are stable.
-
-    Parameters
-    ----------
-    along
-        Follow them while a parameter changes, SI units.
-    plot
-        With --along: save a picture of the branches (.png, .svg, .pdf).
-    """
+    """Find the equilibria of SCENE, and whether they are stable."""
     if request.along is None:
         if request.plot is not None:
             raise UsageError("there is nothing to draw", where="--plot", advice="Give --along PATH=FROM:TO too.")
@@ -159,26 +144,7 @@ _SPECIAL: dict[str, tuple[Callable[..., Any], dict[str, tuple[Kind, Any]]]] = {
 
 
 def _show(value: Any, command: str, scene: str, written: str, picture: Path | None) -> None:
-    """Write what was found to standard output, and draw it.
-
-    Parameters
-    ----------
-    latex
-        Write it in LaTeX.
-    markdown
-        Write a page: symbols, energies, momenta, formulas, matrices.
-    python
-        Write a module of Python that computes it.
-    plot
-        Save a picture (.png, .svg, .pdf); those of several modes are numbered.
-    at
-        The state, such as rod.angle='180 deg' or wheel.angular_velocity=3: speeds that are not named are zero; the
-        scene's own start if not given.
-    region
-        Where to look, such as rod.angle=-90deg:90deg; everywhere if not given.
-    orientation
-        Coordinates of orientations in space: quaternion, or Euler angles such as euler-zyz.
-    """
+    """Write what was found to standard output, and draw it."""
     several = value if isinstance(value, (list, tuple)) and not isinstance(value, Shown) else [value]
     if picture is not None:
         _draw(several[0], picture)

@@ -16,11 +16,6 @@ def once(make: Callable[P, T]) -> Callable[P, T]:
 
     Unlike `functools.cache` it makes it once even if several threads ask at the same time: code of which there are two,
     one of them forgotten, would be taken out of memory while it runs.
-
-    Parameters
-    ----------
-    make
-        Makes it, from what can be a key.
     """
     lock, made = threading.RLock(), dict[tuple[object, ...], T]()
 

@@ -72,15 +72,7 @@ _ROUNDED: dict[str, Callable[..., Any]] = {
 
 
 def roughly(count: int, start: int = 0) -> FloatArray:
-    """Return factors next to one, up or down, shape (count, `WAYS`): the same ones each time, not to be changed.
-
-    Parameters
-    ----------
-    count
-        How many values there are.
-    start
-        The number of the first.
-    """
+    """Return factors next to one, up or down, shape (count, `WAYS`): the same ones each time, not to be changed."""
     return _kept_factors(count, start) if count <= _KEPT else _factors(count, start)
 
 
@@ -121,15 +113,7 @@ class RoughProgram:
         self._results = [place[result.index] for result in results]
 
     def __call__(self, parameters: FloatArray, *groups: FloatArray) -> FloatArray:
-        """Return the results, shape (results, `WAYS`); not finite where there is no value.
-
-        Parameters
-        ----------
-        parameters
-            Values of the parameters; they are rounded here.
-        *groups
-            Values of the inputs, of shape (size,) or (size, `WAYS`), rounded already.
-        """
+        """Return the results, shape (results, `WAYS`); not finite where there is no value."""
         factors = roughly(self._count)
         values: list[Any] = [None] * self._count
         for place, value in self._constants:

@@ -25,18 +25,7 @@ _sound: WeakKeyDictionary[type[Component], set[Hashable]] = WeakKeyDictionary()
 
 
 def check_names(parts: Mapping[str, Part]) -> None:
-    """Refuse parts with names in their declarations that name nothing.
-
-    Parameters
-    ----------
-    parts
-        The leaves of a scene.
-
-    Raises
-    ------
-    DeclarationError
-        With the path of the part, and the file and line of the law.
-    """
+    """Refuse parts with names in their declarations that name nothing."""
     _refuse(parts, lambda part: "names", lambda part: wrong_names(part.component, part.path))
 
 
@@ -45,18 +34,6 @@ def check_laws(parts: Mapping[str, Part], space: Space) -> None:
 
     Joints are held against the constraints that they solve, observables against joint coordinates of their name and
     against their rates, at random states, in all modes.
-
-    Parameters
-    ----------
-    parts
-        The leaves of a scene, whose parameters are known to mean something in its space.
-    space
-        What it lives in.
-
-    Raises
-    ------
-    DeclarationError
-        With the path of the part, and the file and line of the law.
     """
     _refuse(parts, lambda part: _shape_of(part, space), lambda part: contradictions(part, space))
 
@@ -98,15 +75,7 @@ def _special(value: Hashable) -> Hashable:
 
 
 def contradictions(part: Part, space: Space) -> Iterator[DeclarationError]:
-    """Yield what is contradictory in the laws of a part.
-
-    Parameters
-    ----------
-    part
-        The part.
-    space
-        What it lives in.
-    """
+    """Yield what is contradictory in the laws of a part."""
     component = part.component
     joints = [law for law in component.laws("joint") if law.holds_in(space.name)]
     for law in joints:
@@ -147,15 +116,7 @@ SPACES = ("line", "plane", "space")
 
 
 def wrong_names(component: Component, where: str) -> Iterator[DeclarationError]:
-    """Yield an error for each name in a component's declarations that names nothing.
-
-    Parameters
-    ----------
-    component
-        The component.
-    where
-        Its path.
-    """
+    """Yield an error for each name in a component's declarations that names nothing."""
     cls = type(component)
     yield from _wrong_settings(component, where)
     for law in cls._laws.values():

@@ -34,13 +34,7 @@ class Unknown(Exception):
 
 
 def attempt(law: Callable[[], Any]) -> list[float]:
-    """Return what a law gives as numbers.
-
-    Raises
-    ------
-    Unknown
-        If it gives none there.
-    """
+    """Return what a law gives as numbers."""
     try:
         found = [float(one) for one in scalars(law())]
     except Exception as error:  # whatever a law of somebody's own can raise; what is amiss is said when it is read
@@ -51,22 +45,7 @@ def attempt(law: Callable[[], Any]) -> list[float]:
 
 
 def wrong_joint(trial: Trial, law: Law, mode: str) -> Iterator[DeclarationError]:
-    """Yield errors for a joint that contradicts other laws of its component.
-
-    Parameters
-    ----------
-    trial
-        The component in a random state.
-    law
-        The joint.
-    mode
-        The mode of the component.
-
-    Raises
-    ------
-    Unknown
-        If a law has no value there.
-    """
+    """Yield errors for a joint that contradicts other laws of its component."""
     poses_at = _followed(trial, law)
     moving = trial.moving(poses_at)
     poses = poses_at(0.0)
@@ -289,20 +268,7 @@ def _wrong_coordinates(
 
 
 def wrong_rates(trial: Trial, joint: Law | None) -> Iterator[DeclarationError]:
-    """Yield errors for observables whose rates are not their derivatives.
-
-    Parameters
-    ----------
-    trial
-        The component in a random state.
-    joint
-        The joint along which its connectors move; None if each moves by itself.
-
-    Raises
-    ------
-    Unknown
-        If a law has no value there.
-    """
+    """Yield errors for observables whose rates are not their derivatives."""
     laws = {one.name: one for one in trial.component.laws("observable") if one.holds_in(trial.space.name)}
     known = joint.options.coordinates if joint is not None else ()  # `wrong_joint` has looked at these
     rated = [one for one in laws.values() if one.options.rate in laws and one.name not in known]

@@ -118,17 +118,7 @@ class Trial:
         return found
 
     def bound(self, t: float, poses: Mapping[str, Pose], motions: Mapping[str, Motion] | None = None) -> Any:
-        """Return the component with numbers in place of its fields.
-
-        Parameters
-        ----------
-        t
-            Time, s.
-        poses
-            Where its connectors are.
-        motions
-            What they know besides; positions and orientations alone if it is not given.
-        """
+        """Return the component with numbers in place of its fields."""
         if motions is None:
             motions = {name: self.motion(name, pose) for name, pose in poses.items()}
         held = {
@@ -174,17 +164,6 @@ class Trial:
         """Return where connectors are with one of them placed by a joint: b from a, or a from b where b is the world.
 
         Joints that share a coordinate with it place theirs too.
-
-        Parameters
-        ----------
-        law
-            The joint.
-        t
-            Time, s.
-        values
-            Its coordinates; those of the trial at that time if not given.
-        poses
-            Where connectors are without it; those of the trial at that time if not given.
         """
         found = dict(poses or self.at(t))
         for one in self.component.laws("joint"):
@@ -321,17 +300,7 @@ A root in the place of a cosine is right within a quarter turn, and an absolute 
 
 
 def make_trial(part: Part, space: Space, seed: int) -> Trial:
-    """Return a component in a random state, the same for the same seed; with odd seeds its joints are far from zero.
-
-    Parameters
-    ----------
-    part
-        The component with its values.
-    space
-        What it lives in.
-    seed
-        Of the random numbers.
-    """
+    """Return a component in a random state, the same for the same seed; with odd seeds its joints are far from zero."""
     draw = random.Random(seed)
 
     def number() -> float:

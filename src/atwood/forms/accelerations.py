@@ -99,20 +99,7 @@ def accelerations_of(assembly: Assembly) -> AccelerationProgram | None:
 
 
 def acceleration_program(assembly: Assembly, method: Method | None = None) -> AccelerationProgram | None:
-    """Return the accelerations of a scene in generalized coordinates.
-
-    Parameters
-    ----------
-    assembly
-        The scene, assembled in either form.
-    method
-        How to solve for them; None takes what costs least.
-
-    Returns
-    -------
-    AccelerationProgram or None
-        None where constraints are left among the generalized coordinates, or the method asked for does not apply.
-    """
+    """Return the accelerations of a scene in generalized coordinates."""
     equations = assembly.reduced
     if equations.constraints:
         return None
@@ -201,15 +188,7 @@ def _by_mass_matrix(equations: Equations, rows: Sequence[Expression], numeric: b
 
 
 def solve_symmetric(entries: Mapping[tuple[int, int], Expression], right: Sequence[Expression]) -> list[Expression]:
-    """Return the solution of a positive definite system, written out where that is not too long.
-
-    Parameters
-    ----------
-    entries
-        The matrix by row and column, on and above the diagonal.
-    right
-        The right-hand side.
-    """
+    """Return the solution of a positive definite system, written out where that is not too long."""
     return (_solve_numerically if _is_full(entries, len(right)) else _solve_in_order)(entries, right)
 
 

@@ -84,17 +84,7 @@ class RatesProgram:
 
 
 def balance_program(name: str, equations: Equations, parameters: Collection[Expression]) -> BalanceProgram:
-    """Return the balance of forces of a set of equations.
-
-    Parameters
-    ----------
-    name
-        Named in messages.
-    equations
-        The equations, of either form.
-    parameters
-        The symbols of parameters.
-    """
+    """Return the balance of forces of a set of equations."""
     at_rest = dict.fromkeys(equations.accelerations, 0.0)
     inputs, known = state_groups(equations), tuple(parameters)
     mass, product = SparseMatrix((), (), ()), None
@@ -132,17 +122,7 @@ def balance_program(name: str, equations: Equations, parameters: Collection[Expr
 
 
 def rates_program(name: str, equations: Equations, parameters: Collection[Expression]) -> RatesProgram:
-    """Return how the coordinates of a set of equations move with its speeds.
-
-    Parameters
-    ----------
-    name
-        Named in messages.
-    equations
-        The equations, of either form.
-    parameters
-        The symbols of parameters.
-    """
+    """Return how the coordinates of a set of equations move with its speeds."""
     sizes = (len(equations.coordinates), len(equations.speeds))
     if rates_are_speeds(equations):
         everyone = np.arange(sizes[0], dtype=np.intp)

@@ -56,18 +56,7 @@ class CanonicalPrograms:
 
 
 def canonical_programs(assembly: Assembly) -> CanonicalPrograms:
-    """Return Hamilton's equations of a scene in the reduced form.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-
-    Raises
-    ------
-    UnsupportedError
-        If it has no Hamiltonian, or forces act that do not follow from it.
-    """
+    """Return Hamilton's equations of a scene in the reduced form."""
     return assembly.shared.get(_CANONICAL, lambda: _make(assembly))
 
 
@@ -76,18 +65,6 @@ def closed_canonical_programs(assembly: Assembly, form: ClosedForm) -> Canonical
 
     L is that of all coordinates with the formulas put in: holonomic constraints leave Lagrange's equations of the
     independent coordinates as they are (Goldstein, section 1.4). Branches are parameters after all others.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    form
-        Its loops solved.
-
-    Raises
-    ------
-    UnsupportedError
-        If it has no Hamiltonian, or forces act that do not follow from it.
     """
     return assembly.shared.get(_CLOSED, lambda: _make_closed(assembly, form), form)
 
@@ -120,18 +97,7 @@ class SeparablePrograms:
 
 
 def separable_programs(assembly: Assembly) -> SeparablePrograms | None:
-    """Return Hamilton's equations of a scene whose H is a sum of a function of p and one of q; None where it is none.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-
-    Raises
-    ------
-    UnsupportedError
-        If it has no Hamiltonian.
-    """
+    """Return Hamilton's equations of a scene whose H is the sum of a function of p and one of q, else None."""
     return assembly.shared.get(_SEPARABLE, lambda: _separate(assembly))
 
 

@@ -17,20 +17,7 @@ _TINY = 1e-300
 
 
 def check_level(level: str, form: str) -> None:
-    """Refuse a level that would change nothing.
-
-    Parameters
-    ----------
-    level
-        What was asked for.
-    form
-        ``"reduced"`` or ``"dae"``.
-
-    Raises
-    ------
-    UsageError
-        If the form has no levels.
-    """
+    """Refuse a level that would change nothing."""
     if form == "reduced" and level != "ggl":
         raise UsageError(
             f"the reduced form has no levels, and no {level!r}: its constraints are eliminated",
@@ -51,24 +38,6 @@ def dae_form(
     position and velocity constraints, with a second set of multipliers that shifts positions onto the constraints.
     ``index1`` holds the constraints' second derivative and drifts; ``index1-projected`` is the same, with what comes
     out of it projected.
-
-    Parameters
-    ----------
-    name
-        Named in messages.
-    equations
-        Equations in maximal coordinates.
-    parameters
-        The symbols of parameters.
-    level
-        ``"ggl"``, ``"index1"`` or ``"index1-projected"``.
-    tidy
-        Rewrites the residual without changing its values.
-
-    Raises
-    ------
-    UsageError
-        If there is no such level.
     """
     if level not in LEVELS:
         raise UsageError(f"there is no level {level!r} of the dae form", advice=suggestion(level, LEVELS))

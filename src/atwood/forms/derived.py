@@ -42,19 +42,7 @@ _PLAIN = 2
 def derive_once(
     what: str, graph: Graph, read: object, derive: Callable[[], tuple[str, Sequence[Expression]]]
 ) -> tuple[str, list[Expression]]:
-    """Return what a derivation gives, from the cache if the same was derived before.
-
-    Parameters
-    ----------
-    what
-        Names the derivation.
-    graph
-        The graph to which it adds.
-    read
-        All that it reads: expressions, numbers and texts, in tuples, mappings and dataclasses.
-    derive
-        Derives it; returns a word and expressions.
-    """
+    """Return what a derivation gives, from the cache if the same was derived before."""
     store = default_cache()
     key = None if store is None else derivation_key(what, graph, read)
     if store is None or key is None:
@@ -101,18 +89,7 @@ def derivation_key(what: str, graph: Graph, read: object) -> str | None:
 
 @cache
 def hash_of_sources(root: Path = Path(__file__).parents[1]) -> str:
-    """Return a hash of all code that derives.
-
-    Parameters
-    ----------
-    root
-        The folder of the package.
-
-    Raises
-    ------
-    UnsupportedError
-        If it cannot be read: what another version derived could then be taken for what this one would.
-    """
+    """Return a hash of all code that derives."""
     total = sha256()
     for room in SOURCES:
         files = sorted((root / room).rglob("*.py"))
@@ -165,17 +142,7 @@ _MOST_COORDINATES = 12
 
 
 def as_by_hand(equations: Equations, parameters: Sequence[Expression], rows: Sequence[Expression]) -> list[Expression]:
-    """Return rows rewritten with fewer operations, for scenes of the size that one would do by hand.
-
-    Parameters
-    ----------
-    equations
-        Whose rows they are.
-    parameters
-        Symbols that keep their values for a run.
-    rows
-        The rows, with their values.
-    """
+    """Return rows rewritten with fewer operations, for scenes of the size that one would do by hand."""
     if len(equations.coordinates) > _MOST_COORDINATES or equations.solved_speeds:
         return list(rows)
     angles = [q for q, c in zip(equations.coordinates, equations.names, strict=True) if c.unit == "rad"]

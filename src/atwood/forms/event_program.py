@@ -21,22 +21,7 @@ _LARGEST = 120
 def event_program(
     assembly: Assembly, values: Sequence[Expression], kept: Sequence[int], kept_maximal: Sequence[int]
 ) -> Program | None:
-    """Return the program of (t, q, u, shift) with the values of events, each with its shift added.
-
-    Parameters
-    ----------
-    assembly
-        The scene in its mode.
-    values
-        The values, of time, coordinates, speeds, accelerations and reactions.
-    kept, kept_maximal
-        Numbers of the constraints that are independent, in the coordinates of the form and in maximal coordinates.
-
-    Returns
-    -------
-    Program or None
-        None where the values cannot be had so: reactions of redundant constraints, or of very many bodies.
-    """
+    """Return the program of (t, q, u, shift) with the values of events, each with its shift added."""
     equations = assembly.own_equations
     known: dict[Expression, Expression] = {}
     symbols = [one.symbol for one in assembly.reactions if any(depends_on(value, [one.symbol]) for value in values)]

@@ -31,17 +31,7 @@ class Kept:
         self._made: dict[Hashable, Any] = {}
 
     def get(self, key: Key[T], make: Callable[[], T], *about: Hashable) -> T:
-        """Return what was made under a key, making it if it is not there.
-
-        Parameters
-        ----------
-        key
-            What it is.
-        make
-            Makes it, from the value and from `about` alone.
-        about
-            What it depends on besides the value; kept only for the last.
-        """
+        """Return what was made under a key, making it if it is not there."""
         known = self._made.get(key)
         if known is not None and known[0] == about:
             found: T = known[1]

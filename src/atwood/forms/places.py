@@ -20,15 +20,7 @@ TO_MAXIMAL: Key[Program] = Key("maximal coordinates in terms of generalized ones
 
 
 def to_maximal(assembly: Assembly, given: Literal["reduced", "regular"] = "reduced") -> Program:
-    """Return the program of (t, q, u) in generalized coordinates that gives maximal coordinates and speeds.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    given
-        Which generalized coordinates: those of the reduced form, or the same with quaternions, in which starts are.
-    """
+    """Return the program of (t, q, u) in generalized coordinates that gives maximal coordinates and speeds."""
     equations = assembly.in_coordinates(given)
     is_reduced = equations is assembly.reduced
     return assembly.shared.get(TO_MAXIMAL, lambda: _make(assembly, equations, assembly.maximal), is_reduced)
@@ -65,15 +57,7 @@ def _places(reduced: Equations, maximal: Equations) -> tuple[list[Expression], l
 
 
 def with_reactions(reduced: Equations, maximal: Equations) -> Equations:
-    """Return equations in generalized coordinates with the reactions that forces read as functions of the state.
-
-    Parameters
-    ----------
-    reduced
-        Equations in generalized coordinates, whose rows may depend on multipliers.
-    maximal
-        The same in maximal coordinates, where these are known.
-    """
+    """Return equations in generalized coordinates with the reactions that forces read as functions of the state."""
     positions, speeds = _places(reduced, maximal)
     where = dict(zip((*maximal.coordinates, *maximal.speeds), (*positions, *speeds), strict=True))
     return with_known(reduced, dict(zip(maximal.read, substitute(list(maximal.read.values()), where), strict=True)))

@@ -140,11 +140,6 @@ def rows_along_speeds(equations: Equations) -> list[Expression]:
     With loops, the row of a speed that follows from the constraints is left out, and a constraint takes its place. That
     is as good for the coordinates as for the speeds: for an orientation the rows are ``B^T q' = B^T B u``; there
     B^T B is a multiple of one for a quaternion, and one more keeps its size.
-
-    Parameters
-    ----------
-    equations
-        The equations.
     """
     symbols = rate_symbols(equations)
     number = {speed: i for i, speed in enumerate(equations.speeds)}
@@ -179,15 +174,7 @@ def _sum(terms: Sequence[Expression]) -> Expression:
 
 
 def kinematic_rows(equations: Equations, shift: Sequence[Expression] | None = None) -> list[Expression]:
-    """Return, for each coordinate, the row that says how it moves with the speeds.
-
-    Parameters
-    ----------
-    equations
-        The equations.
-    shift
-        For each speed, what is taken from it first.
-    """
+    """Return, for each coordinate, the row that says how it moves with the speeds."""
     symbols = rate_symbols(equations)
     number = {speed: i for i, speed in enumerate(equations.speeds)}
     rows = []
@@ -218,23 +205,7 @@ def make_form_program(
     extra: Sequence[Expression] = (),
     independent: Sequence[int] = (),
 ) -> FormProgram:
-    """Put a residual into programs, with its Jacobian by forward derivatives.
-
-    Parameters
-    ----------
-    name
-        Named in messages.
-    form, level, equations
-        What the residual belongs to.
-    parameters
-        The symbols of parameters.
-    residual
-        F, in terms of time, coordinates, their rates, speeds, accelerations and multipliers.
-    multipliers, extra
-        Symbols of the multipliers.
-    independent
-        See `FormProgram`.
-    """
+    """Put a residual into programs, with its Jacobian by forward derivatives."""
     graph = equations.graph
     rates = rate_symbols(equations)
     y = (*equations.coordinates, *equations.speeds, *multipliers, *extra)
@@ -311,21 +282,7 @@ def derive(
     parameters: tuple[Expression, ...],
     may_go_by_columns: bool,
 ) -> Derivative:
-    """Return the Jacobian of a residual.
-
-    Parameters
-    ----------
-    name
-        What the program is called.
-    residual
-        F.
-    groups
-        Its inputs: time, y and y'.
-    parameters
-        The symbols of parameters.
-    may_go_by_columns
-        Whether it may be its product with a direction.
-    """
+    """Return the Jacobian of a residual."""
     _, (_, y), (_, yp) = groups
     graph = y[0].graph if y else parameters[0].graph
     cj = graph.symbol("cj")

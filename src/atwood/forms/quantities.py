@@ -21,13 +21,7 @@ _ENERGIES: Key[Program] = Key("energies")
 
 
 def find_observables(assembly: Assembly, paths: Sequence[str]) -> list[Observable]:
-    """Return observables of a scene by path.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such quantity.
-    """
+    """Return observables of a scene by path."""
     known = assembly.observables
     for path in paths:
         if path not in known:
@@ -49,19 +43,7 @@ def energy_program(assembly: Assembly) -> Program:
 def known_program(
     assembly: Assembly, key: Key[Program], expressions: Callable[[], Sequence[Expression]], *about: Hashable
 ) -> Program:
-    """Return a program of (t, q, u, a, reactions) that is made once for all assemblies of a structure.
-
-    Parameters
-    ----------
-    assembly
-        One of them.
-    key
-        What it is; messages have its name.
-    expressions
-        Gives what to compute.
-    about
-        What it depends on besides the structure.
-    """
+    """Return a program of (t, q, u, a, reactions) that is made once for all assemblies of a structure."""
     return assembly.shared.get(key, lambda: state_program(assembly, key.name, expressions()), *about)
 
 

@@ -47,19 +47,7 @@ def assembled_anew(
     line_signs: LineSigns | None = None,
     same_origin: bool = False,
 ) -> Assembly:
-    """Return a scene assembled in the form and the coordinates of another, with equations of its own.
-
-    Parameters
-    ----------
-    assembly
-        The other.
-    flat
-        The scene, taken apart.
-    modes, line_signs
-        Mode of each part that has modes, the one it begins in where none is given; on a line, the sign of lengths.
-    same_origin
-        Whether positions are counted from where the other counts them: states pass from one to the other.
-    """
+    """Return a scene assembled in the form and the coordinates of another, with equations of its own."""
     all_modes = modes_of(flat) | dict(modes or {})
     with stage("mechanism"):
         origin = {"origin": assembly.mechanism.origin} if same_origin else {}
@@ -69,17 +57,7 @@ def assembled_anew(
 
 
 def with_flat(assembly: Assembly, flat: FlatScene, source: Source | None = None) -> Assembly:
-    """Return the assembly of a scene with other values: with the same programs if it has the same structure.
-
-    Parameters
-    ----------
-    assembly
-        An assembly of the scene.
-    flat
-        The scene with the other values, taken apart.
-    source
-        Where it comes from; where the assembly comes from if not given.
-    """
+    """Return the assembly of a scene with other values: with the same programs if it has the same structure."""
     source = source or assembly.source
     found, reason = follow(assembly, flat, source)
     if found is not None:
@@ -90,13 +68,7 @@ def with_flat(assembly: Assembly, flat: FlatScene, source: Source | None = None)
 
 
 def follow(assembly: Assembly, flat: FlatScene, source: Source | None = None) -> tuple[Assembly | None, str]:
-    """Return the assembly of a scene with other values, with the same programs; None, and why, if it needs others.
-
-    Parameters
-    ----------
-    assembly, flat, source
-        See `with_flat`.
-    """
+    """Return the assembly of a scene with other values, with the same programs; None, and why, if it needs others."""
     mechanism, reason = moved_to(assembly, flat)
     if mechanism is None:
         return None, reason
@@ -109,17 +81,7 @@ def other_mode(
     line_signs: LineSigns,
     orientation: Orientation | None = None,
 ) -> Assembly:
-    """Return a scene in other modes, with lengths on a line signed as given; what was made before is used again.
-
-    Parameters
-    ----------
-    assembly
-        An assembly of the scene.
-    modes, line_signs
-        Mode of each part that has modes; on a line, the sign of lengths.
-    orientation
-        In which coordinates orientations are; the same if not given.
-    """
+    """Return a scene in other modes, with lengths on a line signed as given; what was made before is used again."""
     if assembly.source is None:
         raise UsageError("it was assembled from leaves, so that it has no other modes", where=assembly.flat.name)
     coordinates = orientation or assembly.orientation
@@ -171,18 +133,7 @@ class _Recipe(NamedTuple):
 
 
 def recipe(assembly: Assembly) -> tuple[Callable[..., Assembly], tuple[Shared, _Recipe]]:
-    """Return what makes an assembly again, for `pickle`.
-
-    Parameters
-    ----------
-    assembly
-        The assembly.
-
-    Raises
-    ------
-    UsageError
-        If it cannot be assembled again.
-    """
+    """Return what makes an assembly again, for `pickle`."""
     if assembly.source is None:
         raise UsageError("it was assembled from leaves and cannot be pickled", where=assembly.flat.name)
     mechanism = assembly.mechanism

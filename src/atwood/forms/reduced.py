@@ -38,24 +38,7 @@ def reduced_form(
     dependent: Sequence[int] = (),
     dependent_speeds: Sequence[int] | None = None,
 ) -> FormProgram:
-    """Return the reduced form of a scene.
-
-    Parameters
-    ----------
-    name
-        Named in messages.
-    equations
-        Equations in the coordinates of the forest.
-    parameters
-        The symbols of parameters.
-    rows
-        The equations' rows, perhaps rewritten.
-    dependent
-        With loops: one speed for each constraint on positions, chosen so that these can be solved for what moves with
-        them.
-    dependent_speeds
-        One speed for each constraint; the same ones when None.
-    """
+    """Return the reduced form of a scene."""
     if not equations.constraints:
         residual = [*kinematic_rows(equations), *rows]
         return make_form_program(name, "reduced", "", equations, parameters, residual)
@@ -143,19 +126,7 @@ class NullSpaceProgram:
 def null_space_program(
     name: str, equations: Equations, parameters: Collection[Expression], rows: Sequence[Expression]
 ) -> NullSpaceProgram:
-    """Return what the reduced form of a mechanism with loops is made of.
-
-    Parameters
-    ----------
-    name
-        Named in messages.
-    equations
-        Equations in the coordinates of the forest, with independent constraints.
-    parameters
-        The symbols of parameters.
-    rows
-        The equations' rows, perhaps rewritten.
-    """
+    """Return what the reduced form of a mechanism with loops is made of."""
     rates = rate_symbols(equations)
     kinematic = rows_along_speeds(equations)
     values = [either_sign(one.value) for one in equations.constraints if one.value is not None]

@@ -57,17 +57,7 @@ class Shared:
         return Shared, ()  # what was made belongs to the process; who shared it does so again
 
     def get(self, key: Key[T], make: Callable[[], T], *about: Hashable) -> T:
-        """Return what was made under a key, making it if it is not there.
-
-        Parameters
-        ----------
-        key
-            What it is.
-        make
-            Makes it, from the structure and from `about` alone.
-        about
-            What it depends on besides the structure.
-        """
+        """Return what was made under a key, making it if it is not there."""
         place = (key, *about) if about else key
         try:
             found: T = self._made[place]
@@ -162,29 +152,7 @@ def _find_shape(flat: FlatScene, mechanism: Mechanism) -> _Shape | None:
 def with_values_of(
     flat: FlatScene, mechanism: Mechanism, shared: Shared, other: FlatScene
 ) -> tuple[Mechanism | None, str]:
-    """Return a mechanism with the values of another scene, if these do not change its structure.
-
-    Parameters
-    ----------
-    flat, mechanism
-        A scene, and its mechanism.
-    shared
-        What is shared by all scenes of this structure.
-    other
-        The scene whose values to take.
-
-    Returns
-    -------
-    Mechanism or None
-        None if the structure is another one.
-    str
-        Why, in words.
-
-    Raises
-    ------
-    TopologyError
-        If rigid parts contradict each other with these values.
-    """
+    """Return a mechanism with the values of another scene, if these do not change its structure."""
     reason = _changed_parts(flat, other)
     shape = shared.get(_SHAPE, lambda: _find_shape(flat, mechanism))
     if reason or shape is None:
@@ -220,15 +188,7 @@ def decisions_of(mechanism: Mechanism, shared: Shared) -> list[Decision]:
 
 
 def decided_alike(mechanism: Mechanism, shared: Shared) -> bool:
-    """Return whether all that was decided by the size of numbers comes out with these as it did.
-
-    Parameters
-    ----------
-    mechanism
-        With other values than those that it was decided with.
-    shared
-        Has the equations.
-    """
+    """Return whether all that was decided by the size of numbers comes out with these as it did."""
     return all(one.how(mechanism) == one.outcome for one in decisions_of(mechanism, shared))
 
 

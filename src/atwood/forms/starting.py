@@ -26,13 +26,7 @@ _STARTING: Key[Shared] = Key("what the scene shares as its start is found")
 
 
 def starting(assembly: Assembly) -> Assembly:
-    """Return a scene as its start is found: with constraints on velocities as they are, which no start decides.
-
-    Parameters
-    ----------
-    assembly
-        The scene; it is returned itself where nothing depends on the start.
-    """
+    """Return a scene as its start is found: with constraints on velocities as they are, which no start decides."""
     mechanism = assembly.mechanism
     if mechanism.places is None:
         return assembly
@@ -47,11 +41,6 @@ def with_constants_of_start(assembly: Assembly) -> Assembly:
     """Return a scene with what its start makes of its constraints on velocities: some are integrals with a constant.
 
     Where parts have modes, another mode could begin with other constants, and everything stays as it is.
-
-    Parameters
-    ----------
-    assembly
-        The scene as its start is found; it is returned itself where nothing depends on the start.
     """
     if assembly.modes or assembly.source is None or not holds_velocities(assembly.mechanism):
         return assembly
@@ -70,20 +59,7 @@ def _beside(shared: Shared) -> Shared:
 
 
 def moved_to(assembly: Assembly, flat: FlatScene) -> tuple[Mechanism | None, str]:
-    """Return the mechanism with the values of another scene; None, and why, if its structure is another.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    flat
-        The other one, taken apart.
-
-    Raises
-    ------
-    StartError
-        If constants come from the start, and the other scene has none.
-    """
+    """Return the mechanism with the values of another scene; None, and why, if its structure is another."""
     before = starting(assembly)
     with assembly.shared.lock:
         # What was decided by the size of numbers is known only when the equations are.
@@ -132,15 +108,7 @@ class Source:
     scene: Model | None = None
 
     def changed(self, values: Mapping[str, Any], start: Mapping[str, Any], guess: Mapping[str, Any]) -> Model:
-        """Return a copy of the scene with other values.
-
-        Parameters
-        ----------
-        values
-            Parameters by path.
-        start, guess
-            Start values by path; None lets one go.
-        """
+        """Return a copy of the scene with other values."""
         if self.scene is None:
             raise UsageError(
                 "it was assembled from leaves, so that its scene is not known", advice="Assemble the scene itself."
@@ -169,15 +137,7 @@ def change_scene(scene: Model, values: Mapping[str, Any], start: Mapping[str, An
 
 
 def no_start_quantity(path: str, known: Mapping[str, Observable]) -> StartError:
-    """Return the error that says that a start value is of nothing.
-
-    Parameters
-    ----------
-    path
-        What was given.
-    known
-        The quantities there are; what is offered instead is a position or a speed, of the same part if there is one.
-    """
+    """Return the error that says that a start value is of nothing."""
     if re.match(r"(lambda|mu)\b", path):
         return StartError(
             "a multiplier follows from positions and speeds and cannot be prescribed at the start",

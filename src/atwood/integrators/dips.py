@@ -31,17 +31,7 @@ class Point:
 
 
 def may_dip(first: Point, last: Point, signs: Sequence[float], share: float = FULL) -> list[bool]:
-    """Return which functions may lose the sign between two points at both of which they have it.
-
-    Parameters
-    ----------
-    first, last
-        The points.
-    signs
-        The sign of each; zero for those that are not looked at.
-    share
-        Up to which share of the distance the tangents must keep the sign.
-    """
+    """Return which functions may lose the sign between two points at both of which they have it."""
     width = last.time - first.time
     return [
         sign != 0.0 and _may(sign * a, sign * b, sign * down * width, sign * up * width, share)
@@ -56,17 +46,7 @@ def _may(a: float, b: float, down: float, up: float, share: float) -> bool:
 
 
 def find_dip(first: Point, last: Point, signs: Sequence[float], read: Callable[[float, float], Point]) -> float | None:
-    """Return a time at which one of the functions has lost its sign between two points; None if none does.
-
-    Parameters
-    ----------
-    first, last
-        The points.
-    signs
-        The sign of each function; zero for those that are not looked at.
-    read
-        The point at a time, with slopes taken over a part of a distance.
-    """
+    """Return a time at which one of the functions has lost its sign between two points; None if none does."""
     shortest = _SHORTEST * (last.time - first.time)
     parts, count, share = [(first, last)], 0, FULL
     while parts and count < _MOST:

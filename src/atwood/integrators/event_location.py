@@ -108,15 +108,7 @@ class EventLocator:
         self._last = None
 
     def handed_on(self, t: float, ahead: Root | None = None) -> tuple[int, ...]:
-        """Return what a start at a time is to know of each event: its sign, or that it has just happened.
-
-        Parameters
-        ----------
-        t
-            The time.
-        ahead
-            What has been found beyond it, but has not happened yet.
-        """
+        """Return what a start at a time is to know of each event: its sign, or that it has just happened."""
         fired = self._fired if t == self._fired_at else [False] * len(self._signs)
         found = [JUST_HAPPENED if one else sign for one, sign in zip(fired, self._signs, strict=True)]
         return tuple(found if ahead is None else (-one or sign for one, sign in zip(ahead.events, found, strict=True)))

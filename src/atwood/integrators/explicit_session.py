@@ -111,15 +111,6 @@ class ExplicitSession(Session):
 
         What the rates and events depend on besides time and values may have changed before. For compiled steps, and for
         sessions that were opened to leave stiff problems to others or not, as this run does.
-
-        Parameters
-        ----------
-        t, y, budget, leave, end
-            As of a new session.
-        horizon
-            A typical length of the run, s.
-        absolute
-            Absolute tolerances; as before if not given.
         """
         self._stepper.renew(horizon, absolute)
         self._watch(horizon)
@@ -174,18 +165,7 @@ class ExplicitSession(Session):
         self._starts += 1
 
     def sample(self, times: FloatArray) -> tuple[FloatArray, FloatArray, StepResult]:
-        """Go on through many times at once, as far as nothing stops it.
-
-        Parameters
-        ----------
-        times
-            Rising, the first not before the time at which the last advance ended.
-
-        Returns
-        -------
-        tuple
-            Values and rates at the times that were reached, one row each, and how it ended.
-        """
+        """Go on through many times at once, as far as nothing stops it."""
         times = np.ascontiguousarray(times, dtype=np.float64)
         if not (len(times) and self._here[0] <= times[0] and times[-1] < inf and np.all(np.diff(times) >= 0.0)):
             raise UsageError(f"cannot sample from t = {self._here[0]:.9g} at these times: they must rise from there")
@@ -204,13 +184,7 @@ class ExplicitSession(Session):
     def _sample_quickly(
         self, times: FloatArray, values: FloatArray, rates: FloatArray
     ) -> tuple[int, StepResult | None]:
-        """Let the stepper go through times as long as no limit is near, and nothing happens.
-
-        Returns
-        -------
-        tuple
-            How many times it filled, and why it must end there; None if single advances can go on.
-        """
+        """Let the stepper go through times as long as no limit is near, and nothing happens."""
         filled = 0
 
         def fill() -> None:

@@ -12,17 +12,7 @@ SAMPLE_ARGUMENTS = {"times": ADDRESS, "wanted": INTEGER, "ys": ADDRESS, "yps": A
 
 
 def write_sample(r: Routine, numbers: Record, counts: Record, width: Operand) -> Routine:
-    """Write the body of ``sample``: fill a table with values and rates at output times; it ends as ``run`` does.
-
-    Parameters
-    ----------
-    r
-        The routine, whose arguments are a session and `SAMPLE_ARGUMENTS`.
-    numbers, counts
-        Of the session, with the fields ``stop`` and ``filled``.
-    width
-        How many numbers a row has.
-    """
+    """Write the body of ``sample``: fill a table with values and rates at output times; it ends as ``run`` does."""
     session, times, wanted, ys, yps = r.arguments
     i = r.variable(0, INTEGER)
     with r.forever():

@@ -280,15 +280,7 @@ class Statistics:
 
 
 def choose_linear_solver(problem: ImplicitProblem, options: SolverOptions, has_fixed: bool = False) -> LinearSolver:
-    """Return the linear solver that the options and the pattern ask for.
-
-    Parameters
-    ----------
-    problem, options
-        What is solved, and how.
-    has_fixed
-        Whether the driver can eliminate with fixed pivots.
-    """
+    """Return the linear solver that the options and the pattern ask for."""
     if options.linear_solver == "dense" or options.linear_solver == "sparse":
         return options.linear_solver
     wanted = options.linear_solver == "fixed"

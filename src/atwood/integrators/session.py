@@ -39,18 +39,7 @@ class Session(ABC):
     _stale: bool
 
     def advance(self, t_out: float) -> StepResult:
-        """Go on to exactly a time, or stop earlier at an event, a limit or a failure.
-
-        Parameters
-        ----------
-        t_out
-            Not before the time at which the last advance ended.
-
-        Returns
-        -------
-        StepResult
-            Where it ended and why, always with a good state.
-        """
+        """Go on to exactly a time, or stop earlier at an event, a limit or a failure."""
         if not self._here[0] <= t_out < inf:
             raise UsageError(f"cannot advance from t = {self._here[0]:.9g} to t = {t_out:.9g}")
         return self._taken(lambda: self._run(float(t_out)))
@@ -101,13 +90,7 @@ class Session(ABC):
         return () if self._locator is None else self._locator.handed_on(self._here[0], self._root)
 
     def sample(self, times: FloatArray) -> tuple[FloatArray, FloatArray, StepResult]:
-        """Go on as far as nothing stops it; return values and rates at the times that were reached, and how it ended.
-
-        Parameters
-        ----------
-        times
-            Rising, the first not before the time at which the last advance ended.
-        """
+        """Integrate until an event; return values and rates at the times that were reached, and how it ended."""
         ended, values, rates = self.here, list[FloatArray](), list[FloatArray]()
         for t in times:
             ended = self.advance(float(t))
@@ -122,18 +105,6 @@ class Session(ABC):
         """Return the solution at times that lie within the last step, as far as nothing can stop the run before them.
 
         It is what single advances would give, without their looks at what cannot have changed.
-
-        Parameters
-        ----------
-        times
-            Rising.
-        first, past
-            Which of them: from the first number to before the second.
-
-        Returns
-        -------
-        ndarray
-            Of shape (times, unknowns): the values at as many of them as could be read, perhaps none.
         """
         return np.empty((0, len(self._here[1])))
 

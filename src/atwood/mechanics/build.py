@@ -33,22 +33,7 @@ from atwood.topology.spanning_forest import Coordinate, SpanningForest
 
 
 def build_equations(mechanism: Mechanism, forest: SpanningForest) -> Equations:
-    """Derive the equations of motion of a mechanism in one form.
-
-    Parameters
-    ----------
-    mechanism
-        The mechanism.
-    forest
-        How its configuration is computed; it says which form it is.
-
-    Raises
-    ------
-    TopologyError
-        If rigid parts contradict each other.
-    UnsupportedError
-        If a law asks for what this version cannot do.
-    """
+    """Derive the equations of motion of a mechanism in one form."""
     derivation = derivation_of(mechanism)
     graph, bodies, space = derivation.table.graph, derivation.bodies, derivation.space
     layouts = {body.index: body_offsets(body, space) for body in bodies.bodies}
@@ -118,13 +103,7 @@ def _moving(
     values: Values,
     taken: Taken,
 ) -> tuple[Movement, dict[Expression, Expression], list[Expression], Values, Taken]:
-    """Return how the mechanism moves, with its linked inputs and its forces, with linear knots eliminated.
-
-    Returns
-    -------
-    tuple
-        The motion, inputs, inertial less applied forces, the constraints on positions, and what was eliminated.
-    """
+    """Return how the mechanism moves, with its linked inputs and its forces, with linear knots eliminated."""
     while True:
         state = motion.finish(taken.solution, taken.speeds)
         signals = resolve_signals(derivation, site, state.kinematics)
@@ -140,15 +119,7 @@ def _moving(
 def _use_up(
     derivation: Derivation, site: Site, masses: Masses, forest: SpanningForest, motion: Motion
 ) -> tuple[Values, Taken]:
-    """Use up the constraints that eliminate coordinates or speeds of the reduced form.
-
-    Returns
-    -------
-    Values
-        The constraints on positions that are left, in terms of the coordinates that are left.
-    Taken
-        What was eliminated, and the constraints on velocities that are left.
-    """
+    """Use up the constraints that eliminate coordinates or speeds of the reduced form."""
     found = find_constraints(derivation, forest, motion.placements)
     values = constraint_values(derivation, site, motion.placements, found.on_positions)
     if derivation.space.is_planar:
@@ -229,21 +200,7 @@ def _read_multipliers(mechanism: Mechanism, signals: Mapping[Expression, Express
 def resolve_signals(
     mechanism: Mechanism, site: Site, kinematics: Kinematics, read: Mapping[Expression, Expression] | None = None
 ) -> dict[Expression, Expression]:
-    """Return what each linked input stands for, and the multipliers that laws of force read where these are known.
-
-    Parameters
-    ----------
-    mechanism, site, kinematics
-        The mechanism.
-    read
-        Multipliers as functions of the state (`Equations.read`); where it is not given, their symbols stay.
-
-    Raises
-    ------
-    DeclarationError
-        If inputs feed each other in a circle, or an output has no meaning here or needs what is known only after the
-        forces are.
-    """
+    """Return what each linked input stands for, and the multipliers that laws of force read where these are known."""
     with mechanism.relations.reading():
         found = _resolved(mechanism, site, kinematics)
     if read:
@@ -268,13 +225,7 @@ def _resolved(mechanism: Mechanism, site: Site, kinematics: Kinematics) -> dict[
 
 
 def _in_turn(mechanism: Mechanism, raw: Mapping[Expression, Expression]) -> dict[Expression, Expression]:
-    """Return what inputs stand for without other inputs in it.
-
-    Raises
-    ------
-    DeclarationError
-        If some feed each other in a circle, with these alone.
-    """
+    """Return what inputs stand for without other inputs in it."""
     reads = {symbol: [other for other in raw if depends_on(value, [other])] for symbol, value in raw.items()}
     found: dict[Expression, Expression] = {}
     while len(found) < len(raw):

@@ -42,25 +42,7 @@ def read_mechanism(
     known_line_signs: LineSigns | None = None,
     origin: Connector | Literal["near"] | None = "near",
 ) -> Mechanism:
-    """Read the laws of all parts and find nodes, joints and bodies.
-
-    Parameters
-    ----------
-    flat
-        The scene.
-    modes
-        Mode of each part that has modes.
-    known_line_signs
-        On a line, the sign of lengths, where it is known already.
-    origin
-        The fixed connector that positions are counted from, None for the world's origin; the one that is near, unless
-        another mode of the scene has settled it.
-
-    Raises
-    ------
-    TopologyError
-        If rigid parts contradict each other.
-    """
+    """Read the laws of all parts and find nodes, joints and bodies."""
     ground = _lay_ground(flat)
     space = ground.space
     check_names(flat.parts)

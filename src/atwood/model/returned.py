@@ -21,17 +21,7 @@ def law_value(bound: Any, name: str) -> Any:
 
 
 def call_law(path: str, law: Law, function: Callable[[], Any]) -> Any:
-    """Return what a function gives that evaluates a law; whatever it raises says the part and the law.
-
-    Parameters
-    ----------
-    path
-        The part.
-    law
-        The law.
-    function
-        Evaluates it.
-    """
+    """Return what a function gives that evaluates a law; whatever it raises says the part and the law."""
     try:
         return function()
     except AtwoodError as error:
@@ -62,13 +52,7 @@ def _what_to_write(error: Exception) -> str:
 
 
 def one_scalar(graph: Graph, value: Any) -> Expression:
-    """Return the one number that a law gives, as an expression.
-
-    Raises
-    ------
-    DeclarationError
-        If it is none.
-    """
+    """Return the one number that a law gives, as an expression."""
     if value is None:
         raise DeclarationError("it returns nothing", advice="End it with return and a number.")
     if isinstance(value, Vector):
@@ -91,20 +75,7 @@ def finite_scalar(graph: Graph, value: Any) -> Expression:
 
 
 def listed(value: Any, kinds: tuple[type, ...]) -> list[Any]:
-    """Return what a law gives as a list of loads, or of inertias.
-
-    Parameters
-    ----------
-    value
-        What it gave.
-    kinds
-        What they can be.
-
-    Raises
-    ------
-    DeclarationError
-        If it is no iterable of these.
-    """
+    """Return what a law gives as a list of loads, or of inertias."""
     wanted = " or ".join(kind.__name__ for kind in kinds)
     advice = f"Yield each {wanted}, or return a list of them, which may be empty."
     if value is None:

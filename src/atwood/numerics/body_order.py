@@ -49,17 +49,7 @@ class _Joint:
 def elimination_stages(
     rows: IndexArray, columns: IndexArray, equations: NDArray[np.intp], bodies: NDArray[np.intp]
 ) -> list[Stage]:
-    """Return the stages of an elimination, from the ends of trees to their roots.
-
-    Parameters
-    ----------
-    rows, columns
-        Where the matrix has entries.
-    equations
-        The row that belongs to each unknown.
-    bodies
-        The number of the body of each unknown; -1 for multipliers of constraints.
-    """
+    """Return the stages of an elimination, from the ends of trees to their roots."""
     of_row = np.empty_like(bodies)
     of_row[equations] = bodies
     joints, by_multiplier = _joints(rows, columns, equations, bodies, of_row)

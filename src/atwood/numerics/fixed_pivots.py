@@ -93,17 +93,6 @@ def fix_pivots(
     Each stage takes the unknowns of its body, then its multipliers, and always that which changes fewest entries
     (H. M. Markowitz, Management Science 3, 1957). What then has no pivot in its own row takes one in the row of another
     such unknown, as what has no mass and its constraints do, or waits for the next stage that it is coupled with.
-
-    Parameters
-    ----------
-    rows, columns
-        Where the matrix has entries.
-    equations
-        The row in which each unknown has its pivot.
-    stages
-        What is eliminated when.
-    samples
-        Entries of matrices for which the pivots are to be good; without any the pattern alone decides.
     """
     size = len(equations)
     numbers = Samples(rows, columns, size, samples) if samples else Residues(len(rows))

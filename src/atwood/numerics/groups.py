@@ -16,13 +16,6 @@ def independent_by_groups(matrix: Any, groups: NDArray[np.intp]) -> bool:
 
     Such a group has columns in which no other row has entries, and its rows are independent in these. Where loops are
     left the answer is no, whatever their rows are.
-
-    Parameters
-    ----------
-    matrix
-        A `scipy.sparse.csr_array`.
-    groups
-        The number of the group of each row; it is independent in its own columns if it `is_clear` there.
     """
     rows_of: dict[int, list[int]] = defaultdict(list)
     for row, group in enumerate(groups.tolist()):

@@ -49,17 +49,7 @@ def row_sizes(jacobian: Matrix, scales: FloatArray) -> FloatArray:
 
 
 def row_scales(jacobian: Matrix, scales: FloatArray, errors: FloatArray) -> FloatArray:
-    """Return the size of each row: how much it changes when a coordinate changes by its scale, if that is known.
-
-    Parameters
-    ----------
-    jacobian
-        The rows.
-    scales
-        Size of each coordinate.
-    errors
-        How far rounding can take each row, in the same scales.
-    """
+    """Return the size of each row: how much it changes when a coordinate changes by its scale, if that is known."""
     return trusted_sizes(row_sizes(jacobian, scales), errors)
 
 
@@ -70,13 +60,7 @@ def trusted_sizes(sizes: FloatArray, errors: FloatArray) -> FloatArray:
 
 
 def certain(errors: FloatArray, sizes: FloatArray) -> FloatArray:
-    """Return what is not rounding alone if it is exceeded.
-
-    Parameters
-    ----------
-    errors, sizes
-        How far rounding can take each row, and its largest entry.
-    """
+    """Return what is not rounding alone if it is exceeded."""
     return tolerances.CERTAIN * _at_least(errors, sizes)
 
 
@@ -87,19 +71,7 @@ def _at_least(errors: FloatArray, sizes: FloatArray) -> FloatArray:
 def independent_rows(
     matrix: Matrix, errors: FloatArray, most: int | None = None, first: NDArray[np.bool_] | None = None
 ) -> list[int]:
-    """Return the numbers of independent rows, as many as there are, and rather the first than the last ones.
-
-    Parameters
-    ----------
-    matrix
-        The rows, with columns of like scale; rows may have any size.
-    errors
-        How far rounding can take each row, in the same units.
-    most
-        How many to return at most.
-    first
-        Which rows come before all others, even if these would make a better choice.
-    """
+    """Return the numbers of independent rows, as many as there are, and rather the first than the last ones."""
     errors = _at_least(errors, row_sizes(matrix, np.ones(matrix.shape[1])))
     if not is_full(matrix):
         if most is None and _is_clear(matrix, errors):
@@ -154,17 +126,6 @@ def review_rows(
 
     A choice is good if what the other rows are made of takes no row of it many times, each measured by the terms that
     it is computed from: exchanging two rows multiplies the volume of the choice by that number.
-
-    Parameters
-    ----------
-    matrix
-        The rows, with columns of like scale.
-    errors
-        How far rounding can take each row; see `independent_rows`.
-    kept
-        The choice.
-    first
-        Rows that come before all others, which take no place of these; see `independent_rows`.
     """
     chosen = list(kept)
     others = [i for i in range(matrix.shape[0]) if i not in set(chosen)]

@@ -34,33 +34,13 @@ def is_full(matrix: Matrix) -> bool:
 
 
 def is_best_full(shape: tuple[int, int], entries: int, many: bool = False) -> bool:
-    """Return whether a matrix is better kept as an array: because it is small, or because it is full anyhow.
-
-    Parameters
-    ----------
-    shape
-        Rows and columns.
-    entries
-        How many are not always zero.
-    many
-        Whether there is one for each of many states.
-    """
+    """Return whether a matrix is better kept as an array: because it is small, or because it is full anyhow."""
     largest, dense = (LARGEST_FULL_OF_MANY, _DENSE_OF_MANY) if many else (LARGEST_FULL, _DENSE)
     return max(shape) <= largest or entries > dense * shape[0] * shape[1]
 
 
 def from_entries(rows: Any, columns: Any, entries: Any, shape: tuple[int, int], full: bool | None = None) -> Matrix:
-    """Return the matrix with the given entries, each place at most once.
-
-    Parameters
-    ----------
-    rows, columns, entries
-        The entries and where they are.
-    shape
-        Rows and columns.
-    full
-        Whether it is to be an array; None for what is better.
-    """
+    """Return the matrix with the given entries, each place at most once."""
     if is_best_full(shape, len(entries)) if full is None else full:
         made = np.zeros(shape)
         made[rows, columns] = entries

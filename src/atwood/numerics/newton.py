@@ -77,41 +77,7 @@ def newton(
     is_even: bool = False,
     refused: tuple[type[Exception], ...] = (),
 ) -> tuple[_Place, Missing]:
-    """Return the place near by at which nothing is missing, or that to which so many steps have led.
-
-    Parameters
-    ----------
-    look
-        What is missing at a place.
-    moved
-        Where a displacement leads from a place.
-    place
-        Where to begin.
-    scales
-        Size of a displacement along each unknown.
-    steps
-        The largest number of steps.
-    met
-        What is missed by less is met: from there on steps are taken as long as they help, up to rounding.
-    exact
-        What is missed by no more needs no further step.
-    still
-        The last step is one that displaces nothing by more, in units of the scales; none unless given.
-    longest
-        No step displaces anything by more, in units of the scales.
-    halvings
-        So often a step is halved until less is missing than before; 0 for full steps.
-    is_even
-        Whether rows of known size have size one (`row_scales`), so that what is missing says how well they are known;
-        see `least_norm`.
-    refused
-        Errors by which a place has no values: steps there are halved as well.
-
-    Returns
-    -------
-    place, missing
-        The place, and what is missing there; where the last step was `still`, what was missing before it.
-    """
+    """Return the place near by at which nothing is missing, or that to which so many steps have led."""
     now = look(place)
     last = inf
     for _ in range(steps):

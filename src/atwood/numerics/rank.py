@@ -62,15 +62,7 @@ class Decomposition:
 
 
 def significant(values: FloatArray, errors: Errors = None) -> BoolArray:
-    """Return which singular values are there in truth; of stacks of matrices, for each.
-
-    Parameters
-    ----------
-    values
-        Singular values, the largest first; shape (..., count).
-    errors
-        How far the matrix may be off.
-    """
+    """Return which singular values are there in truth; of stacks of matrices, for each."""
     if errors is None:
         return np.asarray(values > tolerances.RANK * values[..., :1])
     return np.asarray(values > (float(np.linalg.norm(errors)) if isinstance(errors, np.ndarray) else errors))
@@ -79,24 +71,7 @@ def significant(values: FloatArray, errors: Errors = None) -> BoolArray:
 def decompose(
     matrix: FloatArray, errors: Errors = None, rank: int | None = None, is_whole: bool = True
 ) -> Decomposition:
-    """Return the singular value decomposition of a matrix, with its rank.
-
-    Parameters
-    ----------
-    matrix
-        The matrix; its rows and columns should be in units in which they are of like size.
-    errors
-        How far it may be off.
-    rank
-        The rank, where that is decided already.
-    is_whole
-        Whether null spaces are asked for; of many rows and few columns the rest is known without.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If an entry is not finite.
-    """
+    """Return the singular value decomposition of a matrix, with its rank."""
     left, values, right = within_time(lambda: np.linalg.svd(matrix, full_matrices=is_whole))
     return Decomposition(left, values, right, int(np.sum(significant(values, errors))) if rank is None else rank)
 
@@ -137,28 +112,12 @@ def is_clear(rows: FloatArray) -> bool:
 
 
 def lost_rank(values: FloatArray, away: float) -> int:
-    """Return how many of some rows follow from the others at a singular position.
-
-    Parameters
-    ----------
-    values
-        The singular values of the rows there.
-    away
-        The smallest one a little away.
-    """
+    """Return how many of some rows follow from the others at a singular position."""
     return int(np.sum(values < tolerances.SINGULAR * away))
 
 
 def open_directions(matrix: FloatArray, errors: Errors = 0.0) -> FloatArray:
-    """Return orthonormal directions, one row each, along which independent rows do not change.
-
-    Parameters
-    ----------
-    matrix
-        The rows, of any size.
-    errors
-        Where they nearly depend on each other: how far they may be off, relative to the size of each.
-    """
+    """Return orthonormal directions, one row each, along which independent rows do not change."""
     sizes = np.linalg.norm(matrix, axis=1, keepdims=True)
     found = decompose(matrix / or_one(sizes), errors, None if errors else len(matrix))
     return found.null_space.T

@@ -27,25 +27,6 @@ def least_norm(
 
     Directions whose singular values are errors of the matrix are not followed (G. Golub and C. Van Loan, *Matrix
     Computations*, section 5.5.3).
-
-    Parameters
-    ----------
-    matrix, right
-        The system, its columns in units of like size; or of each of a stack, the right-hand sides as columns.
-    unit
-        Size of a row that is known, where rows are scaled (`row_scales`): if all of them are below `tolerances.RANK` of
-        it, as those of a loop that closes by itself wherever it is, they are rounding and nothing is to be followed.
-    miss
-        By how much a place misses what the system takes it to, on scales on which the rows of one law are alike.
-        Derivatives there are off by as much: directions of smaller singular values, along which one would have to go
-        farther than the scene is large, are rather ones along which nothing changes, and are not followed.
-    errors
-        How far the matrix may be off, relative to its largest singular value; `tolerances.RANK` unless given.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If there is none since a number is not finite; some machines' libraries would look for it for ever.
     """
     least = tolerances.RANK if errors is None else errors
     if not is_full(matrix):
@@ -63,32 +44,13 @@ def least_norm(
 
 
 def least_squares(matrix: _Numbers, right: _Numbers) -> _Numbers:
-    """Return what solves a linear system best, where columns are independent by construction and no rank is asked.
-
-    Parameters
-    ----------
-    matrix, right
-        The system; of several right-hand sides as columns, each has its own solution.
-    """
+    """Return what solves a linear system best, where columns are independent by construction and no rank is asked."""
     _check_finite(matrix, right)
     return np.asarray(np.linalg.lstsq(matrix, right, rcond=None)[0])
 
 
 def solve_even(matrix: FloatArray, right: FloatArray) -> FloatArray:
-    """Return the solution of a square system, with rows and columns scaled alike so that singular means singular.
-
-    Parameters
-    ----------
-    matrix
-        The system, which is as large across as along its diagonal; or a stack of such.
-    right
-        One right-hand side for each, or several as columns.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If one has no solution, or more than one.
-    """
+    """Return the solution of a square system, with rows and columns scaled alike so that singular means singular."""
     if not matrix.size:
         return np.zeros(right.shape)
     size = or_one(np.sqrt(np.maximum(np.max(np.abs(matrix), axis=-1), np.max(np.abs(matrix), axis=-2))))
@@ -107,15 +69,6 @@ def least_size(jacobian: FloatArray, kept: NDArray[np.intp], multipliers: FloatA
     """Return the multipliers of all rows of least size that have the force of some of the independent ones.
 
     What other rows are made of, ``G_r = W G_k``, gives all that exert no force: no small number has to be called zero.
-
-    Parameters
-    ----------
-    jacobian
-        The rows at some states, shape (states, rows, columns).
-    kept
-        Which rows are independent, all others following from them.
-    multipliers
-        Of the independent rows, shape (states, kept).
     """
     others = np.setdiff1d(np.arange(jacobian.shape[1]), kept)
     found = np.zeros(jacobian.shape[:2])

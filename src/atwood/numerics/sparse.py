@@ -93,13 +93,6 @@ def smallest_direction(square: Any, iterations: int = 40) -> tuple[float, FloatA
     """Return the smallest eigenvalue of a symmetric matrix without negative ones, relative to its size, and its vector.
 
     By inverse iteration, which comes from above.
-
-    Parameters
-    ----------
-    square
-        The matrix.
-    iterations
-        At most so many.
     """
     n = square.shape[0]
     size = float(np.max(square.diagonal(), initial=0.0)) or 1.0
@@ -120,17 +113,7 @@ def smallest_direction(square: Any, iterations: int = 40) -> tuple[float, FloatA
 
 
 def massless_directions(mass: Any, jacobian: Any, sizes: FloatArray) -> FloatArray | None:
-    """Return how much each coordinate moves in a direction that nothing gives inertia to; None if there is none.
-
-    Parameters
-    ----------
-    mass
-        The mass matrix.
-    jacobian
-        Derivatives of the independent constraints.
-    sizes
-        Size of each coordinate.
-    """
+    """Return how much each coordinate moves in a direction that nothing gives inertia to; None if there is none."""
     weight = diags_array(sizes)
     square = weight @ mass @ weight
     square = square / (float(np.max(square.diagonal(), initial=0.0)) or 1.0)

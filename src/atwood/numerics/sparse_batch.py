@@ -146,13 +146,7 @@ class Elimination:
             around[j].discard(j)
 
     def factorise(self, entries: FloatArray) -> FloatArray:
-        """Return the factors, from entries by their `number`; where a pivot is zero nothing finite comes out.
-
-        Parameters
-        ----------
-        entries
-            The matrix, shape (len(number), states); overwritten.
-        """
+        """Return the factors, from entries by their `number`; where a pivot is zero nothing finite comes out."""
         room = np.empty((self._touched, entries.shape[1]))
         self._call(elimination_functions()[0], entries, room)
         return entries
@@ -209,15 +203,7 @@ class Normal:
         return self.elimination.factorise(square)
 
     def least_norm(self, entries: FloatArray, right: FloatArray) -> FloatArray:
-        """Return the shortest solution for each state, shape (columns, states).
-
-        Parameters
-        ----------
-        entries
-            Of the whole matrix, shape (entries, states).
-        right
-            What A x is to be, shape (kept rows, states).
-        """
+        """Return the shortest solution for each state, shape (columns, states)."""
         return self.factorised(entries)(right)
 
     def factorised(self, entries: FloatArray) -> Callable[[FloatArray], FloatArray]:
@@ -238,13 +224,6 @@ class Normal:
 
         The rows that are left out are combinations ``D = C K`` of those that are kept. Their multipliers minimise
         ``|k - C^T d|^2 + |d|^2``, so that ``(1 + C C^T) d = C k``.
-
-        Parameters
-        ----------
-        entries
-            Of the whole matrix, shape (entries, states).
-        multipliers
-            Of the rows that are kept, shape (kept rows, states).
         """
         rows, states = self.whole.shape[0], entries.shape[1]
         kept = np.array(self.kept, dtype=np.intp)
@@ -295,22 +274,7 @@ class Borders:
     def solve(
         self, masses: FloatArray, jacobian: FloatArray, bias: FloatArray, gamma: FloatArray
     ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Return the solutions.
-
-        Parameters
-        ----------
-        masses, jacobian
-            Entries of M and G for each state.
-        bias, gamma
-            Shape (number, states).
-
-        Returns
-        -------
-        accelerations, multipliers
-            Shape (number, states).
-        good
-            For which states the solution fulfils its equations; where something has no mass of its own it may not.
-        """
+        """Return the solutions."""
         n, m = len(bias), len(gamma)
         elimination = self._elimination
         entries = np.zeros((len(elimination.number), bias.shape[1]))

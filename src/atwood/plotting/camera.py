@@ -56,18 +56,7 @@ class Camera:
         return toward
 
     def project(self, points: ArrayLike) -> FloatArray:
-        """Return where points are on the page.
-
-        Parameters
-        ----------
-        points
-            In world axes, m, shape (..., 3).
-
-        Returns
-        -------
-        numpy.ndarray
-            To the right and upwards, m, shape (..., 2).
-        """
+        """Return where points are on the page."""
         found: FloatArray = np.asarray(points, dtype=float) @ self.axes[:2].T
         return found
 
@@ -78,18 +67,7 @@ class Camera:
 
 
 def as_camera(view: View | None) -> Camera:
-    """Return the camera of a view.
-
-    Parameters
-    ----------
-    view
-        Azimuth and elevation, degrees, such as ``(30, 20)`` or ``"30,20"``; `DEFAULT_VIEW` when None.
-
-    Raises
-    ------
-    UsageError
-        If it is not two finite numbers, or the elevation is beyond straight above or below.
-    """
+    """Return the camera of a view."""
     given = DEFAULT_VIEW if view is None else view
     try:
         numbers = [float(number) for number in (given.split(",") if isinstance(given, str) else given)]
@@ -105,20 +83,7 @@ def as_camera(view: View | None) -> Camera:
 
 
 def check_view(space: str, view: View | None) -> bool:
-    """Return whether a scene is in space, or raise an error where a view is given and it is not.
-
-    Parameters
-    ----------
-    space
-        What it lives in.
-    view
-        From where it is to be seen.
-
-    Raises
-    ------
-    UsageError
-        If the scene has one side only.
-    """
+    """Return whether a scene is in space, or raise an error where a view is given and it is not."""
     if space != "space" and view is not None:
         where = {"plane": "in a plane", "line": "on a line"}[space]
         advice = "Leave the view away; only scenes in space have other sides."

@@ -26,20 +26,7 @@ ANIMATED = (".gif",)
 
 
 def check_picture(file: str | os.PathLike[str], suffixes: tuple[str, ...] = SUFFIXES) -> None:
-    """Refuse a picture that could not be made, before the work is done.
-
-    Parameters
-    ----------
-    file
-        Where it would go.
-    suffixes
-        What can be made.
-
-    Raises
-    ------
-    UsageError
-        If matplotlib is missing, the suffix is not known or there is no such directory.
-    """
+    """Refuse a picture that could not be made, before the work is done."""
     need_matplotlib()
     target = Path(file)
     if target.suffix.lower() not in suffixes:
@@ -59,18 +46,7 @@ def need_matplotlib() -> None:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Return an empty figure that belongs to no window, and that notebooks show.
-
-    Parameters
-    ----------
-    width, height
-        Size in inches.
-
-    Raises
-    ------
-    UsageError
-        If matplotlib is missing.
-    """
+    """Return an empty figure that belongs to no window, and that notebooks show."""
     need_matplotlib()
     from atwood.plotting.figure import ShownFigure
 
@@ -78,15 +54,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def polish(axes: Axes, x_label: str = "", y_label: str = "") -> None:
-    """Give axes a quiet frame and their labels.
-
-    Parameters
-    ----------
-    axes
-        The axes.
-    x_label, y_label
-        Labels.
-    """
+    """Give axes a quiet frame and their labels."""
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
     for side in ("left", "bottom"):
@@ -104,17 +72,7 @@ def with_unit(label: str, unit: str) -> str:
 
 
 def titled(figure: Figure, text: str, **style: Any) -> None:
-    """Put a title over a figure, which is made as wide as the title is.
-
-    Parameters
-    ----------
-    figure
-        The figure; a title that it has is replaced.
-    text
-        The title.
-    **style
-        Of the text, as matplotlib takes it.
-    """
+    """Put a title over a figure, which is made as wide as the title is."""
     made = figure.suptitle(text, x=0.01, ha="left", fontsize=11, color=INK, **style)
     needed = made.get_window_extent().width / figure.dpi + 0.02 * figure.get_figwidth() + 0.1
     if needed > figure.get_figwidth():
@@ -122,15 +80,7 @@ def titled(figure: Figure, text: str, **style: Any) -> None:
 
 
 def save_figure(figure: Figure, file: str | os.PathLike[str]) -> Path:
-    """Save a figure; the suffix says how.
-
-    Parameters
-    ----------
-    figure
-        The figure.
-    file
-        Where to.
-    """
+    """Save a figure; the suffix says how."""
     check_picture(file)
     target = Path(file)
     # Without a date in it, the same picture is the same file.

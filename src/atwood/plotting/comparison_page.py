@@ -29,17 +29,7 @@ def check_page(directory: Path) -> None:
 
 
 def write_page(comparisons: Sequence[Comparison], failed: Mapping[str, str], directory: Path) -> Path:
-    """Write ``index.html``, and all rows as ``comparisons.csv`` beside it, and return the page.
-
-    Parameters
-    ----------
-    comparisons
-        What was found, scene by scene.
-    failed
-        Scenes of which nothing was found, and why.
-    directory
-        Where to; it is made if it is not there.
-    """
+    """Write ``index.html``, and all rows as ``comparisons.csv`` beside it, and return the page."""
     check_page(directory)
     directory.mkdir(exist_ok=True)
     labels = list(dict.fromkeys(row.label for one in comparisons for row in one.rows if not row.reason))

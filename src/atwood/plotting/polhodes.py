@@ -28,21 +28,6 @@ def polhode(moments: FloatArray, energy: float, points: int = 400) -> list[Float
 
     They are where the sphere of its size cuts the ellipsoid of the kinetic energy (Landau and Lifshitz, Mechanics,
     section 37).
-
-    Parameters
-    ----------
-    moments
-        The principal moments of inertia, ascending, in any unit.
-    energy
-        ``2 T / L^2``, between ``1 / moments[2]`` and ``1 / moments[0]``.
-    points
-        Of each curve.
-
-    Returns
-    -------
-    list
-        Two closed curves of unit vectors along the principal axes, shape (points, 3); or, where `energy` is
-        ``1 / moments[1]``, the two great circles through the middle axis.
     """
     inverse = 1.0 / np.asarray(moments, dtype=float)
     around = np.linspace(0.0, 2.0 * np.pi, points)

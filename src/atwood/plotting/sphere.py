@@ -33,17 +33,7 @@ def draw_sphere(axes: Axes) -> None:
 
 
 def draw_on_sphere(axes: Axes, curve: FloatArray, colour: str, width: float) -> None:
-    """Draw a curve on the sphere, faint where it is behind.
-
-    Parameters
-    ----------
-    axes
-        Where.
-    curve
-        Unit vectors, shape (points, 3).
-    colour, width
-        Of the line.
-    """
+    """Draw a curve on the sphere, faint where it is behind."""
     x, y, depth = SEEN @ curve.T
     for shown, alpha in ((depth >= 0.0, 1.0), (depth < 0.0, 0.22)):
         wide = shown | np.roll(shown, 1)

@@ -74,15 +74,7 @@ class Offer:
 
 
 def find_offers(assembly: Assembly, start: Start) -> tuple[Offer, ...]:
-    """Return where the motion of a scene in space stays by symmetry: on a line, in a plane, or neither.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    start
-        Its start.
-    """
+    """Return where the motion of a scene in space stays by symmetry: on a line, in a plane, or neither."""
     return tuple(_offer(assembly, start, one) for one in find_symmetries(assembly, start))
 
 

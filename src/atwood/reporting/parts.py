@@ -86,13 +86,7 @@ class ParameterEntry:
 
 
 def list_bodies(assembly: Assembly) -> tuple[tuple[BodyEntry, ...], tuple[str, ...]]:
-    """Return what has mass and can move, and the names of what moves without mass.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    """
+    """Return what has mass and can move, and the names of what moves without mass."""
     mechanism, masses = assembly.mechanism, assembly.maximal.masses
     body_of = mechanism.bodies.body_of
     spread = {body_of[node] for one in masses.coupled for node in one.nodes}
@@ -124,13 +118,7 @@ def _number(mechanism: Mechanism, value: Scalar) -> float:
 
 
 def list_joints(assembly: Assembly) -> tuple[JointEntry, ...]:
-    """Return the joints between different bodies, in the order of declaration.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    """
+    """Return the joints between different bodies, in the order of declaration."""
     mechanism, forest = assembly.mechanism, assembly.reduced.forest
     bodies, loop_joints = mechanism.bodies, {id(joint) for joint in forest.loop_joints}
     names = {one.name for one in assembly.reduced.names}
@@ -163,13 +151,7 @@ def _coordinates_of(forest: SpanningForest, joint: Joint) -> Iterator[str]:
 
 
 def list_ties(assembly: Assembly) -> tuple[str, ...]:
-    """Return the parts that hold others by a constraint without being a joint, such as ropes.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    """
+    """Return the parts that hold others by a constraint without being a joint, such as ropes."""
     mechanism = assembly.mechanism
     joints = {joint.part for joint in mechanism.graph.joints}
     return tuple(
@@ -180,13 +162,7 @@ def list_ties(assembly: Assembly) -> tuple[str, ...]:
 
 
 def list_merged(assembly: Assembly) -> tuple[MergedPart, ...]:
-    """Return the parts that are one body with another part, or with the world.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    """
+    """Return the parts that are one body with another part, or with the world."""
     mechanism = assembly.mechanism
     found = []
     for path, local in mechanism.locals_.items():
@@ -223,13 +199,7 @@ def _solids(mechanism: Mechanism, body: int) -> list[str]:
 
 
 def list_dropped(assembly: Assembly) -> tuple[DroppedPart, ...]:
-    """Return the parts that leave nothing in the equations.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    """
+    """Return the parts that leave nothing in the equations."""
     mechanism = assembly.mechanism
     feeding = {source for source, _ in assembly.flat.links.values()}
     found = []
@@ -267,15 +237,7 @@ def _is_nothing(value: Scalar) -> bool:
 
 
 def list_parameters(assembly: Assembly, scene: Model | None = None) -> tuple[ParameterEntry, ...]:
-    """Return every parameter with its value, by path: those of the scene and its models, then those of the parts.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    scene
-        The same as it was declared; without it the parameters of models are not known.
-    """
+    """Return every parameter with its value, by path: those of the scene and its models, then those of the parts."""
     found = [] if scene is None else list(_of_model(scene))
     for path, part in assembly.flat.parts.items():
         for name, spec in part.component.parameter_specs().items():

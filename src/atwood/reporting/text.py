@@ -63,17 +63,7 @@ def overview(report: MechanismReport) -> str:
 
 
 def shorten(names: Iterable[str], shown: int = _SHOWN, least: int = _ARRAY) -> str:
-    """Return names with commas, and of a long list the first ones, the last, and how many.
-
-    Parameters
-    ----------
-    names
-        The names. Vectors in space are written as ``rod.force.x/y/z``, arrays as ``rod[0..9]``.
-    shown
-        Of a longer list, so many are named.
-    least
-        So many elements of an array are written as one.
-    """
+    """Return names with commas, and of a long list the first ones, the last, and how many."""
     listed = list(names)
     short = list(_arrays(list(_vectors(listed)), least))
     if len(short) <= shown:

@@ -34,18 +34,7 @@ def solver_name(result: Result) -> str:
 
 
 def describe_run(result: Result) -> dict[str, Any]:
-    """Return everything about a run but its trajectories, as plain data.
-
-    Parameters
-    ----------
-    result
-        The run.
-
-    Returns
-    -------
-    dict
-        Scene, form, status, happenings, solver statistics, energy, constraints, what was asked for, versions.
-    """
+    """Return everything about a run but its trajectories, as plain data."""
     statistics, options, flat = result.statistics, result.run.options, result.assembly.flat
     ledger, missed = result.energy, result.constraint_max
     outputs = options.outputs
@@ -108,19 +97,7 @@ def describe_run(result: Result) -> dict[str, Any]:
 
 
 def describe_all(result: Result) -> dict[str, Any]:
-    """Return the same with all that a run is made again from: every parameter, the scene, and what was asked for.
-
-    Parameters
-    ----------
-    result
-        The run.
-
-    Returns
-    -------
-    dict
-        As `describe_run`, with ``"parameters"`` by path in SI units, ``"source"``, the scene as `to_data` writes it,
-        and the arguments of `simulate` under ``"asked"``, ``"again"``; ``"no_source"`` says why there is no scene.
-    """
+    """Return the same with all that a run is made again from: every parameter, the scene, and what was asked for."""
     from atwood.model.compose.serialization import to_data  # few runs are saved
 
     found, source = describe_run(result), result.assembly.source

@@ -99,11 +99,6 @@ def compared_paths(assembly: Assembly) -> list[str]:
 
     Axes that differ by less than they are long differ by the angle between two orientations, in radians; coordinates
     of orientations differ where nothing does.
-
-    Parameters
-    ----------
-    assembly
-        The scene in either form.
     """
     known = assembly.observables
     owners = [path for path, local in assembly.mechanism.locals_.items() if local.point_inertias or local.body_inertias]
@@ -121,13 +116,6 @@ def difference(time: FloatArray, values: FloatArray, other_time: FloatArray, oth
 
     At an event the first has states before and after; which of them the other one has there is not known, and the
     larger error beside the event is taken.
-
-    Parameters
-    ----------
-    time, values
-        Output times of the first, s, and its quantity.
-    other_time, other
-        The same of the second, whose times are rising.
     """
     at = np.minimum(np.searchsorted(other_time, time), len(other_time) - 1)
     twice = np.zeros(len(time), dtype=bool)
@@ -143,17 +131,7 @@ def difference(time: FloatArray, values: FloatArray, other_time: FloatArray, oth
 
 
 def estimate_accuracy(first: Run, second: Run, time: FloatArray, error: Callable[[str], FloatArray]) -> Accuracy:
-    """Return how right a motion is from the errors of its positions and angles.
-
-    Parameters
-    ----------
-    first, second
-        The run, and the more accurate one.
-    time
-        Output times, s.
-    error
-        Gives the error of a quantity at these.
-    """
+    """Return how right a motion is from the errors of its positions and angles."""
     asked, known = first.options.accuracy, first.assembly.observables
     length = first.start.length if first.start is not None else 1.0
     compared = dict.fromkeys([*compared_paths(first.assembly), *first.options.nominal])

@@ -74,13 +74,7 @@ class EnergyLedger:
 
     @cached_property
     def parts(self) -> PartEnergies:
-        """The same for each component, worked out when it is first asked for: ``parts["bob"].work["point"]``.
-
-        Raises
-        ------
-        UsageError
-            If the run that it is of is not there.
-        """
+        """The same for each component, worked out when it is first asked for: ``parts["bob"].work["point"]``."""
         if self.source is None:
             raise UsageError("the run that the energy is of is not there", advice="Ask result.energy of a run.")
         return self.source(self.exchanged)
@@ -180,15 +174,7 @@ class Piece:
 
 
 def exchange(pieces: Sequence[Piece], work: FloatArray) -> float:
-    """Return the energy that a scene exchanges, J; see `EnergyLedger.exchanged`.
-
-    Parameters
-    ----------
-    pieces
-        All stretches of the run.
-    work
-        Work at all their samples, J.
-    """
+    """Return the energy that a scene exchanges, J; see `EnergyLedger.exchanged`."""
     shares = np.concatenate([_weights(one.time) for one in pieces])
     if not np.any(shares > 0.0):
         shares = np.ones_like(shares)
@@ -250,21 +236,7 @@ def _weights(t: FloatArray) -> FloatArray:
 def make_ledger(
     pieces: Sequence[Piece], work: Sequence[FloatArray], unsure: float, shown: NDArray[np.bool_], swing: float = 0.0
 ) -> EnergyLedger:
-    """Return the ledger of a run.
-
-    Parameters
-    ----------
-    pieces
-        Samples of each stretch.
-    work
-        Work within each stretch since its start, J.
-    unsure
-        Estimated error of all this work, J.
-    shown
-        Which of all samples are outputs.
-    swing
-        Range of the work between samples, J, where it is known: a drive may have the period of the samples.
-    """
+    """Return the ledger of a run."""
     done, carried = [], 0.0
     for i, (piece, inside) in enumerate(zip(pieces, work, strict=True)):
         carried += piece.gained_since(pieces[i - 1]) if i else 0.0
@@ -293,13 +265,7 @@ _DIGIT = 4.0 * np.finfo(float).eps
 
 
 def account(reading: SegmentQuantities) -> Piece:
-    """Return the samples that a ledger is made of.
-
-    Parameters
-    ----------
-    reading
-        The quantities of a segment.
-    """
+    """Return the samples that a ledger is made of."""
     segment, assembly = reading.segment, reading.segment.assembly
     state = segment.coordinates, segment.speeds
     mechanism, equations = assembly.mechanism, assembly.own_equations

@@ -229,13 +229,7 @@ def _sound(saved: SavedResult) -> SavedResult:
 
 
 def check_target(file: str | os.PathLike[str]) -> None:
-    """Refuse a file that a result could not be saved to, before the work is done.
-
-    Raises
-    ------
-    UsageError
-        If the suffix is not known or there is no such directory.
-    """
+    """Refuse a file that a result could not be saved to, before the work is done."""
     _format_of(Path(file))
     check_directory(Path(file))
 

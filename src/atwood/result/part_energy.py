@@ -126,13 +126,7 @@ class PartEnergies(Shown, Mapping[str, PartEnergy]):
         self.exchanged, self.uncertainty = exchanged, uncertainty
 
     def __getitem__(self, path: str) -> PartEnergy:
-        """Return the energy of a component or a model.
-
-        Raises
-        ------
-        ResultError
-            If there is no such component; it is a `KeyError`, too.
-        """
+        """Return the energy of a component or a model."""
         found = self._parts.get(path) or self._models.get(path)
         if found is None:
             raise MissingQuantityError(
@@ -225,25 +219,13 @@ class PartEnergies(Shown, Mapping[str, PartEnergy]):
 
     @takes(file=FILE)
     def save(self, file: str | os.PathLike[str]) -> Path:
-        """Save all energies as NetCDF-3 (``.nc``), NumPy (``.npz``), MATLAB (``.mat``) or ``.csv``.
-
-        Parameters
-        ----------
-        file
-            Where to.
-        """
+        """Save all energies as NetCDF-3 (``.nc``), NumPy (``.npz``), MATLAB (``.mat``) or ``.csv``."""
         from atwood.result.files import write_trajectories
 
         return write_trajectories(self.trajectories(), file)
 
     def plot(self, file: str | os.PathLike[str] | None = None) -> Any:
-        """Draw the energies of the components above each other, and return the figure; see `atwood.plot_energies`.
-
-        Parameters
-        ----------
-        file
-            Where to save the picture; its suffix says how.
-        """
+        """Draw the energies of the components above each other, and return the figure; see `atwood.plot_energies`."""
         return import_module("atwood.plotting.plots.energies").plot_energies(self, file)
 
     def tables(self) -> tuple[Table, ...]:

@@ -51,17 +51,7 @@ _Done: TypeAlias = dict[tuple[str, str, str], FloatArray]
 
 
 def find_part_energies(run: Run, shown: NDArray[np.bool_], exchanged: float) -> PartEnergies:
-    """Return the energies of all components along a run, and where they came from.
-
-    Parameters
-    ----------
-    run
-        The run.
-    shown
-        Which of all samples are outputs.
-    exchanged
-        What errors are compared with, J.
-    """
+    """Return the energies of all components along a run, and where they came from."""
     flat, segments = run.assembly.flat, run.segments
     connectors = [Connectors(one.assembly.mechanism, flat) for one in segments]
     done, unsure = _within(run, connectors)

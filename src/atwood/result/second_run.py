@@ -53,22 +53,7 @@ _PATIENCE, _SECONDS = 20.0, 30.0
 
 
 def second_run(first: Run, times: FloatArray, accuracy: Callable[[Run], Accuracy]) -> Run:
-    """Solve a scene once more, more accurately, and with other steps.
-
-    Parameters
-    ----------
-    first
-        The run.
-    times
-        Output times, s.
-    accuracy
-        What a second run tells of the first one. Where that is nothing to be believed, steps are shortened.
-
-    Raises
-    ------
-    UsageError
-        If there cannot be a second solution.
-    """
+    """Solve a scene once more, more accurately, and with other steps."""
     where = first.assembly.flat.name
     if first.start is None or not first.segments:
         raise UsageError("there is nothing in the run, and so no error", where=where)
@@ -120,15 +105,7 @@ def _attempts(first: Run, times: FloatArray) -> Iterator[tuple[Assembly, list[Ru
 
 
 def longest_step(first: Run, shorter: float = 1.0) -> float:
-    """Return the longest step of a second solution, s.
-
-    Parameters
-    ----------
-    first
-        The run that is judged.
-    shorter
-        So many times shorter, where steps were too long before.
-    """
+    """Return the longest step of a second solution, s."""
     assert first.start is not None
     step = (first.options.t_end - first.start.time) / _STEPS
     own = first.options.max_step
@@ -153,25 +130,7 @@ _LEAST, _RUNS = 3e-15, 6
 def accurate_run(
     solve: Callable[[RunOptions], Run], options: RunOptions, accuracy: float, solver: str
 ) -> tuple[Run, Run | None, str]:
-    """Solve a scene so that the error of its motion, by a second solution, is below a limit.
-
-    Parameters
-    ----------
-    solve
-        Runs the scene with options.
-    options
-        What else was asked for.
-    accuracy
-        The limit: of positions relative to the extent of the scene, and of angles, rad.
-    solver
-        What solves the scene at first, a key of `METHODS`.
-
-    Returns
-    -------
-    tuple
-        The run with the loosest of the tolerances that were tried which meets it, else the most accurate one; the
-        second solution; and, where the limit is not met, what was reached and until when, in words.
-    """
+    """Solve a scene so that the error of its motion, by a second solution, is below a limit."""
     rtol = min(1e-2, accuracy * METHODS[solver].first_share)
     best: Result | None = None
     failure = ""
@@ -211,13 +170,6 @@ def needed_error(run: Run, doubt: float) -> float:
 
     It is a share of the sizes of coordinates and speeds; zero where rounding, and the error of the work as an integral,
     account for the drift, and where there is no balance.
-
-    Parameters
-    ----------
-    run
-        The run.
-    doubt
-        An error up to this is no reason to look at the work more closely than samples tell.
     """
     every = np.ones(sum(len(one.time) for one in run.segments), dtype=bool)
     with np.errstate(all="ignore"):

@@ -79,13 +79,7 @@ class Trajectories(Shown, Mapping[str, FloatArray]):
         return len(self.paths)
 
     def __getitem__(self, path: str | Quantity) -> FloatArray:
-        """Return a quantity at the output times, shape (times,).
-
-        Raises
-        ------
-        ResultError
-            If there is no such quantity; it is a `KeyError`, too.
-        """
+        """Return a quantity at the output times, shape (times,)."""
         return self.array(str(check(PATH, path, "path", type(self).__name__)))
 
     def table(self, paths: Iterable[str] | None = None) -> dict[str, FloatArray]:

@@ -55,17 +55,7 @@ class TurnCounter:
         return tuple(dict.fromkeys(found))
 
     def counted(self, path: str, raw: Mapping[str, FloatArray], time: FloatArray) -> FloatArray:
-        """Return a quantity at all samples without jumps by whole turns.
-
-        Parameters
-        ----------
-        path
-            The quantity.
-        raw
-            It, and what `needed` says, at the samples, by path: angles within one turn, rad.
-        time
-            The samples, s.
-        """
+        """Return a quantity at all samples without jumps by whole turns."""
         start, rate = self._said.get(path), self._observables[path].rate
         values = self._across_poles(path, raw, time)
         if not rate:
@@ -161,15 +151,6 @@ def unwrap(
     """Return an angle without jumps by whole turns.
 
     With its rate at the samples, also more than half a turn from sample to sample is counted.
-
-    Parameters
-    ----------
-    values
-        Samples, each within one turn, rad.
-    start
-        What the angle was said to be at the start, which fixes the number of whole turns; none if not given.
-    time, rate
-        Times of the samples and rate of the angle there; without them, what turns fast is counted wrong.
     """
     if not len(values):
         return values

@@ -71,20 +71,7 @@ def nodes_between(times: FloatArray, count: int) -> FloatArray:
 
 
 def integral_in_steps(times: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the integral from the first time on, and its estimated error.
-
-    Parameters
-    ----------
-    times
-        Times between which values are smooth.
-    values
-        At the points that `nodes_between` gives, shape (..., times - 1, points).
-
-    Returns
-    -------
-    integral, error
-        Of shape (..., times) and (...).
-    """
+    """Return the integral from the first time on, and its estimated error."""
     from numpy.polynomial import legendre
 
     count, half = values.shape[-1], 0.5 * np.diff(times)
@@ -109,15 +96,6 @@ def find_ledger(
     is not, the run is made again to see what it did within its steps, since integrals that follow the steps are as
     accurate as the solver itself. The run's limit of time holds for both together: where it is used up, the samples
     must do, and the ledger's uncertainty says how far they do.
-
-    Parameters
-    ----------
-    run
-        The run.
-    pieces
-        Its samples.
-    shown
-        Which of all samples are outputs.
     """
     return replace(_balanced(run, pieces, shown), source=partial(_by_part, run, shown))
 
@@ -200,17 +178,7 @@ def nodes_in_steps(run: Run) -> int:
 
 
 def samples_in_steps(run: Run, times: Sequence[FloatArray], count: int) -> list[StepSamples] | None:
-    """Return states within the steps of a run, for which it is made again; None if it comes out otherwise.
-
-    Parameters
-    ----------
-    run
-        The run.
-    times
-        Sample times of each segment.
-    count
-        So many points in each step.
-    """
+    """Return states within the steps of a run, for which it is made again; None if it comes out otherwise."""
     steps = times_of_steps(run)
     grids = [joined_times(one, steps) for one in times]
     nodes = [nodes_between(grid, count) for grid in grids]

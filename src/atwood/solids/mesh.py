@@ -204,23 +204,7 @@ def _place(point: FloatArray) -> str:
 
 
 def weld(points: FloatArray, distance: float) -> tuple[FloatArray, IntArray]:
-    """Make one vertex out of points that coincide.
-
-    Parameters
-    ----------
-    points
-        Shape (n, 3).
-    distance
-        Points whose coordinates differ by no more than this are one vertex, and so are chains of such points; zero
-        for points that are equal. Points further apart than four times this are never joined directly.
-
-    Returns
-    -------
-    vertices : ndarray, shape (k, 3)
-        For each vertex the first of its points.
-    numbers : ndarray, shape (n,)
-        The vertex of each point.
-    """
+    """Make one vertex out of points that coincide."""
     # Adding zero makes one of plus and minus zero.
     exact, numbers = _first_rows(points + 0.0)
     if distance <= 0:
@@ -280,13 +264,7 @@ def signed_volume(vertices: FloatArray, triangles: IntArray) -> float:
 
 
 def split_shells(triangles: IntArray) -> list[IntArray]:
-    """Return the numbers of the triangles of each shell: what hangs together by edges.
-
-    Parameters
-    ----------
-    triangles
-        Shape (m, 3), every edge shared by exactly two triangles.
-    """
+    """Return the numbers of the triangles of each shell: what hangs together by edges."""
     directed = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     owner = np.tile(np.arange(len(triangles)), 3)
     order = np.lexsort(np.sort(directed, axis=1).T)
@@ -308,11 +286,6 @@ def check_shells(vertices: FloatArray, triangles: IntArray, shells: list[IntArra
 
     A shell that faces outward must lie where the others enclose nothing; one that faces inward must lie inside exactly
     one body.
-
-    Raises
-    ------
-    ParameterError
-        If a shell faces the wrong way or bodies overlap, with the place of the shell.
     """
     if len(shells) == 1:
         return
@@ -339,11 +312,6 @@ def check_overlap(vertices: FloatArray, triangles: IntArray, where: str) -> None
 
     Points are spread evenly over the triangles, several on each of a small mesh and on some of a large one: where only
     a small share of the surface lies inside another part, it can be missed.
-
-    Raises
-    ------
-    ParameterError
-        If the mesh cuts through itself, with a place.
     """
     count = int(np.clip(_WORK // len(triangles), _FEWEST, _MOST))
     number = np.arange(count)

@@ -120,20 +120,7 @@ class MechanismGraph:
 
 
 def build_graph(flat: FlatScene, locals_: Mapping[str, LocalPart]) -> MechanismGraph:
-    """Return who meets whom.
-
-    Parameters
-    ----------
-    flat
-        The scene as leaves and connections.
-    locals_
-        What each part contributes, on local symbols.
-
-    Raises
-    ------
-    ConnectError
-        If a connection names a connector that does not exist.
-    """
+    """Return who meets whom."""
     nodes, node_of = _nodes(flat)
     for path, local in locals_.items():
         node_of.update({(path, full): node_of[end] for full, end in local.borrowed.items()})
@@ -179,13 +166,7 @@ def _nodes(flat: FlatScene) -> tuple[tuple[Node, ...], dict[tuple[str, str], int
 def _check_frames(
     met: Sequence[Sequence[str]], connections: Iterable[tuple[str, str]], frames: set[str], points: set[str]
 ) -> None:
-    """Refuse frames that meet through a point only: it does not say whether they are welded or hinged.
-
-    Raises
-    ------
-    ConnectError
-        If there are such frames.
-    """
+    """Refuse frames that meet through a point only: it does not say whether they are welded or hinged."""
     rigid = [name for group in met for name in group if name not in points]
     direct = [pair for pair in connections if points.isdisjoint(pair)]
     class_of = {name: i for i, group in enumerate(connected_groups(rigid, direct)) for name in group}
@@ -240,20 +221,7 @@ T = TypeVar("T", bound=Hashable)
 
 
 def connected_groups(members: Iterable[T], pairs: Iterable[tuple[T, T]]) -> list[list[T]]:
-    """Return groups whose members are connected by pairs, directly or through others.
-
-    Parameters
-    ----------
-    members
-        Everything that belongs to a group, on its own if no pair names it.
-    pairs
-        Pairs of members.
-
-    Returns
-    -------
-    list of list
-        The groups in the order of their first members, each in the order of the members.
-    """
+    """Return groups whose members are connected by pairs, directly or through others."""
     above: dict[T, T] = {member: member for member in members}
 
     def root(member: T) -> T:

@@ -22,19 +22,7 @@ def find_line_signs(
     parameters: Mapping[Expression, float],
     space: Space,
 ) -> dict[tuple[str, str, str], float]:
-    """Return, for pairs of connectors of each part, the sign of the second's start position minus the first's.
-
-    Parameters
-    ----------
-    flat
-        The scene, with its start values and guesses.
-    mechanism, bodies, locals_, space
-        The mechanism.
-    offsets
-        Offset of each node in each body.
-    parameters
-        Values of the parameters.
-    """
+    """Return, for pairs of connectors of each part, the sign of the second's start position minus the first's."""
     assert space.line is not None
     places = {node: _number(offset, space.line, parameters) for node, offset in offsets[0].items()}
     for path, value in {**flat.guess, **flat.start}.items():

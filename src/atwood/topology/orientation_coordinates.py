@@ -80,37 +80,14 @@ class OrientationCoordinates:
 
 
 def coordinates_of(kind: str, body: str) -> list[tuple[str, str]]:
-    """Return names and units of the coordinates of an orientation.
-
-    Parameters
-    ----------
-    kind
-        One of `ORIENTATIONS`.
-    body
-        Name of what is turned.
-    """
+    """Return names and units of the coordinates of an orientation."""
     if kind.startswith("euler-"):
         return [(f"{body}.euler.{name}", "rad") for name in ("phi", "theta", "psi")]
     return [(f"{body}.quaternion.{part}", "1") for part in "wxyz"]
 
 
 def check_orientation(kind: str, form: str, space: str) -> None:
-    """Refuse coordinates that there are not.
-
-    Parameters
-    ----------
-    kind
-        What was asked for.
-    form
-        ``"reduced"`` or ``"dae"``.
-    space
-        Of the scene.
-
-    Raises
-    ------
-    UsageError
-        If there are no such coordinates, or the form or the space does not have them.
-    """
+    """Refuse coordinates that there are not."""
     if kind not in ORIENTATIONS:
         raise UsageError(
             f"there are no coordinates of orientations {kind!r}",

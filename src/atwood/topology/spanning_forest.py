@@ -147,17 +147,7 @@ def grow_spanning_forest(
     space: Space,
     orientation: Orientation,
 ) -> SpanningForest:
-    """Decide how every body is placed and turned.
-
-    Parameters
-    ----------
-    form
-        Whether joints place bodies (reduced) or stay constraints (dae).
-    graph, bodies, locals_, space
-        The mechanism.
-    orientation
-        In which coordinates orientations in space are.
-    """
+    """Decide how every body is placed and turned."""
     grower = _Grower(graph, bodies, locals_, space, orientation)
     joints = [joint for joint in graph.joints if not joint.is_rigid and _between(joint, bodies)]
     if form == "reduced":
@@ -385,13 +375,7 @@ class _Grower:
         return locked
 
     def count_turns(self, solved: set[tuple[str, str, int]]) -> dict[Expression, tuple[int, int]]:
-        """Give coordinates to joints whose turns count and that nothing hangs on; add what needs none to solved.
-
-        Parameters
-        ----------
-        solved
-            Constraints that hold whatever the coordinates are.
-        """
+        """Give coordinates to joints whose turns count and that nothing hangs on; add what needs none to solved."""
         counted: dict[Expression, tuple[int, int]] = {}
         wanted = {
             symbol

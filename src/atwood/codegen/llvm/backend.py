@@ -115,24 +115,7 @@ class NativeKernel:
         self._spaces: list[_Space] = []
 
     def __call__(self, *groups: Any) -> tuple[list[float], ...]:
-        """Evaluate the program.
-
-        Parameters
-        ----------
-        *groups
-            One sequence of floats for each input group, in order.
-
-        Returns
-        -------
-        tuple
-            One list for each output group.
-
-        Raises
-        ------
-        KernelEvaluationError
-            If the groups have the wrong sizes, or an output has no finite value because an operation was
-            applied outside its domain.
-        """
+        """Evaluate the program."""
         space = self._take_space()
         if len(groups) != len(space.inputs):
             self._refuse([len(group) for group in groups])

@@ -114,20 +114,7 @@ class Built:
     failures: Failures | None
 
     def derive(self, name: str, program: Program, parameter_values: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return what depends on parameters alone, and the room that the code needs.
-
-        Parameters
-        ----------
-        name, program
-            A part of the module.
-        parameter_values
-            The values in the order of the program's parameters.
-
-        Raises
-        ------
-        KernelEvaluationError
-            If the number of values is wrong.
-        """
+        """Return what depends on parameters alone, and the room that the code needs."""
         values = np.array(parameter_values, dtype=np.float64)
         count = len(program.parameters)
         if values.shape != (count,):
@@ -156,22 +143,7 @@ def build_code(
     routines: RoutineSource | None = None,
     cached: bool = True,
 ) -> Built:
-    """Compile programs, or take them from the cache.
-
-    Parameters
-    ----------
-    parts
-        The programs.
-    options
-        How to compile them.
-    exports
-        The names of routines.
-    routines
-        What writes routines that call the programs, or stand alone.
-    cached
-        Whether to use the cache.  Programs that call functions in Python are never kept: their names do not say
-        what they do.
-    """
+    """Compile programs, or take them from the cache."""
     with stage("code"):
         return within_time(lambda: _build(parts, options, exports, routines, cached))
 
@@ -235,18 +207,7 @@ def _key(parts: Sequence[Part], options: CodeOptions, routines: RoutineSource | 
 
 @cache
 def hash_of_generators(room: Path = Path(__file__).parents[1]) -> str:
-    """Return a hash of the files that write code, so that no change to them goes unnoticed.
-
-    Parameters
-    ----------
-    room
-        The folder of the code generators.
-
-    Raises
-    ------
-    UnsupportedError
-        If one of them cannot be read: machine code of another version could then be taken for that of this one.
-    """
+    """Return a hash of the files that write code, so that no change to them goes unnoticed."""
     total = sha256()
     for name in GENERATORS:
         try:

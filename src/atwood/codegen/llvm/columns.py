@@ -26,13 +26,7 @@ _COLUMNS = ctypes.CFUNCTYPE(None, *[c_void_p] * 5, c_int64)
 
 
 def compile_columns(program: Program) -> ColumnProgram:
-    """Compile a program for many states at once.
-
-    Parameters
-    ----------
-    program
-        What to compute; without functions in Python.
-    """
+    """Compile a program for many states at once."""
     inputs = tuple(len(group.symbols) for group in program.inputs)
     outputs = tuple(len(group.expressions) for group in program.outputs)
     part, routines = Part("kernel", program), RoutineSource("codegen.llvm.columns", (), (inputs, outputs))
@@ -55,13 +49,7 @@ class ColumnProgram:
         self.outputs = [len(group.expressions) for group in program.outputs]
 
     def bind(self, parameter_values: ArrayLike) -> ColumnKernel:
-        """Compute once what depends on parameters alone.
-
-        Parameters
-        ----------
-        parameter_values
-            The values in the order of the program's parameters.
-        """
+        """Compute once what depends on parameters alone."""
         derived, _ = self.built.derive("kernel", self.program, parameter_values)
         return ColumnKernel(self, derived)
 
@@ -81,18 +69,7 @@ class ColumnKernel:
         self.code, self._derived = code, derived
 
     def __call__(self, *groups: FloatArray) -> tuple[FloatArray, ...]:
-        """Evaluate the program; what is outside the domain of an operation gives nan.
-
-        Parameters
-        ----------
-        *groups
-            One array of shape (size, states) for each input group.
-
-        Returns
-        -------
-        tuple
-            One array of shape (size, states) for each output group.
-        """
+        """Evaluate the program; what is outside the domain of an operation gives nan."""
         check_time()
         code, states = self.code, max(one.shape[1] for one in groups)
         given = [_full(one, (size, states)) for one, size in zip(groups, code.inputs, strict=True)]

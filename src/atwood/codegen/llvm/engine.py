@@ -80,17 +80,7 @@ def _unload_dead() -> None:
 
 
 def compile_text(text: str, level: int, has_variables: bool = False) -> bytes:
-    """Return the object code of a module.
-
-    Parameters
-    ----------
-    text
-        The module in LLVM's language.
-    level
-        How hard LLVM works on the machine code, from 0 to 3.
-    has_variables
-        Whether functions keep variables in memory, of which registers are made.
-    """
+    """Return the object code of a module."""
     with _lock:
         with binding.create_context() as context, binding.parse_assembly(text, context) as module:
             if has_variables:
@@ -106,24 +96,7 @@ def compile_text(text: str, level: int, has_variables: bool = False) -> bytes:
 def load_code(
     code: bytes, names: Iterable[str], imports: Mapping[str, int], kept: tuple[object, ...] = ()
 ) -> LoadedCode:
-    """Put object code into memory, ready to be called.
-
-    Parameters
-    ----------
-    code
-        The object code.
-    names
-        The functions to export.
-    imports
-        The addresses of the functions that it calls.
-    kept
-        Kept alive together with the code.
-
-    Raises
-    ------
-    RuntimeError
-        If the code is no object code of this machine, or lacks one of the functions.
-    """
+    """Put object code into memory, ready to be called."""
     names = tuple(names)
     builder = binding.JITLibraryBuilder().add_object_img(code)
     for name, address in imports.items():
@@ -153,13 +126,7 @@ def find_symbol(name: str) -> int | None:
 
 
 def require_symbols(names: Iterable[str]) -> dict[str, int]:
-    """Return the addresses of functions of the C library.
-
-    Raises
-    ------
-    UnsupportedError
-        If one of them is not there.
-    """
+    """Return the addresses of functions of the C library."""
     addresses: dict[str, int] = {}
     for name in names:
         address = find_symbol(name)

@@ -64,15 +64,7 @@ class Layout:
 
 
 def main_body(program: Program, positions: Sequence[int] | None = None) -> Body:
-    """Return what is computed in every call.
-
-    Parameters
-    ----------
-    program
-        What to compute.
-    positions
-        Where the results of the only output group go, if not one after the other.
-    """
+    """Return what is computed in every call."""
     given = [("derived", program.prologue)]
     given += [(f"in{k}", tuple(group.symbols)) for k, group in enumerate(program.inputs)]
     results = [
@@ -97,15 +89,7 @@ def matrix_key(solve: Expression) -> MatrixKey:
 
 
 def lay_out(body: Body, longest: int) -> Layout:
-    """Cut a body into chunks and give every value that crosses between them a place.
-
-    Parameters
-    ----------
-    body
-        What to compute.
-    longest
-        The number of operations in a chunk; a single large linear system can exceed it.
-    """
+    """Cut a body into chunks and give every value that crosses between them a place."""
     known = {node.index for _, nodes in body.given for node in nodes}
     chunks = _cut(_units(_depth_first([node for node, _, _ in body.results], known)), longest)
     slots, used = _share_slots(chunks)

@@ -111,20 +111,7 @@ class Part:
 
 
 def write_module(programs: Sequence[Part], options: CodeOptions) -> ModuleText:
-    """Write the two functions of each program.
-
-    Parameters
-    ----------
-    programs
-        What to compute.
-    options
-        What the code depends on.
-
-    Raises
-    ------
-    UnsupportedError
-        If there is an operation without machine code.
-    """
+    """Write the two functions of each program."""
     needs = Needs()
     parts: list[str] = []
     scratch = 0

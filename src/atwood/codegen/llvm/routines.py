@@ -37,13 +37,7 @@ _REDUCED = {  # the function of LLVM, what it returns, and what it takes first
 
 
 def print_routines(routines: Sequence[Routine]) -> str:
-    """Return the functions of a module, and the declarations of LLVM's own functions that they call.
-
-    Parameters
-    ----------
-    routines
-        The routines; those that are called by name come from here or from elsewhere in the module.
-    """
+    """Return the functions of a module, and the declarations of LLVM's own functions that they call."""
     printer = _Printer()
     parts = [printer.function(one) for one in routines]
     return "\n".join([*parts, *sorted(printer.declared)])

@@ -46,17 +46,7 @@ class GuardCode:
         self._program, self._built = program, built
 
     def bind(self, parameter_values: ArrayLike, reach: float, shortest: float) -> GuardData:
-        """Return the guard of one session.
-
-        Parameters
-        ----------
-        parameter_values
-            The values in the order of the program's parameters.
-        reach
-            The program's last input.
-        shortest
-            Steps that are no longer than this are not judged, s.
-        """
+        """Return the guard of one session."""
         address = self._built.code.addresses["guard"]
         derived, scratch = self._built.derive("kernel", self._program, parameter_values)
         data = np.zeros(4)
@@ -76,13 +66,7 @@ class GuardCode:
 
 
 def compile_guard(program: Program) -> GuardCode:
-    """Compile a program that judges steps.
-
-    Parameters
-    ----------
-    program
-        See `atwood.simulation.problem.curved_laws.watched_program`.
-    """
+    """Compile a program that judges steps."""
     part = Part("kernel", program)
     routines = RoutineSource("codegen.llvm.step_guard")
     return GuardCode(program, build_code([part], default_options([part]), exports=["guard"], routines=routines))

@@ -148,25 +148,7 @@ class BoundKernel:
     prologue_values: list[Any]
 
     def __call__(self, *groups: Any) -> tuple[Any, ...]:
-        """Evaluate the program.
-
-        Parameters
-        ----------
-        *groups
-            One sequence of floats for each input group, in order.  For a vectorized program one array for each,
-            of shape ``(size, samples)``, or ``(size,)`` where all samples have the same values.
-
-        Returns
-        -------
-        tuple
-            One list for each output group; for a vectorized program one array of shape ``(size, samples)``.
-
-        Raises
-        ------
-        KernelEvaluationError
-            If the groups have the wrong sizes, or an output has no finite value because an operation was
-            applied outside its domain.  A vectorized program gives nan for that sample instead.
-        """
+        """Evaluate the program."""
         check_time()
         compiled = self.compiled
         if len(groups) != len(compiled.program.inputs):

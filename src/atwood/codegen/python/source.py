@@ -59,21 +59,7 @@ def write_function(
     nodes: Iterable[Expression],
     results: Sequence[Sequence[Expression]],
 ) -> tuple[str, list[object]]:
-    """Return the source of a function, and the external functions that it calls as ``e0``, ``e1``, ...
-
-    Parameters
-    ----------
-    name
-        What to call it.
-    flavour
-        See :data:`Flavour`.
-    given
-        The values of each argument; every argument is a sequence.
-    nodes
-        What the results need, arguments before users.
-    results
-        The values to return, as one list for each entry.
-    """
+    """Return the source of a function, and the external functions that it calls as ``e0``, ``e1``, ..."""
     nodes = list(nodes)
     uses = Counter(argument.index for node in nodes for argument in node.arguments)
     uses.update(result.index for group in results for result in group)

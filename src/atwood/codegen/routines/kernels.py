@@ -26,17 +26,5 @@ def place_of(r: Routine, number: Value) -> Value:
 def call_kernel(
     r: Routine, name: str, inputs: Sequence[Value], derived: Value, scratch: Value, outputs: Sequence[Value]
 ) -> Value:
-    """Call a program; return 0, or 1 where a result is not finite.
-
-    Parameters
-    ----------
-    r
-        The routine that calls.
-    name
-        The name of the program in the module.
-    inputs, outputs
-        The array of each group.
-    derived, scratch
-        What depends on parameters alone, and room.
-    """
+    """Call a program; return 0, or 1 where a result is not finite."""
     return r.call(name, addresses(r, inputs), derived, scratch, addresses(r, outputs))

@@ -95,13 +95,7 @@ class EventData:
         return values
 
     def joined(self, user_data: int, size: int) -> Array[c_void_p]:
-        """Return user data of IDA's other functions with those of the events behind them.
-
-        Parameters
-        ----------
-        user_data, size
-            Where they are, and how long: nothing but pointers.
-        """
+        """Return user data of IDA's other functions with those of the events behind them."""
         block = (c_void_p * (EVENTS_PLACE + 1))()
         if size > EVENTS_PLACE * ctypes.sizeof(c_void_p):
             raise UsageError(f"user data of {size} bytes leave no place for those of events")
@@ -130,15 +124,7 @@ class EventCode:
         self._ida = addresses["ida_events"] if has_ida else 0
 
     def bind(self, parameter_values: ArrayLike, shifts: ArrayLike) -> EventData:
-        """Return the functions for one session.
-
-        Parameters
-        ----------
-        parameter_values
-            The values in the order of the program's parameters.
-        shifts
-            What is added to each value.
-        """
+        """Return the functions for one session."""
         shift = np.array(shifts, dtype=np.float64)
         derived, scratch = self._built.derive("kernel", self.program, parameter_values)
         memory = np.zeros(3 + 3 * len(shift))
@@ -156,20 +142,7 @@ class EventCode:
 
 
 def compile_events(program: Program, for_ida: bool) -> EventCode:
-    """Compile the values of events.
-
-    Parameters
-    ----------
-    program
-        Program of (t, q, u, shift) with one output group.
-    for_ida
-        Whether IDA is to call them too, which needs to know how SUNDIALS was built.
-
-    Raises
-    ------
-    UsageError
-        If the program has other inputs or outputs.
-    """
+    """Compile the values of events."""
     groups = [len(group.symbols) for group in program.inputs]
     if len(groups) != 4 or groups[0] != 1 or [groups[3]] != [len(program.results)]:
         raise UsageError(f"needs the input groups t, q, u and shift, not groups of {groups}", where=program.name)
@@ -182,15 +155,7 @@ def compile_events(program: Program, for_ida: bool) -> EventCode:
 
 
 def write_routines(coordinates: int, speeds: int, count: int, layout: SundialsLayout | None) -> list[Routine]:
-    """Write the values of events, what compares them with those at the last point, and the function that IDA calls.
-
-    Parameters
-    ----------
-    coordinates, speeds, count
-        The length of q and u, and the number of events.
-    layout
-        Where SUNDIALS' structures have their arrays, if IDA is to call them.
-    """
+    """Write the values of events, what compares them with those at the last point, and the function that IDA calls."""
     written = [_values(coordinates), _look(coordinates + speeds, count)]
     return [*written, _ida_events(layout, count)] if layout is not None else written
 

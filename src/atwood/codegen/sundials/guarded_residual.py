@@ -65,17 +65,7 @@ def write_routines(layout: SundialsLayout) -> list[Routine]:
 def guarded_residual(
     guard: tuple[int, int], residual: int, user_data: int, data_bytes: int, size: int
 ) -> tuple[int, Array[c_void_p], Callable[[float, FloatArray, FloatArray], None], object]:
-    """Return a residual that judges steps first, IDA's user data for it, what tells it of a start, and what to keep.
-
-    Parameters
-    ----------
-    guard
-        Address and data of what judges.
-    residual, user_data, data_bytes
-        The residual itself, and its user data, which are nothing but pointers.
-    size
-        How many of the unknowns, the first ones, are looked at.
-    """
+    """Return a residual that judges steps first, IDA's user data for it, what tells it of a start, and what to keep."""
     block = (c_void_p * (EVENTS_PLACE + 1))()
     if _PLACE * ctypes.sizeof(c_void_p) < data_bytes != ctypes.sizeof(block):  # else those of events are behind them
         raise UsageError(f"user data of {data_bytes} bytes leave no place for what judges steps")

@@ -18,19 +18,7 @@ JACOBIAN = {"t": NUMBER, "cj": NUMBER} | dict.fromkeys(("yy", "yyp", "rr", "matr
 
 
 def callbacks_source(layout: SundialsLayout, size: int, form: str, entries: int) -> RoutineSource:
-    """Return what writes residual, Jacobian and error weights.
-
-    Parameters
-    ----------
-    layout
-        Where SUNDIALS' structures have their arrays.
-    size
-        The number of unknowns.
-    form
-        How the matrix is filled: ``"dense"``, ``"sparse"``, or ``"columns"`` by products with unit vectors.
-    entries
-        The number of entries of a sparse matrix.
-    """
+    """Return what writes residual, Jacobian and error weights."""
     return RoutineSource("codegen.sundials.ida_routines", (), (layout, size, form, entries))
 
 
@@ -102,17 +90,6 @@ def write_weights(layout: SundialsLayout, size: int, fields: Sequence[str], atte
     """Write the error weights, ``1 / (relative |y| + absolute)``; -1 where one is not positive.
 
     IDA asks for them before every step. On -1 it hands over what it has; so it does where somebody should look.
-
-    Parameters
-    ----------
-    layout
-        Where SUNDIALS' structures have their arrays.
-    size
-        The number of unknowns.
-    fields
-        The pointers of the user's data.
-    attention
-        Where the data's array ``state`` says that somebody should look.
     """
     r = Routine("ida_weights", {"yy": ADDRESS, "weights": ADDRESS, "data": ADDRESS}, exported=True)
     *vectors, data = r.arguments

@@ -44,13 +44,7 @@ class SundialsLayout:
 
 @cache
 def sundials_layout() -> SundialsLayout:
-    """Return the layout of the structures in the libraries that scikit-sundae ships.
-
-    Raises
-    ------
-    UnsupportedError
-        If scikit-sundae does not say how its libraries were built, or they do not compute with 64-bit floats.
-    """
+    """Return the layout of the structures in the libraries that scikit-sundae ships."""
     found = importlib.util.find_spec("sksundae")
     path = Path(found.origin).with_name("py_config.pxi") if found is not None and found.origin else None
     try:

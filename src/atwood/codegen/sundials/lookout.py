@@ -80,19 +80,7 @@ class LookoutCode:
         self.look = _LOOK(self.look_address)
 
     def bind(self, parameter_values: ArrayLike, sizes: ArrayLike, kept: Sequence[int], pace: Pace) -> LookoutData:
-        """Return the data of one run; they must live as long as it goes on.
-
-        Parameters
-        ----------
-        parameter_values
-            The values in the order of the program's parameters.
-        sizes
-            The size of each speed.
-        kept
-            Numbers of the conditions that are looked at.
-        pace
-            When to look.
-        """
+        """Return the data of one run; they must live as long as it goes on."""
         shape, program = self.shape, self.program
         derived, scratch = self.built.derive("held", program, parameter_values)
         arrays: dict[str, NDArray[Any]] = {
@@ -199,22 +187,7 @@ class LookoutData:
 
 
 def compile_lookout(program: Program, speeds: int, size: int, places: tuple[ArrayLike, ArrayLike]) -> LookoutCode:
-    """Compile what looks at a motion.
-
-    Parameters
-    ----------
-    program
-        Program of (t, q, u) with values, slopes and drifts of conditions.
-    speeds, size
-        The length of u, and of the vector y that begins with q and u.
-    places
-        Row and column of each slope.
-
-    Raises
-    ------
-    UsageError
-        If the program has other inputs or outputs than these.
-    """
+    """Compile what looks at a motion."""
     rows, columns = (np.asarray(one, dtype=np.int64).ravel().tolist() for one in places)
     inputs, outputs = [len(one.symbols) for one in program.inputs], [len(one.expressions) for one in program.outputs]
     if len(inputs) != 3 or inputs[2] != speeds or len(outputs) != 3 or outputs[1] != len(rows):
@@ -228,15 +201,7 @@ def compile_lookout(program: Program, speeds: int, size: int, places: tuple[Arra
 
 
 def slope_lists(conditions: int, places: Sequence[tuple[int, int]]) -> dict[str, NDArray[np.int64]]:
-    """Return row and column of each slope, which two are multiplied, and where in the lower half of ``G G^T``.
-
-    Parameters
-    ----------
-    conditions
-        The number of conditions.
-    places
-        Row and column of each slope.
-    """
+    """Return row and column of each slope, which two are multiplied, and where in the lower half of ``G G^T``."""
     by_column: dict[int, list[tuple[int, int]]] = {}
     for entry, (row, column) in enumerate(places):
         by_column.setdefault(column, []).append((row, entry))

@@ -117,17 +117,7 @@ def _places(lengths: dict[str, int]) -> dict[str, int]:
 
 
 def null_space_source(layout: SundialsLayout, shape: NullSpaceShape, sparse: bool) -> RoutineSource:
-    """Return what writes residual, Jacobian and error weights with IDA's signatures.
-
-    Parameters
-    ----------
-    layout
-        Where SUNDIALS' structures have their arrays.
-    shape
-        How many there are of each.
-    sparse
-        Whether IDA's matrix is sparse.
-    """
+    """Return what writes residual, Jacobian and error weights with IDA's signatures."""
     files = ("codegen/sundials/ida_routines.py",)
     return RoutineSource("codegen.sundials.null_space", files, (layout, shape, sparse))
 

@@ -27,30 +27,7 @@ def compile_null_space_callbacks(
     cache: bool = True,
     layout: SundialsLayout | None = None,
 ) -> NullSpaceCallbacks:
-    """Compile what the reduced form of a mechanism with loops is made of to functions that IDA calls.
-
-    Parameters
-    ----------
-    stack
-        Program of (t, y, y') with kinematic rows, balances, constraints, their rates, and their slopes.
-    derivatives
-        Program of (t, y, y', cj, multipliers) with the entries of the derivatives of all but the Jacobian.
-    jacobian, pattern
-        Row and column of each slope, and of each derivative.
-    shape
-        How many there are of each.
-    sparse
-        Whether IDA's matrix is sparse; its pattern is full.
-    cache
-        Whether to use the cache on disk.
-    layout
-        Where SUNDIALS' structures have their arrays; by default as in the libraries that scikit-sundae ships.
-
-    Raises
-    ------
-    UsageError
-        If the programs have other inputs or outputs than these.
-    """
+    """Compile what the reduced form of a mechanism with loops is made of to functions that IDA calls."""
     jacobian_rows, jacobian_columns, rows, columns = (
         np.asarray(x, dtype=np.int64).ravel() for x in (*jacobian, *pattern)
     )
@@ -98,25 +75,7 @@ class NullSpaceCallbacks(Callbacks):
         self.shape = shape
 
     def bind(self, parameter_values: ArrayLike, choice: ArrayLike, sizes: ArrayLike, limit: float) -> NullSpaceData:
-        """Return the user's data for values of the parameters; each run needs its own.
-
-        Parameters
-        ----------
-        parameter_values
-            The values in the order of the programs' parameters.
-        choice
-            Which coordinates are dependent, as the lists that `NullSpaceShape.choice` names.
-        sizes
-            The size of each speed.
-        limit
-            How much of a dependent coordinate one of the independent ones may move, both by their sizes, before the
-            choice counts as poor.
-
-        Raises
-        ------
-        KernelEvaluationError
-            If the number of values is wrong.
-        """
+        """Return the user's data for values of the parameters; each run needs its own."""
         arrays = self._arrays(parameter_values) | {
             "choice": np.array(choice, dtype=np.int64),
             "work": np.zeros(self.shape.work["end"]),

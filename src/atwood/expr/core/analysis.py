@@ -38,15 +38,7 @@ def live(outputs: Iterable[Expression | float]) -> list[Expression]:
 
 
 def dependents(nodes: Sequence[Expression], roots: Iterable[Expression]) -> set[int]:
-    """Return the indices of the nodes that depend on a root, roots among them included.
-
-    Parameters
-    ----------
-    nodes
-        Nodes in topological order, as from :func:`live`.
-    roots
-        The expressions to depend on.
-    """
+    """Return the indices of the nodes that depend on a root, roots among them included."""
     result = {root.index for root in roots}
     for node in nodes:
         if node.index not in result:

@@ -408,13 +408,6 @@ def logarithmic_slopes(d: Expression, kept: Container[int]) -> Slopes | None:
 
     An exponential, a hyperbolic cosine, their products, and their sums with what depends on parameters alone have
     factors that stay finite where they themselves do not. None for all else.
-
-    Parameters
-    ----------
-    d
-        What a quotient is divided by.
-    kept
-        Numbers of expressions that are independent, whatever they are made of.
     """
     if d.index in kept or d.is_parametric:
         return None
@@ -439,17 +432,7 @@ def logarithmic_slopes(d: Expression, kept: Container[int]) -> Slopes | None:
 
 
 def tangent_of_quotient(n: Expression, slopes: Slopes, tangents: Mapping[int, Expression]) -> Expression:
-    """Return the derivative of a quotient from those slopes of its divisor.
-
-    Parameters
-    ----------
-    n
-        The quotient.
-    slopes
-        See `logarithmic_slopes`.
-    tangents
-        Derivatives by the numbers of expressions; others have none.
-    """
+    """Return the derivative of a quotient from those slopes of its divisor."""
     a, d = n.arguments
     total = zero = n.graph.zero
     for one, factor in slopes:
@@ -460,17 +443,7 @@ def tangent_of_quotient(n: Expression, slopes: Slopes, tangents: Mapping[int, Ex
 def hand_back_quotient(
     n: Expression, slopes: Slopes, weight: Expression, hand_back: Callable[[Expression, Expression], None]
 ) -> None:
-    """Hand the weight of a quotient back to what it is made of.
-
-    Parameters
-    ----------
-    n, slopes
-        See `tangent_of_quotient`.
-    weight
-        Its weight.
-    hand_back
-        Takes an expression and what is added to its weight.
-    """
+    """Hand the weight of a quotient back to what it is made of."""
     hand_back(n.arguments[0], divide(weight, n.arguments[1]))
     for one, factor in slopes:
         hand_back(one, negate(multiply(multiply(factor, weight), n)))

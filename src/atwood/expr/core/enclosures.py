@@ -40,15 +40,7 @@ _PI = 3.141592653589793
 
 
 def enclose(outputs: Sequence[Expression], given: Callable[[Expression], Pair | None]) -> dict[int, Pair]:
-    """Return bounds of expressions, and of what they are made of, by their numbers in the graph.
-
-    Parameters
-    ----------
-    outputs
-        The expressions.
-    given
-        Bounds of what is known; None for what is to be worked out. It knows every symbol.
-    """
+    """Return bounds of expressions, and of what they are made of, by their numbers in the graph."""
     found: dict[int, Pair] = {}
     open_: dict[int, Expression] = {}
     stack = list(outputs)

@@ -24,15 +24,7 @@ _ROUND, _TINY = 2.0**-51, 1e-300
 
 
 def bounds(outputs: Sequence[Expression], values: Mapping[Expression, Bounds]) -> list[Bounds]:
-    """Return bounds of expressions; infinite where nothing is known of them.
-
-    Parameters
-    ----------
-    outputs
-        The expressions.
-    values
-        Lower and upper bounds of every symbol that they need, arrays that broadcast.
-    """
+    """Return bounds of expressions; infinite where nothing is known of them."""
     known: dict[int, Bounds] = {symbol.index: given for symbol, given in values.items()}
     with np.errstate(all="ignore"):
         for node in live(outputs):

@@ -162,27 +162,7 @@ COMMUTATIVE = frozenset({"add", "mul"})
 
 
 def solve_floats(size: int, entries: Sequence[float], right: Sequence[float]) -> list[float]:
-    """Solve a small dense linear system by elimination with partial pivoting.
-
-    Parameters
-    ----------
-    size
-        Number of unknowns.
-    entries
-        The matrix, row by row.
-    right
-        The right-hand side.
-
-    Returns
-    -------
-    list of float
-        The unknowns.
-
-    Raises
-    ------
-    ZeroDivisionError
-        If a pivot is exactly zero.
-    """
+    """Solve a small dense linear system by elimination with partial pivoting."""
     rows = [[*entries[i * size : (i + 1) * size], right[i]] for i in range(size)]
     for column in range(size):
         pivot = max(range(column, size), key=lambda i: abs(rows[i][column]))

@@ -76,13 +76,7 @@ class TimeRelations:
 
     @contextmanager
     def reading(self, is_reading: bool = True) -> Iterator[None]:
-        """Take up relations while laws that make motions are read; what is only shown is evaluated as it stands.
-
-        Parameters
-        ----------
-        is_reading
-            False for what a solution is worked out with, and is no law.
-        """
+        """Take up relations while laws that make motions are read; what is only shown is evaluated as it stands."""
         before, self._is_reading = self._is_reading, is_reading
         try:
             yield
@@ -199,18 +193,7 @@ class MotionRelations(TimeRelations):
     def taken_out(
         self, values: Sequence[Expression], places: Mapping[Expression, Expression], is_closed: bool = False
     ) -> list[Expression]:
-        """Return expressions with what stands for their relations.
-
-        Parameters
-        ----------
-        values
-            The expressions.
-        places
-            The coordinates and speeds that they are in, in terms of those of which differences are to be; empty where
-            they are the same.
-        is_closed
-            Whether relations that have not been found yet stay as they are.
-        """
+        """Return expressions with what stands for their relations."""
         self._kinds |= {one.index: _MOVING for one in places}
         graph, again = self.time.graph, [one for one in live(values) if one.operation in _COMPARING]
         again = [one for one in again if self.are_timed(*one.arguments)]
@@ -241,17 +224,7 @@ _VALUES: Mapping[str, Callable[[float], float]] = {
 
 
 def values_just_after(relations: Sequence[Relation], known: Mapping[Expression, float], t: float) -> tuple[float, ...]:
-    """Return the values of relations just after a time, also where some of them change at that very time.
-
-    Parameters
-    ----------
-    relations
-        The relations, each after those that it reads.
-    known
-        Values of the parameters.
-    t
-        The time, s.
-    """
+    """Return the values of relations just after a time, also where some of them change at that very time."""
     if not relations:
         return ()
     relations_of = relations[0].symbol.graph.relations

@@ -44,13 +44,7 @@ class Formula:
         return fitted(f"<Formula of {', '.join(map(str, self.arguments))}: {self.expression}>")
 
     def __call__(self, *values: Scalar) -> Scalar:
-        """Return the value of the formula.
-
-        Parameters
-        ----------
-        *values
-            One for each argument.
-        """
+        """Return the value of the formula."""
         if len(values) != len(self.arguments):
             raise AtwoodError(f"the formula {self.expression} takes {len(self.arguments)} arguments, not {len(values)}")
         graph = graph_of(*values)

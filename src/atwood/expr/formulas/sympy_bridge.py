@@ -32,16 +32,7 @@ _FROM_SYMPY_UNARY = {"Abs": "absolute"} | {
 def to_sympy(
     expressions: Sequence[Expression | float], symbols: Mapping[Expression, SympyExpression] | None = None
 ) -> list[SympyExpression]:
-    """Return expressions written out in full in sympy.
-
-    Parameters
-    ----------
-    expressions
-        What to translate.
-    symbols
-        What to write for some expressions, such as ``{angle: sympy.Function("q")(t)}``.  Symbols that are not
-        named become real sympy symbols of the same name.
-    """
+    """Return expressions written out in full in sympy."""
     return _translate(expressions, symbols or {}, None)[1]
 
 
@@ -50,22 +41,7 @@ def to_sympy_shared(
     symbols: Mapping[Expression, SympyExpression] | None = None,
     prefix: str = "x",
 ) -> tuple[list[tuple[SympyExpression, SympyExpression]], list[SympyExpression]]:
-    """Return expressions in sympy with names for what they share.
-
-    Parameters
-    ----------
-    expressions, symbols
-        As for :func:`to_sympy`.
-    prefix
-        What the names of the intermediate values begin with.
-
-    Returns
-    -------
-    replacements
-        Pairs of a name and what it stands for, in the order of computation, as ``sympy.cse`` returns them.
-    expressions
-        The expressions in terms of the names.
-    """
+    """Return expressions in sympy with names for what they share."""
     return _translate(expressions, symbols or {}, prefix)
 
 
@@ -181,20 +157,7 @@ def from_sympy(
     mapping: Mapping[SympyExpression | str, Expression | float] | None = None,
     functions: Mapping[str, ExternalFunction] | None = None,
 ) -> Expression:
-    """Return a sympy expression as an expression of a graph.
-
-    Parameters
-    ----------
-    expression
-        What to translate.
-    graph
-        Where to build it.
-    mapping
-        What stands for some sympy expressions, usually symbols, or for symbols of a name.  Other symbols become
-        symbols of the graph with the same name.
-    functions
-        The external functions to call for undefined sympy functions, by name.
-    """
+    """Return a sympy expression as an expression of a graph."""
     import sympy
 
     known: dict[SympyExpression, Expression] = {}

@@ -69,25 +69,7 @@ def taylor_programs(
     parameters: Sequence[Expression],
     lanes: int = 1,
 ) -> TaylorPrograms:
-    """Return the recurrences of a system.
-
-    Parameters
-    ----------
-    name
-        What the system is called in messages.
-    time, states, parameters
-        The symbols of the system.
-    rates
-        The time derivatives of the states.
-    lanes
-        How many convolutions are computed at a time: squares take places that pairs would leave empty.
-
-    Raises
-    ------
-    UnsupportedError
-        If a rate has no Taylor series that is known beforehand: it switches with the state, or calls a function that
-        the graph does not look into.
-    """
+    """Return the recurrences of a system."""
     if len(rates) != len(states):
         raise UsageError(f"{len(states)} states need as many rates, not {len(rates)}", where=name)
     target = Graph()

@@ -346,17 +346,7 @@ def _product(emitter: Emitter, factors: Sequence[Factor]) -> Expression:
 
 
 def sum_terms(emitter: Emitter, terms: Sequence[Term], nested: bool) -> Expression:
-    """Return the sum of terms.
-
-    Parameters
-    ----------
-    emitter
-        What the factors mean.
-    terms
-        The terms.
-    nested
-        Whether the factor that most terms share is taken out, again and again (Horner's scheme).
-    """
+    """Return the sum of terms."""
     if not terms:
         return emitter.graph.zero
     sign, total = _nested(emitter, terms) if nested else _plain(emitter, terms)

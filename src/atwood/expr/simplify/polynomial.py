@@ -199,28 +199,7 @@ def expand(
     effort: Effort | None = None,
     longest: int | None = None,
 ) -> Expansion:
-    """Write expressions as polynomials.
-
-    Parameters
-    ----------
-    rows
-        The expressions.
-    angles
-        What sines and cosines of integer combinations are recognised for.
-    parameters
-        The symbols that go into coefficients.
-    limit
-        The largest number of monomials.
-    effort
-        How many operations on single terms this may take; a million if it is not said.
-    longest
-        What depends on parameters alone is an atom where it has more terms than this.
-
-    Raises
-    ------
-    TooLargeError
-        If a polynomial becomes larger than the limit, or has coefficients that are not finite.
-    """
+    """Write expressions as polynomials."""
     expansion = Expansion(tuple(angles), effort=effort or Effort(1_000_000))
     nodes = live(rows)
     moving = varying(nodes, parameters) | {angle.index for angle in angles}

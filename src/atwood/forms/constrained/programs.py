@@ -63,23 +63,7 @@ def constrained_program(
     kept: Sequence[int],
     light: Sequence[int],
 ) -> ConstrainedProgram:
-    """Return accelerations and projections of a mechanism whose constraints stay.
-
-    Parameters
-    ----------
-    name
-        Named in messages.
-    equations
-        Equations in the coordinates of either form.
-    parameters
-        The symbols of parameters.
-    rows
-        The equations' rows, perhaps rewritten.
-    kept
-        Numbers of the constraints that are independent.
-    light
-        Numbers of the speeds of what has no inertia of its own in each of its directions.
-    """
+    """Return accelerations and projections of a mechanism whose constraints stay."""
     graph = equations.graph
     sizes = tuple(graph.symbol(f"size of {one.name}") for one in equations.speed_names)
     held = keep_constraints(equations, kept)

@@ -172,20 +172,7 @@ _UNITS = {"m": "kg*m/s", "rad": "kg*m^2/s"}
 
 
 def momenta_of(assembly: Assembly, equations: Equations) -> Mapping[str, Observable]:
-    """Return the momenta ``dL/dq'`` of coordinates by path.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    equations
-        Its equations in the coordinates that are meant: generalized ones.
-
-    Returns
-    -------
-    dict
-        Empty in maximal coordinates, and where constraints on velocities are solved, whose momenta are not free.
-    """
+    """Return the momenta ``dL/dq'`` of coordinates by path."""
     if equations is assembly.maximal:
         return {}
     form = "reduced" if equations is assembly.reduced else "regular"

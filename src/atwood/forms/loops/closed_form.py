@@ -72,19 +72,6 @@ def closed_form(
 
     None where a dependent coordinate is read otherwise than by its sine and cosine, as by a law in a sum with another
     angle that is not one of the mechanism.
-
-    Parameters
-    ----------
-    name
-        Named in messages.
-    equations
-        In generalized coordinates.
-    parameters
-        The symbols of parameters.
-    loops
-        The dependent coordinates as functions of the independent ones.
-    rows
-        The equations' rows, perhaps rewritten.
     """
     free, moving = loops.independent, loops.speeds
     moved = _Moved(equations, loops)
@@ -138,15 +125,7 @@ def closed_form(
 
 
 def in_terms_of_independent(form: ClosedForm, values: Sequence[Expression]) -> list[Expression]:
-    """Return functions of all coordinates and speeds as functions of the independent ones.
-
-    Parameters
-    ----------
-    form
-        The mechanism with its loops solved.
-    values
-        What reads dependent angles by their sines and cosines.
-    """
+    """Return functions of all coordinates and speeds as functions of the independent ones."""
     return substitute(_with_single_angles(list(values)), form.known)
 
 

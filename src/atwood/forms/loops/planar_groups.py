@@ -25,15 +25,7 @@ if TYPE_CHECKING:
 
 
 def two_unknowns(loops: Loops, ks: tuple[int, ...], unknowns: tuple[int, ...]) -> tuple[Group, ...]:
-    """Return the group of a joint's constraints with two unknowns; nothing where it is of no known form.
-
-    Parameters
-    ----------
-    loops
-        The loops.
-    ks, unknowns
-        Numbers of the constraints and of the coordinates.
-    """
+    """Return the group of a joint's constraints with two unknowns; nothing where it is of no known form."""
     i, j = unknowns
     angles = loops.is_angle[i], loops.is_angle[j]
     if all(angles):

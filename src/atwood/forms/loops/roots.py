@@ -81,15 +81,7 @@ class Root:
 
 
 def one_unknown(loops: Loops, ks: tuple[int, ...], unknowns: tuple[int, ...]) -> tuple[Group, ...]:
-    """Return the group of one constraint with one unknown; nothing where it is of no known form.
-
-    Parameters
-    ----------
-    loops
-        The loops.
-    ks, unknowns
-        Numbers of the constraint and of the coordinate.
-    """
+    """Return the group of one constraint with one unknown; nothing where it is of no known form."""
     (k,), (number,) = ks, unknowns
     if not loops.shapes.may_be(ks, {number: loops.is_angle[number]}):
         return ()
@@ -105,21 +97,7 @@ def solved_for(
     along: tuple[Expression, ...],
     size: Expression | None = None,
 ) -> Group | None:
-    """Return the solution of ``g = 0``; None where g is neither a wave in an angle nor of second degree in a length.
-
-    Parameters
-    ----------
-    loops
-        The loops.
-    g
-        What is zero.
-    number
-        The unknown coordinate.
-    ks, along
-        Constraints, and by what to multiply them for the speed of the unknown.
-    size
-        For an equation of second degree, what the square of its root is compared with; the scene's extent if not given.
-    """
+    """Return the solution of ``g = 0``; None where g is neither a wave in an angle nor of second degree in a length."""
     if loops.is_angle[number]:
         return _angle(loops, g, number, ks, along)
     x = loops.q[number]
@@ -245,15 +223,6 @@ class ConstraintShapes:
         """Return whether constraints may be sums of a constant and of first harmonics, or powers, of each unknown.
 
         One length may stand in second degree; beside one angle, also in products with its harmonics.
-
-        Parameters
-        ----------
-        ks
-            Numbers of the constraints.
-        unknowns
-            Numbers of the coordinates; whether each is an angle.
-        nested
-            So many times the second is counted in the first.
         """
         at, basis, moved = self._at.copy(), [np.ones(WAYS)], []
         for share, is_angle in zip(self._shares, unknowns.values(), strict=False):
@@ -272,15 +241,7 @@ class ConstraintShapes:
         return _is_combination(found, np.array(basis))
 
     def turns_about(self, ks: tuple[int, ...], number: int, others: Sequence[int]) -> bool:
-        """Return whether an angle may turn three constraints about an axis that does not depend on other unknowns.
-
-        Parameters
-        ----------
-        ks
-            Numbers of the constraints.
-        number, others
-            Numbers of the angle and of the other unknowns.
-        """
+        """Return whether an angle may turn three constraints about an axis that does not depend on other unknowns."""
         axes = []
         for share in (0.3, -0.4):
             at = self._at.copy()

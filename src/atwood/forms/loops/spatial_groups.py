@@ -59,15 +59,7 @@ class _Cross:
 
 
 def three_unknowns(loops: Loops, ks: tuple[int, ...], unknowns: tuple[int, ...]) -> tuple[Group, ...]:
-    """Return the groups of a ball's constraints with three unknowns; nothing where they are of no known form.
-
-    Parameters
-    ----------
-    loops
-        The loops.
-    ks, unknowns
-        Numbers of the constraints and of the coordinates.
-    """
+    """Return the groups of a ball's constraints with three unknowns; nothing where they are of no known form."""
     if len(ks) != 3:
         return ()
     for i, j in itertools.permutations(unknowns, 2):

@@ -81,17 +81,7 @@ def has_sides(assembly: Assembly) -> bool:
 
 
 def in_pieces(assembly: Assembly, handed: frozenset[int] = frozenset(), layered: bool = False) -> Assembly:
-    """Return a scene whose relations of what moves are parameters; the scene itself if there are none.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    handed
-        Numbers of the relations that are left to the laws.
-    layered
-        Whether a sign among those changes within a layer.
-    """
+    """Return a scene whose relations of what moves are parameters; the scene itself if there are none."""
     walls = _walls(assembly)
     if walls is None:
         return assembly

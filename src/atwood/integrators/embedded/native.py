@@ -174,19 +174,7 @@ class CompiledStepper(NativeStepper):
     def _called(
         self, kind: Callable[..., Any], function: Callable[..., Any], arrays: tuple[int, ...], target: int | None = None
     ) -> int:
-        """Return the address of a function in C that calls one in Python.
-
-        Parameters
-        ----------
-        kind
-            The type of the function in C.
-        function
-            The function, which takes the arguments but the last, and the target unless it is read too.
-        arrays
-            Which of them are arrays.
-        target
-            Which takes up the values; without one they are a judgement, whose no is a failure.
-        """
+        """Return the address of a function in C that calls one in Python."""
         size = self._size
         count = max(arrays) + 1
 

@@ -22,17 +22,7 @@ from atwood.late import dataclass
 
 
 def rates_source(coordinates: int, speeds: int, given: bool, projects: bool = False) -> RoutineSource:
-    """Return what writes ``rates``, and ``project`` where there are constraints.
-
-    Parameters
-    ----------
-    coordinates, speeds
-        Their numbers.
-    given
-        Whether the program ``kernel`` gives the rates of both, or the speeds are the rates of the coordinates.
-    projects
-        Whether the program ``nearer`` takes a step onto the constraints.
-    """
+    """Return what writes ``rates``, and ``project`` where there are constraints."""
     files = ("integrators/explicit_problem.py",)
     return RoutineSource("integrators.embedded.rates", files, (coordinates, speeds, given, projects))
 
@@ -113,15 +103,7 @@ class CompiledAccelerations:
         self._prologue = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)(self._built.code.addresses["kernel_prologue"])
 
     def bind(self, parameter_values: ArrayLike, projects: bool = True) -> Callable[[], CompiledRates]:
-        """Compute once what depends on parameters alone; return what gives each session functions of its own.
-
-        Parameters
-        ----------
-        parameter_values
-            The values in the order of the programs' parameters.
-        projects
-            Whether there are constraints to be met.
-        """
+        """Compute once what depends on parameters alone; return what gives each session functions of its own."""
         addresses = self._built.code.addresses
         derived = [self._built.derive(name, one, parameter_values)[0] for name, one in self._programs.items()]
         project = addresses["project"] if projects and self._room else 0

@@ -35,15 +35,6 @@ def run(
     """Take steps: 0 at the stop time, 1 at the limit of steps, 2 where one fails, 4 behind one that is not good.
 
     Times are multiples of the step from where it began, so that rounding does not add up.
-
-    Parameters
-    ----------
-    layout
-        The memory of a session.
-    attempt
-        Writes a step from a time, of a length; returns 0 where it is found.
-    failed, good
-        Write what comes after either.
     """
     r, m, _ = open_routine(layout, "run", exported=True)
     stop, h, origin, limit = m.numbers.stop, m.numbers.step, m.numbers.origin, m.counts.limit

@@ -252,20 +252,6 @@ class GaussStepper(Stepper):
         """Return a step whose error is within tolerances along the first steps of a motion, and take it from here on.
 
         The error is that of a step against two of half its length.
-
-        Parameters
-        ----------
-        t, y
-            The start.
-        end
-            The time of the end, s.
-        tolerances, relative
-            Absolute tolerances of q and u, and the relative one.
-
-        Raises
-        ------
-        SolveError
-            If no step is accurate enough.
         """
         step, best, too_long = (end - t) / 4.0, 0.0, np.inf
         order = self._compiled.order

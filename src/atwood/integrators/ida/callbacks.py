@@ -110,17 +110,7 @@ def address(function: Any) -> int:
 
 
 def residual_function(problem: ImplicitProblem, record: Record, library: SundialsLibrary) -> Any:
-    """Return the residual as an ``IDAResFn``.
-
-    Parameters
-    ----------
-    problem
-        The equations.
-    record
-        Takes up what goes wrong.
-    library
-        SUNDIALS.
-    """
+    """Return the residual as an ``IDAResFn``."""
     function, dot = problem.residual, np.dot
     given = _Views(problem.size, library.N_VGetArrayPointer, writeable=False)
     wanted = _Views(problem.size, library.N_VGetArrayPointer, writeable=True)
@@ -149,19 +139,7 @@ def residual_function(problem: ImplicitProblem, record: Record, library: Sundial
 def jacobian_function(
     problem: ImplicitProblem, record: Record, library: SundialsLibrary, linear_solver: LinearSolver
 ) -> Any:
-    """Return the Jacobian as an ``IDALsJacFn``.
-
-    Parameters
-    ----------
-    problem
-        The equations.
-    record
-        Takes up what goes wrong.
-    library
-        SUNDIALS.
-    linear_solver
-        Decides what the matrix looks like.
-    """
+    """Return the Jacobian as an ``IDALsJacFn``."""
     function, dot = problem.jacobian, np.dot
     rows, columns = problem.pattern
     given = _Views(problem.size, library.N_VGetArrayPointer, writeable=False)
@@ -217,17 +195,7 @@ def _sparse_writer(problem: ImplicitProblem, library: SundialsLibrary) -> tuple[
 
 
 def weight_function(relative: FloatArray, absolute: FloatArray, record: Record, library: SundialsLibrary) -> Any:
-    """Return ``1 / (relative |y| + absolute)`` as an ``IDAEwtFn``.
-
-    Parameters
-    ----------
-    relative, absolute
-        For each unknown.
-    record
-        Takes up what goes wrong.
-    library
-        SUNDIALS.
-    """
+    """Return ``1 / (relative |y| + absolute)`` as an ``IDAEwtFn``."""
     given = _Views(len(relative), library.N_VGetArrayPointer, writeable=False)
     wanted = _Views(len(relative), library.N_VGetArrayPointer, writeable=True)
 
@@ -248,17 +216,7 @@ def weight_function(relative: FloatArray, absolute: FloatArray, record: Record, 
 
 
 def explain(problem: ImplicitProblem, record: Record, states: Iterable[State]) -> None:
-    """Ask the Python residual what compiled functions cannot say: which equation has no value.
-
-    Parameters
-    ----------
-    problem
-        The equations.
-    record
-        Takes up the answer.
-    states
-        Where to ask; the first answer counts.
-    """
+    """Ask the Python residual what compiled functions cannot say: which equation has no value."""
     undefined = record.undefined
     for t, y, yp in states:
         try:

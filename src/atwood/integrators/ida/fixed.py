@@ -59,13 +59,7 @@ class TableLayout:
 
 @cache
 def table_layout(library: SundialsLibrary) -> TableLayout:
-    """Return where solvers have their functions.
-
-    Raises
-    ------
-    LookupError
-        If the dense solver's are nowhere.
-    """
+    """Return where solvers have their functions."""
     context, number = c_void_p(), c_double()
     library.SUNContext_Create(0, ctypes.byref(context))
     vector = library.N_VMake_Serial(1, ctypes.addressof(number), context)

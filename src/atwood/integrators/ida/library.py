@@ -326,13 +326,7 @@ _found: SundialsLibrary | SundialsMissing | None = None
 
 
 def library() -> SundialsLibrary:
-    """Return the libraries, opened once for the whole process.
-
-    Raises
-    ------
-    SundialsMissing
-        If they cannot be used.
-    """
+    """Return the libraries, opened once for the whole process."""
     global _found
     with _lock:
         if _found is None:

@@ -223,17 +223,7 @@ class IdaMemory:
         self.call("IDASetJacFn", self._jacobian)
 
     def renew_factors(self, t: float, rate: float, user_data: int) -> bool:
-        """Work out the Jacobian anew and factorise it, as IDA did last; return whether that worked.
-
-        Parameters
-        ----------
-        t
-            The time that belongs to `y` and `yp`.
-        rate
-            The factor cj of the last Jacobian, to which IDA relates the factors.
-        user_data
-            What the Jacobian is given.
-        """
+        """Work out the Jacobian anew and factorise it, as IDA did last; return whether that worked."""
         parts, library = self._parts, self.library
         own = parts.fixed or parts.sparse
         solver, matrix = (own.solver, own.matrix) if own else (parts.solver, parts.matrix)

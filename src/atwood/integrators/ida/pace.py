@@ -80,17 +80,7 @@ class Pace:
         return steps - count >= STALLED_STEPS
 
     def judge_lap(self, t: float, steps: int, repeated: Callable[[], int], horizon: float) -> tuple[bool, float | None]:
-        """Tell, once a lap, whether the run would never end, and how much steps must grow from now on, if that changes.
-
-        Parameters
-        ----------
-        t, steps
-            The time, and the steps since the start.
-        repeated
-            Returns how many of these were repeated.
-        horizon
-            How far the run goes, s.
-        """
+        """Return, once a lap, whether the run would never end, and the required growth of its steps if it changed."""
         since, count, before = self.lap
         taken = steps - count
         if taken < _LAP:

@@ -91,21 +91,7 @@ def prepare(
     record: Record,
     state: State,
 ) -> IdaMemory:
-    """Return IDA's memory at a start.
-
-    Parameters
-    ----------
-    problem, options, tuning
-        What to solve, and how.
-    linear_solver
-        The one that was chosen.
-    native
-        Compiled functions; without them the Python functions are called back.
-    record
-        Takes up what goes wrong in Python functions.
-    state
-        The start.
-    """
+    """Return IDA's memory at a start."""
     sundials = library()
     memory = IdaMemory(sundials, problem.size)
     if native is None:
@@ -143,17 +129,7 @@ def prepare(
 
 
 def measured_tuning(size: int, is_held: bool, has_fixed_pivots: bool) -> tuple[float, float, float]:
-    """Return the Newton coefficient, the least growth of a step and the age of a Jacobian that `IdaTuning` takes.
-
-    Parameters
-    ----------
-    size
-        The number of unknowns.
-    is_held
-        Whether some of them are algebraic.
-    has_fixed_pivots
-        Whether the matrix is eliminated with fixed pivots, so that a new one costs little whatever its size.
-    """
+    """Return the Newton coefficient, the least growth of a step and the age of a Jacobian that `IdaTuning` takes."""
     if has_fixed_pivots and is_held and size > _CHEAP:
         return FIXED_NEWTON, _HELD_GROWTH, _FIXED_AGE
     growth = _GROWTH if size > _CHEAP else _HELD_GROWTH if is_held else _SMOOTH_GROWTH

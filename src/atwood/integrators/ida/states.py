@@ -15,15 +15,7 @@ _FEW = 64
 
 
 def checked_state(size: int, t: float, y: FloatArray, yp: FloatArray | None) -> State:
-    """Return a state to start from, with its own arrays.
-
-    Parameters
-    ----------
-    size
-        The number of unknowns that it must have.
-    t, y, yp
-        The state.
-    """
+    """Return a state to start from, with its own arrays."""
     state = (float(t), np.array(y, dtype=np.float64), np.array(yp, dtype=np.float64))
     for part in state[1:]:
         if part.shape != (size,):

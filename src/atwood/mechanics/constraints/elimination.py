@@ -176,17 +176,7 @@ def rounds_to_zero(
     parameters: Mapping[Expression, float],
     place: Mapping[Expression, float] | None = None,
 ) -> NDArray[np.bool_]:
-    """Return which expressions are no larger than what rounding could have made of them.
-
-    Parameters
-    ----------
-    expressions
-        Of one graph.
-    parameters
-        Symbols that keep their values, with these.
-    place
-        All other symbols that they depend on, with theirs.
-    """
+    """Return which expressions are no larger than what rounding could have made of them."""
     where = place or {}
     if all(one.is_constant for one in expressions):
         return np.array([one.is_zero for one in expressions], dtype=bool)

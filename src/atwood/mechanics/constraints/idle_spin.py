@@ -59,13 +59,7 @@ class _Slender:
 
 
 def idle_speeds(derivation: Derivation, state: Movement) -> dict[Expression, Expression] | None:
-    """Return, for each spin that is held, one speed in terms of the others; None if one has no constant coefficient.
-
-    Parameters
-    ----------
-    derivation, state
-        The mechanism, and how it moves.
-    """
+    """Return, for each spin that is held, one speed in terms of the others; None if one has no constant coefficient."""
     graph, speeds = derivation.table.graph, list(state.speeds)
     solved: dict[Expression, Expression] = {}
     for index, axis in derivation.idle_spins.items():
@@ -84,13 +78,7 @@ def idle_speeds(derivation: Derivation, state: Movement) -> dict[Expression, Exp
 
 
 def hold_idle_spins(mechanism: Mechanism) -> Mechanism:
-    """Return a mechanism in which spins without inertia, on which nothing acts, are held.
-
-    Parameters
-    ----------
-    mechanism
-        The mechanism.
-    """
+    """Return a mechanism in which spins without inertia, on which nothing acts, are held."""
     if not mechanism.space.is_spatial:
         return mechanism
     oriented = [index for index in sorted(mechanism.bodies.oriented) if index]

@@ -32,17 +32,7 @@ Balance = tuple[int, Expression]
 def linear_knots(
     derivation: Derivation, state: Movement, rows: Sequence[Expression], values: Values
 ) -> dict[Expression, Expression]:
-    """Return the coordinates that follow from a balance of forces that is linear in them.
-
-    Parameters
-    ----------
-    derivation, state
-        The mechanism, and how it moves.
-    rows
-        For each speed, inertial less applied generalized force.
-    values
-        The constraints on positions; what they touch is left to them.
-    """
+    """Return the coordinates that follow from a balance of forces that is linear in them."""
     found: dict[Expression, Expression] = {}
     light = _without_inertia(rows, state)
     of_speed = {rate: q for q, rate in zip(state.coordinates, state.rates, strict=True)}
@@ -69,17 +59,7 @@ def balance_knots(
     forces: Sequence[Expression],
     constraints: Sequence[Constraint],
 ) -> tuple[tuple[Expression, ...], tuple[Constraint, ...]]:
-    """Return the forces of constraints, and the constraints, with those of knots.
-
-    Parameters
-    ----------
-    derivation, state
-        The mechanism, and how it moves.
-    rows
-        For each speed, inertial less applied generalized force.
-    forces, constraints
-        For each speed, the generalized force of the constraints; and these.
-    """
+    """Return the forces of constraints, and the constraints, with those of knots."""
     found, made, pushes = _balances(derivation, state, rows, constraints), list(constraints), list(forces)
     rates = dict(zip(state.coordinates, state.rates, strict=True))
     along: dict[Expression, Expression | float] = {derivation.time: 1.0, **rates}

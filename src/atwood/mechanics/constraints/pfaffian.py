@@ -83,15 +83,7 @@ def switches(expressions: Sequence[Expression]) -> bool:
 
 
 def pfaffian_forms(state: Movement | Equations, rates: Sequence[tuple[str, LocalConstraint, Expression]]) -> list[Form]:
-    """Return constraints on velocities as forms.
-
-    Parameters
-    ----------
-    state
-        How the mechanism moves.
-    rates
-        Part, constraint, and residual in terms of coordinates and speeds.
-    """
+    """Return constraints on velocities as forms."""
     still = dict.fromkeys(state.speeds, 0.0)
     found = []
     for path, one, rate in rates:
@@ -198,20 +190,7 @@ def _scaled(places: Places, form: Form, mechanism: Mechanism) -> FloatArray:
 def constant_pivot(
     derivation: Derivation, places: Places, form: Form, allowed: Sequence[int]
 ) -> tuple[int, Expression] | None:
-    """Return the speed with the largest coefficient of those that are the same everywhere, and its coefficient.
-
-    Parameters
-    ----------
-    derivation, places, form
-        What is asked, and where.
-    allowed
-        Numbers of the speeds that may be taken.
-
-    Returns
-    -------
-    tuple or None
-        None if none of these coefficients is the same everywhere and at least a tenth of any other.
-    """
+    """Return the speed with the largest coefficient of those that are the same everywhere, and its coefficient."""
 
     def how(mechanism: Mechanism) -> int | None:
         values = _scaled(places, form, mechanism)
@@ -262,15 +241,7 @@ Time has the number after the last speed.
 
 
 def linear_integrals(derivation: Derivation, places: Places, forms: Sequence[Form], together: bool) -> list[Integral]:
-    """Return functions, linear in the coordinates, whose constancy says as much as forms do.
-
-    Parameters
-    ----------
-    derivation, places, forms
-        What is asked, and where.
-    together
-        Whether combinations of forms are looked at where no form alone can be integrated.
-    """
+    """Return functions, linear in the coordinates, whose constancy says as much as forms do."""
     own = _integrable_speeds(places.state)
     found: list[Integral] = []
     for number, form in enumerate(forms):
@@ -356,20 +327,7 @@ _LARGEST = 12
 
 
 def integrable_together(mechanism: Mechanism, equations: Equations) -> bool | None:
-    """Return whether the constraints of a scene, all together, could be written as ones on positions.
-
-    Parameters
-    ----------
-    mechanism
-        The scene.
-    equations
-        Its equations, with the constraints that are asked about.
-
-    Returns
-    -------
-    bool or None
-        None if it cannot be told: with too many speeds, or where coefficients have no values.
-    """
+    """Return whether the constraints of a scene, all together, could be written as ones on positions."""
     n, m = len(equations.speeds), len(equations.constraints)
     if not m or n > _LARGEST:
         return None

@@ -41,23 +41,7 @@ _LARGEST_FILL = 20_000
 
 
 def _check_reads(mechanism: Mechanism, read: Sequence[Expression], constraints: Sequence[Constraint]) -> None:
-    """Refuse a law of force that reads a multiplier which nothing determines.
-
-    Parameters
-    ----------
-    mechanism
-        The mechanism.
-    read
-        Multipliers that laws of force read.
-    constraints
-        The constraints in maximal coordinates.
-
-    Raises
-    ------
-    UnsupportedError
-        With the path of the constraint. One that is dropped, since what it would turn needs no orientation, exerts
-        nothing.
-    """
+    """Refuse a law of force that reads a multiplier which nothing determines."""
     graph = mechanism.table.graph
     known = {one.multiplier for one in constraints}
     known |= {multiplier_symbol(graph, *key) for key in mechanism.bodies.idle}
@@ -74,22 +58,7 @@ def _check_reads(mechanism: Mechanism, read: Sequence[Expression], constraints: 
 def known_multipliers(
     mechanism: Mechanism, equations: Equations, read: Sequence[Expression]
 ) -> dict[Expression, Expression]:
-    """Return the multipliers that forces read, in terms of time, coordinates and speeds.
-
-    Parameters
-    ----------
-    mechanism
-        The mechanism.
-    equations
-        Its equations in maximal coordinates, whose rows may depend on multipliers.
-    read
-        The multipliers wanted.
-
-    Raises
-    ------
-    UnsupportedError
-        If nothing determines one of them.
-    """
+    """Return the multipliers that forces read, in terms of time, coordinates and speeds."""
     _check_reads(mechanism, read, equations.constraints)
     rows, speeds, accelerations = equations.rows, equations.speeds, equations.accelerations
     constraints = equations.constraints

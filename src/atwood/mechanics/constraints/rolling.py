@@ -72,19 +72,7 @@ def take_up(
     values: Values,
     rolling: OnVelocities,
 ) -> Taken:
-    """Find out what becomes of constraints on velocities in the reduced form.
-
-    Parameters
-    ----------
-    derivation, site, masses, forest, motion
-        The derivation.
-    solution
-        Coordinates that constraints on positions have eliminated.
-    values
-        All constraints on positions, those that are used up marked.
-    rolling
-        The constraints on velocities.
-    """
+    """Find out what becomes of constraints on velocities in the reduced form."""
     found, left = dict(solution), list(rolling)
     integrals: list[Integral] = []
     while left:
@@ -121,17 +109,7 @@ def take_up(
 def without_idle_spins(
     derivation: Derivation, state: Movement, taken: Taken, on_velocities: OnVelocities, values: Values
 ) -> Taken:
-    """Return the same with spins that have no inertia: each takes one speed away, where nothing else is constrained.
-
-    Parameters
-    ----------
-    derivation, state
-        The derivation, and how it moves.
-    taken
-        What has become of the other constraints on velocities.
-    on_velocities, values
-        All constraints on velocities, and those on positions, of which those that are used up are marked.
-    """
+    """Return the same with spins that have no inertia: each takes one speed away, where nothing else is constrained."""
     idle = tuple(one for one in on_velocities if one[1].law is IDLE_SPIN)
     if not idle:
         return taken
@@ -287,15 +265,7 @@ def _solved_speeds(derivation: Derivation, places: Places, forms: Sequence[Form]
 def integrated(
     derivation: Derivation, site: Site, state: Movement, rolling: OnVelocities
 ) -> dict[tuple[str, str, int], Integral]:
-    """Return the constraints on velocities that are ones on positions by themselves, in the dae form.
-
-    Parameters
-    ----------
-    derivation, site, state
-        The derivation, and how it moves.
-    rolling
-        The constraints on velocities.
-    """
+    """Return the constraints on velocities that are ones on positions by themselves, in the dae form."""
     if derivation.places is None or not rolling:
         return {}
     forms = _forms(derivation, site, state, rolling)

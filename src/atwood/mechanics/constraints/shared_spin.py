@@ -50,17 +50,7 @@ class Axis:
 
 
 def spinning_together(mechanism: Mechanism, axes: Mapping[int, Axis], known: Mapping[Expression, float]) -> list[int]:
-    """Return bodies whose spins are to be held, so that no spin without inertia is left free.
-
-    Parameters
-    ----------
-    mechanism
-        The mechanism.
-    axes
-        The axes of all slender bodies whose spin may be free.
-    known
-        The values of parameters, of time and of relations of it.
-    """
+    """Return bodies whose spins are to be held, so that no spin without inertia is left free."""
     crossed = _across_hinges(mechanism, axes, known)
     axes = {body: one for body, one in axes.items() if body not in crossed}
     bodies = sorted(axes)

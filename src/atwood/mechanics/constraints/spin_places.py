@@ -69,19 +69,7 @@ def places_of(
     known: Mapping[Expression, float],
     count: int,
 ) -> Iterator[Place]:
-    """Yield places of a part, at random but as its joints allow.
-
-    Parameters
-    ----------
-    mechanism, path, local
-        The part.
-    axes
-        The axes of bodies that may spin.
-    known
-        The values of parameters, of time and of relations of it.
-    count
-        How many.
-    """
+    """Yield places of a part, at random but as its joints allow."""
     chance = np.random.default_rng(1)
     size = (
         max((float(np.linalg.norm(arm)) for one in axes.values() for arm in one.offsets.values()), default=1.0) or 1.0

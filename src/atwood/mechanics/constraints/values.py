@@ -58,13 +58,7 @@ def holds_velocities(mechanism: Mechanism) -> bool:
 
 
 def find_constraints(mechanism: Mechanism, forest: SpanningForest, placements: Placements) -> LeftOver:
-    """Return the constraints that hold only if somebody sees to it, in joint coordinates where these are known.
-
-    Raises
-    ------
-    UnsupportedError
-        If one follows the output of another component, or is one on positions that reads a continuous state.
-    """
+    """Return the constraints that hold only if somebody sees to it, in joint coordinates where these are known."""
     positions: list[tuple[str, LocalConstraint]] = []
     velocities: list[tuple[str, LocalConstraint]] = []
     for path, local in mechanism.locals_.items():
@@ -103,17 +97,7 @@ def constraint_values(
 def levels(
     mechanism: Mechanism, site: Site, state: Movement, chosen: Values, placed: Sequence[Expression]
 ) -> list[Constraint]:
-    """Return holonomic constraints with their time derivatives.
-
-    Parameters
-    ----------
-    mechanism, site, state
-        Where things are and how they move.
-    chosen
-        The constraints with their multipliers.
-    placed
-        Their values in terms of coordinates.
-    """
+    """Return holonomic constraints with their time derivatives."""
     found = []
     by_parts = mechanism.space.is_spatial
     symbols = (state.coordinates, state.rates, state.speeds, state.accelerations)
@@ -137,13 +121,7 @@ def velocity_levels(
     signals: Mapping[Expression, Expression],
     integrals: Mapping[tuple[str, str, int], Integral],
 ) -> list[Constraint]:
-    """Return constraints on velocities with their time derivative; those that are integrals hold positions too.
-
-    Raises
-    ------
-    UnsupportedError
-        If one is not affine in the velocities.
-    """
+    """Return constraints on velocities with their time derivative; those that are integrals hold positions too."""
     found = []
     for path, one, multiplier in chosen:
         local = mechanism.locals_[path]

@@ -20,17 +20,7 @@ _Place = tuple[Expression | None, Expression]
 
 
 def without_whole_turns(derivation: Derivation, angles: Sequence[Expression], values: Values) -> Values:
-    """Take whole turns off the constraints that hold two angles at a difference that follows from others before.
-
-    Parameters
-    ----------
-    derivation
-        The mechanism, which notes what is decided.
-    angles
-        The coordinates that are angles in a plane.
-    values
-        The constraints.
-    """
+    """Take whole turns off the constraints that hold two angles at a difference that follows from others before."""
     zero = derivation.table.graph.constant(0.0)
     places: dict[Expression | None, _Place] = {angle: (angle, zero) for angle in [None, *angles]}
     kept: Values = []

@@ -72,17 +72,7 @@ class _Entry:
 
 
 def eliminate(system: SymmetricSystem, order: Sequence[int], tidy: Tidy = list) -> list[Step]:
-    """Eliminate the unknowns of a system one after the other.
-
-    Parameters
-    ----------
-    system
-        The system.
-    order
-        All unknowns, in an order in which no pivot vanishes.
-    tidy
-        Rewrites entries before they are used, without changing their values.
-    """
+    """Eliminate the unknowns of a system one after the other."""
     graph = system.right[0].graph
     rows: list[dict[int, _Entry]] = [{} for _ in system.right]
     for (i, j), value in system.entries.items():
@@ -136,17 +126,7 @@ def back_substitute(step: Step, known: Mapping[int, Expression]) -> Expression:
 
 
 def minimum_degree(places: Sequence[Place], size: int, first: Sequence[int] = ()) -> list[int]:
-    """Return an order of elimination that adds few entries: always the unknown with the fewest neighbours.
-
-    Parameters
-    ----------
-    places
-        Where entries are.
-    size
-        Number of unknowns.
-    first
-        Unknowns that go first among those with as many neighbours.
-    """
+    """Return an order of elimination that adds few entries: always the unknown with the fewest neighbours."""
     touching: dict[int, set[int]] = {i: set() for i in range(size)}
     for i, j in places:
         if i != j:
@@ -194,13 +174,6 @@ def place_differences(
 
     The difference of two positions along a chain becomes the one link between them, although each position is a sum
     over all links before it.
-
-    Parameters
-    ----------
-    outputs
-        The expressions to rewrite.
-    mapping
-        What stands for each symbol.
     """
     if not outputs:
         return []

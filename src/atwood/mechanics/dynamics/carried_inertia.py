@@ -95,13 +95,7 @@ class CarriedInertia:
 
     @cached_property
     def _shares(self) -> list[_Share]:
-        """What the parts of the body add to it.
-
-        Raises
-        ------
-        TopologyError
-            If there is no such body: it is fixed to the world, or a part spreads its mass between several points.
-        """
+        """What the parts of the body add to it."""
         if self._body.is_fixed:
             raise TopologyError(
                 "it acts on the mass of the body there, and what is there is fixed to the world", where=self._where
@@ -131,13 +125,7 @@ class CarriedInertia:
 def inertia_asked_for(
     network: MechanismGraph, bodies: Bodies, locals_: Mapping[str, LocalPart], space: Space
 ) -> dict[tuple[str, str], CarriedInertia]:
-    """Return the inertia of the body at each connector of which a law asks for it, by part and connector.
-
-    Parameters
-    ----------
-    network, bodies, locals_, space
-        The mechanism.
-    """
+    """Return the inertia of the body at each connector of which a law asks for it, by part and connector."""
     return {
         (path, name): CarriedInertia(network, bodies, locals_, space, path, name)
         for path, local in locals_.items()

@@ -187,17 +187,7 @@ def inertia_forces(
     lifted: Lifted,
     forces: Forces,
 ) -> dict[int, list[Expression]]:
-    """Return ``m (a - g)`` at the centre of mass of each body, and add the inertia of masses spread between nodes.
-
-    Parameters
-    ----------
-    site, masses, kinematics
-        The mechanism.
-    lifted
-        What `lifted_accelerations` gave.
-    forces
-        Takes up, with its sign reversed, what acts at nodes and the inertial torques.
-    """
+    """Return ``m (a - g)`` at the centre of mass of each body, and add the inertia of masses spread between nodes."""
     at_nodes, at_references = lifted
     at_centers: dict[int, list[Expression]] = {}
     for index, one in masses.bodies.items():
@@ -225,19 +215,7 @@ def push_body(
     body: BodyInertia,
     falling: tuple[Sequence[Scalar], Sequence[Scalar]],
 ) -> None:
-    """Add the inertial force of a rigid body, taken to its frame's node.
-
-    Parameters
-    ----------
-    site, kinematics
-        The mechanism.
-    forces
-        Takes up the force, and the torque about the node.
-    path, body
-        The part and its inertia.
-    falling
-        Acceleration of the node, and that of free fall, unless the first is without it.
-    """
+    """Add the inertial force of a rigid body, taken to its frame's node."""
     space = site.space
     node = site.node(path, body.frame.name)
     index, turn = site.bodies.body_of[node], site.node_turns[node]
@@ -265,19 +243,7 @@ def balance_rows(
     forces: Forces,
     speeds: Sequence[Expression],
 ) -> list[Expression]:
-    """Return, for each speed, the virtual power of inertial less other forces: one reverse sweep.
-
-    Parameters
-    ----------
-    kinematics
-        The velocity program.
-    at_centers
-        Inertial forces at the reference points of bodies.
-    forces
-        Forces on nodes and torques on bodies.
-    speeds
-        The symbols of the speeds.
-    """
+    """Return, for each speed, the virtual power of inertial less other forces: one reverse sweep."""
     outputs: list[Expression] = []
     cotangents: list[Expression] = []
     for index, inertial in at_centers.items():
@@ -342,17 +308,7 @@ def constraint_levels(
     speeds: Sequence[Expression],
     accelerations: Sequence[Expression],
 ) -> tuple[list[Expression], list[Expression]]:
-    """Return the first and second time derivatives of constraints on positions: one sweep for all of them.
-
-    Parameters
-    ----------
-    values
-        Their residuals, of time and coordinates.
-    time, coordinates, speeds, accelerations
-        The symbols.
-    rates
-        Derivatives of the coordinates.
-    """
+    """Return the first and second time derivatives of constraints on positions: one sweep for all of them."""
     first: dict[Expression, Expression | float] = {time: 1.0, **dict(zip(coordinates, rates, strict=True))}
     if not values:
         return [], []

@@ -132,13 +132,6 @@ def in_joint_coordinates(
     """Return functions with the coordinates of joints that bodies hang on in place of their formulas.
 
     So a spring on a joint sees the coordinate itself, which counts its turns, and acts on that coordinate alone.
-
-    Returns
-    -------
-    functions
-        The functions.
-    coordinates
-        The symbols of these coordinates.
     """
     formulas: dict[Expression, Expression] = {}
     hung = [symbol for symbol in local.formulas if symbol in kinematics.joint_rates]
@@ -267,25 +260,7 @@ def _rates_of_symbols(
 def local_gradients(
     local: LocalPart, function: Expression, factor: Expression, of_velocities: bool = False
 ) -> list[tuple[str, list[Expression], list[Expression]]]:
-    """Return, for each connector, force and torque of a function: its derivatives times a factor, in one reverse sweep.
-
-    Parameters
-    ----------
-    local
-        The part.
-    function
-        Of the local symbols.
-    factor
-        What the derivatives are multiplied by.
-    of_velocities
-        Whether to differentiate with respect to velocities, and not to positions and orientations.
-
-    Returns
-    -------
-    list
-        Name of each connector, force components in world axes, and torque components: counter-clockwise in a plane,
-        in the axes of the connector in space; empty at a point.
-    """
+    """Return each connector's force and torque: derivatives of a function times a factor, in one reverse sweep."""
     wanted: list[Expression] = []
     for symbols in local.connectors.values():
         wanted += [*symbols.velocity, *symbols.spin] if of_velocities else [*symbols.position, *symbols.orientation]

@@ -81,15 +81,7 @@ def add_masses(
     layouts: Mapping[int, tuple[Mapping[int, Vector], Mapping[int, NodeTurn]]],
     space: Space,
 ) -> Masses:
-    """Add up the inertia of all parts, with the parallel-axis theorem (Goldstein, section 5.3).
-
-    Parameters
-    ----------
-    mechanism, bodies, locals_, space
-        The mechanism.
-    layouts
-        Offset and turn of each node in each body.
-    """
+    """Add up the inertia of all parts, with the parallel-axis theorem (Goldstein, section 5.3)."""
     shares: dict[int, list[RigidMass]] = {}
     coupled: list[CoupledMass] = []
     fixed: list[str] = []
@@ -131,13 +123,7 @@ def add_masses(
 
 
 def tensor_of(path: str, body: BodyInertia) -> Axes:
-    """Return the inertia tensor of a rigid body about its centre of mass, as its columns.
-
-    Raises
-    ------
-    DeclarationError
-        If the part gives none, as a part of the plane need not.
-    """
+    """Return the inertia tensor of a rigid body about its centre of mass, as its columns."""
     if body.tensor is None:
         raise DeclarationError(
             "in space a rigid body needs an inertia tensor, and this part gives a moment about one axis only",
@@ -152,11 +138,6 @@ def check_tensors(locals_: Mapping[str, LocalPart], values: Mapping[Expression, 
     """Refuse inertia that no body can have: not symmetric, a negative principal moment, one beyond the others' sum.
 
     In a plane only the moment about its normal counts, and the others need not be given: they may all be zero.
-
-    Raises
-    ------
-    ParameterError
-        With the path of the part.
     """
     for path, local in locals_.items():
         for body in local.body_inertias:
@@ -175,13 +156,7 @@ def check_tensors(locals_: Mapping[str, LocalPart], values: Mapping[Expression, 
 
 
 def check_masses(masses: Masses, values: Mapping[Expression, float]) -> None:
-    """Refuse bodies whose masses add up to less than nothing; one that depends on time is known only later.
-
-    Raises
-    ------
-    ParameterError
-        With the paths of the parts.
-    """
+    """Refuse bodies whose masses add up to less than nothing; one that depends on time is known only later."""
     found = [(" and ".join(one.parts), one.mass) for one in masses.bodies.values()]
     found += [(one.part, row[i]) for one in masses.coupled for i, row in enumerate(one.masses)]
     known = [(where, mass) for where, mass in found if not isinstance(mass, Expression) or mass.is_parametric]

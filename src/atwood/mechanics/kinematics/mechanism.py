@@ -182,17 +182,7 @@ def place_of_largest(values: Sequence[Expression], mechanism: Mechanism) -> int:
 
 
 def from_start(derivation: Derivation, name: str, form: str, value: Expression) -> Expression:
-    """Return a parameter that has the value of an expression where the scene starts, whichever start that is.
-
-    Parameters
-    ----------
-    derivation
-        It notes the parameter.
-    name
-        Of the parameter.
-    form, value
-        In which form's coordinates it is said, and what it is the value of.
-    """
+    """Return a parameter that has the value of an expression where the scene starts, whichever start that is."""
     symbol = derivation.table.graph.parameter(name)
     derivation.found[symbol] = constant = Constant(form, value)
     derivation.table.values[symbol] = _at_start(derivation, constant)
@@ -205,15 +195,7 @@ def _at_start(mechanism: Mechanism, constant: Constant) -> float:
 
 
 def started_at(mechanism: Mechanism, places: Mapping[str, Mapping[Expression, float]]) -> Mechanism:
-    """Return a mechanism with the constants of another start.
-
-    Parameters
-    ----------
-    mechanism
-        With the values of all other parameters.
-    places
-        Where it starts.
-    """
+    """Return a mechanism with the constants of another start."""
     made = replace(mechanism, places=places, table=replace(mechanism.table, values=dict(mechanism.table.values)))
     for symbol, constant in mechanism.constants.items():
         made.table.values[symbol] = _at_start(made, constant)
@@ -242,13 +224,7 @@ def sizing_parameters(mechanism: Mechanism) -> Iterator[tuple[str, str]]:
 
 
 def check_closures(mechanism: Mechanism) -> None:
-    """Check that rigid joints between parts of one body agree.
-
-    Raises
-    ------
-    TopologyError
-        If they do not: fixed parts contradict each other, or rigid parts do not fit together.
-    """
+    """Check that rigid joints between parts of one body agree."""
     bodies, space = mechanism.bodies, mechanism.space
     for joint in bodies.closures:
         body = bodies.bodies[bodies.body_of[joint.a]]
@@ -305,13 +281,7 @@ _FAR = 10.0
 
 
 def find_origin(mechanism: Mechanism) -> Connector | None:
-    """Return the fixed connector that positions are counted from; None for the world's origin, if that is near.
-
-    Parameters
-    ----------
-    mechanism
-        With positions from the world's origin.
-    """
+    """Return the fixed connector that positions are counted from; None for the world's origin, if that is near."""
     nodes = _attached(mechanism)
     size = extent(mechanism)
     if not nodes or nodes[0] == WORLD or size == 0.0:

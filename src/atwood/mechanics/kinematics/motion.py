@@ -158,13 +158,7 @@ def _moved(left: _Symbols, kinematics: Kinematics, lifted: Lifted) -> Movement:
 
 
 def motion_in_plane(mechanism: Mechanism, forest: SpanningForest, shape_of: Mapping[int, BodyShape]) -> Motion:
-    """Return the motion of a mechanism on a line or in a plane.
-
-    Parameters
-    ----------
-    mechanism, forest, shape_of
-        The mechanism.
-    """
+    """Return the motion of a mechanism on a line or in a plane."""
     graph, space = mechanism.table.graph, mechanism.space
     every = _all_symbols(mechanism, forest)
     origin = tuple(graph.symbol(f"origin:{axis}") for axis in space.axis_names)
@@ -211,13 +205,7 @@ def _with_joint_references(
 
 
 def motion_in_space(mechanism: Mechanism, forest: SpanningForest, shape_of: Mapping[int, BodyShape]) -> Motion:
-    """Return the motion of a mechanism in space.
-
-    Parameters
-    ----------
-    mechanism, forest, shape_of
-        The mechanism.
-    """
+    """Return the motion of a mechanism in space."""
 
     def finish(solution: Solution, speeds: Solution = _NONE) -> Movement:
         left = _left(mechanism, forest, solution, speeds)

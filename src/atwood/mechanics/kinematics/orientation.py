@@ -55,15 +55,7 @@ def plain(turn: NodeTurn) -> Scalar:
 
 
 def rotate(vector: Vector, turn: NodeTurn) -> Vector:
-    """Return, in the axes of a body, a vector that is given in those of a node.
-
-    Parameters
-    ----------
-    vector
-        The vector.
-    turn
-        How the node is turned from the body; in the plane counter-clockwise as seen on the page.
-    """
+    """Return, in the axes of a body, a vector that is given in those of a node."""
     if isinstance(turn, tuple):
         return from_axes(turn, vector)
     if turn.is_zero if isinstance(turn, Expression) else turn == 0.0:
@@ -72,17 +64,7 @@ def rotate(vector: Vector, turn: NodeTurn) -> Vector:
 
 
 def node_axes(angle: Expression | None, axes: Axes | None, turn: NodeTurn) -> Axes | None:
-    """Return the axes of a node in world axes; None if its body has no orientation.
-
-    Parameters
-    ----------
-    angle
-        Angle of the body, in the plane.
-    axes
-        Axes of the body, in space.
-    turn
-        How the node is turned from the body.
-    """
+    """Return the axes of a node in world axes; None if its body has no orientation."""
     if isinstance(turn, tuple):
         return None if axes is None else compose(axes, turn)
     return None if angle is None else planar_axes(angle + turn)
@@ -135,13 +117,6 @@ def quaternion_axes(quaternion: Sequence[Scalar], square: Scalar | None = None) 
 
     Divided by the square of its size, so that the size means nothing and cannot drift (Goldstein, section 4.5, with
     e0 to e3 of any sum of squares).
-
-    Parameters
-    ----------
-    quaternion
-        The quaternion.
-    square
-        The square of its size, if that is known.
     """
     w, x, y, z = quaternion
     twice = 2.0 / (w * w + x * x + y * y + z * z if square is None else square)
@@ -208,28 +183,14 @@ FARTHEST_COSINE = 0.9
 
 
 def orientation_axes(orientation: OrientationCoordinates, values: Sequence[Expression]) -> Axes:
-    """Return the axes of a body in the world's.
-
-    Parameters
-    ----------
-    orientation
-        Which coordinates they are.
-    values
-        Its coordinates.
-    """
+    """Return the axes of a body in the world's."""
     if orientation.kind == "quaternion":
         return quaternion_axes(values)
     return compose(BASES[orientation.base], _turns(orientation, values).axes())
 
 
 def orientation_quaternion(orientation: OrientationCoordinates, values: Sequence[Expression]) -> Quaternion:
-    """Return the quaternion of a body, of any size, scalar part first.
-
-    Parameters
-    ----------
-    orientation, values
-        See `orientation_axes`.
-    """
+    """Return the quaternion of a body, of any size, scalar part first."""
     if orientation.kind == "quaternion":
         w, x, y, z = values
         return w, x, y, z
@@ -239,28 +200,14 @@ def orientation_quaternion(orientation: OrientationCoordinates, values: Sequence
 def orientation_rates(
     orientation: OrientationCoordinates, values: Sequence[Expression], spin: Sequence[Expression]
 ) -> list[Scalar]:
-    """Return the derivatives of the coordinates of an orientation.
-
-    Parameters
-    ----------
-    orientation, values
-        See `orientation_axes`.
-    spin
-        Angular velocity in the axes of the body, rad/s.
-    """
+    """Return the derivatives of the coordinates of an orientation."""
     if orientation.kind == "quaternion":
         return quaternion_rates(values, spin)
     return _euler_rates(orientation, values, Vector(*spin))
 
 
 def orientation_margin(orientation: OrientationCoordinates, values: Sequence[Expression]) -> Expression | None:
-    """Return what rises through zero where the coordinates are to be switched; None if they are regular everywhere.
-
-    Parameters
-    ----------
-    orientation, values
-        See `orientation_axes`.
-    """
+    """Return what rises through zero where the coordinates are to be switched; None if they are regular everywhere."""
     if orientation.is_homogeneous:
         return None
     first, _, third = orientation.turns
@@ -290,15 +237,7 @@ def _euler_rates(orientation: OrientationCoordinates, values: Sequence[Expressio
 def euler_spin(
     orientation: OrientationCoordinates, angles: Sequence[Expression], rates: Sequence[Expression]
 ) -> list[Scalar]:
-    """Return the angular velocity in the axes of the body from the derivatives of Euler angles.
-
-    Parameters
-    ----------
-    orientation
-        Euler angles.
-    angles, rates
-        The angles and their derivatives (Goldstein, section 4.9).
-    """
+    """Return the angular velocity in the axes of the body from the derivatives of Euler angles."""
     first, second, third = orientation.turns
     turns = _turns(orientation, angles).turns
     phi, theta, psi = (IDENTITY[axis] * rate for axis, rate in zip((first, second, third), rates, strict=True))

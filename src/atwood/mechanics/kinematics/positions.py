@@ -107,17 +107,7 @@ def shapes(
     layouts: Mapping[int, tuple[Mapping[int, Vector], Mapping[int, NodeTurn]]],
     references: Mapping[int, Vector],
 ) -> dict[int, BodyShape]:
-    """Return the shape of every body.
-
-    Parameters
-    ----------
-    bodies
-        The bodies.
-    layouts
-        Offset and turn of each node in each body.
-    references
-        Reference point of each body in its own axes; the root where it is not given.
-    """
+    """Return the shape of every body."""
     found = {}
     for body in bodies.bodies:
         offsets, turns = layouts[body.index]
@@ -136,19 +126,7 @@ def place(
     space: Space,
     origin: Components,
 ) -> Placements:
-    """Compute where every node is, walking the forest from the world outwards.
-
-    Parameters
-    ----------
-    graph
-        Where expressions live.
-    mechanism, bodies, forest, shape_of, locals_, space
-        The mechanism.
-    coordinates
-        The symbols of the forest's coordinates.
-    origin
-        Position of the world's origin. Symbols here let the whole world be accelerated, see `lifted_accelerations`.
-    """
+    """Compute where every node is, walking the forest from the world outwards."""
     angles: dict[int, Expression] = {0: graph.constant(0.0)}
     for turn in forest.orientations:
         if turn.coordinate is not None:
@@ -256,13 +234,7 @@ def _across_joint(
 
 
 def _turned_by(joint: Joint, symbol: Expression, angle: Scalar) -> Scalar:
-    """Return the joint coordinate for which a joint in a plane turns b against a by an angle.
-
-    Raises
-    ------
-    UnsupportedError
-        If the angle is no multiple of the coordinate, but for a constant.
-    """
+    """Return the joint coordinate for which a joint in a plane turns b against a by an angle."""
     rotation: Any = joint.local.placement.rotation
     if rotation is symbol:
         return angle
@@ -285,15 +257,7 @@ def differentiate(
     speeds: Sequence[Expression],
     accelerations: Sequence[Expression],
 ) -> Kinematics:
-    """Return the placements with their time derivatives: two forward sweeps over the position program.
-
-    Parameters
-    ----------
-    placements
-        Positions and orientations.
-    time, coordinates, speeds, accelerations
-        The symbols; a coordinate's rate is its speed.
-    """
+    """Return the placements with their time derivatives: two forward sweeps over the position program."""
     nodes, bodies, references = placements.positions, placements.angles, placements.references
     flat = [c for p in nodes.values() for c in p] + list(bodies.values()) + [c for p in references.values() for c in p]
     first: dict[Expression, Expression | float] = {time: 1.0, **dict(zip(coordinates, speeds, strict=True))}
@@ -326,17 +290,6 @@ def lifted_accelerations(
 
     Weight is the same as the world's origin accelerating against it; so it is added once, where the recursion begins,
     and not for every mass (Featherstone, Rigid Body Dynamics Algorithms, section 5.3).
-
-    Parameters
-    ----------
-    placements
-        With the world's origin in them.
-    origin
-        The symbols of the origin.
-    pull
-        Acceleration of free fall, along the free components.
-    time, coordinates, speeds, accelerations
-        The symbols.
     """
     graph = time.graph
     drift = [graph.symbol(f"rate of {o.name}") for o in origin]
@@ -367,19 +320,7 @@ def displaced(
     ends: Sequence[Turned],
     moves: Mapping[Expression, tuple[Expression, Expression, Expression]],
 ) -> tuple[Vector, Vector, Vector]:
-    """Return the displacement of a joint and its first two time derivatives, in the axes that it is given in.
-
-    Parameters
-    ----------
-    graph
-        Where expressions live.
-    joint
-        The joint, on local symbols.
-    ends
-        How frames a and b are turned.
-    moves
-        Each of its coordinates with its derivatives.
-    """
+    """Return the displacement of a joint and its first two time derivatives, in the axes that it is given in."""
     first: dict[Expression, Expression | float] = {}
     more: dict[Expression, Expression | float] = {}
     known: dict[Expression, Expression] = {}
@@ -419,21 +360,7 @@ class BodyPoint:
 
 
 def body_point_of(kinematics: Kinematics, body: int, turn: NodeTurn, vector: Vector, space: Space) -> BodyPoint:
-    """Return an arm that is given in the axes of a node.
-
-    Parameters
-    ----------
-    kinematics
-        How bodies move; a body without an orientation has the world's axes.
-    body
-        The body of the node.
-    turn
-        How the node is turned from its body.
-    vector
-        The arm, m.
-    space
-        What the scene lives in.
-    """
+    """Return an arm that is given in the axes of a node."""
     placements = kinematics.placements
     spin = kinematics.angular_velocities.get(body, ())
     spin_rate = kinematics.angular_accelerations.get(body, ())

@@ -286,27 +286,7 @@ def move_in_space(
     course: Course,
     pull: Vector,
 ) -> tuple[Kinematics, tuple[dict[int, Components], dict[int, Components]]]:
-    """Compute how every node moves, walking the forest from the world outwards.
-
-    Parameters
-    ----------
-    graph
-        Where expressions live.
-    bodies, forest, shape_of
-        The mechanism.
-    course
-        The coordinates and how they go on.
-    pull
-        Acceleration of free fall, m/s^2.
-
-    Returns
-    -------
-    kinematics
-        Positions, orientations, velocities, accelerations.
-    lifted
-        Accelerations less that of free fall, of nodes and of reference points: weight enters once, where the recursion
-        begins.
-    """
+    """Compute how every node moves, walking the forest from the world outwards."""
     walk = _Walk(graph, bodies, forest, shape_of, course)
     walk.lay_world(_State(_STILL, _STILL, _STILL, -pull))
     for attachment in forest.attachments:

@@ -34,17 +34,7 @@ class InternalReactions:
 def internal_reaction_program(
     mechanism: Mechanism, equations: Equations, reactions: Sequence[Reaction], parameters: Collection[Expression]
 ) -> InternalReactions | None:
-    """Return the program of all reactions inside bodies; None if no component reports one.
-
-    Parameters
-    ----------
-    mechanism, equations
-        The mechanism, and its equations in maximal coordinates.
-    reactions
-        What `list_reactions` gave.
-    parameters
-        The symbols of parameters.
-    """
+    """Return the program of all reactions inside bodies; None if no component reports one."""
     wanted = [reaction for reaction in reactions if reaction.axis >= 0]
     if not wanted:
         return None

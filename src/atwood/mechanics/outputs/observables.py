@@ -159,21 +159,7 @@ def make_binding(
     energies: Mapping[str, Any],
     signals: Mapping[Expression, Expression],
 ) -> Binding:
-    """Return what the laws of a part read when they may read everything.
-
-    Parameters
-    ----------
-    mechanism, equations
-        The mechanism.
-    local
-        The part.
-    reactions, known
-        Its reactions and its joint coordinates, by name.
-    energies
-        Energies and totals of the model around it.
-    signals
-        What linked inputs stand for.
-    """
+    """Return what the laws of a part read when they may read everything."""
     path, site, kinematics, space = local.part.path, equations.site, equations.kinematics, mechanism.space
     motions = {}
     mapping = local_map(site, local, kinematics) if local.borrowed else {}

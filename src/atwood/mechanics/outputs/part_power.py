@@ -54,15 +54,7 @@ class PartPowers:
 
 
 def part_energy_program(mechanism: Mechanism, equations: Equations, parameters: Collection[Expression]) -> Program:
-    """Return the program of (t, q, u) that gives kinetic and potential energy of each part in turn, J.
-
-    Parameters
-    ----------
-    mechanism, equations
-        The mechanism, and its equations in maximal coordinates.
-    parameters
-        The symbols of parameters.
-    """
+    """Return the program of (t, q, u) that gives kinetic and potential energy of each part in turn, J."""
     signals = resolve_signals(mechanism, equations.site, equations.kinematics, equations.read)
     values = [x for path in mechanism.locals_ for x in part_energies(mechanism, equations, path, signals)]
     return Program("energies by part", _inputs(equations)[:3], tuple(parameters), (OutputGroup("e", tuple(values)),))
@@ -71,15 +63,7 @@ def part_energy_program(mechanism: Mechanism, equations: Equations, parameters: 
 def part_powers(
     mechanism: Mechanism, equations: Equations, parameters: Collection[Expression], of_impulses: bool = False
 ) -> PartPowers:
-    """Return the program of all powers, part by part.
-
-    Parameters
-    ----------
-    mechanism, equations, parameters
-        See `part_energy_program`.
-    of_impulses
-        Whether to take inertia and constraints alone, which is all that acts in an impact.
-    """
+    """Return the program of all powers, part by part."""
     signals = resolve_signals(mechanism, equations.site, equations.kinematics)
     multipliers = multipliers_by_part(equations)
     found: dict[Flow, Expression] = {}
@@ -187,13 +171,6 @@ def applied_power(mechanism: Mechanism, equations: Equations) -> Expression:
 
     Constraints that move with time (drives) are left out: their power is minus their multiplier times the explicit
     time derivative of the constraint.
-
-    Parameters
-    ----------
-    mechanism
-        The mechanism.
-    equations
-        Its equations in one form.
     """
     graph, kinematics = equations.graph, equations.kinematics
     signals = resolve_signals(mechanism, equations.site, kinematics, equations.read)
@@ -221,15 +198,7 @@ def applied_power(mechanism: Mechanism, equations: Equations) -> Expression:
 
 
 def switched_energy(mechanism: Mechanism, equations: Equations) -> Expression:
-    """Return the energy, J, of the potentials that act in some modes only, which comes and goes with these.
-
-    Parameters
-    ----------
-    mechanism
-        The mechanism.
-    equations
-        Its equations in one form.
-    """
+    """Return the energy, J, of the potentials that act in some modes only, which comes and goes with these."""
     kinematics = equations.kinematics
     signals = resolve_signals(mechanism, equations.site, kinematics, equations.read)
     total = equations.graph.constant(0.0)

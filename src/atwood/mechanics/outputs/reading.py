@@ -35,21 +35,7 @@ def observe(
     lock: AbstractContextManager[Any] | None = None,
     momenta: Callable[[], Mapping[str, Observable]] | None = None,
 ) -> Mapping[str, Observable]:
-    """Return every observable of every component, by path.
-
-    Parameters
-    ----------
-    mechanism
-        The mechanism.
-    equations
-        Its equations in one form.
-    reactions
-        What `list_reactions` gave.
-    lock
-        Held while expressions are made, where several threads may ask.
-    momenta
-        Gives the momenta of coordinates by path, such as ``p:rail.displacement``, which are not listed.
-    """
+    """Return every observable of every component, by path."""
     return Observables(mechanism, equations, reactions, lock or nullcontext(), momenta)
 
 
@@ -212,15 +198,7 @@ class Reader:
         return energy_rate(self._equations, energy)
 
     def binding(self, local: LocalPart, with_energies: bool = False) -> Binding:
-        """Return what the laws of a part read.
-
-        Parameters
-        ----------
-        local
-            The part.
-        with_energies
-            Whether that includes energies and totals of the model around it.
-        """
+        """Return what the laws of a part read."""
         path = local.part.path
         known, zero = self._known.get(path, {}), self._mechanism.table.graph.zero
         across = {name: zero for name, value in local.binding.reactions.items() if is_zero(value)}  # of a plane

@@ -121,17 +121,7 @@ def energy_rate(equations: Equations, energy: Expression) -> Expression:
 
 
 def observe_totals(mechanism: Mechanism, prefix: str, around: Mapping[str, object]) -> dict[str, Observable]:
-    """Return the quantities of a model as a whole, by path.
-
-    Parameters
-    ----------
-    mechanism
-        The mechanism.
-    prefix
-        Path of the model with a dot; empty for the scene.
-    around
-        Its energies and totals by name.
-    """
+    """Return the quantities of a model as a whole, by path."""
     found: dict[str, Observable] = {}
     for name, value, unit, doc in _quantities(mechanism.space.name, around):
         take(mechanism, found, f"{prefix}{name}", value, unit, doc, False)

@@ -52,17 +52,7 @@ def named_parts(parts: Mapping[str, Parts]) -> Iterator[tuple[str, Component]]:
 
 
 def class_path(end: Any, names: Mapping[int, str], where: str) -> str:
-    """Return the path of an end that was written in the class body of a model.
-
-    Parameters
-    ----------
-    end
-        The end.
-    names
-        Names of the declared parts by identity.
-    where
-        Name of the class.
-    """
+    """Return the path of an end that was written in the class body of a model."""
     _check_is_end(end, where)
     if isinstance(end, ConnectorSpec):
         return end.name
@@ -172,13 +162,7 @@ def check_same_connectors(old: Parts, new: Any, where: str) -> None:
 
 
 def find_end(model: Component, path: str) -> Connector | InputRef | OutputRef:
-    """Return the end at a dotted path within a model.
-
-    Raises
-    ------
-    UsageError
-        If there is none.
-    """
+    """Return the end at a dotted path within a model."""
     component, steps = model, path.split(".")
     while len(steps) > 1 and steps[0] in component._children():
         component = component._children()[steps[0]]
@@ -199,15 +183,7 @@ def find_end(model: Component, path: str) -> Connector | InputRef | OutputRef:
 
 
 def declared_parts(cls: type[Component], inherited: dict[str, Parts]) -> dict[str, Parts]:
-    """Return the parts that a class declares and inherits, each an object of its own.
-
-    Parameters
-    ----------
-    cls
-        The class, a model.
-    inherited
-        The parts of its bases.
-    """
+    """Return the parts that a class declares and inherits, each an object of its own."""
     found = dict(inherited)
     for name, value in list(vars(cls).items()):
         is_array = isinstance(value, list) and bool(value) and all(isinstance(one, Component) for one in value)
@@ -249,22 +225,7 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
 
 
 def check_new_parts(model: Component, name: str, part: Any, taken: Collection[str]) -> None:
-    """Refuse a part, or an array of parts, that a model cannot take under a name.
-
-    Parameters
-    ----------
-    model
-        The model.
-    name, part
-        What it is to take.
-    taken
-        Names of the parts that it has.
-
-    Raises
-    ------
-    DeclarationError
-        If the name is taken or no identifier, or a part is none, or is somewhere already.
-    """
+    """Refuse a part, or an array of parts, that a model cannot take under a name."""
     where = model.path or type(model).__name__
     check(NAME, name, "name", f"{where}.add", DeclarationError)
     if not _NAME.match(name):

@@ -146,13 +146,7 @@ def copy_parts(parts: Parts) -> Any:
 
 
 def apply_differences(model: Model, differences: Differences) -> None:
-    """Repeat changes on a model; what is there already, or whose part is gone, is left out.
-
-    Raises
-    ------
-    ConnectError
-        If a connection would lose one of its ends.
-    """
+    """Repeat changes on a model; what is there already, or whose part is gone, is left out."""
     for path, values in differences.settings.items():  # outer parts come first, so that the inner ones are there
         part = _part_at(model, path)
         if part is not None:
@@ -218,17 +212,7 @@ def check_pairs(joined: Iterable[tuple[str, str]], prefix: str, new: Component) 
 
 
 def check_connections(around: Any, name: str, new: Component) -> None:
-    """Refuse a component that lacks an end that the models around have connected.
-
-    Parameters
-    ----------
-    around
-        The model that it is to be part of; None if there is none.
-    name
-        Its name there.
-    new
-        The component.
-    """
+    """Refuse a component that lacks an end that the models around have connected."""
     prefix = f"{name}."
     while around is not None:
         check_pairs(around._connections, prefix, new)

@@ -21,15 +21,7 @@ CHANGES = ("settings", "replaced", "added", "connections", "starts")
 
 
 def write_component(component: Component, path: str) -> dict[str, Any]:
-    """Return a component as plain data: its class, the values it was given, and what its parts were made of.
-
-    Parameters
-    ----------
-    component
-        The component.
-    path
-        Where it is, for errors.
-    """
+    """Return a component as plain data: its class, the values it was given, and what its parts were made of."""
     written: dict[str, Any] = {"class": _class_name(type(component), path)}
     values = {name: _write_value(value, join_path(path, name)) for name, value in component._settings.items()}
     if values:
@@ -108,13 +100,7 @@ def _class_name(cls: type[Component], path: str) -> str:
 
 
 def find_class(name: Any, where: str) -> type[Component]:
-    """Return the class that a saved name means, which is imported.
-
-    Raises
-    ------
-    UsageError
-        If there is no such class of components.
-    """
+    """Return the class that a saved name means, which is imported."""
     module_name, _, qualified = name.partition(":") if isinstance(name, str) else ("", "", "")
     if not module_name or not qualified:
         raise UsageError(f"{name!r} does not name a class", where=where, advice="A class is named 'module:Class'.")

@@ -440,15 +440,7 @@ class Binding:
 
 
 def bind(component: Component, binding: Binding) -> Any:
-    """Return the component with values in place of its fields, so that its laws can be evaluated.
-
-    Parameters
-    ----------
-    component
-        The component.
-    binding
-        Numbers, expressions or sympy terms for everything its laws may read.
-    """
+    """Return the component with values in place of its fields, so that its laws can be evaluated."""
     twin = object.__new__(type(component))
     for name in ("_parent", "_name", "_settings"):
         object.__setattr__(twin, name, getattr(component, name))

@@ -158,13 +158,7 @@ def check_reserved(cls: type, name: str) -> None:
 
 
 def signature_of(cls: Any) -> inspect.Signature:
-    """Return the signature with which a class of components is called: its parameters, inputs and parts, by name.
-
-    Raises
-    ------
-    AttributeError
-        If its `__init__` says that by itself: a class with one of its own, and the bases of all.
-    """
+    """Return the signature with which a class of components is called: its parameters, inputs and parts, by name."""
     parts = getattr(cls, "_prototypes", {})
     is_base = cls.__module__.startswith("atwood.model.") and not cls._parameters
     if is_base or not cls.__init__.__module__.startswith("atwood.model."):

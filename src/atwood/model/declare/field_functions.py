@@ -202,13 +202,7 @@ class StateSpec(Field):
         return Quantity(instance, self.name, self.unit.text, self.doc)
 
     def check(self, value: Any, where: str) -> Any:
-        """Return a start value in its SI unit, or refuse it; one of its own for each element where there are several.
-
-        Raises
-        ------
-        ParameterError
-            If it is no finite number in the right unit.
-        """
+        """Return a start value in its SI unit, or refuse it; one for each element where there are several."""
         if callable(value):
             return value
         if isinstance(value, FieldReference) and value.operation == "parameter":

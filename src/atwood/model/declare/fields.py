@@ -161,13 +161,7 @@ class ParameterSpec(Field):
         self.structural = structural or direction or integer or text or bool(choices or function_of or array)
 
     def check(self, value: Any, where: str) -> Any:
-        """Return a value in its own type and SI unit, or refuse it.
-
-        Raises
-        ------
-        ParameterError
-            If it is not finite, of the wrong type or dimension, or out of bounds.
-        """
+        """Return a value in its own type and SI unit, or refuse it."""
         if isinstance(value, ParameterExpression):
             if value.operation == "signal":
                 raise ParameterError(f"a parameter cannot follow the input {value!r}", where=where)
@@ -257,14 +251,7 @@ class SignalSpec(Field):
         super().__init__("signal", default, unit, doc)
 
     def check(self, value: Any, where: str) -> Any:
-        """Return a value that can drive this input, a number, a formula of t or a function of time, or refuse it.
-
-        Raises
-        ------
-        ParameterError
-            If it is no finite number in the right unit, no formula of t, or a function that cannot be evaluated on an
-            expression.
-        """
+        """Return a value that can drive this input, a number, a formula of t or a function of time, or refuse it."""
         if isinstance(value, ParameterExpression):
             return self._check_expression(value, where)
         if isinstance(value, str) or is_sympy(value):
@@ -294,20 +281,7 @@ def _plain_number(value: Any) -> float | None:
 
 
 def check_array(value: Any, where: str) -> tuple[Any, ...]:
-    """Return numbers as a tuple, or as a tuple of rows that are equally long.
-
-    Parameters
-    ----------
-    value
-        A sequence of numbers or of rows, a NumPy array, a data frame.
-    where
-        The path of the parameter.
-
-    Raises
-    ------
-    ParameterError
-        If it is none of these, or a number is not finite.
-    """
+    """Return numbers as a tuple, or as a tuple of rows that are equally long."""
     plain = value.to_numpy() if hasattr(value, "to_numpy") else value
     plain = plain.tolist() if hasattr(plain, "tolist") else plain
     if not isinstance(plain, (list, tuple)) or not plain:

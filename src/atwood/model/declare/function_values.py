@@ -42,13 +42,7 @@ class Function:
         self._nodes = live(self._results)
 
     def __call__(self, *values: Scalar) -> Any:
-        """Return the value, a scalar or a `Vector`; on numbers, on expressions and on sympy terms alike.
-
-        Parameters
-        ----------
-        *values
-            One for each argument.
-        """
+        """Return the value, a scalar or a `Vector`; on numbers, on expressions and on sympy terms alike."""
         if len(values) != len(self.arguments):
             names = ", ".join(self.arguments)
             raise AtwoodError(f"the function {self.text} takes {names}, which are not {len(values)} values")
@@ -89,15 +83,7 @@ class Function:
         return Function(self.arguments, slopes, f"d({self.text})/d{name}")
 
     def scaled(self, arguments: Sequence[float], result: float) -> Function:
-        """Return the same function where its arguments, and its value, are counted in other units.
-
-        Parameters
-        ----------
-        arguments
-            By how much the number for each argument grows.
-        result
-            By how much the number for the value grows.
-        """
+        """Return the same function where its arguments, and its value, are counted in other units."""
         symbols = [self._symbol(name) / size for name, size in zip(self.arguments, arguments, strict=True)]
         made = [one * result for one in self._rebuilt(self._graph, symbols)]
         return Function(self.arguments, made, self.text)
@@ -140,24 +126,7 @@ class Function:
 
 
 def read_function(written: Any, arguments: Any, text: Any, where: str) -> Function:
-    """Return the function that `Function.steps` wrote.
-
-    Parameters
-    ----------
-    written
-        A list of steps for each result.
-    arguments
-        The names of the arguments.
-    text
-        What it was given as.
-    where
-        The path of the parameter.
-
-    Raises
-    ------
-    ParameterError
-        If the data make no function.
-    """
+    """Return the function that `Function.steps` wrote."""
     names_are_right = isinstance(arguments, (list, tuple)) and all(isinstance(name, str) for name in arguments)
     if not isinstance(written, list) or len(written) not in (1, 3) or not names_are_right:
         raise ParameterError("the stored function cannot be read", where=where, advice="Save the scene again.")
@@ -168,27 +137,7 @@ def read_function(written: Any, arguments: Any, text: Any, where: str) -> Functi
 
 
 def make_function(value: Any, arguments: Sequence[str], size: int, unit: Unit, where: str) -> Function:
-    """Return what is given for a parameter as a function.
-
-    Parameters
-    ----------
-    value
-        A number, a quantity (``"2 V"``), a formula in text or sympy, or a Python function; for a vector three of them,
-        or a function that returns three numbers.
-    arguments
-        The names of the arguments.
-    size
-        1, or 3 for a vector.
-    unit
-        The unit of the value.
-    where
-        The path of the parameter.
-
-    Raises
-    ------
-    ParameterError
-        If it is none of these, or reads what is no argument.
-    """
+    """Return what is given for a parameter as a function."""
     if isinstance(value, Function) and value.arguments == tuple(arguments) and len(value._results) == size:
         return value
     graph = Graph()

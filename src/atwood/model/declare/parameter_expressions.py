@@ -50,13 +50,7 @@ class ParameterExpression:
         return OPERATIONS[self.operation](*values)
 
     def worked_out(self, model: Component, where: str) -> Any:
-        """Return the same.
-
-        Raises
-        ------
-        ParameterError
-            If there is no value, as of a division by zero; it names `where`.
-        """
+        """Return the same."""
         try:
             return self.value_in(model)
         except (ArithmeticError, TypeError) as error:
@@ -106,13 +100,7 @@ class ParameterExpression:
 
 
 def combine(operation: str, *operands: Any) -> ParameterExpression:
-    """Return an operation on deferred values and numbers.
-
-    Raises
-    ------
-    DeclarationError
-        If an operand is neither, or the units do not go together.
-    """
+    """Return an operation on deferred values and numbers."""
     for operand in operands:
         if isinstance(operand, ParameterExpression):
             _check_is_number(operand)

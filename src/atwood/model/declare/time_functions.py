@@ -27,13 +27,7 @@ Steps = Sequence[Sequence[Any]]
 
 
 def trace(function: Callable[..., Any], where: str, arguments: Sequence[str] = ("t",)) -> Expression:
-    """Return what a function gives for symbols of a graph of its own: ``t``, or those of other arguments.
-
-    Raises
-    ------
-    ParameterError
-        If it cannot be evaluated on an expression.
-    """
+    """Return what a function gives for symbols of a graph of its own: ``t``, or those of other arguments."""
     graph = Graph()
     try:
         return graph.convert(function(*map(graph.symbol, arguments)))
@@ -53,33 +47,14 @@ def check_function(function: Callable[[Any], Any], where: str) -> None:
 
 
 def write_function(function: Callable[[Any], Any], where: str) -> list[list[Any]]:
-    """Return a function of time as steps.
-
-    Parameters
-    ----------
-    function
-        The function.
-    where
-        The path of the input that it drives.
-
-    Raises
-    ------
-    ParameterError
-        If it cannot be evaluated on an expression, or calls an external function.
-    """
+    """Return a function of time as steps."""
     if isinstance(function, StoredFunction):
         return [list(step) for step in function.steps]
     return steps_of(trace(function, where), where)
 
 
 def steps_of(result: Expression, where: str) -> list[list[Any]]:
-    """Return an expression as steps; symbols go by their names.
-
-    Raises
-    ------
-    ParameterError
-        If it calls an external function, or has an infinite constant.
-    """
+    """Return an expression as steps; symbols go by their names."""
     written: dict[int, Any] = {}
     steps: list[list[Any]] = []
     for node in live([result]):
@@ -247,24 +222,7 @@ _OPERATORS: Mapping[type, Callable[..., Any]] = {
 
 
 def read_text(text: str, symbols: Mapping[str, Any], unit: Unit, where: str) -> Any:
-    """Return the value of a formula, or of a quantity, which has no operator between its number and its unit.
-
-    Parameters
-    ----------
-    text
-        The formula or the quantity.
-    symbols
-        The arguments of the formula, by name.
-    unit
-        The unit that a quantity is asked for in, and that a formula is in.
-    where
-        The path that an error names.
-
-    Raises
-    ------
-    ParameterError
-        If it is neither, or reads what is no argument; or if it could be both: the unit of a quantity is an argument.
-    """
+    """Return the value of a formula, or of a quantity, which has no operator between its number and its unit."""
     tree, split = _parsed(text), split_quantity(text)
     if tree is not None:
         try:
@@ -317,17 +275,7 @@ _WORDS = re.compile("[A-Za-z_][A-Za-z_0-9]*")
 
 
 def unknown_name(name: str, symbols: Mapping[str, Any], where: str) -> ParameterError:
-    """Return the error about a name in a formula that is no argument of it.
-
-    Parameters
-    ----------
-    name
-        The name.
-    symbols
-        The arguments.
-    where
-        The path of the parameter.
-    """
+    """Return the error about a name in a formula that is no argument of it."""
     known = [*symbols, *_NAMES]
     advice = suggestion(name, known) if near_matches(name, known) else f"It is a function of {', '.join(symbols)}."
     return ParameterError(f"the formula reads {name!r}, which is no argument of it", where=where, advice=advice)

@@ -95,24 +95,7 @@ class FlatScene:
 
 
 def flatten(scene: Model, name: str | None = None) -> FlatScene:
-    """Take a scene apart into its leaves.
-
-    Parameters
-    ----------
-    scene
-        The scene; a plain model is taken as a scene with the usual settings.
-    name
-        What to call it; the name of its class otherwise, or of its variable where it is a plain `Scene`.
-
-    Raises
-    ------
-    DeclarationError
-        If it holds no parts.
-    ParameterError
-        If a value that is bound to the parameters of an enclosing model is not admissible.
-    StartError
-        If a start value is no number.
-    """
+    """Take a scene apart into its leaves."""
     if not isinstance(scene, Model):
         raise UsageError(f"{scene!r} is no scene", advice="Pass a Scene or a Model.")
     for setting in scene._settings if scene._parent is None else ():
@@ -150,11 +133,6 @@ def title(scene: Model) -> str:
 
     The variable is that of the nearest caller outside of Atwood who has one, unless it only says what the scene is, as
     ``scene`` does.
-
-    Parameters
-    ----------
-    scene
-        The scene.
     """
     kind = type(scene).__name__
     if type(scene) not in (Scene, Model):

@@ -51,20 +51,7 @@ class JointReference:
 
 
 def find_joint_references(taken: Sequence[tuple[JointCoordinateUse, LocalPart]], graph: Graph) -> list[JointReference]:
-    """Return what a part takes hold of.
-
-    Parameters
-    ----------
-    taken
-        The joints' coordinates with what these joints contribute.
-    graph
-        Where expressions live.
-
-    Raises
-    ------
-    DeclarationError
-        If what a joint offers is no coordinate of it.
-    """
+    """Return what a part takes hold of."""
     found = []
     for used, joint in taken:
         symbol = graph.symbol(f"{used.joint}.{used.coordinate}")
@@ -79,19 +66,7 @@ def find_joint_references(taken: Sequence[tuple[JointCoordinateUse, LocalPart]],
 
 
 def formulas_of(part: Part, bound: Any, symbols: Sequence[Expression], graph: Graph) -> Formulas:
-    """Return what coordinates of a joint, and their rates, are in terms of its connectors.
-
-    Parameters
-    ----------
-    part
-        The joint.
-    bound
-        Its component, to be evaluated on its symbols.
-    symbols
-        The symbols of the coordinates.
-    graph
-        Where expressions live.
-    """
+    """Return what coordinates of a joint, and their rates, are in terms of its connectors."""
     laws = {law.name: law for law in part.component.laws("observable")}
 
     def formula(name: str) -> Expression:
@@ -108,18 +83,7 @@ def formulas_of(part: Part, bound: Any, symbols: Sequence[Expression], graph: Gr
 
 
 def turns_read(part: Part, formulas: Formulas, functions: Sequence[Expression]) -> tuple[Expression, ...]:
-    """Return those of a joint's coordinates whose turns count for what the joint does or passes on.
-
-    Parameters
-    ----------
-    part
-        The joint.
-    formulas
-        Its coordinates as functions of its frames.
-    functions
-        What its laws of force gave, and what inputs elsewhere are linked to. The functions of events are not known yet:
-        a joint that has any counts its turns.
-    """
+    """Return those of a joint's coordinates whose turns count for what the joint does or passes on."""
     periodic = {f"{part.path}.{law.name}" for law in part.component.laws("observable") if law.options.periodic}
     turning = {symbol: formula for symbol, (formula, _) in formulas.items() if symbol.name in periodic}
     if not turning or part.component.laws("event"):
@@ -135,17 +99,6 @@ def counting_constraints(
 
     They hold where nothing hangs on the joint. ``2 tan((phi - formula)/2)`` has slope one at each of its zeros, which
     are whole turns apart, and no jump where the formula has one.
-
-    Parameters
-    ----------
-    part
-        The joint.
-    counted
-        Names of the coordinates whose turns the joint's own laws read, or that other parts take hold of.
-    formulas
-        The coordinates as functions of the joint's frames.
-    graph
-        Where expressions live.
     """
     found = []
     for law in part.component.laws("observable"):
@@ -180,22 +133,7 @@ class JointCoordinateUse:
 
 
 def find_joint_coordinate_uses(flat: FlatScene) -> dict[str, tuple[JointCoordinateUse, ...]]:
-    """Return, for each part that takes hold of joints, what it takes hold of.
-
-    Parameters
-    ----------
-    flat
-        The scene.
-
-    Raises
-    ------
-    ConnectError
-        If such a part is connected to no joint, or joints are connected to each other.
-    DeclarationError
-        If a joint takes hold of joints itself, or offers a coordinate that it does not observe.
-    UnsupportedError
-        If the coordinate does not exist in the scene's space.
-    """
+    """Return, for each part that takes hold of joints, what it takes hold of."""
     offered: dict[str, tuple[str, str]] = {}
     wanted: dict[str, tuple[str, str]] = {}
     for path, part in flat.parts.items():

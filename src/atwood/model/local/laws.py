@@ -58,32 +58,7 @@ def localize(
     line_signs: Mapping[tuple[str, str, str], float] | None,
     carried: Mapping[tuple[str, str], Carried] | None = None,
 ) -> dict[str, LocalPart]:
-    """Evaluate the laws of every part on its local symbols.
-
-    Parameters
-    ----------
-    flat
-        The scene.
-    space
-        What it lives in.
-    time
-        The symbol of time.
-    table
-        Takes up the parameters.
-    modes
-        Mode of each part that has modes.
-    line_signs
-        On a line: for (part, connector, connector) the sign of the second's position minus the first's; None while
-        they are not known yet.
-    carried
-        Inertia of the body that a connector is on, by part and connector, of those that ask for it; None while it is
-        not known yet.
-
-    Raises
-    ------
-    AtwoodError
-        If a law cannot be evaluated; it names the part and the law.
-    """
+    """Evaluate the laws of every part on its local symbols."""
     for path, part in flat.parts.items():
         _check_space(path, part, space.name)
     used = find_joint_coordinate_uses(flat)
@@ -345,24 +320,7 @@ def _local_constraints(part: Part, law: Law, bound: Any, graph: Graph) -> Iterab
 
 
 def output_value(part: Part, bound: Any, name: str, space: Space) -> Scalar:
-    """Return what an output is.
-
-    Parameters
-    ----------
-    part
-        The part.
-    bound
-        The same, bound to what its laws read.
-    name
-        The output: an observable or a reaction, with its axis if it is a vector.
-    space
-        What the scene lives in.
-
-    Raises
-    ------
-    DeclarationError
-        If it has no meaning in this space, or if it is a vector and no component is named, or the other way round.
-    """
+    """Return what an output is."""
     stem, _, axis = name.partition(".")
     law = next((one for one in part.component.laws("observable") if one.name == stem), None)
     if law is None or name in bound._binding().reactions:

@@ -20,24 +20,7 @@ def check_lagrangians(
     connectors: Sequence[LocalConnector],
     linked: Collection[Expression],
 ) -> None:
-    """Refuse Lagrangians whose momenta have no rate: of linked inputs, or with switches by the clock.
-
-    Parameters
-    ----------
-    path
-        Path of the part.
-    lagrangians
-        What its laws returned.
-    connectors
-        The symbols of its connectors.
-    linked
-        Stand-ins for inputs that are linked to an output.
-
-    Raises
-    ------
-    UnsupportedError
-        If one does.
-    """
+    """Refuse Lagrangians whose momenta have no rate: of linked inputs, or with switches by the clock."""
     velocities = [symbol for one in connectors for symbol in (*one.velocity, *one.spin)]
     for value in lagrangians:
         if depends_on(value, linked):
@@ -64,20 +47,7 @@ def find_varying(
     linked: Collection[Expression],
     graph: Graph,
 ) -> tuple[Inertia, ...]:
-    """Return the inertias that change with time.
-
-    Parameters
-    ----------
-    path, connectors, linked, graph
-        See `check_lagrangians`.
-    inertias
-        What its laws returned.
-
-    Raises
-    ------
-    DeclarationError
-        If one depends on anything but parameters and time, or a centre of mass changes its place in the body.
-    """
+    """Return the inertias that change with time."""
     moving = [s for one in connectors for s in (*one.position, *one.velocity, *one.orientation, *one.spin)]
     clock = () if graph.relations is None else graph.relations.roots
     found = []
@@ -109,17 +79,7 @@ def _values(one: Inertia) -> list[Scalar]:
 
 
 def inertial_energy(one: Inertia, gravity: Vector, space: str) -> Scalar:
-    """Return kinetic energy and that of weight, J, on the symbols of a part.
-
-    Parameters
-    ----------
-    one
-        An inertia, of connectors that know their motion.
-    gravity
-        Acceleration of free fall, m/s^2.
-    space
-        ``"line"``, ``"plane"`` or ``"space"``.
-    """
+    """Return kinetic energy and that of weight, J, on the symbols of a part."""
     total: Scalar = 0.0
     if isinstance(one, PointInertia):
         for a, row in zip(one.points, one.masses, strict=True):
@@ -144,17 +104,6 @@ def energies_in(
     """Return the energies that a part's inertias have in a scene's field of gravity.
 
     A rigid body has it at its centre of mass; of points that share their mass (a rod's ends) each has its half.
-
-    Parameters
-    ----------
-    field
-        Energy of a kilogram as a function of x, y, z and t; None where there is no field.
-    inertias
-        What the part's inertia laws gave.
-    time
-        The symbol of time.
-    graph
-        Where expressions live.
     """
     if field is None or field.is_zero:
         return ()

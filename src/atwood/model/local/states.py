@@ -30,17 +30,7 @@ def state_values(part: Part, graph: Graph) -> dict[str, Any]:
 
 
 def declared_starts(parts: Mapping[str, Part], t_start: float, is_discrete: bool = False) -> dict[str, float]:
-    """Return the start of each number of the states of all parts, by path, unless the scene says otherwise.
-
-    Parameters
-    ----------
-    parts
-        The parts.
-    t_start
-        When the scene starts, s.
-    is_discrete
-        Whether of the states that change at moments only, or of the continuous ones.
-    """
+    """Return the start of each number of the states of all parts, by path, unless the scene says otherwise."""
     return {
         f"{path}.{name}": start
         for path, part in parts.items()
@@ -61,24 +51,7 @@ def discrete_states(part: Part, graph: Graph) -> tuple[DiscreteState, ...]:
 
 
 def local_states(part: Part, laws: Sequence[Law], bound: Any, graph: Graph) -> tuple[LocalState, ...]:
-    """Return the continuous states of a part, with their rates.
-
-    Parameters
-    ----------
-    part
-        The part.
-    laws
-        Its laws of rates that hold in the mode.
-    bound
-        The component on its symbols.
-    graph
-        Where these live.
-
-    Raises
-    ------
-    DeclarationError
-        If a rate is said twice, or of something else, or never.
-    """
+    """Return the continuous states of a part, with their rates."""
     specs = {name: spec for name, spec in part.component.state_specs().items() if not spec.is_discrete}
     said = {name for law in part.component.laws("derivative") for name in law.options.states}
     for name in specs:

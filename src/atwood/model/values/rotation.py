@@ -165,17 +165,7 @@ def to_axes(axes: Axes, vector: Vector) -> Vector:
 
 
 def spin_through(turn_: Turn, rate: Scalar, spin: Vector) -> Vector:
-    """Return the angular velocity behind a turn, in the axes there.
-
-    Parameters
-    ----------
-    turn_
-        The turn.
-    rate
-        Rate of its angle.
-    spin
-        Angular velocity before the turn, in the axes before it.
-    """
+    """Return the angular velocity behind a turn, in the axes there."""
     found: Vector = to_axes(turn_.axes(), spin) + turn_.axis * rate
     return found
 

@@ -84,20 +84,7 @@ class Unit:
 
 @lru_cache(maxsize=512)
 def parse_unit(text: str) -> Unit:
-    """Read a unit.
-
-    Parameters
-    ----------
-    text
-        Unit names, and brackets of them, joined by ``*``, ``.``, ``/`` or a space, each with an optional integer
-        power (``m^2``, ``m2``). A ``/`` divides by what comes next alone: ``kg/m s^2`` is ``kg*s^2/m``, ``kg/(m s^2)``
-        a pressure.
-
-    Raises
-    ------
-    DeclarationError
-        If a name in it is not a unit.
-    """
+    """Read a unit."""
     if text == "any":  # of a source, whose value takes the unit of the input that it drives
         return Unit(text, 1.0, (0, 0, 0, 0))
     tokens = _tokens(text)
@@ -169,13 +156,7 @@ def _factor(token: str, tokens: list[str], text: str) -> tuple[float, Exponents]
 
 
 def parse_si_unit(text: str) -> Unit:
-    """Read a unit that must be an SI unit, as everything is declared and reported in.
-
-    Raises
-    ------
-    DeclarationError
-        If it cannot be read, or is a multiple such as ``"mm"``.
-    """
+    """Read a unit that must be an SI unit, as everything is declared and reported in."""
     unit = parse_unit(text)
     if unit.factor != 1.0:
         raise DeclarationError(
@@ -202,22 +183,7 @@ def split_quantity(text: str) -> tuple[float, str] | None:
 
 
 def parse_quantity(text: str, unit: Unit, where: str) -> float:
-    """Read a number with an optional unit, such as ``"30 cm"``, and return it in the SI unit asked for.
-
-    Parameters
-    ----------
-    text
-        What was written.
-    unit
-        The unit that the value is declared with; a bare number is taken to be in it.
-    where
-        The path that an error names.
-
-    Raises
-    ------
-    ParameterError
-        If it is not a number, or its unit has another dimension.
-    """
+    """Read a number with an optional unit, such as ``"30 cm"``, and return it in the SI unit asked for."""
     split = split_quantity(text)
     if split is None:
         raise ParameterError(f"{text!r} is not a number", where=where, advice=f"Give a number in {unit.text}.")

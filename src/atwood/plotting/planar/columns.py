@@ -16,26 +16,6 @@ def spread_columns(
 
     A rope's ends hang on both sides of its pulley; a pulley that hangs on another rope is half as large, so that what
     hangs on it stays apart.
-
-    Parameters
-    ----------
-    ropes
-        Nodes of each rope: an end, the pulleys, the other end.
-    others
-        Nodes of all other parts that join two nodes.
-    body_of
-        Body of each node; 0 is the world.
-    radius
-        Radius of a pulley in the world.
-
-    Returns
-    -------
-    columns
-        By body.
-    places
-        By the node of the groove of a fixed pulley.
-    radii
-        By the node of the pulley's groove.
     """
     columns: dict[int, float] = {0: 0.0}
     places: dict[int, float] = {}

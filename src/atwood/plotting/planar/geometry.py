@@ -137,20 +137,7 @@ class Picture:
 
 
 def find_connectors(result: Result, paths: str | Sequence[str]) -> dict[str, int]:
-    """Return the nodes of connectors.
-
-    Parameters
-    ----------
-    result
-        The run.
-    paths
-        Paths of connectors, such as ``"rod2.b"``, or of parts that have a single one.
-
-    Raises
-    ------
-    UsageError
-        If there is no such connector.
-    """
+    """Return the nodes of connectors."""
     found = {}
     nodes = result.assembly.mechanism.graph.node_of
     known = {f"{part}.{name}": node for (part, name), node in nodes.items()}
@@ -165,15 +152,7 @@ def find_connectors(result: Result, paths: str | Sequence[str]) -> dict[str, int
 
 
 def make_picture(result: Result, also: Iterable[int] = ()) -> Picture:
-    """Return where everything is on the page along a run of a scene in a plane or on a line.
-
-    Parameters
-    ----------
-    result
-        The run.
-    also
-        Nodes that are wanted though nothing is drawn there.
-    """
+    """Return where everything is on the page along a run of a scene in a plane or on a line."""
     mechanism = result.assembly.mechanism
     shapes = _shapes(mechanism)
     points = _node_points(result)
@@ -388,15 +367,7 @@ def _value(mechanism: Mechanism, value: Scalar) -> float:
 
 
 def pulling(result: Result, part: str) -> NDArray[np.bool_]:
-    """Return at which output times a rope has a law in its mode: slack, or let go, it has none.
-
-    Parameters
-    ----------
-    result
-        The run.
-    part
-        Path of the rope.
-    """
+    """Return at which output times a rope has a law in its mode: slack, or let go, it has none."""
     pieces = []
     for segment in result.run.segments:
         local = segment.assembly.mechanism.locals_[part]
@@ -406,15 +377,7 @@ def pulling(result: Result, part: str) -> NDArray[np.bool_]:
 
 
 def hanging(ends: FloatArray, spare: float) -> FloatArray:
-    """Return a slack rope as a parabola, about as much longer than the straight way as it has to spare.
-
-    Parameters
-    ----------
-    ends
-        Both ends on the page, m, shape (2, 2).
-    spare
-        By how much it is longer than the way between them, m.
-    """
+    """Return a slack rope as a parabola, about as much longer than the straight way as it has to spare."""
     share = np.linspace(0.0, 1.0, 41)[:, None]
     sag = np.sqrt(0.375 * spare * (float(np.linalg.norm(ends[1] - ends[0])) + 0.5 * spare))
     line: FloatArray = ends[0] + share * (ends[1] - ends[0]) - np.array([0.0, 4.0 * sag]) * share * (1.0 - share)

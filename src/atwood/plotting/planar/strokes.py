@@ -41,19 +41,7 @@ class Pen:
         return COLOURS[self.heavy.index(shape)] if shape in self.heavy else INK
 
     def draw(self, axes: Axes, moment: int, alpha: float, depth: int) -> None:
-        """Draw everything at one time.
-
-        Parameters
-        ----------
-        axes
-            Where.
-        moment
-            Number of the time.
-        alpha
-            How strongly: what is fainter is mixed with white, so that nothing shines through.
-        depth
-            What is drawn later lies in front.
-        """
+        """Draw everything at one time."""
         for shape in self.picture.shapes:
             points = np.array([self.picture.points[node][moment] for node in shape.nodes])
             self.share = 1.0 if shape.kind == "ground" else alpha
@@ -237,17 +225,7 @@ class Pen:
 
 
 def draw_trace(axes: Axes, points: FloatArray, colour: str) -> None:
-    """Draw the path of a point, older parts fainter.
-
-    Parameters
-    ----------
-    axes
-        Where.
-    points
-        Places in order.
-    colour
-        Its colour.
-    """
+    """Draw the path of a point, older parts fainter."""
     from matplotlib.collections import LineCollection
     from matplotlib.colors import to_rgb
 

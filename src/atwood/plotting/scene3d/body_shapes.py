@@ -110,15 +110,7 @@ class BodyShape:
         return found
 
     def drawn(self, thinnest: float, thickest: float) -> BodyShape:
-        """Return it as it is drawn.
-
-        Parameters
-        ----------
-        thinnest
-            What is thinner is drawn so thick, m.
-        thickest
-            Bars that are thicker are drawn so thick, so that they do not hide the joints, m.
-        """
+        """Return it as it is drawn."""
         if self.kind == "own":
             return self
         sides = np.maximum(self.sides, thinnest)
@@ -146,11 +138,6 @@ def shape_of(lump: Lump) -> BodyShape:
     ``a^2 = 6 (J2 + J3 - J1)/m``. Of a cylinder they are ``m r^2/2`` about its axis and ``m (3 r^2 + h^2)/12`` across
     (Landau and Lifshitz, Mechanics, section 32). Every inertia that a body can have has such a box and, where it is
     symmetrical, such a cylinder.
-
-    Parameters
-    ----------
-    lump
-        Mass and inertia.
     """
     if lump.outline is not None:
         surface = outline_mesh(lump.outline)

@@ -25,17 +25,7 @@ _ROPE, _ROD = "#a8642a", "#5d6b78"
 
 
 def draw_space(axes: Axes, picture: SpacePicture, moment: int) -> None:
-    """Draw a scene at one time, with the paths until then.
-
-    Parameters
-    ----------
-    axes
-        Where; see `frame_space`.
-    picture
-        The scene.
-    moment
-        Number of the output time.
-    """
+    """Draw a scene at one time, with the paths until then."""
     model = picture.model
     draw_floor(axes, picture, moment)
     for trail in picture.trails:
@@ -136,17 +126,7 @@ _TIES: dict[str, Callable[[Stage, FloatArray, FloatArray], None]] = {
 
 
 def frame_space(axes: Axes, picture: SpacePicture, moment: int) -> None:
-    """Give axes the bounds of a picture, and nothing else.
-
-    Parameters
-    ----------
-    axes
-        The axes.
-    picture
-        The scene.
-    moment
-        Number of the output time.
-    """
+    """Give axes the bounds of a picture, and nothing else."""
     lows, highs = picture.bounds_at(moment)
     axes.set_xlim(float(lows[0]), float(highs[0]))
     axes.set_ylim(float(lows[1]), float(highs[1]))
@@ -155,17 +135,7 @@ def frame_space(axes: Axes, picture: SpacePicture, moment: int) -> None:
 
 
 def space_panels(picture: SpacePicture, titles: Sequence[str], name: str = "") -> tuple[Figure, list[Axes]]:
-    """Return a figure with panels of the shape of a picture.
-
-    Parameters
-    ----------
-    picture
-        The scene.
-    titles
-        What stands above each panel.
-    name
-        What stands above them all.
-    """
+    """Return a figure with panels of the shape of a picture."""
     lows, highs = picture.bounds_at(0)
     width, height = highs - lows
     count = len(titles)
@@ -188,17 +158,7 @@ _SHADOW, _GRID = "#e7ebef", "#d9dfe5"
 
 
 def draw_floor(axes: Axes, picture: SpacePicture, moment: int) -> None:
-    """Draw a grid on the floor, and on it the shadows of what is above, straight down.
-
-    Parameters
-    ----------
-    axes
-        Where.
-    picture
-        The scene; nothing is drawn where it has no floor.
-    moment
-        Number of the output time.
-    """
+    """Draw a grid on the floor, and on it the shadows of what is above, straight down."""
     from matplotlib.collections import LineCollection, PolyCollection
 
     if picture.floor is None:
@@ -236,17 +196,7 @@ def _from_above(picture: SpacePicture, moment: int) -> list[FloatArray]:
 
 
 def draw_sphere(axes: Axes, camera: Camera, trail: Trail) -> None:
-    """Draw the sphere on which the end of an axis moves, or half of it, with a net of meridians and parallels.
-
-    Parameters
-    ----------
-    axes
-        Where.
-    camera
-        The eye.
-    trail
-        The path; nothing is drawn where it has no sphere.
-    """
+    """Draw the sphere on which the end of an axis moves, or half of it, with a net of meridians and parallels."""
     from matplotlib.collections import LineCollection
     from matplotlib.patches import Polygon
 
@@ -274,17 +224,7 @@ def draw_sphere(axes: Axes, camera: Camera, trail: Trail) -> None:
 
 
 def draw_corner_axes(axes: Axes, camera: Camera, bounds: tuple[FloatArray, FloatArray]) -> None:
-    """Draw the directions of the world's axes in the lower left corner.
-
-    Parameters
-    ----------
-    axes
-        Where.
-    camera
-        The eye.
-    bounds
-        Corners of the page, m.
-    """
+    """Draw the directions of the world's axes in the lower left corner."""
     lows, highs = bounds
     size = 0.07 * float(np.max(highs - lows))
     arms = camera.axes[:2].T

@@ -54,13 +54,7 @@ class SpaceModel:
 
 
 def build_model(reading: Reading) -> SpaceModel:
-    """Return the pieces of a scene.
-
-    Parameters
-    ----------
-    reading
-        What there is to draw.
-    """
+    """Return the pieces of a scene."""
     shapes = tuple(shape_of(lump) for lump in reading.lumps)
     # Rings and shafts have sizes of their own, so that the extent is known only when they are there.
     rough = _put_together(reading, shapes, *_extent(reading, shapes, []))

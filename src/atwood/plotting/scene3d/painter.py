@@ -99,19 +99,7 @@ class Stage:
         self._lines: list[_Lines] = []
 
     def mesh(self, mesh: Mesh, colour: ArrayLike | str, line: float = 0.8, *, below: bool = False) -> None:
-        """Add a surface, shaded, with its outline.
-
-        Parameters
-        ----------
-        mesh
-            In world axes.
-        colour
-            Its colour in full light.
-        line
-            Width of its lines, points.
-        below
-            Whether all else stands on it, before it as the eye sees it, so that it hides nothing.
-        """
+        """Add a surface, shaded, with its outline."""
         away = _FAR * self.unit if below else 0.0
         page, depth = self.camera.project(mesh.vertices), self.camera.depth(mesh.vertices) - away
         seen = mesh.normals @ self.camera.axes.T
@@ -127,17 +115,7 @@ class Stage:
         self._cut(mesh.vertices[drawn[:, 0]], mesh.vertices[drawn[:, 1]], to_rgb(INK)[None], line, away)
 
     def line(self, points: FloatArray, colour: ArrayLike | str, width: float) -> None:
-        """Add a line.
-
-        Parameters
-        ----------
-        points
-            Its corners in world axes, m, shape (points, 3).
-        colour
-            Its colour; or one for each piece between two points, shape (points - 1, 3).
-        width
-            In points.
-        """
+        """Add a line."""
         self._cut(points[:-1], points[1:], np.atleast_2d(to_rgb(colour)), width)
 
     def _cut(self, starts: FloatArray, ends: FloatArray, tones: FloatArray, width: float, away: float = 0.0) -> None:
@@ -156,17 +134,7 @@ class Stage:
         self._lines.append(_Lines(page, depths, np.broadcast_to(tones, (len(counts), 3))[whose], width))
 
     def ball(self, center: FloatArray, radius: float, colour: ArrayLike | str) -> None:
-        """Add a ball.
-
-        Parameters
-        ----------
-        center
-            In world axes, m.
-        radius
-            m.
-        colour
-            Its colour.
-        """
+        """Add a ball."""
         middle = self.camera.project(center)
         self._balls.append(_Ball(middle, float(self.camera.depth(center)), radius, to_rgb(colour)))
 
@@ -214,15 +182,7 @@ class Stage:
         return found
 
     def paint(self, axes: Axes, layer: float) -> None:
-        """Paint everything that was added.
-
-        Parameters
-        ----------
-        axes
-            Where.
-        layer
-            What has a higher one lies over it, whatever its distance.
-        """
+        """Paint everything that was added."""
         from matplotlib.collections import LineCollection, PolyCollection
 
         shown = self._shown_faces()

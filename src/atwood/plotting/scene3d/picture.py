@@ -151,17 +151,7 @@ class SpacePicture:
 
 
 def make_space_picture(result: Result, camera: Camera, traced: Mapping[str, int] | None = None) -> SpacePicture:
-    """Return what is drawn of a run of a scene in space.
-
-    Parameters
-    ----------
-    result
-        The run.
-    camera
-        The eye.
-    traced
-        Further nodes whose paths are drawn, by name.
-    """
+    """Return what is drawn of a run of a scene in space."""
     model = build_model(read_scene(result))
     reading, trails = model.reading, []
     heavy = [(reading.place(node), colour) for node, colour in model.heavy]
@@ -194,13 +184,7 @@ def _outermost(corners: FloatArray) -> FloatArray:
 
 
 def hull(points: FloatArray) -> FloatArray:
-    """Return the corners of the convex hull of points on the page, counter-clockwise (Andrew's monotone chain).
-
-    Parameters
-    ----------
-    points
-        Shape (points, 2).
-    """
+    """Return the corners of the convex hull of points on the page, counter-clockwise (Andrew's monotone chain)."""
     order = points[np.lexsort((points[:, 1], points[:, 0]))]
     found: list[FloatArray] = []
     for side in (order, order[::-1]):

@@ -195,13 +195,7 @@ class Reading:
 
 
 def read_scene(result: Result) -> Reading:
-    """Return what there is to draw of a scene in space.
-
-    Parameters
-    ----------
-    result
-        The run.
-    """
+    """Return what there is to draw of a scene in space."""
     mechanism = result.assembly.mechanism
     offsets, turns = _layouts(mechanism)
     poses = _poses(result)
@@ -340,19 +334,7 @@ def _ties(path: str, local: LocalPart, nodes: Mapping[str, int]) -> list[Tie]:
 def read_joint(
     reading: Reading, mechanism: Mechanism, path: str, joint: LocalJoint, nodes: Mapping[str, int]
 ) -> list[Joining]:
-    """Return what a joint looks like; nothing where it holds nothing, or holds rigidly.
-
-    Parameters
-    ----------
-    reading
-        Where everything is.
-    mechanism
-        The scene.
-    path, joint
-        The part and its law.
-    nodes
-        Node of each of its connectors.
-    """
+    """Return what a joint looks like; nothing where it holds nothing, or holds rigidly."""
     options, placement = joint.law.options, joint.placement
     if options.rigid or options.a == "world" or _is_idle(mechanism, path, joint):
         return []

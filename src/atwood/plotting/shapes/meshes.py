@@ -64,15 +64,7 @@ class Mesh:
         return ends[has_length], faces[has_length], bends[has_length] < _SHARP
 
     def placed(self, origin: ArrayLike, axes: ArrayLike) -> Mesh:
-        """Return the same surface elsewhere.
-
-        Parameters
-        ----------
-        origin
-            Where its origin goes, m.
-        axes
-            Where its axes go: the columns of a rotation matrix.
-        """
+        """Return the same surface elsewhere."""
         turn = np.asarray(axes, dtype=float)
         moved = Mesh(np.asarray(origin, dtype=float) + self.vertices @ turn.T, self.faces, self.marked)
         # Neither the edges nor how faces meet depend on where it is.
@@ -81,15 +73,7 @@ class Mesh:
 
 
 def frame_along(direction: ArrayLike, near: ArrayLike = (1.0, 0.0, 0.0)) -> FloatArray:
-    """Return a rotation matrix whose last column is along a direction, and the first as near to another as can be.
-
-    Parameters
-    ----------
-    direction
-        Any vector but zero.
-    near
-        Where the first column would best point.
-    """
+    """Return a rotation matrix whose last column is along a direction, and the first as near to another as can be."""
     z = np.asarray(direction, dtype=float)
     z = z / np.linalg.norm(z)
     x = np.asarray(near, dtype=float)
@@ -102,15 +86,7 @@ def frame_along(direction: ArrayLike, near: ArrayLike = (1.0, 0.0, 0.0)) -> Floa
 
 
 def box(sides: Sequence[float], cells: int = 4) -> Mesh:
-    """Return a box about the origin.
-
-    Parameters
-    ----------
-    sides
-        Its sides along x, y and z, m.
-    cells
-        Into how many faces its longest side is divided; others in proportion.
-    """
+    """Return a box about the origin."""
     half = 0.5 * np.asarray(sides, dtype=float)
     counts = np.maximum(1, np.round(cells * half / np.max(half)).astype(int))
     vertices: list[FloatArray] = []
@@ -141,20 +117,7 @@ def box(sides: Sequence[float], cells: int = 4) -> Mesh:
 
 
 def revolved(profile: ArrayLike, around: int = 36, marks: bool = False, closed: bool = False) -> Mesh:
-    """Return the surface that a line makes when it is turned about z.
-
-    Parameters
-    ----------
-    profile
-        Distance from the axis and height of each of its points, m, shape (points, 2); counter-clockwise about what is
-        inside, as seen with the axis on the left, that is upwards on the outside.
-    around
-        Into how many parts the circle is divided; a multiple of four where there are marks.
-    marks
-        Whether to mark every other quarter.
-    closed
-        Whether the line ends where it begins, as that of a ring.
-    """
+    """Return the surface that a line makes when it is turned about z."""
     line = np.asarray(profile, dtype=float)
     angles = 2.0 * np.pi * np.arange(around) / around
     cosines, sines = np.cos(angles), np.sin(angles)
@@ -171,15 +134,7 @@ def revolved(profile: ArrayLike, around: int = 36, marks: bool = False, closed: 
 
 
 def cylinder(radius: float, height: float, around: int = 36, marks: bool = False) -> Mesh:
-    """Return a cylinder about the origin, along z.
-
-    Parameters
-    ----------
-    radius, height
-        m.
-    around, marks
-        See `revolved`.
-    """
+    """Return a cylinder about the origin, along z."""
     lengths = np.linspace(-0.5 * height, 0.5 * height, 1 + max(1, min(12, round(height / (2.0 * radius)))))
     widths = np.array([0.0, 0.35, 0.65, 0.86, 1.0]) * radius
     profile = [(w, lengths[0]) for w in widths] + [(radius, z) for z in lengths[1:]]
@@ -188,17 +143,7 @@ def cylinder(radius: float, height: float, around: int = 36, marks: bool = False
 
 
 def ring(radius: float, thickness: float, around: int = 64, corners: int = 14) -> Mesh:
-    """Return a ring about the origin, whose axis is z.
-
-    Parameters
-    ----------
-    radius
-        Of its middle line, m.
-    thickness
-        Radius of its round section, m.
-    around, corners
-        Into how many parts the two circles are divided.
-    """
+    """Return a ring about the origin, whose axis is z."""
     angles = 2.0 * np.pi * np.arange(corners) / corners
     profile = np.stack([radius + thickness * np.cos(angles), thickness * np.sin(angles)], axis=-1)
     return revolved(profile, around, closed=True)
@@ -217,13 +162,6 @@ def joint_curve(mechanism: Mechanism, path: str, joint: LocalJoint) -> FloatArra
     """Return the curve on which a joint moves its second node, from the first one, m, shape (points, 3).
 
     None where it moves it on a straight line, not at all, or with several coordinates.
-
-    Parameters
-    ----------
-    mechanism
-        The scene.
-    path, joint
-        The part and its law.
     """
     shift = [mechanism.table.graph.convert(c) for c in joint.placement.displacement]
     moving = [c for c in joint.coordinates if depends(shift, c)]
@@ -287,28 +225,14 @@ _THIN = 0.01
 
 
 def outline_of(local: LocalPart) -> Outline | None:
-    """Return what a part looks like, with the numbers of its scene; None if it does not say.
-
-    Parameters
-    ----------
-    local
-        The part.
-    """
+    """Return what a part looks like, with the numbers of its scene; None if it does not say."""
     part = local.part
     found: Outline | None = bind(part.component, Binding(values=part.values)).outline()
     return found
 
 
 def outline_mesh(outline: Outline, around: int = 40) -> Mesh:
-    """Return the surface of an outline, in the axes of the part's frame.
-
-    Parameters
-    ----------
-    outline
-        The outline.
-    around
-        How many corners stand for a circle.
-    """
+    """Return the surface of an outline, in the axes of the part's frame."""
     made = _own_mesh(outline, around)
     return made if outline.axes is None else made.placed(np.zeros(3), outline.axes)
 

@@ -43,22 +43,7 @@ def _read(file: Path) -> list[dict[str, Any]]:
 
 
 def write_with_companion(file: Path, content: bytes, about: Mapping[str, Any]) -> None:
-    """Write a CSV file, and beside it its checksum and what else is known.
-
-    Parameters
-    ----------
-    file
-        Where to.
-    content
-        What the CSV file holds.
-    about
-        What is no number, as plain data.
-
-    Raises
-    ------
-    UsageError
-        If one of them cannot be written.
-    """
+    """Write a CSV file, and beside it its checksum and what else is known."""
     entry = {"sha256": hashlib.sha256(content).hexdigest(), "about": json.loads(json_text(about))}
     with _REPLACING:
         try:
@@ -76,18 +61,7 @@ def write_with_companion(file: Path, content: bytes, about: Mapping[str, Any]) -
 
 
 def read_with_companion(file: Path) -> tuple[str, Mapping[str, Any] | None]:
-    """Return the text of a CSV file and what is known besides; None where there is no file beside it.
-
-    Parameters
-    ----------
-    file
-        The CSV file.
-
-    Raises
-    ------
-    ValueError
-        If it is not what was saved.
-    """
+    """Return the text of a CSV file and what is known besides; None where there is no file beside it."""
     plain = file.read_bytes().replace(b"\r\n", b"\n")
     if not _beside(file).exists():
         return plain.decode(), None

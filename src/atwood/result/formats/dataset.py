@@ -82,13 +82,7 @@ class Dataset:
         return found.hexdigest()
 
     def verified(self, checksum: str | None) -> Dataset:
-        """Return it, if it is what was saved.
-
-        Raises
-        ------
-        ValueError
-            If it has another checksum.
-        """
+        """Return it, if it is what was saved."""
         if checksum != self.checksum():
             raise ValueError("its checksum is that of other contents")
         return self
@@ -121,18 +115,7 @@ def _plain(value: Any) -> Any:
 
 
 def needed(name: str) -> Any:
-    """Return a module that is optional.
-
-    Parameters
-    ----------
-    name
-        ``"pandas"`` or ``"xarray"``.
-
-    Raises
-    ------
-    UsageError
-        If it is not installed.
-    """
+    """Return a module that is optional."""
     try:
         return import_module(name)
     except ImportError as error:
@@ -141,13 +124,7 @@ def needed(name: str) -> Any:
 
 
 def to_xarray(data: Dataset) -> Any:
-    """Return arrays as an `xarray.Dataset`, with units and meanings as the attributes of the CF conventions.
-
-    Parameters
-    ----------
-    data
-        The arrays.
-    """
+    """Return arrays as an `xarray.Dataset`, with units and meanings as the attributes of the CF conventions."""
     xarray = needed("xarray")
     every = {one.path: (one.dimensions, one.values, _attributes(one)) for one in data.variables}
     coordinates = {one.path: every.pop(one.path) for one in data.variables if one.is_coordinate}

@@ -30,15 +30,6 @@ def write_matlab(data: Dataset, file: Path, checksum: str) -> None:
 
     The variable ``atwood`` is a text in JSON, for ``jsondecode``: paths, units and meanings by name, and what else is
     known.
-
-    Parameters
-    ----------
-    data
-        The arrays.
-    file
-        Where to.
-    checksum
-        Kept beside them.
     """
     from scipy.io import savemat
 
@@ -75,13 +66,7 @@ def _column(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def read_matlab(file: Path) -> tuple[Dataset, str]:
-    """Return arrays that were written, and their checksum.
-
-    Parameters
-    ----------
-    file
-        The file.
-    """
+    """Return arrays that were written, and their checksum."""
     from scipy.io import loadmat
 
     check_unpacked(file)

@@ -14,17 +14,7 @@ from atwood.result.formats.dataset import Dataset, Variable, json_text, unique_n
 
 
 def write_netcdf(data: Dataset, file: Path, checksum: str) -> None:
-    """Write arrays; text becomes arrays of characters.
-
-    Parameters
-    ----------
-    data
-        The arrays.
-    file
-        Where to.
-    checksum
-        Kept beside them.
-    """
+    """Write arrays; text becomes arrays of characters."""
     from scipy.io import netcdf_file
 
     taken: set[str] = set()
@@ -73,13 +63,7 @@ def _name(path: str, taken: set[str]) -> str:
 
 
 def read_netcdf(file: Path) -> tuple[Dataset, str | None]:
-    """Return arrays that were written, and their checksum; files of old versions have none.
-
-    Parameters
-    ----------
-    file
-        The file.
-    """
+    """Return arrays that were written, and their checksum; files of old versions have none."""
     from scipy.io import netcdf_file
 
     source: Any

@@ -20,17 +20,7 @@ _ABOUT = "atwood"
 
 
 def write_npz(data: Dataset, file: Path, checksum: str) -> None:
-    """Write arrays.
-
-    Parameters
-    ----------
-    data
-        The arrays.
-    file
-        Where to.
-    checksum
-        Kept beside them.
-    """
+    """Write arrays."""
     taken = {_ABOUT, "file", "allow_pickle"}  # which numpy takes for its own
     names = [unique_name(one.path, taken) for one in data.variables]
     heads = [
@@ -44,13 +34,7 @@ def write_npz(data: Dataset, file: Path, checksum: str) -> None:
 
 
 def read_npz(file: Path) -> tuple[Dataset, str]:
-    """Return arrays that were written, and their checksum.
-
-    Parameters
-    ----------
-    file
-        The file.
-    """
+    """Return arrays that were written, and their checksum."""
     check_unpacked(file)
     with file.open("rb") as stream, np.load(stream, allow_pickle=False) as found:  # a damaged file is closed, too
         about = json.loads(str(found[_ABOUT]))
@@ -70,18 +54,7 @@ _COMPRESSED = 15
 
 
 def check_unpacked(file: Path) -> None:
-    """Refuse a file in NumPy's or MATLAB's format that holds too much.
-
-    Parameters
-    ----------
-    file
-        The file.
-
-    Raises
-    ------
-    ValueError
-        If it does.
-    """
+    """Refuse a file in NumPy's or MATLAB's format that holds too much."""
     packed, total = file.stat().st_size, 0
     if 1032 * packed < _MOST:  # no byte stands for more than 1032
         return

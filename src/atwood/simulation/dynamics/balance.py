@@ -132,20 +132,7 @@ class Balance:
     def accelerate(
         self, t: float, q: FloatArray, u: FloatArray, kept: NDArray[np.intp] | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Return accelerations and multipliers.
-
-        Parameters
-        ----------
-        t, q, u
-            A state that fulfils the constraints.
-        kept
-            Constraints that are independent, all unless given; the multipliers are those of these.
-
-        Raises
-        ------
-        SolveError
-            If the forces do not determine the accelerations.
-        """
+        """Return accelerations and multipliers."""
         return solve_balance(self.at(t, q, u), kept, t)
 
     def project(
@@ -154,15 +141,6 @@ class Balance:
         """Return the nearest state that fulfils the constraints on position and velocity.
 
         Orientations come out with coordinates of size one.
-
-        Parameters
-        ----------
-        t, q, u
-            A state near the constraints.
-        scales
-            Size of a displacement along each speed; nearness is measured in these.
-        iterations
-            The largest number of Newton steps.
         """
         q = self.kinematic_map.normalized(q)
         if not self.constraints:
@@ -244,22 +222,7 @@ def solve_balance(now: BalanceValues, kept: NDArray[np.intp] | None, t: float) -
 
 
 def solve_determined(matrix: FloatArray, right: FloatArray, t: float) -> FloatArray:
-    """Solve a balance of forces; see `solve_even`.
-
-    Parameters
-    ----------
-    matrix
-        The balance, square; or one of each of several states, shape (states, n, n).
-    right
-        One right-hand side for each, or several as columns.
-    t
-        The time, for the error.
-
-    Raises
-    ------
-    SolveError
-        If there is no solution, or more than one.
-    """
+    """Solve a balance of forces; see `solve_even`."""
     try:
         solution = solve_even(matrix, right)
     except np.linalg.LinAlgError:
@@ -281,17 +244,7 @@ _CHUNK = 128
 
 
 def columns_of(kernel: BoundKernel, size: int, *groups: Any) -> FloatArray:
-    """Return the matrix of which a program gives the product with a direction, its last input.
-
-    Parameters
-    ----------
-    kernel
-        The program, vectorized.
-    size
-        Number of columns.
-    *groups
-        Its other inputs, for one state.
-    """
+    """Return the matrix of which a program gives the product with a direction, its last input."""
     state = [np.asarray(group, dtype=float)[:, None] for group in groups]
     unit = np.eye(size)
     parts = [kernel(*state, unit[:, i : i + _CHUNK])[0] for i in range(0, size, _CHUNK)]
@@ -306,17 +259,7 @@ def mass_at(assembly: Assembly, form: FormName, t: float, q: FloatArray, u: Floa
 
 
 def masses_at(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray) -> FloatArray:
-    """Return mass matrices in generalized coordinates that are not written out, shape (states, number, number).
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    t, q, u
-        States, of shape (1 or states,) and (states, number).
-    values
-        Values of the parameters, of shape (parameters,), or (parameters, states) where they differ.
-    """
+    """Return mass matrices in generalized coordinates that are not written out, shape (states, number, number)."""
     program = assembly.balance("reduced")
     assert program.mass_product is not None
     code = assembly.compiled(program.mass_product, vectorized=True)

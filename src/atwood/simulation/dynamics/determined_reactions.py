@@ -30,20 +30,6 @@ def check_read_reactions(assembly: Assembly, t: float, q: FloatArray, u: FloatAr
     Reactions of redundant constraints are determined up to those that balance each other: a null vector of the
     transposed constraint Jacobian. A force may read what these do not change, such as the force of a hinge within the
     plane of its loop.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    t, q, u
-        A state in the coordinates of the form.
-    length
-        Extent of the scene, m.
-
-    Raises
-    ------
-    UnsupportedError
-        If one does; with the reaction that it reads, and the constraints that share it.
     """
     if not assembly.own_equations.read:
         return

@@ -65,15 +65,7 @@ def _direction(equations: Equations, places: Sequence[int]) -> Mapping[Expressio
 
 
 def spread(assembly: Assembly, given: Sequence[tuple[Expression, float]]) -> float:
-    """Return the largest of given lengths, where places in one floating group count from each other, m.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    given
-        What starts somewhere, as an expression of the coordinates in which starts are found, and where.
-    """
+    """Return the largest of given lengths, where places in one floating group count from each other, m."""
     largest, rest = 0.0, list(given)
     one = assembly.mechanism.table.graph.constant(1.0)
     for places in _movable(assembly, assembly.regular):
@@ -89,23 +81,7 @@ def spread(assembly: Assembly, given: Sequence[tuple[Expression, float]]) -> flo
 def seen_from_afar(
     assembly: Assembly, q: FloatArray, u: FloatArray, length: float, span: float
 ) -> tuple[float, FloatArray]:
-    """Return which share of a tolerance relative to positions is one relative to the extent, and speeds without drift.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    q, u
-        A state in the form's own coordinates.
-    length, span
-        Extent of the scene, m, and length of the run, s.
-
-    Returns
-    -------
-    tuple
-        One, and the speeds as they are, unless a floating group is far away, or comes there: then its mean velocity is
-        no part of them.
-    """
+    """Return the share of a position's tolerance that is relative to the extent, and speeds without drift."""
     equations, farthest, own = assembly.own_equations, 0.0, u.copy()
     known = {one: i for i, one in enumerate(equations.speeds)}
     for places in _movable(assembly, equations):

@@ -124,17 +124,7 @@ def reference_coordinates(equations: Equations) -> FloatArray:
 
 
 def best_rough_orientation(equations: Equations, far_off: Callable[[FloatArray], float], q: FloatArray) -> FloatArray:
-    """Return coordinates with each orientation the best of some that cover all of them evenly.
-
-    Parameters
-    ----------
-    equations
-        With the orientation coordinates.
-    far_off
-        How far coordinates are from what is wanted.
-    q
-        Where to begin; what is not an orientation stays.
-    """
+    """Return coordinates with each orientation the best of some that cover all of them evenly."""
     best, least = q, far_off(q)
     for orientation in equations.orientation_coordinates:
         if orientation.kind != "quaternion" or least == 0.0:

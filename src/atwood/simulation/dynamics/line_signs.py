@@ -14,17 +14,7 @@ LineSigns = dict[tuple[str, str, str], float]
 
 
 def actual_line_signs(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, form: str) -> LineSigns:
-    """Return, for pairs of connectors of each part, the sign of the second's position minus the first's.
-
-    Parameters
-    ----------
-    assembly
-        The scene; in a plane or in space nothing is signed, and nothing is returned.
-    t, q, u
-        A state.
-    form
-        The form that its coordinates are of.
-    """
+    """Return, for pairs of connectors of each part, the sign of the second's position minus the first's."""
     if not assembly.mechanism.space.is_line:
         return {}
     equations = assembly.reduced if form == "reduced" else assembly.maximal

@@ -39,13 +39,7 @@ _MISSED = 1e-6
 
 
 def is_numerical(error: Exception) -> bool:
-    """Return whether an error says that numbers cannot be worked with, and comes from where they are.
-
-    Parameters
-    ----------
-    error
-        What was raised.
-    """
+    """Return whether an error says that numbers cannot be worked with, and comes from where they are."""
     if isinstance(error, np.linalg.LinAlgError):
         return True
     if isinstance(error, AtwoodError) or not isinstance(error, (ValueError, ArithmeticError)):
@@ -62,13 +56,6 @@ def numerical_failure(assembly: Assembly, t: float, q: FloatArray, u: FloatArray
     """Return the error of a scene whose numbers could not be worked with, with what is to blame as far as it shows.
 
     That is a law without a value, else the constraint that is missed most, else what moves fastest.
-
-    Parameters
-    ----------
-    assembly, t, q, u
-        The scene in its mode, and the last good state in the coordinates of its form.
-    error
-        What was raised.
     """
     said = f"at t = {t:.6g} its numbers could not be worked with ({error})"
     missing = undefined_value_at(assembly, t, q, u)
@@ -123,13 +110,7 @@ def _most_missed(
 
 @contextmanager
 def named(assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> Iterator[None]:
-    """Turn the errors of libraries into those of a scene at a state; see `numerical_failure`.
-
-    Raises
-    ------
-    SolveError
-        In the place of such an error.
-    """
+    """Turn the errors of libraries into those of a scene at a state; see `numerical_failure`."""
     try:
         yield
     except (ValueError, ArithmeticError) as error:
@@ -185,17 +166,7 @@ class _Quantity:
 def states_ahead(
     t: float, state: tuple[FloatArray, FloatArray], rates: tuple[FloatArray, FloatArray], horizon: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return a state and others ahead of it, nearer ones first: times, coordinates and speeds.
-
-    Parameters
-    ----------
-    t
-        Time, s.
-    state, rates
-        Coordinates and speeds, and their derivatives.
-    horizon
-        Length of the run, s.
-    """
+    """Return a state and others ahead of it, nearer ones first: times, coordinates and speeds."""
     h = np.concatenate([[0.0], horizon * np.geomspace(1e-16, _FARTHEST, 97)])
     with np.errstate(all="ignore"):
         q_rate, a = (np.where(np.isfinite(one), one, 0.0)[:, None] for one in rates)
@@ -206,15 +177,7 @@ def states_ahead(
 
 
 def find_undefined_value(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArray) -> UndefinedValue | None:
-    """Return the first law or input of a component that has no value at the first of some states where one has none.
-
-    Parameters
-    ----------
-    assembly
-        The scene in its mode.
-    t, q, u
-        States in the coordinates of the form, shape (states,) and (number, states).
-    """
+    """Return the first law or input of a component that has no value at the first of some states where one has none."""
     quantities, program = assembly.shared.get(_LAW_VALUES, lambda: _law_values(assembly))
     if not quantities:
         return None

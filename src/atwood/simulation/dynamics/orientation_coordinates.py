@@ -64,15 +64,7 @@ def switch_functions(equations: Equations) -> tuple[EventFunction, ...]:
 
 
 def to_regular(assembly: Assembly, q: FloatArray) -> FloatArray:
-    """Return generalized coordinates with quaternions, from those of the reduced form; one state or many.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    q
-        Shape (coordinates,) or (coordinates, samples).
-    """
+    """Return generalized coordinates with quaternions, from those of the reduced form; one state or many."""
     return _carried(assembly, assembly.reduced, assembly.regular, q)
 
 
@@ -101,15 +93,7 @@ def _carried(assembly: Assembly, before: Equations, after: Equations, q: FloatAr
 
 
 def own_names(assembly: Assembly, names: Sequence[str]) -> tuple[str, ...]:
-    """Return names of coordinates with quaternions as those of the reduced form.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    names
-        Some of them; one of an orientation stands for all.
-    """
+    """Return names of coordinates with quaternions as those of the reduced form."""
     regular, reduced = assembly.regular, assembly.reduced
     if regular is reduced:
         return tuple(names)
@@ -125,13 +109,6 @@ def longest_step(equations: Equations, u: FloatArray) -> float:
 
     A uniform turn is a straight line in some of them, and its steps would grow until rounding is amplified; and a
     step that is longer than the margin could pass its singular place unseen.
-
-    Parameters
-    ----------
-    equations
-        The equations.
-    u
-        Speeds.
     """
     own = [
         list(body_orientation.speeds)
@@ -149,17 +126,7 @@ def _plain(equations: Equations) -> list[str]:
 
 
 def switch_coordinates(assembly: Assembly, q: FloatArray, reassemble: Reassemble) -> tuple[Assembly, FloatArray]:
-    """Return a scene in coordinates that are far from singular, and its coordinates there.
-
-    Parameters
-    ----------
-    assembly
-        The scene, in the reduced form.
-    q
-        Its generalized coordinates with quaternions.
-    reassemble
-        Gives the scene in other coordinates.
-    """
+    """Return a scene in coordinates that are far from singular, and its coordinates there."""
     orientation = assembly.orientation
     if not orientation.kind.startswith("euler-"):
         return assembly, from_regular(assembly, q)

@@ -24,15 +24,7 @@ _SETTLED = 1.01
 
 
 def choose_dependent_coordinates(jacobian: FloatArray, scales: FloatArray) -> tuple[int, ...]:
-    """Return the coordinates that the constraints determine best: in turn, the column of which most is left.
-
-    Parameters
-    ----------
-    jacobian
-        Derivatives of independent constraints.
-    scales
-        Size of each coordinate.
-    """
+    """Return the coordinates that the constraints determine best: in turn, the column of which most is left."""
     count = jacobian.shape[0]
     rows = or_one(np.max(np.abs(jacobian * scales), axis=1, initial=0.0))
     left = jacobian * scales / rows[:, None]
@@ -50,17 +42,7 @@ def choose_dependent_coordinates(jacobian: FloatArray, scales: FloatArray) -> tu
 
 
 def review_partitioning(jacobian: FloatArray, scales: FloatArray, dependent: tuple[int, ...]) -> tuple[int, ...]:
-    """Return a better choice of dependent coordinates if a choice has become poor, else the same one.
-
-    Parameters
-    ----------
-    jacobian
-        Derivatives of independent constraints.
-    scales
-        Size of each coordinate.
-    dependent
-        The choice.
-    """
+    """Return a better choice of dependent coordinates if a choice has become poor, else the same one."""
     scaled = jacobian * scales
     chosen = list(dependent)
     bound = POOR

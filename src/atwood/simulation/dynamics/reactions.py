@@ -47,23 +47,7 @@ def maximal_state(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArra
 def accelerations_and_multipliers(
     assembly: Assembly, form: FormName, t: FloatArray, q: FloatArray, u: FloatArray, kept: NDArray[np.intp]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Solve the balance of forces for many states, with the multipliers of all constraints.
-
-    Parameters
-    ----------
-    assembly, form
-        The scene and the coordinates that the states are in.
-    t, q, u
-        States, of shape (samples,) and (number, samples).
-    kept
-        Numbers of independent constraints.
-
-    Returns
-    -------
-    accelerations, multipliers, explicit_rate
-        Of shape (number, samples); drift is the constraints' explicit time derivative. With redundant constraints the
-        multipliers are those of least size, moments divided by the extent of the scene.
-    """
+    """Solve the balance of forces for many states, with the multipliers of all constraints."""
     program = assembly.balance(form)
     values = assembly.kernel(program.program, vectorized=True)(t[None, :], q, u)
     a, multipliers = _solved(assembly, form, (t, q, u), kept, values)
@@ -255,13 +239,7 @@ class ReactionSolver:
         self._internal_reactions = internal_reactions_of(assembly)
 
     def for_rows(self, rows: FloatArray) -> ReactionSolver:
-        """Return the same for states that have parameters of their own, where no constraint is redundant.
-
-        Parameters
-        ----------
-        rows
-            Values of the parameters, shape (parameters, samples).
-        """
+        """Return the same for states that have parameters of their own, where no constraint is redundant."""
         twin = copy.copy(self)
         twin.assembly = self.assembly.with_rows(rows)
         return twin

@@ -73,17 +73,7 @@ class _Place:
 
 
 def find_rank(balance: Balance, t: float, q: FloatArray, scales: FloatArray) -> RankFinding:
-    """Find the rank of the constraints.
-
-    Parameters
-    ----------
-    balance
-        The balance of forces of the form.
-    t, q
-        Time and position of the start.
-    scales
-        Size of a displacement along each speed.
-    """
+    """Find the rank of the constraints."""
     count = balance.constraints
     if count == 0:
         return RankFinding((), (), 0, 0)
@@ -126,13 +116,6 @@ def review_kept(finding: RankFinding, balance: Balance, t: float, q: FloatArray,
     """Return a finding with other independent constraints if those that were kept have become a poor choice.
 
     Which components of a joint's constraint follow from others changes as the mechanism turns.
-
-    Parameters
-    ----------
-    finding
-        What is known.
-    balance, t, q, scales
-        See `find_rank`.
     """
     if not finding.redundant or not finding.kept:
         return finding
@@ -148,17 +131,7 @@ def review_kept(finding: RankFinding, balance: Balance, t: float, q: FloatArray,
 def kept_along(
     finding: RankFinding, balance: Balance, t: FloatArray, q: FloatArray, scales: FloatArray, sizes: FloatArray
 ) -> list[tuple[slice, NDArray[np.intp]]]:
-    """Return which constraints to keep along a motion: stretches of its samples, with the constraints for each.
-
-    Parameters
-    ----------
-    finding, balance, scales
-        See `review_kept`.
-    t, q
-        Times and coordinates, of shape (samples,) and (number, samples).
-    sizes
-        Size of each coordinate.
-    """
+    """Return which constraints to keep along a motion: stretches of its samples, with the constraints for each."""
     parts = [0]
     kept = [finding.kept]
     way = np.concatenate([[0.0], np.cumsum(np.max(np.abs(np.diff(q, axis=1)) / sizes[:, None], axis=0, initial=0.0))])

@@ -81,15 +81,7 @@ class RowErrors:
         return self._laws
 
     def near(self, t: float, q: FloatArray, scales: FloatArray) -> FloatArray:
-        """Return how far rounding can take values and slopes where coordinates are of like size, shape (rows,).
-
-        Parameters
-        ----------
-        t, q
-            Time and coordinates.
-        scales
-            Size of a displacement along each speed.
-        """
+        """Return how far rounding can take values and slopes where coordinates are of like size, shape (rows,)."""
         reach, first = float(np.abs(q).max(initial=0.0)), self._first is None
         passed = 0.0 if self._first is None else abs(t - self._first)
         if first or reach > _GROWN * self._reach or (self.moves_by_itself and passed > _GROWN * self._passed):
@@ -125,17 +117,7 @@ class RowErrors:
     def of_jacobian(
         self, t: float, q: FloatArray, scales: FloatArray, miss: float = 0.0, of_rates: bool = False
     ) -> FloatArray:
-        """Return how far rounding can take slopes at a place that is known no better than the values, shape (rows,).
-
-        Parameters
-        ----------
-        t, q, scales
-            See `near`.
-        miss
-            By how much the place misses what it was to meet, relative to the scales.
-        of_rates
-            Whether values are rates, which do not say where the place is.
-        """
+        """Return how far rounding can take slopes at a place that is known no better than the values, shape (rows,)."""
         tangent = self._kinematic_matrix(t, q)
         values, found, _ = self._rough(t, q, scales, 1.0)
         errors = self._of_rows(_spread(found), tangent, scales)
@@ -152,13 +134,7 @@ class RowErrors:
         return self.shared(errors)
 
     def of_values(self, t: float, q: FloatArray, scales: FloatArray) -> FloatArray:
-        """Return how far rounding can take values at a place where nothing moves by itself, shape (rows,).
-
-        Parameters
-        ----------
-        t, q, scales
-            See `near`.
-        """
+        """Return how far rounding can take values at a place where nothing moves by itself, shape (rows,)."""
         return self.shared(_spread(self._rough(t, q, scales, 1.0)[0]))
 
     def shared(self, sizes: FloatArray, chosen: NDArray[np.intp] | None = None) -> FloatArray:

@@ -47,15 +47,7 @@ class Scales:
 
 
 def size_of(unit: str, length: Sizes, time: Sizes, mass: Sizes) -> Sizes:
-    """Return the size of a quantity for one scene or for many, by the powers in its SI unit; of an angle, one.
-
-    Parameters
-    ----------
-    unit
-        Its SI unit.
-    length, time, mass
-        Sizes of the scenes, m, s and kg.
-    """
+    """Return the size of a quantity for one scene or for many, by the powers in its SI unit; of an angle, one."""
     masses, lengths, times, _ = parse_unit(unit).exponents
     return mass**masses * length**lengths * time**times
 
@@ -87,15 +79,7 @@ def origin_part(assembly: Assembly, observable: Observable) -> float:
 
 
 def coordinate_scales(equations: Equations, length: Sizes) -> FloatArray:
-    """Return the size of each coordinate: the extent for a length, one radian for an angle, else one; or rows of these.
-
-    Parameters
-    ----------
-    equations
-        The scene.
-    length
-        Its extent, m, or those of many runs.
-    """
+    """Return the size of each coordinate: the extent for a length, 1 rad for an angle, else one; or rows of these."""
     nominal = {i: one.nominal for i, one in enumerate(equations.states, start=equations.placing) if one.nominal}
     own = np.array([nominal.get(i, 1.0) for i in range(len(equations.names))])
     is_extent = [one.unit == "m" and i not in nominal for i, one in enumerate(equations.names)]
@@ -151,21 +135,7 @@ def find_scales(
     sizes: FloatArray,
     span: float,
 ) -> Scales:
-    """Return the sizes of a scene from its start.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    length
-        Its extent.
-    speeds, accelerations
-        At the start.
-    sizes
-        Size of a displacement along each speed.
-    span
-        Length of the run, s.
-    """
+    """Return the sizes of a scene from its start."""
     gravity = next((v for s, v in assembly.mechanism.table.values.items() if s.name == "gravity"), 0.0)
     time = float(find_times(length, speeds, accelerations, sizes, gravity, span))
     return Scales(length, time, float(total_masses(assembly)) * length / time**2)
@@ -177,19 +147,7 @@ _MASSES: Key[Program] = Key("masses")
 def find_times(
     length: Sizes, speeds: FloatArray, accelerations: FloatArray, sizes: FloatArray, gravity: Sizes, span: float
 ) -> FloatArray:
-    """Return in what time something happens, s: speeds, accelerations or gravity lead as far as the sizes.
-
-    Parameters
-    ----------
-    length
-        Extent of the scene, m; of each run, where there are many.
-    speeds, accelerations, sizes
-        As of `find_scales`; a row for each run.
-    gravity
-        m/s^2.
-    span
-        Length of the run, s: nothing takes longer.
-    """
+    """Return in what time something happens, s: speeds, accelerations or gravity lead as far as the sizes."""
     with np.errstate(divide="ignore", invalid="ignore"):
         falling = np.sqrt(np.asarray(length) / np.abs(gravity))
         times = [np.full((*falling.shape, 1), span), falling[..., None]]
@@ -200,15 +158,7 @@ def find_times(
 
 
 def total_masses(assembly: Assembly, rows: FloatArray | None = None) -> FloatArray | float:
-    """Return the mass of all that moves, at the start, kg; 1 kg where nothing that moves has a mass.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    rows
-        Parameters of each run, shape (runs, number); None where there is one, or all have the same.
-    """
+    """Return the mass of all that moves, at the start, kg; 1 kg where nothing that moves has a mass."""
     if rows is None:
         return float(sum(assembly.kernel(_masses(assembly))([assembly.flat.t_start])[0])) or 1.0
     kernel = assembly.compiled(_masses(assembly), vectorized=True).bind(rows.T)

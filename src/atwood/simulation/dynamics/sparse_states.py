@@ -38,20 +38,7 @@ class States:
     def solve(
         self, t: FloatArray, values: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
     ) -> tuple[FloatArray, FloatArray]:
-        """Return accelerations and the multipliers of the independent constraints, each of shape (number, states).
-
-        Parameters
-        ----------
-        t
-            Times, s.
-        values
-            What the program gives at these states: mass, bias, gamma and slope, each of shape (number, states).
-
-        Raises
-        ------
-        SolveError
-            If the forces do not determine the accelerations at a state.
-        """
+        """Return accelerations and the multipliers of the independent constraints, each of shape (number, states)."""
         mass, bias, gamma, jacobian = values
         program, kept = self._program, self._kept
         found_a, found_l = np.zeros((program.speeds, len(t))), np.zeros((len(kept), len(t)))
@@ -96,15 +83,7 @@ class States:
         )
 
     def least_size(self, jacobian: FloatArray, multipliers: FloatArray) -> FloatArray:
-        """Return the multipliers of all constraints of least size with the force of some of the independent ones.
-
-        Parameters
-        ----------
-        jacobian
-            Entries of the Jacobian, shape (entries, states).
-        multipliers
-            Of the independent constraints, shape (number, states).
-        """
+        """Return the multipliers of all constraints of least size with the force of some of the independent ones."""
         if self._normal is None:
             return multipliers
         m, states = self._program.constraints, jacobian.shape[1]

@@ -58,17 +58,6 @@ def jumped(
     A one-sided constraint that could not bear the impulse of a jump lets go: the mode is entered in which it does not
     act, with the velocities before the jump, and what else jumps is an impact there. Where a part is to stop the run
     then, the state stays as it is.
-
-    Parameters
-    ----------
-    before, after
-        The scene on both sides of the switch.
-    state
-        Time, coordinates and speeds just before it, in the coordinates of the form.
-    length
-        Extent of the scene, m.
-    reassemble
-        Gives the scene after it in other modes.
     """
     events: list[EventRecord] = []
     while True:
@@ -87,24 +76,7 @@ def jumped(
 def pass_time_event(
     before: Assembly, after: Assembly, t: float, q: FloatArray, u: FloatArray, length: float
 ) -> tuple[FloatArray, FloatArray, tuple[EventRecord, ...]]:
-    """Return the state just after a time event, and the impacts, one for each part whose motion jumps in speed.
-
-    Parameters
-    ----------
-    before, after
-        The scene on both sides of the event.
-    t, q, u
-        Time and state just before it, in the coordinates of the form.
-    length
-        Extent of the scene, m.
-
-    Raises
-    ------
-    LetsGo
-        If a one-sided constraint cannot bear the impulse of a jump of velocity, and lets go.
-    SolveError
-        If a prescribed position jumps, or prescribed velocities are infinite or contradict each other after the event.
-    """
+    """Return the state just after a time event, and the impacts, one for each part whose motion jumps in speed."""
     if not after.shared.get(_MOTION_SWITCHES, lambda: bool(_switching(after))):
         return q, u, ()
     big_q, big_u = (x[:, 0] for x in maximal_state(before, np.array([t]), q[:, None], u[:, None]))

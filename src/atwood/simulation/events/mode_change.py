@@ -57,23 +57,7 @@ def enter_mode(
     length: float,
     also: Mapping[str, str] | None = None,
 ) -> tuple[Assembly, FloatArray, FloatArray]:
-    """Return the scene in the mode that an event leads to, with its state.
-
-    Parameters
-    ----------
-    state
-        Time, coordinates and speeds just before the event.
-    assembly
-        The scene before the event.
-    event
-        The event.
-    reassemble
-        Gives the scene in other modes and orientation coordinates.
-    length
-        Extent of the scene, m.
-    also
-        Modes that other parts enter at the same time.
-    """
+    """Return the scene in the mode that an event leads to, with its state."""
     t, q, u = state
     big_q, big_u = (x[:, 0] for x in maximal_state(assembly, np.array([t]), q[:, None], u[:, None]))
     line_signs = actual_line_signs(assembly, t, q, u, assembly.form)
@@ -116,17 +100,6 @@ def plastic_impact(
 
     Impulses act along the constraints only: ``M (u+ - u-) = G^T Lambda``, ``G u+ + g_t = 0``. One that is one-sided, as
     a rope is that can only pull, bears impulses of one sign: an impact that needs the other one is refused.
-
-    Parameters
-    ----------
-    after, balance
-        The scene after the impact, and its balance of forces in maximal coordinates.
-    event
-        What the impact is told as.
-    state
-        Time, coordinates and speeds just before it, in maximal coordinates.
-    sizes
-        Size of a displacement along each speed.
     """
     t, q, u = state
     now = balance.at(t, q, u)
@@ -229,24 +202,7 @@ def generalized_state(
     maximal: tuple[FloatArray, FloatArray],
     length: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the generalized coordinates and speeds, with quaternions, that give the same maximal ones.
-
-    Parameters
-    ----------
-    before, after
-        The scene that a state is of, and that whose generalized coordinates are sought.
-    t
-        Time.
-    own, maximal
-        The state in the coordinates of its own form, and in maximal ones.
-    length
-        Extent of the scene, m.
-
-    Returns
-    -------
-    coordinates, speeds, miss
-        The state, and by how much it misses the maximal coordinates, each in its own size.
-    """
+    """Return the generalized coordinates and speeds, with quaternions, that give the same maximal ones."""
     equations = after.regular
     reduced_map, maximal_map = kinematic_map_of(after, "regular"), kinematic_map_of(after, "dae")
     program, rows, columns = _maximal_places(after)
@@ -280,17 +236,7 @@ def generalized_state(
 
 
 def generalized_speeds(after: Assembly, t: float, q: FloatArray, speeds: FloatArray, sizes: FloatArray) -> FloatArray:
-    """Return the generalized speeds, with quaternions, that give the same speeds in maximal coordinates.
-
-    Parameters
-    ----------
-    after
-        The scene.
-    t, q
-        Time and generalized coordinates.
-    speeds, sizes
-        Speeds in maximal coordinates, and the size of a displacement along each.
-    """
+    """Return the generalized speeds, with quaternions, that give the same speeds in maximal coordinates."""
     program, rows, columns = _maximal_places(after)
     still = np.zeros(len(after.regular.speeds))
     matrix = np.zeros((len(sizes), len(still)))

@@ -113,15 +113,7 @@ a whole margin would leave them at zero, with a sign that nobody knows.
 def margins_at_start(
     functions: Sequence[EventFunction], values: FloatArray, small: FloatArray
 ) -> tuple[BoolArray, FloatArray]:
-    """Return which events have happened where a mode starts, and what is added to those that start at zero.
-
-    Parameters
-    ----------
-    functions
-        What is watched.
-    values, small
-        Values of the events there, and their margins; the last axis is along the events, and so in what is returned.
-    """
+    """Return which events have happened where a mode starts, and what is added to those that start at zero."""
     directions = np.array([one.direction for one in functions], dtype=np.float64)
     counts = np.array([not one.is_noted for one in functions], dtype=np.bool_)
     happened: BoolArray = counts & (directions * values > _PASSED * small)
@@ -217,13 +209,7 @@ class EventProbe:
         return values
 
     def compiled(self, for_ida: bool) -> EventData | None:
-        """Return the same as machine code, for one session; None if nothing is watched, or it cannot be compiled.
-
-        Parameters
-        ----------
-        for_ida
-            Whether SUNDIALS is to call it.
-        """
+        """Return the same as machine code, for one session; None if nothing is watched, or it cannot be compiled."""
         code = self.code(for_ida)
         return None if code is None else code.bind(self.assembly.parameter_values, self.shift)
 
@@ -333,15 +319,6 @@ def without_margin(
     What starts at zero has to pass it by ten times the tolerance, lest errors of a step set it off.
     Where it comes from the other side, and crosses the margin in a small part of the time since the mode began,
     there is no doubt, and the margin would only make the event late, and what follows later still.
-
-    Parameters
-    ----------
-    values, shift
-        ``values(t, y)``: the events of the mode with what is added to those that start at zero.
-    step
-        Where the solver stopped at an event.
-    began
-        When the mode began, s.
     """
     fired = [i for i, sign in enumerate(step.events) if sign]
     since = step.t - began

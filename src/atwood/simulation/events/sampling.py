@@ -109,22 +109,7 @@ class Sampler:
         return tuple(i for i, one in enumerate(self.updates) if one.path == part and one.law.options.at == event)
 
     def call(self, chosen: Iterable[int], assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> Updated:
-        """Return what updates make of a state, one after the other.
-
-        Parameters
-        ----------
-        chosen
-            Which of them.
-        assembly
-            The scene with the values that are held so far.
-        t, q, u
-            The state, in the coordinates of the form.
-
-        Raises
-        ------
-        SolveError
-            If one of them raises something, or returns what is no number for each state that it sets.
-        """
+        """Return what updates make of a state, one after the other."""
         from atwood.simulation.events.update_inputs import (
             update_inputs_of,  # not with this module: few scenes have updates
         )
@@ -147,13 +132,7 @@ class Sampler:
 
 
 def _ordered(updates: Sequence[_Update], reading: UpdateInputs) -> list[_Update]:
-    """Return updates of one moment, each after those that set what its inputs are made of.
-
-    Raises
-    ------
-    DeclarationError
-        If there is no such order.
-    """
+    """Return updates of one moment, each after those that set what its inputs are made of."""
     if len(updates) < 2:
         return list(updates)
     before: dict[str, set[str]] = {one.label: set() for one in updates}
@@ -231,18 +210,7 @@ def remembering(assembly: Assembly) -> list[str]:
 
 
 def refuse_updates(assembly: Assembly) -> None:
-    """Refuse to solve a scene twice whose parts call functions at sample times.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-
-    Raises
-    ------
-    UsageError
-        If it has such parts: what they call may remember what it was called with.
-    """
+    """Refuse to solve a scene twice whose parts call functions at sample times."""
     for path in remembering(assembly):
         raise UsageError(
             "it calls functions at sample times, which may remember what they were called with: the scene is not "
@@ -253,24 +221,7 @@ def refuse_updates(assembly: Assembly) -> None:
 
 
 def find_sampler(assembly: Assembly, start: float, end: float, moments: FloatArray) -> Sampler:
-    """Return the updates of a scene, and when they are due in a run.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    start, end
-        The run, s.
-    moments
-        Outputs: a sample time that is at one of these but for rounding is at it.
-
-    Raises
-    ------
-    ParameterError
-        If a sample time is not above zero.
-    DeclarationError
-        If parts feed each other in a circle within one moment.
-    """
+    """Return the updates of a scene, and when they are due in a run."""
     for path, part in assembly.flat.parts.items():
         if type(part.component).check_run is not Component.check_run:
             _bound(assembly, path, start).check_run(start, end)

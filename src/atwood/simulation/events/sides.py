@@ -59,19 +59,7 @@ def plain_sides(assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> t
 def find_sides(
     plan: Plan, t: float, q: FloatArray, u: FloatArray, before: Sequence[float], changed: Collection[int]
 ) -> Found:
-    """Return the values of the relations from a state on.
-
-    Parameters
-    ----------
-    plan
-        The scene in its mode.
-    t, q, u
-        The state.
-    before
-        Values of the relations until there.
-    changed
-        Numbers of those that change there.
-    """
+    """Return the values of the relations from a state on."""
     sides = plan.assembly.sides
     assert sides is not None
     reader = _Reader(plan.assembly)

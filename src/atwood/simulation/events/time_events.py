@@ -101,20 +101,7 @@ class Schedule:
 
 
 def find_schedule(assembly: Assembly, start: float, end: float) -> Schedule:
-    """Return when the relations of a scene change in a run, and their values.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    start, end
-        The run, s.
-
-    Raises
-    ------
-    SolveError
-        If one changes endlessly often.
-    """
+    """Return when the relations of a scene change in a run, and their values."""
     relations = assembly.relations
     if not relations or not end > start:
         return Schedule(np.zeros(0), np.array([assembly.relation_values]).reshape(len(relations), 1))

@@ -68,17 +68,7 @@ class ClosureError:
 def find_closure_errors(
     assembly: Assembly, equations: Equations, t: float, q: FloatArray, length: float
 ) -> list[ClosureError]:
-    """Return the gaps of all joints that close loops, and of ties, in the order of declaration.
-
-    Parameters
-    ----------
-    assembly, equations
-        The scene, in generalized coordinates.
-    t, q
-        Time and coordinates.
-    length
-        Extent of the scene, m.
-    """
+    """Return the gaps of all joints that close loops, and of ties, in the order of declaration."""
     table = assembly.known_values
     place = {**table, equations.time: t, **dict(zip(equations.coordinates, np.asarray(q).tolist(), strict=True))}
     signals = resolve_signals(assembly.mechanism, equations.site, equations.kinematics, equations.read)
@@ -168,15 +158,7 @@ def _least(values: Sequence[Expression], local: LocalPart, known: Numbers, moved
 
 
 def wrongly_turned(assembly: Assembly, equations: Equations, t: float, q: FloatArray) -> list[str]:
-    """Return the paths of joints that close loops and whose frames are turned as their joint cannot turn them.
-
-    Parameters
-    ----------
-    assembly, equations
-        The scene, in generalized coordinates.
-    t, q
-        Time and coordinates that fulfil the constraints.
-    """
+    """Return the paths of joints that close loops and whose frames are turned as their joint cannot turn them."""
     if not assembly.mechanism.space.is_spatial or not equations.forest.loop_joints:
         return []
     parts, program = assembly.shared.get(_BRANCH_TESTS, lambda: _branch_tests(assembly, equations))

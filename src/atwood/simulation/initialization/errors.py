@@ -61,13 +61,7 @@ class Failed:
 
 
 def explain_positions(failed: Failed) -> StartError:
-    """Return the error that says whether a loop cannot close or the start contradicts itself.
-
-    Parameters
-    ----------
-    failed
-        The start that was not found.
-    """
+    """Return the error that says whether a loop cannot close or the start contradicts itself."""
     fixed = failed.level.fixed
     own = failed.residual[len(failed.residual) - len(fixed) :]
     held = _missed_most(failed)
@@ -220,17 +214,7 @@ def _unlike(one: float, other: float) -> str:
 
 
 def far_from_guess(failed: Failed, found: FloatArray, wrong: Sequence[str]) -> StartError:
-    """Return the error that says that all fits only far from the guess.
-
-    Parameters
-    ----------
-    failed
-        The start that was not found.
-    found
-        Coordinates of the nearest place at which everything holds.
-    wrong
-        Joints that would be the wrong way round nearer to the guess.
-    """
+    """Return the error that says that all fits only far from the guess."""
     equations, assembly, guessed = failed.equations, failed.assembly, failed.level.guessed
     off, _ = System(assembly, equations, guessed, False).at(failed.time, found, np.zeros_like(failed.scales))
     places = [f"{one.path} = {one.value + miss:.4g}" for one, miss in zip(guessed, off, strict=True)]
@@ -257,17 +241,7 @@ def far_from_guess(failed: Failed, found: FloatArray, wrong: Sequence[str]) -> S
 
 
 def wrong_way_round(failed: Failed, part: str, advice: str = "") -> StartError:
-    """Return the error that says that a joint would have to be put in the wrong way round.
-
-    Parameters
-    ----------
-    failed
-        The start that was not found.
-    part
-        Path of the joint.
-    advice
-        What to do, if more is known.
-    """
+    """Return the error that says that a joint would have to be put in the wrong way round."""
     loop = _loop_through(failed.assembly, part)
     fixed = as_said(failed.level.fixed)
     return StartError(
@@ -307,17 +281,7 @@ def _freedom(failed: Failed) -> int:
 
 
 def freedom_at(assembly: Assembly, equations: Equations, scales: FloatArray, t: float, q: FloatArray) -> int:
-    """Return how many speeds constraints leave free at a place.
-
-    Parameters
-    ----------
-    assembly, equations
-        The scene.
-    scales
-        Size of a displacement along each speed.
-    t, q
-        Time and coordinates.
-    """
+    """Return how many speeds constraints leave free at a place."""
     if not equations.constraints:
         return len(scales)
     system = System(assembly, equations, [], True, of_speeds=True)
@@ -326,36 +290,14 @@ def freedom_at(assembly: Assembly, equations: Equations, scales: FloatArray, t: 
 
 
 def contradicted(equations: Equations, residual: FloatArray) -> str:
-    """Return the label of the constraint that is missed most; empty if there is none.
-
-    Parameters
-    ----------
-    equations
-        With the constraints.
-    residual
-        What each misses, scaled.
-    """
+    """Return the label of the constraint that is missed most; empty if there is none."""
     return equations.constraints[int(np.argmax(np.abs(residual)))].label if len(residual) else ""
 
 
 def contradiction(
     fixed: Sequence[Target], residual: FloatArray, freedom: int, remark: str = "", held: str = ""
 ) -> StartError:
-    """Return the error that says which fixed values cannot all hold.
-
-    Parameters
-    ----------
-    fixed
-        What is fixed.
-    residual
-        What each value misses, scaled.
-    freedom
-        How many coordinates are free.
-    remark
-        What else there is to say.
-    held
-        The constraint that is missed most.
-    """
+    """Return the error that says which fixed values cannot all hold."""
     if not fixed:
         return StartError(
             f"constraints contradict each other at the start{remark}",

@@ -53,17 +53,7 @@ class Nearest:
 
 
 def units_of_rows(assembly: Assembly, equations: Equations, system: System, length: float) -> FloatArray:
-    """Return what counts as one in each row of a system: the scene's extent for what is missed in metres, else 1.
-
-    Parameters
-    ----------
-    assembly, equations
-        The scene.
-    system
-        Its conditions.
-    length
-        Extent of the scene, m.
-    """
+    """Return what counts as one in each row of a system: the scene's extent for what is missed in metres, else 1."""
     found = []
     for one in equations.constraints if system.constraints else ():
         if one.value is not None:
@@ -75,26 +65,7 @@ def units_of_rows(assembly: Assembly, equations: Equations, system: System, leng
 def closest(
     system: System, units: FloatArray, scales: FloatArray, t: float, q: FloatArray, iterations: int = 300
 ) -> Nearest:
-    """Return the place near another one where the sum of squares of what is missed is least.
-
-    Parameters
-    ----------
-    system
-        What is to be met.
-    units
-        What counts as one in each row.
-    scales
-        Size of a displacement along each speed.
-    t, q
-        Time and coordinates to begin from.
-    iterations
-        The largest number of steps.
-
-    Raises
-    ------
-    KernelEvaluationError
-        If something has no value where it begins.
-    """
+    """Return the place near another one where the sum of squares of what is missed is least."""
     assert system.kinematic_map is not None
     still = np.zeros_like(scales)
 
@@ -137,15 +108,7 @@ def closest(
 def places_around(
     system: System, scales: FloatArray, t: float, q: FloatArray, hangs: bool = False
 ) -> Iterator[FloatArray]:
-    """Yield a place and then others around it, the same ones each time, farther and farther away.
-
-    Parameters
-    ----------
-    system, scales, t, q
-        See `closest`.
-    hangs
-        Whether the first of the others has free points lower, each more than the one before.
-    """
+    """Yield a place and then others around it, the same ones each time, farther and farther away."""
     assert system.kinematic_map is not None
     random = np.random.default_rng(20)
     yield q
@@ -171,15 +134,7 @@ def closest_of_all(
     q: FloatArray,
     is_enough: Callable[[Nearest], bool] = lambda nearest: nearest.size < 1e-12,
 ) -> Nearest | None:
-    """Return the least of what `closest` finds from a place and from others around it; None if nothing has a value.
-
-    Parameters
-    ----------
-    system, units, scales, t, q
-        See `closest`.
-    is_enough
-        Whether to look no further.
-    """
+    """Return the least of what `closest` finds from a place and from others around it; None if nothing has a value."""
     best: Nearest | None = None
     alike = 0
     for place in places_around(system, scales, t, q):
@@ -236,19 +191,7 @@ class _Said:
 
 
 def placed_in_turn(equations: Equations, system: System, length: float, t: float, q: FloatArray) -> FloatArray:
-    """Return coordinates that are found body by body.
-
-    Parameters
-    ----------
-    equations
-        The scene in generalized coordinates, in the order in which bodies are placed.
-    system
-        What is said, without constraints.
-    length
-        Extent of the scene, m.
-    t, q
-        Time, and where to begin.
-    """
+    """Return coordinates that are found body by body."""
     rows, columns = np.asarray(system.rows, dtype=np.intp), np.asarray(system.columns, dtype=np.intp)
     last = np.full(system.shape[0], -1)
     np.maximum.at(last, rows, columns)

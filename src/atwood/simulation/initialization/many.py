@@ -30,28 +30,6 @@ def meet_positions(
 
     The steps are those of `atwood.simulation.initialization.system.nearest`; runs for which one of them does not lessen
     what is missing are left to it.
-
-    Parameters
-    ----------
-    assembly
-        The scene, in the reduced form, whose rates are speeds.
-    conditions
-        What is to be met.
-    parameters
-        Values of the parameters, shape (parameters,) or (parameters, runs).
-    t
-        Time of the start, s.
-    q
-        Coordinates, shape (runs, number); changed in place.
-    sizes
-        Size of a displacement along each speed, shape (runs, number).
-    wanted
-        What each condition is to be, shape (conditions, runs).
-
-    Returns
-    -------
-    array
-        Which runs meet their conditions.
     """
     runs, (count, n) = len(q), conditions.shape
     if not count:
@@ -113,30 +91,7 @@ def meet_speeds(
     sizes: FloatArray,
     wanted: FloatArray,
 ) -> NDArray[np.bool_]:
-    """Move speeds to the nearest ones that meet conditions, as `find_start` does.
-
-    Parameters
-    ----------
-    assembly
-        The scene, in the reduced form.
-    conditions
-        What is to be met.
-    parameters
-        Values of the parameters, shape (parameters,) or (parameters, runs).
-    t
-        Time of the start, s.
-    q, u
-        States, shape (runs, number); the speeds are changed in place.
-    sizes
-        Size of a displacement along each speed, shape (runs, number).
-    wanted
-        What each condition is to be, shape (conditions, runs).
-
-    Returns
-    -------
-    array
-        Which runs meet their conditions.
-    """
+    """Move speeds to the nearest ones that meet conditions, as `find_start` does."""
     runs, (count, n) = len(q), conditions.shape
     if not count:
         return np.ones(runs, dtype=bool)

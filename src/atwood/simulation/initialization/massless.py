@@ -24,24 +24,7 @@ State = tuple[float, FloatArray, FloatArray]
 def check_massless_directions(
     assembly: Assembly, mass: Matrix, jacobian: Matrix, sizes: FloatArray, state: State
 ) -> None:
-    """Refuse a direction in which something can move without inertia.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    mass, jacobian
-        The mass matrix, and the derivatives of the independent constraints, along the speeds.
-    sizes
-        Size of a displacement along each speed.
-    state
-        Time, coordinates and speeds of the form.
-
-    Raises
-    ------
-    StartError
-        If there is one; it names the part.
-    """
+    """Refuse a direction in which something can move without inertia."""
     n = mass.shape[0]
     if n == 0:
         return

@@ -70,17 +70,7 @@ class Immobile:
 
 
 def find_immobile(assembly: Assembly, freedom: int, start: Start) -> Immobile | None:
-    """Return why nothing can move; None if something can, or is driven.
-
-    Parameters
-    ----------
-    assembly
-        The scene, in either form.
-    freedom
-        Its degrees of freedom.
-    start
-        Its start.
-    """
+    """Return why nothing can move; None if something can, or is driven."""
     equations = assembly.maximal
     values = [one.value if one.value is not None else one.rate for one in equations.constraints]
     if freedom > 0 or not equations.speeds:
@@ -108,18 +98,7 @@ def find_immobile(assembly: Assembly, freedom: int, start: Start) -> Immobile | 
 
 
 def refuse_immobile(assembly: Assembly, freedom: int, start: Start) -> None:
-    """Raise if nothing can move, and nothing is driven or may let go later: this is seldom what was meant.
-
-    Parameters
-    ----------
-    assembly, freedom, start
-        See `find_immobile`.
-
-    Raises
-    ------
-    TopologyError
-        If it is so; it says what would have to let go.
-    """
+    """Raise if nothing can move, and nothing is driven or may let go later: this is seldom what was meant."""
     if all(_only_holds(part.component) for part in assembly.flat.parts.values()):
         raise TopologyError(
             "there is nothing in it but what is fixed in the world",

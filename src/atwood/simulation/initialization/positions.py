@@ -57,26 +57,7 @@ class Positions:
 def solve_positions(
     assembly: Assembly, equations: Equations, level: Level, scales: FloatArray, length: float, t: float
 ) -> Positions:
-    """Return coordinates that fulfil constraints and what is fixed.
-
-    Parameters
-    ----------
-    assembly, equations
-        The scene.
-    level
-        What is said of positions.
-    scales
-        Size of a displacement along each speed.
-    length
-        Extent of the scene, m.
-    t
-        Time of the start, s.
-
-    Raises
-    ------
-    StartError
-        If a loop cannot close, or what is fixed contradicts itself or the constraints.
-    """
+    """Return coordinates that fulfil constraints and what is fixed."""
     level, start = _without_states(assembly, equations, level, t)
     every = [*level.guessed, *level.fixed]
     kinematic_map = kinematic_map_of(assembly, "regular")
@@ -244,25 +225,6 @@ def unwound(
 
     Newton's method may go round on its way, and a spring on the joint would begin wound up. A turn is taken back if no
     body stands otherwise without it, and what is said holds as before.
-
-    Parameters
-    ----------
-    assembly, equations
-        The scene.
-    targets
-        What is said of positions.
-    constrained
-        Whether the constraints are to hold as before; else bodies are only where they are said to be by now.
-    scales
-        Size of a displacement along each speed.
-    length
-        Extent of the scene, m.
-    t
-        Time of the start, s.
-    near
-        What is said of the coordinates themselves; zero where nothing is.
-    q
-        Coordinates of the start.
     """
     if not assembly.mechanism.space.is_spatial:  # in a plane angles are absolute, and not those of joints
         return q

@@ -186,15 +186,7 @@ def _met(guess: GuessMet, length: float) -> tuple[str, str]:
 
 
 def report_initialization(assembly: Assembly, start: Start) -> InitializationReport:
-    """Find out what a start moved.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    start
-        Its start, as `find_start` gives it.
-    """
+    """Find out what a start moved."""
     equations, t = assembly.regular, start.time
     guesses = _guesses(assembly, equations, start)
     if np.array_equal(start.rough, start.coordinates):

@@ -26,17 +26,6 @@ def _least_rates(assembly: Assembly, level: Level, rows: FloatArray, length: flo
 
     Not seen is what takes nothing farther, in all the time of the scene, than what is apart in one place: so speeds
     that a run gave, with their rounding, are a start again, also of a mechanism that was just at rest.
-
-    Parameters
-    ----------
-    assembly, level
-        The scene, and what is said of speeds.
-    rows
-        By how much each condition changes when something moves by its size.
-    length
-        Extent of the scene, m.
-    fastest
-        The largest speed, in sizes a second.
     """
     said = np.array([abs(one.value) for one in level.fixed])
     units = np.array([length if one.observable.unit == "m/s" else 1.0 for one in level.fixed])
@@ -79,26 +68,7 @@ def _speeds_by_path(assembly: Assembly, equations: Equations) -> dict[str, int]:
 def solve_speeds(
     assembly: Assembly, equations: Equations, level: Level, scales: FloatArray, length: float, t: float, q: FloatArray
 ) -> tuple[FloatArray, tuple[str, ...], tuple[str, ...]]:
-    """Return speeds that fulfil constraints and what is fixed; which nothing determines, and what repeats others.
-
-    Parameters
-    ----------
-    assembly, equations
-        The scene.
-    level
-        What is said of speeds.
-    scales
-        Size of a displacement along each speed.
-    length
-        Extent of the scene, m.
-    t, q
-        Time and coordinates of the start.
-
-    Raises
-    ------
-    StartError
-        If what is fixed contradicts itself or the constraints.
-    """
+    """Return speeds that fulfil constraints and what is fixed; which nothing determines, and what repeats others."""
     u, is_direct = said(equations.speeds, [*level.guessed, *level.fixed], np.zeros(len(equations.speeds)))
     if not equations.constraints:
         told = _told(assembly, equations, level)

@@ -85,33 +85,14 @@ def maximal_state(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatAr
 
 
 def settle(assembly: Assembly, start: Start, reassemble: Reassemble) -> tuple[Assembly, FloatArray, FloatArray]:
-    """Return an assembly in orientation coordinates that are regular at a start, with the start in its coordinates.
-
-    Parameters
-    ----------
-    assembly, start
-        The scene and its start.
-    reassemble
-        Gives the scene in other orientation coordinates.
-    """
+    """Return an assembly in orientation coordinates that are regular at a start, with the start in its coordinates."""
     if assembly.form == "reduced":
         return *switch_coordinates(assembly, start.coordinates, reassemble), start.speeds
     return assembly, *own_state(assembly, start)
 
 
 def find_start(assembly: Assembly) -> Start:
-    """Find a consistent start; it is found once for an assembly.
-
-    Parameters
-    ----------
-    assembly
-        The scene, with its start values and guesses.
-
-    Raises
-    ------
-    StartError
-        If a start value names no quantity, or they contradict each other or the constraints.
-    """
+    """Find a consistent start; it is found once for an assembly."""
     return assembly.kept.get(_START, lambda: _find(assembly))
 
 
@@ -190,13 +171,7 @@ def _unworkable(assembly: Assembly, t: float, error: Exception) -> StartError:
 
 
 def _taken_up(assembly: Assembly, starting: Assembly, start: Start) -> Start:
-    """Return a start in the coordinates and speeds that constraints on velocities leave.
-
-    Raises
-    ------
-    StartError
-        If the equations were made for another start, which gave their constants of integration.
-    """
+    """Return a start in the coordinates and speeds that constraints on velocities leave."""
     before, after = starting.regular, assembly.regular
     q = dict(zip(before.coordinates, start.coordinates.tolist(), strict=True))
     u = dict(zip(before.speeds, start.speeds.tolist(), strict=True))

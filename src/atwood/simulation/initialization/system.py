@@ -49,19 +49,7 @@ _CONDITIONS: Key[Conditions] = Key("conditions of a start")
 def start_conditions(
     assembly: Assembly, equations: Equations, targets: Sequence[Target], constrained: bool, of_speeds: bool
 ) -> Conditions:
-    """Return the conditions of a start.
-
-    Parameters
-    ----------
-    assembly, equations
-        The scene.
-    targets
-        What is to be met.
-    constrained
-        Whether the constraints are among the conditions, before the targets.
-    of_speeds
-        Whether they are on speeds, or on coordinates.
-    """
+    """Return the conditions of a start."""
 
     def make() -> Conditions:
         constraints: list[Expression] = []
@@ -179,21 +167,7 @@ def counted(
     matrix: Matrix,
     errors: FloatArray,
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return which coordinates or speeds nothing determines, and which fixed values repeat others.
-
-    Parameters
-    ----------
-    names
-        Of the coordinates or speeds.
-    matrix
-        How coordinates move with the speeds; None where each has its own.
-    fixed, constraints
-        What is fixed, and how many constraints come before that.
-    matrix
-        Derivatives of both, columns scaled.
-    errors
-        How far rounding can take each row.
-    """
+    """Return which coordinates or speeds nothing determines, and which fixed values repeat others."""
     if 0 in matrix.shape:
         return tuple(names), ()
     kept = independent_rows(matrix, errors, first=np.arange(matrix.shape[0]) < constraints)

@@ -126,18 +126,7 @@ CONDITIONS = optional(Kind(_WATCHED, lambda value: _WATCHES.read(value), "CONDIT
 
 
 def refuse_idle_settings(solver: str, order: int | None, step: float | None, first_step: float | None = None) -> None:
-    """Refuse an order or a step for a solver that chooses these itself, and a first step for one that does not.
-
-    Parameters
-    ----------
-    solver, order, step, first_step
-        What was asked for.
-
-    Raises
-    ------
-    UsageError
-        If it is so.
-    """
+    """Refuse an order or a step for a solver that chooses these itself, and a first step for one that does not."""
     equal = [one.key for one in METHODS.values() if one.has_equal_steps]
     for name, value in (("order", order), ("step", step)):
         if value is not None and solver not in equal:
@@ -150,18 +139,7 @@ def refuse_idle_settings(solver: str, order: int | None, step: float | None, fir
 
 
 def refuse_two_accuracies(accuracy: float | None, rtol: float, atol: float | None, step: float | None) -> None:
-    """Refuse an accuracy of the motion together with a tolerance or a step, of which one would be ignored.
-
-    Parameters
-    ----------
-    accuracy, rtol, atol, step
-        What was asked for.
-
-    Raises
-    ------
-    UsageError
-        If it is so.
-    """
+    """Refuse an accuracy of the motion together with a tolerance or a step, of which one would be ignored."""
     given = [("rtol", rtol, tolerances.RTOL), ("atol", atol, None), ("step", step, None)]
     for name, value, usual in given:
         if accuracy is not None and value != usual:
@@ -178,22 +156,7 @@ def check_span(
     step: float | None = None,
     first_step: float | None = None,
 ) -> None:
-    """Refuse a run that does not go forwards, that takes no time, or that would take too many steps.
-
-    Parameters
-    ----------
-    begin, end
-        Times of its start and of its end, s.
-    max_step
-        The largest step, s.
-    step, first_step
-        The step, where all are equal, and else the first one, s.
-
-    Raises
-    ------
-    UsageError
-        If it is so.
-    """
+    """Refuse a run that does not go forwards, that takes no time, or that would take too many steps."""
     span = end - begin
     if not span > 0.0 or not np.isfinite(span):
         raise UsageError(f"the end, t = {end:g}, is not after the start, t = {begin:g}", advice="Give a later t_end.")

@@ -183,11 +183,6 @@ def can_be_solved(plan: Plan) -> bool:
     """Return whether a scene is one of which loops are solved by formulas, if their form is right.
 
     Its constraints hold positions, its rates are speeds, and no law reads a multiplier.
-
-    Parameters
-    ----------
-    plan
-        The scene in its mode.
     """
     equations = plan.assembly.reduced
     return bool(
@@ -212,20 +207,7 @@ def _freedoms_besides(plan: Plan) -> int:
 
 
 def solve_at(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> Solved | None:
-    """Return the loops of a mechanism solved by formulas on the branch of a position, with the best choice there.
-
-    Parameters
-    ----------
-    plan
-        The scene in its mode.
-    t, q, u
-        An admissible state.
-
-    Returns
-    -------
-    Solved or None
-        None where there are no formulas, or every choice is near a dead centre.
-    """
+    """Return the loops of a mechanism solved by formulas on the branch of a position, with the best choice there."""
     if not can_be_solved(plan):
         return None
     about = t, q.tobytes(), u.tobytes(), plan.finding.kept, plan.scales.length
@@ -258,15 +240,7 @@ def _solve_at(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> Solved | No
 
 
 def on_branch(plan: Plan, form: ClosedForm, t: float, q: FloatArray, u: FloatArray) -> Solved | None:
-    """Return a form on the branch of a position; None where it does not lead there, or a dead centre is near.
-
-    Parameters
-    ----------
-    plan, form
-        The scene in its mode, and its loops solved with one choice of independent coordinates.
-    t, q, u
-        An admissible state.
-    """
+    """Return a form on the branch of a position; None where it does not lead there, or a dead centre is near."""
     assembly, many = plan.assembly, ManyBranches(form, plan.assembly)
     values, found = many.branches(np.array([t]), q[None], assembly.parameter_values[None])
     if not found[0]:
@@ -348,15 +322,7 @@ class ManyBranches:
     assembly: Assembly
 
     def states(self, t: FloatArray, y: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return all coordinates and speeds, each of shape (number, samples).
-
-        Parameters
-        ----------
-        t, y
-            Times, and independent coordinates and speeds, of shape (samples,) and (samples, number).
-        values
-            Of parameters and branches, shape (samples, number).
-        """
+        """Return all coordinates and speeds, each of shape (number, samples)."""
         n = len(self.form.loops.independent)
         q, u = self._call(self.form.states, values, t, y[:, :n].T, y[:, n:].T)
         return q, u
@@ -364,17 +330,7 @@ class ManyBranches:
     def values(
         self, t: float, q: FloatArray, u: FloatArray, parameters: FloatArray, lengths: FloatArray, time: FloatArray
     ) -> tuple[FloatArray, NDArray[np.bool_]]:
-        """Return parameters and branches of admissible states, and which of them lead there and meet no dead centre.
-
-        Parameters
-        ----------
-        t, q, u
-            The time, and coordinates and speeds, of shape (runs, number).
-        parameters
-            Their values, shape (runs, number).
-        lengths, time
-            Extent of the scene, m, and time in which something happens, s, of each run.
-        """
+        """Return parameters and branches of admissible states, and which of them lead there and meet no dead centre."""
         values, found = self.branches(np.full(len(q), t), q, parameters)
         if not np.any(found):
             return values, found
@@ -391,15 +347,7 @@ class ManyBranches:
         return values, found
 
     def branches(self, t: FloatArray, q: FloatArray, parameters: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-        """Return parameters and branches of admissible positions, and to which of these formulas may lead.
-
-        Parameters
-        ----------
-        t, q
-            Times and coordinates, of shape (runs,) and (runs, number).
-        parameters
-            Their values, shape (runs, number).
-        """
+        """Return parameters and branches of admissible positions, and to which of these formulas may lead."""
         with np.errstate(all="ignore"):
             branches, conditions = self._call(self.form.branches, parameters, t, q.T)
         values = np.concatenate([parameters, np.reshape(branches, (-1, len(q))).T], axis=1)
@@ -437,13 +385,6 @@ class ManyBranches:
 
         The second is the most by which it changes from one position that was looked at to the next. Both are zero where
         a dead centre is met, a loop does not close, or no angle turns.
-
-        Parameters
-        ----------
-        t, y
-            The time, and independent coordinates and speeds, of shape (runs, number).
-        values
-            Of parameters and branches, shape (runs, number).
         """
         loops, runs = self.form.loops, len(y)
         count, names = len(loops.margins), self.assembly.reduced.names

@@ -81,20 +81,7 @@ def _no_quantity(path: str, known: Mapping[str, Any]) -> UsageError:
 
 
 def condition_functions(assembly: Assembly, conditions: Sequence[Condition]) -> tuple[EventFunction, ...]:
-    """Return conditions as functions of the state of a scene, made once for each structure.
-
-    Parameters
-    ----------
-    assembly
-        The scene in its mode.
-    conditions
-        What is looked for.
-
-    Raises
-    ------
-    UsageError
-        If one cannot be read, or reads what the scene does not have.
-    """
+    """Return conditions as functions of the state of a scene, made once for each structure."""
     if not conditions:
         return ()
     return assembly.shared.get(_CONDITIONS, lambda: tuple(_functions(assembly, conditions)), tuple(conditions))

@@ -44,17 +44,7 @@ def constrained_problem(
     events: Callable[[float, FloatArray, FloatArray], Values] | None = None,
     directions: tuple[int, ...] = (),
 ) -> ExplicitProblem:
-    """Return the equations of a scene for an explicit method, with ``y = (q, u)`` on its constraints.
-
-    Parameters
-    ----------
-    plan
-        The scene in its mode.
-    t, y
-        A state.
-    events, directions
-        What is watched, as functions of (t, y, y'), and in which direction.
-    """
+    """Return the equations of a scene for an explicit method, with ``y = (q, u)`` on its constraints."""
     assembly, program = plan.assembly, _program(plan, t, y)
     n, m = plan.program.coordinates, plan.program.speeds
     values = np.concatenate([assembly.parameter_values, plan.sizes])

@@ -63,15 +63,7 @@ class Curved:
 
 
 def find_curved(assembly: Assembly, is_estimated: bool = True) -> tuple[Curved, ...]:
-    """Return the functions in the laws of a scene that may change fast, in the coordinates and speeds of its form.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    is_estimated
-        Whether the method estimates its error in each step.
-    """
+    """Return the functions in the laws of a scene that may change fast, in the coordinates and speeds of its form."""
     more = frozenset() if is_estimated else _UNESTIMATED
 
     def find() -> tuple[Curved, ...]:
@@ -165,17 +157,7 @@ def _curved_in(outputs: Sequence[Expression], operations: frozenset[str]) -> Ite
 
 
 def _share(one: Curved, argument: Pair, exponent: Pair | None, reach: Scalar) -> Scalar:
-    """Return how far a function changes between bounds of its argument, as a share of how far it may.
-
-    Parameters
-    ----------
-    one
-        The function.
-    argument, exponent
-        Bounds.
-    reach
-        How far it may change, in units of its own scale.
-    """
+    """Return how far a function changes between bounds of its argument, as a share of how far it may."""
     low, high = argument
     if one.operation == "exp":
         return (maximum(high, -_FAINT) - maximum(low, -_FAINT)) / reach
@@ -207,19 +189,7 @@ def _steep(x: Scalar) -> Scalar:
 
 
 def is_needed(assembly: Assembly, curved: Sequence[Curved], span: tuple[float, float], reach: float) -> bool:
-    """Return whether any of the functions can change by more than a step may, whatever coordinates and speeds are.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    curved
-        The functions.
-    span
-        The times of the run, s.
-    reach
-        How far a function may change in a step, in units of its own scale.
-    """
+    """Return whether any of the functions can change by more than a step may, whatever coordinates and speeds are."""
     equations, values = assembly.own_equations, assembly.parameter_values.tolist()
     known = {s: (np.array([v]), np.array([v])) for s, v in zip(assembly.parameters, values, strict=True)}
     anywhere = np.array([-inf]), np.array([inf])
@@ -253,23 +223,6 @@ def watched_program(
 
     Its inputs are the time, the unknowns and their rates at the beginning of the step, then at its end, and the reach:
     how far a function may change, in units of its own scale. Its one output is how many times that it changes.
-
-    Parameters
-    ----------
-    name
-        Named in messages.
-    curved
-        The functions.
-    inputs
-        The symbols of time, coordinates and speeds of the solver.
-    parameters
-        The symbols of parameters.
-    angles
-        The symbols of angles, of whose sines and cosines places are made.
-    known
-        What other coordinates and speeds are, in terms of the solver's.
-    smooth
-        What is smooth over a step whatever it is made of, as are reactions.
     """
     (time,), *states = (group.symbols for group in inputs)
     unknowns = [one for group in states for one in group]

@@ -20,15 +20,6 @@ def pivots_of(equations: Equations, program: FormProgram, samples: Sequence[Floa
     Coordinates and speeds have their pivots in their kinematic and dynamic rows, whose masses and rates make them
     positive; the multiplier of a constraint force in the constraint on velocities (or accelerations), and that which
     keeps positions in the constraint on positions.
-
-    Parameters
-    ----------
-    equations
-        Equations in maximal coordinates.
-    program
-        Programs of the form.
-    samples
-        Entries of matrices for which the pivots are to be good; see `atwood.numerics.fixed_pivots.fix_pivots`.
     """
     first = program.coordinates + program.speeds
     rows = np.arange(program.size, dtype=np.intp)

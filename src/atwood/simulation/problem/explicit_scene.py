@@ -28,22 +28,7 @@ def explicit_problem(
     directions: tuple[int, ...] = (),
     found: AccelerationProgram | None = None,
 ) -> ExplicitProblem | None:
-    """Return the equations of a scene in the reduced form for an explicit method, with ``y = (q, u)``.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    events, directions
-        What is watched, as functions of (t, y, y'), and in which direction.
-    found
-        The accelerations, where they are there already.
-
-    Returns
-    -------
-    ExplicitProblem or None
-        None if the scene has no coordinates, or constraints are left among them.
-    """
+    """Return the equations of a scene in the reduced form for an explicit method, with ``y = (q, u)``."""
     program = found or accelerations_of(assembly)
     if program is None or len(assembly.reduced.coordinates) == 0:
         return None
@@ -57,19 +42,7 @@ def explicit_problem_of(
     events: Callable[[float, FloatArray, FloatArray], Values] | None = None,
     directions: tuple[int, ...] = (),
 ) -> ExplicitProblem:
-    """Return what an explicit method is given of accelerations.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    program
-        The accelerations.
-    values
-        Values of its parameters.
-    events, directions
-        See `explicit_problem`.
-    """
+    """Return what an explicit method is given of accelerations."""
     _, n, m = (len(group.symbols) for group in program.program.inputs)
     kernel = assembly.compiled(program.program).bind(values)
 

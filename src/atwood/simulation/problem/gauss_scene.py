@@ -30,13 +30,6 @@ def momenta_of(found: CanonicalPrograms, kernel: BoundKernel) -> Momenta:
 
     Where there are more coordinates than speeds, they are those of least size: the others are constants of the motion
     that nothing depends on.
-
-    Parameters
-    ----------
-    found
-        Hamilton's equations.
-    kernel
-        Its program of the momenta, with values of the parameters.
     """
 
     def momenta(t: float, q: FloatArray, u: FloatArray) -> FloatArray:
@@ -67,28 +60,7 @@ def hamiltonian(
     asked: tuple[int | None, float | None],
     solved: Solved | None = None,
 ) -> Hamiltonian:
-    """Return Hamilton's equations of a scene in the reduced form.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    problem
-        The same for explicit methods.
-    start
-        Time, and (q, u).
-    sizes
-        How large (q, u) are in the scene.
-    asked
-        The order and the step; None where they are to be chosen.
-    solved
-        Its closed loops, solved by formulas; (q, u) are then the independent ones.
-
-    Raises
-    ------
-    UnsupportedError
-        If the scene is no Hamiltonian system.
-    """
+    """Return Hamilton's equations of a scene in the reduced form."""
     programs = canonical_programs(assembly) if solved is None else closed_canonical_programs(assembly, solved.form)
     name, (t, y) = assembly.flat.name, start
     if problem.compiled is None:

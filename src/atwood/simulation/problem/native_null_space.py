@@ -57,17 +57,7 @@ class CompiledNullSpace:
         dependent: tuple[tuple[int, ...], tuple[int, ...]],
         review: Callable[[float, FloatArray], bool],
     ) -> NativeCallbacks:
-        """Return the functions for one session.
-
-        Parameters
-        ----------
-        code
-            What `compile_null_space` gave.
-        dependent
-            The choice at first: dependent displacements, and dependent speeds.
-        review
-            Looks at them anew at a time and a state, and returns whether others were chosen.
-        """
+        """Return the functions for one session."""
         places, speeds = dependent
         data = code.bind(self.parameter_values, choice_lists(self.program, speeds, places), self.sizes, POOR)
         self._sessions.add(data)
@@ -106,15 +96,6 @@ def choice_lists(
 
     The rows come in the order kinematic rows of independent coordinates, constraints, balances of independent speeds,
     rates of constraints.
-
-    Parameters
-    ----------
-    program
-        The mechanism.
-    dependent
-        The choice: as many speeds as there are constraints.
-    places
-        As many speeds as there are constraints on positions, along which displacements follow; the same when None.
     """
     shape, given = null_space_shape(program), set(dependent)
     free = [i for i in range(shape.speeds) if i not in given]

@@ -17,20 +17,7 @@ from atwood.simulation.dynamics.scales import motion_names
 
 
 def read_nominal(assembly: Assembly, given: Mapping[str, Any] | None) -> dict[str, float]:
-    """Return nominal sizes in SI units.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    given
-        Numbers, or texts with units, by the path of a quantity.
-
-    Raises
-    ------
-    UsageError
-        If there is no such quantity, or its size is no finite number above 0 in its unit.
-    """
+    """Return nominal sizes in SI units."""
     found = {}
     for path, size in (given or {}).items():
         if path not in assembly.observables:
@@ -58,15 +45,6 @@ def with_nominal(
     A quantity that is linear in one coordinate, such as the displacement of a mass or the angle of a geared shaft, says
     the size of that; one that is linear in several, such as an angle between two bodies, says that none is larger. A
     speed is sized as its coordinate in the scene's time, unless a rate is given.
-
-    Parameters
-    ----------
-    assembly, equations
-        The scene, and its equations in the coordinates that the sizes are of.
-    sizes
-        Of coordinates, and of speeds.
-    nominal
-        What `read_nominal` gave.
     """
     places, speeds = (one.copy() for one in sizes)
     found = [(size, _slopes(assembly, equations, path)) for path, size in nominal.items()]

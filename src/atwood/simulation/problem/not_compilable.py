@@ -25,28 +25,12 @@ _PLAIN = ("potential", "dissipation", "force", "inertia", "lagrangian", "derivat
 
 
 def find_not_compilable(assembly: Assembly, program: Program) -> str:
-    """Return what keeps a program from being compiled, with the component and the law; empty if nothing does.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    program
-        One of its programs.
-    """
+    """Return what keeps a program from being compiled, with the component and the law; empty if nothing does."""
     return assembly.shared.get(_NOT_COMPILABLE, lambda: _describe(assembly, program), program)
 
 
 def announce(assembly: Assembly, not_compilable: str) -> None:
-    """Warn that a scene runs through kernels in Python.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    not_compilable
-        What `find_not_compilable` gave.
-    """
+    """Warn that a scene runs through kernels in Python."""
     warnings.warn(
         f"{assembly.flat.name} is evaluated in Python, which is slower: {not_compilable}. Write it in plain "
         "arithmetic with Atwood's functions to have it compiled.",

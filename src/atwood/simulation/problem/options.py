@@ -24,13 +24,6 @@ def how_solved(form: str, level: str, solvers: Iterable[str]) -> str:
     """Return form and solver in words, ``"dae (ggl), IDA"``, with each solver where it was changed on the way.
 
     Levels say how constraints enter the residual of IDA; other methods have none.
-
-    Parameters
-    ----------
-    form, level
-        Of the assembly.
-    solvers
-        Keys of methods, or their titles, in the order in which they took turns.
     """
     titles = {one.title: one for one in METHODS.values()}
     methods = [METHODS.get(each) or titles[each] for each in solvers]
@@ -175,15 +168,7 @@ class Samples:
 
 
 def sample_times(t: float, options: RunOptions) -> Samples:
-    """Return all samples, the start among them.
-
-    Parameters
-    ----------
-    t
-        Time of the start, s.
-    options
-        How the run is made.
-    """
+    """Return all samples, the start among them."""
     if isinstance(options.outputs, (int, np.integer)):
         asked = np.linspace(t, options.t_end, int(options.outputs))
     else:

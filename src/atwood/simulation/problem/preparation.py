@@ -29,24 +29,7 @@ _PLAN: Key[Plan] = Key("plan")
 
 
 def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length: float, span: float) -> Plan:
-    """Prepare a run from a consistent state in the coordinates of the form.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    t, q, u
-        The state.
-    length
-        Extent of the scene, m.
-    span
-        Length of the run, s.
-
-    Raises
-    ------
-    StartError
-        If the forces do not determine the accelerations.
-    """
+    """Prepare a run from a consistent state in the coordinates of the form."""
     about = t, q.tobytes(), u.tobytes(), length, span
     made = assembly.kept.get(_PLAN, lambda: _make_plan(assembly, t, q, u, length, span), *about)
     if made.not_compilable:

@@ -182,13 +182,7 @@ class Plan:
         return bool(self.dependent_speeds) and (self._null_space is None or self.dependent != self.dependent_speeds)
 
     def check_held(self, t: float, q: FloatArray, u: FloatArray) -> None:
-        """Refuse a state that misses constraints even after it has been projected onto them: they contradict.
-
-        Raises
-        ------
-        SolveError
-            If it does; it names the constraint that is missed most.
-        """
+        """Refuse a state that misses constraints even after it has been projected onto them: they contradict."""
         now = self.balance.at(t, q, u)
         rows = self.balance.row_scales(now, t, q, self.sizes)
         misses = np.maximum(np.abs(now.value / rows), np.abs(now.rate / rows) * self.scales.time)
@@ -325,13 +319,6 @@ class Plan:
         """Return the absolute tolerance of each unknown; multipliers are kept out of the error test.
 
         Those of the stabilised form move points by speeds, and turn bodies by speeds over arms.
-
-        Parameters
-        ----------
-        relative
-            Share of the sizes.
-        nominal
-            Sizes of quantities that were given, by path.
         """
         program, scales = self.program, self.scales
         forces = np.full(program.multipliers, 1e3 * scales.force)

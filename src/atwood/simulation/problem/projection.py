@@ -85,15 +85,7 @@ class ConstraintsAt:
         return moved + self.explicit_rate
 
     def step(self, right: FloatArray, rows: Sequence[int] | None = None) -> FloatArray:
-        """Return the shortest displacements that change independent constraints by so much.
-
-        Parameters
-        ----------
-        right
-            By how much, for all constraints; shape (states, number).
-        rows
-            Of positions, which of them hold positions; the independent ones if not given.
-        """
+        """Return the shortest displacements that change independent constraints by so much."""
         if self.normal is not None or rows is None:
             return self.solver()(right)
         chosen = list(rows)
@@ -110,15 +102,7 @@ class ConstraintsAt:
 
 
 def project_states(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> Projected:
-    """Return the nearest states that fulfil the constraints on position and velocity.
-
-    Parameters
-    ----------
-    plan
-        The scene in its mode.
-    t, q, u
-        States near the constraints, of shape (states,) and (number, states).
-    """
+    """Return the nearest states that fulfil the constraints on position and velocity."""
     chunk = _chunk(plan)
     parts = [
         _project(plan, t[i : i + chunk], q[:, i : i + chunk], u[:, i : i + chunk]) for i in range(0, len(t), chunk)
@@ -154,13 +138,6 @@ def nearly_projected(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) ->
 
     For iterations that come ever nearer to the constraints by themselves: what is missed is missed squared afterwards.
     Speeds are projected once: where little is missed, so is little by rounding.
-
-    Parameters
-    ----------
-    plan
-        The scene in its mode.
-    t, q, u
-        States quite near the constraints, of shape (states,) and (number, states).
     """
     sizes, kinematic_map = plan.sizes[:, None], plan.balance.kinematic_map
     holding = plan.balance.holding(list(plan.finding.kept))
@@ -178,15 +155,7 @@ def nearly_projected(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) ->
 
 
 def misses_of(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatArray:
-    """Return by how much states miss the constraints on position and velocity, shape (2, states).
-
-    Parameters
-    ----------
-    plan
-        The scene in its mode.
-    t, q, u
-        States, of shape (states,) and (number, states).
-    """
+    """Return by how much states miss the constraints on position and velocity, shape (2, states)."""
     chunk = _chunk(plan)
     found = np.zeros((2, len(t)))
     for i in range(0, len(t), chunk):
@@ -304,13 +273,7 @@ def _least_norm(jacobian: FloatArray) -> Callable[[FloatArray], FloatArray]:
 
 
 def project_safely(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return one projected state that meets all constraints.
-
-    Raises
-    ------
-    SolveError
-        If there is none; it names the constraint that is missed most.
-    """
+    """Return one projected state that meets all constraints."""
     q, u = plan.balance.project(t, q, u, plan.sizes)
     plan.check_held(t, q, u)
     return q, u

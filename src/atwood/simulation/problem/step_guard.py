@@ -37,22 +37,7 @@ def step_guard(
     closed: tuple[ClosedForm, FloatArray] | None = None,
     is_estimated: bool = True,
 ) -> StepGuard | None:
-    """Return what judges the steps of a session; None where no law can change faster than coordinates do.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    span
-        The times of the run, s.
-    reach
-        How far a function may change in a step; see `~atwood.integrators.methods.Method`.
-    closed
-        Its closed loops, solved by formulas, with the values of their parameters; None where all coordinates are
-        integrated.
-    is_estimated
-        Whether the method estimates its error in each step.
-    """
+    """Return what judges the steps of a session; None where no law can change faster than coordinates do."""
     found = _by_bounds(assembly, span, reach, closed, is_estimated)
     calls = find_external(assembly)
     return _by_samples(assembly, span, calls, closed, found) if calls else found

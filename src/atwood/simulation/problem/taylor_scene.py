@@ -31,15 +31,7 @@ _LANES = 8
 
 
 def recurrences(assembly: Assembly) -> TaylorPrograms:
-    """Return the recurrences of a scene in the reduced form, with the state (q, u).
-
-    Raises
-    ------
-    UsageError
-        If the scene has no coordinates, or constraints are left among them.
-    UnsupportedError
-        If a law switches with the motion, or calls a function that the graph does not look into.
-    """
+    """Return the recurrences of a scene in the reduced form, with the state (q, u)."""
     found = accelerations_of(assembly)
     if found is None or not len(assembly.reduced.coordinates):
         raise UsageError(
@@ -97,19 +89,7 @@ def taylor_problem(
     found: AccelerationProgram | None = None,
     values: FloatArray | None = None,
 ) -> TaylorProblem:
-    """Return what the Taylor-series method is given of a scene; errors as for `recurrences`.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    stop_time
-        The end of the stretch in which the same laws act.
-    has_events
-        Whether events are looked for.
-    found, values
-        The accelerations and the values of their parameters, where they are not those of the scene itself.
-    """
+    """Return what the Taylor-series method is given of a scene; errors as for `recurrences`."""
     programs = recurrences(assembly) if found is None else recurrences_of(assembly, found)
     parameters = np.asarray(assembly.parameter_values if values is None else values, dtype=np.float64)
     return TaylorProblem(

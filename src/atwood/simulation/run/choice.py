@@ -79,18 +79,7 @@ class Choice:
 
 
 def check_solver(asked: str) -> None:
-    """Refuse a solver that there is not, or that cannot be had.
-
-    Parameters
-    ----------
-    asked
-        What was asked for, as in `~atwood.integrators.methods.METHODS`.
-
-    Raises
-    ------
-    UsageError
-        If there is no such solver, or IDA was asked for and its libraries cannot be found.
-    """
+    """Refuse a solver that there is not, or that cannot be had."""
     if asked not in (AUTO, *METHODS):
         raise UsageError(f"there is no solver {asked!r}", advice=suggestion(asked, (AUTO, *METHODS)))
     if asked == IDA.key:
@@ -114,17 +103,7 @@ def implicit_solver() -> str:
 
 
 def choose(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArray) -> Choice:
-    """Return what solves one mode of a scene, and why.
-
-    Parameters
-    ----------
-    plan
-        The scene in its mode.
-    options
-        What was asked for.
-    t, q, u
-        The state from which it goes on.
-    """
+    """Return what solves one mode of a scene, and why."""
     if options.solver != AUTO:
         return Choice(t, options.solver, ASKED)
     assembly = plan.assembly
@@ -243,18 +222,7 @@ def _in_words(found: Stiffness) -> str:
 def stiffness_of(
     plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArray, goes_on: bool = False
 ) -> Stiffness | None:
-    """Return how stiff a scene is at a state; None if nothing in it can die away.
-
-    Parameters
-    ----------
-    plan, options
-        The scene in its mode, and what was asked for.
-    t, q, u
-        The state.
-    goes_on
-        Whether a run is there on its way: then what happens in it is as fast as the state changes, and not as at its
-        start, of which nothing may be left.
-    """
+    """Return how stiff a scene is at a state; None if nothing in it can die away."""
     assembly = plan.assembly
     if not can_be_stiff(assembly):
         return None
@@ -289,13 +257,7 @@ def _on_constraints(plan: Plan, t: float, y: FloatArray) -> ExplicitProblem:
 
 
 def describe_choices(choices: Sequence[Choice]) -> str:
-    """Return what solved a run and why, as a sentence.
-
-    Parameters
-    ----------
-    choices
-        One after the other.
-    """
+    """Return what solved a run and why, as a sentence."""
     if not choices:
         return "none: the run ended before one was chosen"
     said = [f"{choices[0].name}: {choices[0].reason}"]

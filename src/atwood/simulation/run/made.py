@@ -122,13 +122,7 @@ def as_asked(segments: Sequence[SegmentRecord], outputs: int | FloatArray) -> tu
 
 
 def run_out_of_time(assembly: Assembly, start: Start | None, options: RunOptions) -> Run:
-    """Return a run whose time was used up before its start was recorded.
-
-    Parameters
-    ----------
-    assembly, start, options
-        As of `atwood.simulation.run.run.run`; no start where it was not found.
-    """
+    """Return a run whose time was used up before its start was recorded."""
     message = f"the limit of {options.max_seconds:g} s was used up before the start was found"
     return Run(assembly, (), (), Statistics(), "time_limit", message, start, options, ())
 
@@ -212,17 +206,7 @@ class Outcome:
 
 
 def shortest_mode(plan: Plan, options: RunOptions, began: float) -> float:
-    """Return a time within which only errors, and margins of events, change a mode and change it back, s.
-
-    Parameters
-    ----------
-    plan
-        The scene in its mode.
-    options
-        What the run was asked for.
-    began
-        When it began, s.
-    """
+    """Return a time within which only errors, and margins of events, change a mode and change it back, s."""
     margin = min(20.0 * options.relative_tolerance, 1e-5) * plan.scales.time
     return max(1e-9 * (options.t_end - began), margin)
 
@@ -242,15 +226,7 @@ def times_of_steps(run: Run) -> FloatArray:
 
 
 def run_again(run: Run, between: FloatArray) -> Run | None:
-    """Return the same run with more samples, or None if it comes out otherwise.
-
-    Parameters
-    ----------
-    run
-        A run.
-    between
-        Times of the samples that come on top.
-    """
+    """Return the same run with more samples, or None if it comes out otherwise."""
     found = _repeat(run, between, None)
     if found is None or len(found.segments) != len(run.segments):
         return None

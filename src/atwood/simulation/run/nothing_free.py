@@ -12,17 +12,7 @@ from atwood.simulation.run.record import Recorder
 
 
 def follow(segment: Segment, recorder: Recorder, t: float) -> Outcome:
-    """Go through a mode in which nothing is free to move: its state is a function of time, its events still happen.
-
-    Parameters
-    ----------
-    segment
-        What it is to be.
-    recorder
-        Takes up the samples.
-    t
-        When it begins, s.
-    """
+    """Go through a mode in which nothing is free to move: its state is a function of time, its events still happen."""
     nothing, last, options = np.zeros(0), t, segment.options
     noted: list[EventRecord] = []
 

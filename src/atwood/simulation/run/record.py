@@ -113,13 +113,7 @@ class Recorder:
         return float(blocks[-1].time[-1]) if blocks else -np.inf
 
     def take(self, t: float, y: FloatArray, shown: bool) -> None:
-        """Record a state of the solver; one at the time of the last takes its place, as after an event.
-
-        Raises
-        ------
-        SolveError
-            If states cannot be projected, since constraints contradict each other; what came before is kept.
-        """
+        """Record a state of the solver; one at the time of the last takes its place, as after an event."""
         blocks, pending = self._samples
         if t == self.end:
             if pending:
@@ -151,15 +145,7 @@ class Recorder:
             self._finish(t, y, shown)
 
     def pass_over(self, crossing: SingularCrossing, t: FloatArray, shown: NDArray[np.bool_]) -> None:
-        """Record a singular crossing, in place of all samples since its start; its states are not to be projected.
-
-        Parameters
-        ----------
-        crossing
-            The crossing, with its path.
-        t, shown
-            Sample times on its way, and which of them are outputs.
-        """
+        """Record a singular crossing, in place of all samples since its start; its states are not to be projected."""
         assert crossing.path is not None
         self.rewind(crossing.path.start)
         self.settle()

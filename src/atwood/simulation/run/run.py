@@ -49,28 +49,7 @@ _CHATTER = 50
 def run(
     assembly: Assembly, start: Start, options: RunOptions, reassemble: Reassemble, clock: Clock | None = None
 ) -> Run:
-    """Run a scene from its start to its end.
-
-    Parameters
-    ----------
-    assembly, start
-        The scene and its start.
-    options
-        How.
-    reassemble
-        Gives the scene in other modes and orientation coordinates, with lengths on a line signed as given.
-    clock
-        Its limit of time; one that begins now if not given.
-
-    Raises
-    ------
-    UsageError
-        If the end is not after the start.
-    TopologyError
-        If nothing can move, and no structure is meant.
-    SolveError
-        If the solver fails; what came before is in its `run` attribute.
-    """
+    """Run a scene from its start to its end."""
     check_span(start.time, options.t_end, options.max_step, options.step, options.first_step)
     check_solver(options.solver)
     options = allowed(options)

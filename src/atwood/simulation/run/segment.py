@@ -53,17 +53,7 @@ _PARTS = 5
 
 
 def run_segment(segment: Segment, recorder: Recorder, t: float, q: FloatArray, u: FloatArray) -> Outcome:
-    """Integrate in one mode until a time, an event or a limit of the run.
-
-    Parameters
-    ----------
-    segment
-        What it is to be.
-    recorder
-        Takes up the samples.
-    t, q, u
-        The state at its start.
-    """
+    """Integrate in one mode until a time, an event or a limit of the run."""
     plan = segment.plan
     n = plan.program.coordinates
     with more_time():  # so that there is its start, whatever comes

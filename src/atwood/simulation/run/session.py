@@ -94,28 +94,7 @@ def open_session(
     give_up: Callable[[float, FloatArray], None] | None = None,
     keeps_constraints: bool = False,
 ) -> Session:
-    """Start a method.
-
-    Parameters
-    ----------
-    request
-        What is to be solved.
-    method
-        The method.
-    t, y, yp
-        Consistent start values; explicit methods find the rates by themselves.
-    leave
-        See `~atwood.integrators.explicit_session.ExplicitSession`.
-    give_up
-        See `~atwood.simulation.run.closed_session.ClosedLoopSession`.
-    keeps_constraints
-        See `~atwood.simulation.run.choice.Choice`.
-
-    Raises
-    ------
-    UsageError
-        If the scene is not one for the method.
-    """
+    """Start a method."""
     plan = request.plan
     if method.is_implicit:
         return method.open(_implicit_task(request, method, t, y, yp))
@@ -288,19 +267,7 @@ def equations_of(
     start: tuple[float, FloatArray],
     solved: Solved | None = None,
 ) -> tuple[Callable[[], TaylorProblem], Callable[[], Hamiltonian]]:
-    """Return the equations of a task as series and as Hamilton's, made where a method asks for them.
-
-    Parameters
-    ----------
-    request
-        What is to be solved.
-    problem
-        The equations for explicit methods, with what is watched.
-    start
-        Time and values.
-    solved
-        Closed loops, solved by formulas; values are then those of independent coordinates.
-    """
+    """Return the equations of a task as series and as Hamilton's, made where a method asks for them."""
     assembly, options = request.plan.assembly, request.options
     found = () if solved is None else (solved.form.accelerations, solved.values)
 

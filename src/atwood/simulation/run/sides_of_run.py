@@ -65,19 +65,7 @@ class SidesOfRun:
         return replace(assembly, shared=sides.shared, sides=sides, side_values=values)
 
     def recorded(self, record: SegmentRecord, plan: Plan, assembly: Assembly, ends_at_switch: bool) -> SegmentRecord:
-        """Return what was recorded of a stretch with the laws as they are; on a switch, those of the stretch hold.
-
-        Parameters
-        ----------
-        record
-            What was recorded.
-        plan
-            What it was run with.
-        assembly
-            The scene with its laws as they are.
-        ends_at_switch
-            Whether a relation of what moves ended it.
-        """
+        """Return what was recorded of a stretch with the laws as they are; on a switch, those of the stretch hold."""
         starts_at_switch, self._begins_at_switch = self._begins_at_switch, ends_at_switch
         if plan.assembly.sides is None:
             return record
@@ -92,15 +80,7 @@ class SidesOfRun:
         return replace(record, plan=plan.in_piece(assembly), coordinates=q, speeds=u)
 
     def change(self, changed: Iterable[int], is_short: bool) -> None:
-        """Take note of relations that change.
-
-        Parameters
-        ----------
-        changed
-            Their numbers.
-        is_short
-            Whether the stretch before was one that only errors make.
-        """
+        """Take note of relations that change."""
         self._changed = tuple(changed)
         if not is_short:
             self._sways.clear()

@@ -88,23 +88,7 @@ def find_stiffness(
     span: float,
     relative_tolerance: float,
 ) -> Stiffness:
-    """Return how stiff ``y' = f(t, y)``, ``y = (q, u)``, is at a state, from the eigenvalues of its Jacobian.
-
-    Parameters
-    ----------
-    rates
-        The right-hand side.
-    t, y
-        The state.
-    scale
-        Size of each unknown.
-    time
-        Time in which something happens, s.
-    span
-        How long the run still goes on, s.
-    relative_tolerance
-        Of the run.
-    """
+    """Return how stiff ``y' = f(t, y)``, ``y = (q, u)``, is at a state, from the eigenvalues of its Jacobian."""
     try:
         matrix = _jacobians(lambda rows: np.asarray([rates(t, rows[0])], dtype=float), y[None], scale[None])[0]
     except (KernelEvaluationError, ArithmeticError):
@@ -121,17 +105,7 @@ def present_time(
     time: float,
     span: float,
 ) -> float:
-    """Return the time in which something happens at a state, s, by how fast it changes.
-
-    Parameters
-    ----------
-    rates, t, y, scale, span
-        As of `find_stiffness`.
-    coordinates
-        How many of the unknowns are coordinates; the others are their speeds.
-    time
-        What makes sizes of speeds of those of coordinates, s.
-    """
+    """Return the time in which something happens at a state, s, by how fast it changes."""
     try:
         changes = np.abs(np.asarray(rates(t, y), dtype=float)) / scale
     except (KernelEvaluationError, ArithmeticError):
@@ -148,19 +122,7 @@ def find_stiff_rows(
     span: FloatArray,
     relative_tolerance: float,
 ) -> NDArray[np.bool_]:
-    """Return which of many runs are stiff, as `find_stiffness` has it of one.
-
-    Parameters
-    ----------
-    rates
-        The right-hand sides at states of all runs, one row each.
-    y, scale
-        States and sizes of the unknowns, shape (runs, number).
-    time, span
-        Of each run, s.
-    relative_tolerance
-        Of all runs.
-    """
+    """Return which of many runs are stiff, as `find_stiffness` has it of one."""
     matrices = _jacobians(rates, y, scale)
     each = zip(matrices, time.tolist(), span.tolist(), strict=True)
     return np.array([_judged(*one, relative_tolerance).is_stiff for one in each], dtype=np.bool_)

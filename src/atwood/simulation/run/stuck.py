@@ -24,13 +24,6 @@ def explain_stuck(plan: Plan, failed: StepResult) -> SolveError | None:
     """Return the error of a run that failed, with the motion that changes fastest there; None if nothing moves.
 
     Changes of speeds are compared in units of the scene's length, or one radian, so that metres and radians compare.
-
-    Parameters
-    ----------
-    plan
-        What was solved.
-    failed
-        How it ended.
     """
     equations = plan.assembly.own_equations
     _, speeds = plan.program.split(failed.y)

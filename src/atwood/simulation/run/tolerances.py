@@ -29,13 +29,7 @@ _FAR = 1e-2
 
 
 def allowed(options: RunOptions) -> RunOptions:
-    """Return options with a tolerance that the arithmetic can meet; it is said in a warning if that is another one.
-
-    Parameters
-    ----------
-    options
-        What was asked for.
-    """
+    """Return options with a tolerance that the arithmetic can meet; it is said in a warning if that is another one."""
     asked = options.relative_tolerance
     if not 0.0 < asked < LEAST:
         return options
@@ -54,15 +48,6 @@ def too_tight(
 
     Larger tolerances are tried from where it failed, or from where it began, if it has not come far: the steps that it
     took until then need not have been good ones.
-
-    Parameters
-    ----------
-    request, method
-        What was to be solved, and by which implicit method.
-    failed
-        How it ended.
-    opened
-        Where it began.
     """
     options, t = request.options, failed.t
     asked = options.relative_tolerance
@@ -89,21 +74,7 @@ def too_tight(
 
 
 def raised_where_too_tight(solve: Callable[[RunOptions], Run], assembly: Assembly, options: RunOptions) -> Run:
-    """Return a run, made again with a warning where its tolerance is below what rounding allows.
-
-    Parameters
-    ----------
-    solve
-        Makes the run.
-    assembly, options
-        The scene, and what was asked for.
-
-    Raises
-    ------
-    SolveError
-        If it fails otherwise, or has states that functions of people make, which would be called again for times that
-        they have seen.
-    """
+    """Return a run, made again with a warning where its tolerance is below what rounding allows."""
     while True:
         try:
             return solve(options)

@@ -115,19 +115,7 @@ def find_arc(
     end: float,
     guess: Callable[[FloatArray], States | None] | None = None,
 ) -> Arc | None:
-    """Return how a motion goes on from a state; None where no smooth motion is found.
-
-    Parameters
-    ----------
-    plan
-        The scene in its mode.
-    t, q, u
-        A state that fulfils the constraints.
-    end
-        When the arc is to end. A place where constraints depend on each other may lie in the middle between.
-    guess
-        Gives coordinates and speeds at times, about, or None where it cannot; then they are those of the state.
-    """
+    """Return how a motion goes on from a state; None where no smooth motion is found."""
     x, _ = _points()
     times = t + 0.5 * (end - t) * (x + 1.0)
     if not np.all(np.diff(times) > 0.0):  # too short for the digits of time
@@ -236,19 +224,6 @@ def follow(
 
     Arcs become so short that none of them leaps over what it should turn away from: a measure of how near the position
     is falls on none of them to less than a half.
-
-    Parameters
-    ----------
-    plan
-        The scene in its mode.
-    state
-        Time, coordinates and speeds, which fulfil the constraints.
-    end
-        When the path is to end.
-    tolerance
-        The error of an arc, relative to the scene's sizes, where rounding leaves room for it.
-    measure
-        Gives the measure at times and places.
     """
     t, q, u = state
     whole, arcs = end - t, []

@@ -106,17 +106,7 @@ class SingularCrossing:
 
 
 def stuck_at(constraint: Constraint, t: float, message: str) -> SolveError:
-    """Return the error of a solver that failed at a singular position.
-
-    Parameters
-    ----------
-    constraint
-        What nearly follows from the other constraints there.
-    t
-        When.
-    message
-        What the solver said.
-    """
+    """Return the error of a solver that failed at a singular position."""
     return SolveError(
         f"near t = {t:.6g} the mechanism comes to a singular position, where {constraint.label} nearly follows from "
         f"the other constraints, too slowly or too closely to determine how the motion continues: {message}",
@@ -127,15 +117,7 @@ def stuck_at(constraint: Constraint, t: float, message: str) -> SolveError:
 
 
 def events_on(path: Path, plan: Plan, probe: EventProbe) -> Root | None:
-    """Return the first event on a path; None if there is none.
-
-    Parameters
-    ----------
-    path
-        The motion.
-    plan, probe
-        The scene in its mode, and what is watched.
-    """
+    """Return the first event on a path; None if there is none."""
     if not probe.event_functions:
         return None
     size, n, m = plan.program.size, plan.program.coordinates, len(plan.sizes)
@@ -162,35 +144,13 @@ _LEAST = 1e-7
 
 
 def is_slow(plan: Plan, arc: Arc, t: float, fastest: float, tolerance: float) -> bool:
-    """Return whether a motion has so little energy at a time that errors could have it turn back.
-
-    Parameters
-    ----------
-    plan
-        The scene in its mode.
-    arc
-        The motion.
-    t
-        When.
-    fastest
-        The largest speed about then, in units of the scene's sizes; those of the arc count too.
-    tolerance
-        The relative tolerance of the run.
-    """
+    """Return whether a motion has so little energy at a time that errors could have it turn back."""
     here, *ends = np.max(np.abs(arc.at(np.array([t, arc.start, arc.end]))[1]) / plan.sizes[:, None], axis=0).tolist()
     return bool(here**2 < max(_ENERGIES * tolerance, _LEAST) * max(fastest, *ends) ** 2)
 
 
 def slowest(t: FloatArray, speeds: FloatArray, sizes: FloatArray) -> float | None:
-    """Return when a motion is slowest between some times; None where it is at their ends.
-
-    Parameters
-    ----------
-    t, speeds
-        Times equally far from each other, and speeds of shape (number, times).
-    sizes
-        The size of each speed.
-    """
+    """Return when a motion is slowest between some times; None where it is at their ends."""
     square = np.sum((speeds / sizes[:, None]) ** 2, axis=0)
     least = int(np.argmin(square))
     if least in (0, len(t) - 1):
@@ -202,23 +162,7 @@ def slowest(t: FloatArray, speeds: FloatArray, sizes: FloatArray) -> float | Non
 
 
 def rests_at(plan: Plan, measure: RankMeasure, arc: Arc, far: float, fastest: float, tolerance: float) -> float | None:
-    """Return when an arc comes to rest so close to a singular position that errors decide on what follows; else None.
-
-    Parameters
-    ----------
-    plan
-        The scene in its mode.
-    measure
-        How near states are to a singular position.
-    arc
-        A motion.
-    far
-        The measure elsewhere.
-    fastest
-        See `is_slow`.
-    tolerance
-        The relative tolerance of the run.
-    """
+    """Return when an arc comes to rest so close to a singular position that errors decide what follows, or None."""
     times = np.linspace(arc.start, arc.end, 65)
     rest = slowest(times, arc.at(times)[1], plan.sizes)
     if rest is None:

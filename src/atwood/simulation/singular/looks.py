@@ -47,17 +47,7 @@ class Look:
 
 
 def stride_from(plan: Plan, look: Look, whole: float) -> float:
-    """Return the time in which something moves as far as it may until the next look; never beyond the end.
-
-    Parameters
-    ----------
-    plan
-        The scene in its mode.
-    look
-        A state.
-    whole
-        The length of the run.
-    """
+    """Return the time in which something moves as far as it may until the next look; never beyond the end."""
     speeds = slice(plan.program.coordinates, plan.program.coordinates + len(plan.sizes))
     speed, pull = (float(np.max(np.abs(one[speeds]) / plan.sizes)) for one in (look.y, look.yp))
     if not np.isfinite(speed + pull):
@@ -69,32 +59,14 @@ def stride_from(plan: Plan, look: Look, whole: float) -> float:
 
 
 def cubic(s: FloatArray, ends: tuple[FloatArray, FloatArray], slopes: tuple[FloatArray, FloatArray]) -> FloatArray:
-    """Return the cubic through two states with their rates, at shares of the way from one to the other.
-
-    Parameters
-    ----------
-    s
-        The shares.
-    ends, slopes
-        The states, and their rates times the length of the way.
-    """
+    """Return the cubic through two states with their rates, at shares of the way from one to the other."""
     (a, b), (v, w) = ends, slopes
     found: FloatArray = a + s * v + s**2 * (3.0 * (b - a) - 2.0 * v - w) + s**3 * (2.0 * (a - b) + v + w)
     return found
 
 
 def going_on(plan: Plan, look: Look, times: FloatArray) -> FloatArray:
-    """Return coordinates and speeds at times near a look, about: from the accelerations there, shape (number, times).
-
-    Parameters
-    ----------
-    plan
-        The scene in its mode.
-    look
-        A state.
-    times
-        When, s.
-    """
+    """Predict coordinates and speeds at times near a look from the accelerations there, shape (number, times)."""
     n, m = plan.program.coordinates, len(plan.sizes)
     later = np.asarray(times) - look.t
     u = look.y[n : n + m, None] + look.yp[n : n + m, None] * later
@@ -105,17 +77,7 @@ def going_on(plan: Plan, look: Look, times: FloatArray) -> FloatArray:
 
 
 def compiled_looks(plan: Plan, whole: float, size: int) -> LookoutData | None:
-    """Return what looks at a motion by itself, for one run; None where nothing can be compiled.
-
-    Parameters
-    ----------
-    plan
-        The scene in its mode.
-    whole
-        The length of the run.
-    size
-        The number of the solver's unknowns, which begin with coordinates and speeds.
-    """
+    """Return what looks at a motion by itself, for one run; None where nothing can be compiled."""
     held, assembly = plan.balance.program, plan.assembly
     if plan.not_compilable or held.constraints > _LARGEST:
         return None

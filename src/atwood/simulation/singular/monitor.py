@@ -48,11 +48,6 @@ def singularity_monitor_of(
     """Return what looks out for singular positions; None where there can be none: without loops.
 
     Without projection (plain index 1) drift is to be seen, and nothing is looked out for.
-
-    Parameters
-    ----------
-    plan, tolerance, end, step_result
-        See `SingularityMonitor`.
     """
     if not plan.is_projected or not plan.assembly.reduced.constraints:
         return None
@@ -157,17 +152,7 @@ class SingularityMonitor(WaysOver):
         self.next = step_result.t + stride_from(self.plan, one, self._whole)
 
     def look(self, step_result: StepResult, between: bool, at_end: bool) -> SingularCrossing | None:
-        """Take up what a solver gave, and return the first singular position over which it must be helped.
-
-        Parameters
-        ----------
-        step_result
-            Where the solver is, or where and why it ended.
-        between
-            Whether this is where the monitor wanted to look, or a session noticed something, and not an output.
-        at_end
-            Whether the run is to end here.
-        """
+        """Take up what a solver gave, and return the first singular position over which it must be helped."""
         ended = step_result.status not in (Status.REACHED, Status.NOTICED)
         if step_result.status is Status.INTERRUPTED or not (between or at_end or ended):
             return None

@@ -73,13 +73,7 @@ class RankMeasure:
         return self._of(now)
 
     def at(self, t: FloatArray, q: FloatArray) -> FloatArray:
-        """Return the measure, shape (states,).
-
-        Parameters
-        ----------
-        t, q
-            Times and places near the constraints, of shape (states,) and (number, states).
-        """
+        """Return the measure, shape (states,)."""
         return self._of(self._constraints(t, q))
 
     def _of(self, now: ConstraintsAt) -> FloatArray:
@@ -108,15 +102,7 @@ class RankMeasure:
 
 
 def find_crossing(measure: RankMeasure, arc: Arc) -> tuple[float, float] | None:
-    """Return when an arc passes closest to a singular position, and how far away it is at its ends; None if never.
-
-    Parameters
-    ----------
-    measure
-        The measure.
-    arc
-        The motion.
-    """
+    """Return when an arc passes closest to a singular position, and how far away it is at its ends; None if never."""
     middle, half = 0.5 * (arc.start + arc.end), 0.5 * (arc.end - arc.start)
     far = np.inf
     for _ in range(2):  # once more near by, where nothing else bends the measure
@@ -191,15 +177,7 @@ def _clenshaw(coefficients: list[float], x: float) -> float:
 
 
 def zero_ahead(times: FloatArray, away: FloatArray) -> float | None:
-    """Return when a measure falls to zero at an even rate, and rises again, between some times; None if it does not.
-
-    Parameters
-    ----------
-    times
-        Equally far from each other.
-    away
-        The measure there.
-    """
+    """Return when a measure falls to zero at an even rate, and rises again, between some times; None if it does not."""
     least = int(np.argmin(away)) if np.all(np.isfinite(away)) else 0
     if not 0 < least < len(away) - 1:
         return None
@@ -212,19 +190,7 @@ def zero_ahead(times: FloatArray, away: FloatArray) -> float | None:
 
 
 def find_loss(measure: RankMeasure, arc: Arc, t: float, away: float) -> Loss | None:
-    """Return what is lost at a time of an arc; None if that is no singular position.
-
-    Parameters
-    ----------
-    measure
-        The measure.
-    arc
-        A motion.
-    t
-        When it comes closest to a singular position.
-    away
-        The measure a little away from it.
-    """
+    """Return what is lost at a time of an arc; None if that is no singular position."""
     finding = measure.plan.finding
     q = measure.plan.balance.kinematic_map.normalized(arc.at(np.array([t]))[0][:, 0])
     constraint_jacobian, misses = measure.jacobian_at(t, q)

@@ -197,15 +197,7 @@ class Comparison(Shown):
 
 
 def write_rows(comparisons: Sequence[Comparison], file: str | os.PathLike[str]) -> Path:
-    """Save the rows of comparisons as one CSV file, and return it; see `Comparison.save`.
-
-    Parameters
-    ----------
-    comparisons
-        Made in one environment.
-    file
-        Where to.
-    """
+    """Save the rows of comparisons as one CSV file, and return it; see `Comparison.save`."""
     target = check_rows_file(file)
     names = ["scene", "t_end", *names_of(ComparisonRow)]
 
@@ -288,13 +280,7 @@ def _blas() -> str:
 
 
 def judge(rows: Iterable[tuple[str, float | None, float | None]]) -> str:
-    """Return which form is cheapest at an error that all reach, and by how much.
-
-    Parameters
-    ----------
-    rows
-        Label, error and time of each run.
-    """
+    """Return which form is cheapest at an error that all reach, and by how much."""
     curves: dict[str, list[tuple[float, float]]] = {}
     for label, error, wall in rows:
         if error is not None and wall:
@@ -333,15 +319,7 @@ def _reaches(points: list[tuple[float, float]], error: float) -> bool:
 
 
 def cost_at(points: list[tuple[float, float]], error: float) -> float | None:
-    """Return the time at an error, between the runs by logarithms; None if they do not come near it.
-
-    Parameters
-    ----------
-    points
-        Error and time of each run.
-    error
-        The error.
-    """
+    """Return the time at an error, between the runs by logarithms; None if they do not come near it."""
     if not _reaches(points, error):
         return None
     ordered = sorted(points)

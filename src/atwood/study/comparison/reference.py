@@ -81,28 +81,7 @@ def find_reference(
     max_seconds: float | None,
     watch: Callable[[str], object],
 ) -> Reference:
-    """Return the reference of a scene: its closed form where it has one that holds, a quadrature, or a solution.
-
-    Parameters
-    ----------
-    scene, flat
-        The scene, and the same as leaves.
-    assembled
-        Gives the scene in a form and at a level.
-    t_end
-        Time of the end, s. A run that an event stops earlier shortens the comparison.
-    outputs
-        Number of output times.
-    max_seconds
-        Limit of a run.
-    watch
-        Called with what is being done.
-
-    Raises
-    ------
-    SolveError
-        If no tight solution can be found.
-    """
+    """Return the reference of a scene: its closed form where it has one that holds, a quadrature, or a solution."""
     tight, note = _tight_solutions(flat, assembled, t_end, outputs, max_seconds, watch)
     (best, said), (second, other) = tight
     paths = compared_paths(best.assembly)
@@ -176,15 +155,7 @@ def run_form(
     solver: str = "auto",
     samples: int = 400,
 ) -> Result:
-    """Run a scene in one form.
-
-    Parameters
-    ----------
-    assembled
-        Gives the scene in a form and at a level; what it made before is used again.
-    form, level, rtol, t_end, outputs, max_seconds, solver, samples
-        See `atwood.simulate`.
-    """
+    """Run a scene in one form."""
     result = simulate(
         assembled(form, level),
         t_end=t_end,
@@ -200,17 +171,7 @@ def run_form(
 
 
 def table_at(result: Result, paths: Iterable[str], times: FloatArray) -> dict[str, FloatArray]:
-    """Return quantities at output times that were asked for; just after an event, where one happens then.
-
-    Parameters
-    ----------
-    result
-        A run to the last of these times at least.
-    paths
-        Which quantities.
-    times
-        Output times of the run, s.
-    """
+    """Return quantities at output times that were asked for; just after an event, where one happens then."""
     places = _places(result, times)
     return {path: values[places] for path, values in result.table(paths).items()}
 
@@ -222,15 +183,7 @@ def _places(result: Result, times: FloatArray) -> NDArray[np.intp]:
 def scaled_difference(
     one: Mapping[str, FloatArray], other: Mapping[str, FloatArray], scales: Mapping[str, float]
 ) -> float:
-    """Return the largest scaled difference of two sets of trajectories.
-
-    Parameters
-    ----------
-    one, other
-        Trajectories by path.
-    scales
-        Size of each.
-    """
+    """Return the largest scaled difference of two sets of trajectories."""
     return max((float(np.max(np.abs(one[path] - other[path]))) / scales[path] for path in one), default=0.0)
 
 

@@ -81,22 +81,7 @@ def _first_mode(request: SweepRequest) -> str:
 def run_batches(
     request: SweepRequest, records: Records, threads: int, watch: Callable[[int], object]
 ) -> NDArray[np.intp]:
-    """Make the runs that can be made many at a time.
-
-    Parameters
-    ----------
-    request, records
-        What to run, and where to write what became of it.
-    threads
-        How many threads share them.
-    watch
-        Called with the number of runs that were done since.
-
-    Returns
-    -------
-    array
-        Numbers of the runs that are left, to be made one by one.
-    """
+    """Make the runs that can be made many at a time."""
     equations = request.assembly.reduced
     count, shown = request.cases.count, len(request.times) * (len(equations.coordinates) + len(equations.speeds))
     length = max(1, min(_PIECE, -(-count // (4 * threads)), _NUMBERS // max(1, shown)))

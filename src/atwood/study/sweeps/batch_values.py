@@ -91,13 +91,7 @@ class ParameterRows:
         return False
 
     def read(self, runs: NDArray[np.intp]) -> tuple[FloatArray | None, NDArray[np.bool_]]:
-        """Return the parameters of runs, one row each, and which of them keep the structure; None if all are the same.
-
-        Parameters
-        ----------
-        runs
-            Numbers of the runs.
-        """
+        """Return the parameters of runs, a row each (None if all are equal), and which runs keep the structure."""
         usable = np.ones(len(runs), dtype=bool)
         if not self.varies:
             return None, usable
@@ -252,15 +246,7 @@ class StartRows:
     def read(
         self, runs: NDArray[np.intp], parameters: FloatArray | None
     ) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Return coordinates, speeds and extents of runs, one row each, and which of them could be found.
-
-        Parameters
-        ----------
-        runs
-            Numbers of the runs.
-        parameters
-            Their parameters, one row each, where they change.
-        """
+        """Return coordinates, speeds and extents of runs, one row each, and which of them could be found."""
         assembly = self._request.assembly
         q, u = (np.zeros((len(runs), len(s))) for s in (assembly.reduced.coordinates, assembly.reduced.speeds))
         lengths = self._extents(runs, parameters)
@@ -311,15 +297,7 @@ class StartRows:
 def read_starts(
     starts: StartRows, rows: ParameterRows, runs: NDArray[np.intp]
 ) -> tuple[NDArray[np.intp], tuple[FloatArray, FloatArray], FloatArray, FloatArray | None]:
-    """Return the runs whose structure and start could be found, and of these states, extents and parameters.
-
-    Parameters
-    ----------
-    starts, rows
-        What gives starts and parameters.
-    runs
-        Numbers of the runs.
-    """
+    """Return the runs whose structure and start could be found, and of these states, extents and parameters."""
     parameters, usable = rows.read(runs)
     q, u, lengths, found = starts.read(runs, parameters)
     usable &= found & np.all(np.isfinite(q), axis=1) & np.all(np.isfinite(u), axis=1)

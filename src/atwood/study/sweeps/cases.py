@@ -87,24 +87,7 @@ class Cases:
 
 
 def make_cases(scene: Model, vary: Mapping[str, Any] | None, start: Mapping[str, Any] | None, combine: str) -> Cases:
-    """Put the runs of a sweep together, and check every value.
-
-    Parameters
-    ----------
-    scene
-        The scene.
-    vary, start
-        Values of parameters and start values by path.
-    combine
-        ``"grid"``: every value with every other. ``"list"``: the first of each, the second of each, and so on.
-
-    Raises
-    ------
-    UsageError
-        If nothing is varied, or lists differ in length.
-    AtwoodError
-        If there is no such parameter, or a value is not admissible.
-    """
+    """Put the runs of a sweep together, and check every value."""
     axes = [_axis(scene.copy(), path, values, False) for path, values in (vary or {}).items()]
     axes += [_axis(scene.copy(), path, values, True) for path, values in (start or {}).items()]
     if not axes:

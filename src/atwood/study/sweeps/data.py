@@ -20,11 +20,6 @@ def labels(sweep: Sweep) -> dict[str, str]:
     """Return what each thing that was varied is called beside the quantities: no two of these names are the same.
 
     A parameter has its path, a start value ``start.`` before it, since there is mostly a quantity of its path.
-
-    Parameters
-    ----------
-    sweep
-        The sweep.
     """
     taken = {*_OWN, *sweep.quantities}
     found = {}
@@ -36,13 +31,7 @@ def labels(sweep: Sweep) -> dict[str, str]:
 
 
 def as_dataset(sweep: Sweep) -> Dataset:
-    """Return a sweep as arrays: a grid has a dimension for each thing that was varied, a list the dimension ``run``.
-
-    Parameters
-    ----------
-    sweep
-        The sweep.
-    """
+    """Return a sweep as arrays: a grid has a dimension for each thing that was varied, a list the dimension ``run``."""
     named = labels(sweep)
     is_grid = len(named) == len(sweep.shape)
     runs = tuple(named.values()) if is_grid else ("run",)
@@ -64,13 +53,7 @@ def as_dataset(sweep: Sweep) -> Dataset:
 
 
 def as_table(sweep: Sweep) -> Any:
-    """Return a sweep as a table of pandas; see `Sweep.to_dataframe`.
-
-    Parameters
-    ----------
-    sweep
-        The sweep.
-    """
+    """Return a sweep as a table of pandas; see `Sweep.to_dataframe`."""
     pandas, times = needed("pandas"), len(sweep.time)
     index = pandas.MultiIndex.from_product([range(len(sweep)), sweep.time], names=["run", "time"])
     columns = {label: np.repeat(sweep.varied[path], times) for path, label in labels(sweep).items()}
@@ -94,13 +77,7 @@ def about_sweep(sweep: Sweep) -> dict[str, Any]:
 
 
 def from_dataset(data: Dataset) -> Sweep:
-    """Return the sweep that arrays were made of.
-
-    Parameters
-    ----------
-    data
-        The arrays.
-    """
+    """Return the sweep that arrays were made of."""
     arrays, about = data.by_path(), data.about
     shape = tuple(about["shape"])
     varied = {}
@@ -135,19 +112,7 @@ def from_parts(
     end_time: NDArray[Any],
     steps: NDArray[Any],
 ) -> Sweep:
-    """Return a sweep from its arrays and what `about_sweep` says of it.
-
-    Parameters
-    ----------
-    about
-        What is no array.
-    time, quantities, meanings, status, end_time, steps
-        See `Sweep`.
-    varied
-        By label, one value a run.
-    units
-        Of quantities by path, of what was varied by label.
-    """
+    """Return a sweep from its arrays and what `about_sweep` says of it."""
     runs = int(np.prod(about["shape"]))
     expected = [(time, time.shape[:1]), (end_time, (runs,)), (steps, (runs,))]
     expected += [(values, (runs,)) for values in varied.values()]

@@ -33,26 +33,7 @@ from atwood.study.sweeps.result import Sweep
 
 @takes(sweep=instance("a Sweep", Sweep), file=FILE)
 def save_sweep(sweep: Sweep, file: str | os.PathLike[str]) -> Path:
-    """Save a sweep.
-
-    Parameters
-    ----------
-    sweep
-        The sweep.
-    file
-        Where to; its suffix says how: ``.nc`` (NetCDF-3), ``.npz`` (NumPy), ``.mat`` (MATLAB), ``.json``, or ``.csv``
-        with a row for each run and time.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    UsageError
-        If the suffix is not known, or the file cannot be written.
-    """
+    """Save a sweep."""
     target = Path(file)
     write, _ = _format_of(target)
     if write is _write_csv:

@@ -97,17 +97,6 @@ class SweepMode:
 
         The rule is that of `atwood.simulation.events.modes.EventProbe`; a run in which a one-sided bound does not hold
         at once is made by itself.
-
-        Parameters
-        ----------
-        t, q, u
-            States, of shape (runs,) and (runs, number).
-        values
-            Parameters of each run in the order of this mode; None where all have the same.
-        lengths, time
-            Its sizes, m and s.
-        tolerance
-            The relative tolerance.
         """
         runs, count = len(t), len(self.functions)
         if self.program is None:
@@ -134,25 +123,7 @@ class SweepMode:
         times: FloatArray,
         end: float,
     ) -> tuple[FloatArray, StepResult, Statistics]:
-        """Take a run from a state through output times, as far as no event stops it.
-
-        Parameters
-        ----------
-        t, y
-            The state.
-        values
-            Its parameters; None where all runs have the same.
-        shift
-            What is added to its events.
-        absolute
-            Absolute tolerances.
-        budget
-            Its limits.
-        times
-            Output times that are left, s.
-        end
-            The end of the run, s.
-        """
+        """Take a run from a state through output times, as far as no event stops it."""
         if values is not None:
             self.rates.fill(self.own_rates, values)
         if self.events is not None and self.event_data is not None:
@@ -179,19 +150,7 @@ class SweepMode:
 def find_mode(
     request: SweepRequest, modes: Mapping[str, str], at: tuple[float, FloatArray, FloatArray, float], varies: bool
 ) -> tuple[SweepMode | None, str]:
-    """Return a mode of the first run, by what it is at a state; None, and why, where runs are made by themselves.
-
-    Parameters
-    ----------
-    request
-        The sweep.
-    modes
-        The mode of each part.
-    at
-        Time, coordinates and speeds, and the extent of the scene, m.
-    varies
-        Whether parameters change from run to run.
-    """
+    """Return a mode of the first run, by what it is at a state; None, and why, where runs are made by themselves."""
     base, options = request.assembly, request.options
     assembly = base.other_mode(dict(modes), {})
     equations = assembly.reduced

@@ -53,17 +53,7 @@ class Motion(Protocol):
     def begin(
         self, t: float, q: FloatArray, u: FloatArray, values: FloatArray | None, lengths: FloatArray, time: FloatArray
     ) -> tuple[FloatArray, FloatArray | None, NDArray[np.bool_]]:
-        """Return what is integrated, the values of its parameters, and which runs can be made so.
-
-        Parameters
-        ----------
-        t, q, u
-            The start: coordinates and speeds, of shape (runs, number).
-        values
-            Parameters of the scene, shape (runs, number); None where they are the same for all.
-        lengths, time
-            Sizes of each run, m and s.
-        """
+        """Return what is integrated, the values of its parameters, and which runs can be made so."""
         ...
 
     def columns(self) -> list[int]:
@@ -255,19 +245,7 @@ def find_way(request: SweepRequest) -> tuple[Way | None, str]:
 
 
 def open_places(motion: Motion, method: Method, options: RunOptions, values: FloatArray) -> BatchPlaces:
-    """Open a session of a method, for one thread, and return where a batch finds what it needs of it.
-
-    Parameters
-    ----------
-    motion
-        What is integrated.
-    method
-        The method.
-    options
-        What was asked for.
-    values
-        Parameters of one run.
-    """
+    """Open a session of a method, for one thread, and return where a batch finds what it needs of it."""
     own = compiled_rates(motion.assembly, motion.program).open()
     task = task_of(motion, method, options, values, own)
     assert method.batch is not None
@@ -284,17 +262,7 @@ def task_of(
     functions: Sequence[EventFunction] = (),
     data: EventData | None = None,
 ) -> Task:
-    """Return what a session is opened for that makes one run of a sweep after another.
-
-    Parameters
-    ----------
-    motion, method, options, values
-        As of `open_places`.
-    own
-        The rates, with their place for parameters, which get those of one run.
-    functions, data
-        What is watched, as machine code.
-    """
+    """Return what a session is opened for that makes one run of a sweep after another."""
     assembly, begin = motion.assembly, motion.assembly.flat.t_start
     relative = min(options.relative_tolerance, method.loosest_tolerance)
     settings = SolverOptions(relative, 1.0, max_step=options.max_step, horizon=options.t_end - begin)

@@ -29,23 +29,7 @@ def read_quantities(
     numbers: NDArray[np.intp],
     own: Callable[[int], Assembly],
 ) -> FloatArray:
-    """Return quantities at states of many runs, shape (quantities, states).
-
-    Parameters
-    ----------
-    motion
-        The scene.
-    paths
-        What to read.
-    state
-        Times, coordinates and speeds, of shape (states,) and (number, states).
-    rows
-        Parameters of the run of each state, shape (states, number); None where they are the same for all.
-    numbers
-        Number of that run.
-    own
-        The assembly of a run, for reactions of redundant constraints.
-    """
+    """Return quantities at states of many runs, shape (quantities, states)."""
     assembly, (t, q, u) = motion.assembly, state
     if not len(t):
         return np.zeros((len(paths), 0))

@@ -143,13 +143,7 @@ class Sweep(Shown):
         return len(self.status)
 
     def __getitem__(self, path: str) -> FloatArray:
-        """Return a quantity of all runs, shape (runs, times).
-
-        Raises
-        ------
-        ResultError
-            If it was not kept.
-        """
+        """Return a quantity of all runs, shape (runs, times)."""
         path = str(check(PATH, path, "path", "Sweep"))
         if path not in self.quantities:
             kept = suggestion(path, near_matches(path, self.paths)) or f"It kept {', '.join(self.paths[:12])}."

@@ -97,13 +97,7 @@ class Records:
 
 
 def expand_paths(assembly: Assembly, quantities: Iterable[str] | None) -> tuple[str, ...]:
-    """Return the paths of quantities; the coordinates when none are given, all below a component for its path.
-
-    Raises
-    ------
-    ResultError
-        If there is no such quantity.
-    """
+    """Return the paths of quantities; the coordinates when none are given, all below a component for its path."""
     known = assembly.observables
     if quantities is None:
         return tuple(one.name for one in assembly.reduced.names if one.name in known) or tuple(known)
@@ -147,19 +141,7 @@ def run_one_by_one(
     threads: int,
     watch: Callable[[int], object],
 ) -> None:
-    """Make runs, each by itself, as `simulate` makes them.
-
-    Parameters
-    ----------
-    request, records
-        What to run, and where to write what became of it.
-    runs
-        Numbers of the runs.
-    threads
-        How many threads share them.
-    watch
-        Called with the number of runs that were done since.
-    """
+    """Make runs, each by itself, as `simulate` makes them."""
     structures = _Structures(request.assembly)
 
     def work(run: int, _: threading.Event) -> int:
@@ -172,19 +154,7 @@ def run_one_by_one(
 def shared_work(
     work: Callable[[Any, threading.Event], int], pieces: Sequence[Any], threads: int, watch: Callable[[int], object]
 ) -> None:
-    """Do pieces of work in threads; Ctrl-C sets the event that the work is given, and stops all of it.
-
-    Parameters
-    ----------
-    work
-        Does one piece, and returns how many runs that were.
-    pieces
-        What to do.
-    threads
-        How many threads share them; one is this one.
-    watch
-        Called with the number of runs that were done since.
-    """
+    """Do pieces of work in threads; Ctrl-C sets the event that the work is given, and stops all of it."""
     stop = threading.Event()
     if threads == 1 or len(pieces) < 2:
         for piece in pieces:
@@ -271,15 +241,7 @@ def _take(request: SweepRequest, records: Records, run: int, result: Result) -> 
 def run_in_processes(
     request: SweepRequest, records: Records, executor: Executor, watch: Callable[[int], object]
 ) -> None:
-    """Make runs where an executor puts them.
-
-    Parameters
-    ----------
-    request, records, watch
-        See `run_one_by_one`.
-    executor
-        Takes pieces of work.
-    """
+    """Make runs where an executor puts them."""
     pieces = np.array_split(np.arange(request.cases.count), min(request.cases.count, _CHUNKS))
     waiting: dict[Future[Any], NDArray[np.intp]] = {}
     try:

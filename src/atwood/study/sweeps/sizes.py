@@ -24,21 +24,7 @@ def time_scales(
     values: FloatArray | None,
     span: float,
 ) -> FloatArray:
-    """Return in what time something happens in each run, as `find_scales` has it; nan where that has no value.
-
-    Parameters
-    ----------
-    motion
-        The scene.
-    t, q, u
-        States, of shape (runs,) and (runs, number).
-    lengths
-        Extent of each run, m.
-    values
-        Its parameters, shape (runs, number); None where all have the same.
-    span
-        Length of a run, s.
-    """
+    """Return in what time something happens in each run, as `find_scales` has it; nan where that has no value."""
     assembly = motion.assembly
     if not len(t):
         return np.zeros(0)
@@ -52,17 +38,7 @@ def time_scales(
 
 
 def absolute_tolerances(assembly: Assembly, lengths: FloatArray, time: FloatArray, relative: float) -> FloatArray:
-    """Return the absolute tolerances of coordinates and speeds of each run, as `Plan.tolerances` has them.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    lengths, time
-        Sizes of each run, m and s.
-    relative
-        The relative tolerance that was asked for.
-    """
+    """Return the absolute tolerances of coordinates and speeds of each run, as `Plan.tolerances` has them."""
     share, equations = min(relative, LOOSEST), assembly.reduced
     sizes = coordinate_scales(equations, lengths), motion_scales(equations, lengths) / time[:, None]
     return np.concatenate([share * one for one in sizes], axis=1)
@@ -96,23 +72,7 @@ def are_stiff(
     time: FloatArray,
     options: RunOptions,
 ) -> NDArray[np.bool_]:
-    """Return which runs `choose` would give to an implicit method; none where a method was asked for.
-
-    Parameters
-    ----------
-    motion
-        The scene.
-    t, y
-        Times, and what is integrated, of shape (runs,) and (runs, number).
-    values
-        Parameters of what is integrated, shape (runs, number); None where all runs have the same.
-    tolerances
-        Absolute tolerances, as many shares of the unknowns' sizes.
-    time
-        In what time something happens, s.
-    options
-        What was asked for.
-    """
+    """Return which runs `choose` would give to an implicit method; none where a method was asked for."""
     assembly = motion.assembly
     if not len(t) or options.solver != AUTO or not can_be_stiff(assembly):
         return np.zeros(len(t), dtype=np.bool_)

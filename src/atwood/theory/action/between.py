@@ -256,18 +256,7 @@ _DIFFERENCE = 1e-5
 
 
 def refuse_tied(assembly: Assembly) -> None:
-    """Refuse a scene whose ends are not those of free coordinates, or whose equations switch.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-
-    Raises
-    ------
-    UnsupportedError
-        If it is so.
-    """
+    """Refuse a scene whose ends are not those of free coordinates, or whose equations switch."""
     name, equations = assembly.flat.name, assembly.own_equations
     if assembly.form == "dae" or equations.constraints or not rates_are_speeds(equations):
         raise UnsupportedError(

@@ -255,13 +255,7 @@ def action(
 
 
 def action_of_run(run: Run) -> Action:
-    """Return the action of a run; it is made again to look at it within its steps.
-
-    Parameters
-    ----------
-    run
-        The run.
-    """
+    """Return the action of a run; it is made again to look at it within its steps."""
     steps = times_of_steps(run)
     nodes = [panels(joined_times(one.time, steps)) for one in run.segments if len(one.time) > 1]
     again = run_again(run, np.concatenate([one.times.ravel() for one in nodes])) if nodes else None
@@ -420,29 +414,7 @@ def panels(edges: FloatArray) -> Nodes:
 def curves_at(
     given: Mapping[str, Any], names: Sequence[str], nodes: Nodes, where: str
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return values and derivatives of functions of time at points, and their values at the two ends.
-
-    Parameters
-    ----------
-    given
-        By path: a number, text or a sympy expression in t, or a function of an array of times.
-    names
-        The paths; those that are not given are zero.
-    nodes
-        The points.
-    where
-        The scene, for errors.
-
-    Returns
-    -------
-    tuple
-        Shapes (names, points), the same, and (names, 2).
-
-    Raises
-    ------
-    UsageError
-        If a path is unknown, or a function has no finite value.
-    """
+    """Return values and derivatives of functions of time at points, and their values at the two ends."""
     for path in given:
         if path not in names:
             raise UsageError(f"{path!r} is no coordinate of it", where=where, advice=suggestion(path, list(names)))

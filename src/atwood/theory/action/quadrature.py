@@ -110,28 +110,7 @@ class Level:
 def level_through(
     energy: Energy, q: float, p: float, size: float, turn: float | None = None, name: str = "it"
 ) -> Level:
-    """Return the level of H through a state of one coordinate and its momentum.
-
-    Parameters
-    ----------
-    energy
-        H, of arrays.
-    q, p
-        The state.
-    size
-        How large q is.
-    turn
-        The period of the coordinate, if it may be one.
-    name
-        What is spoken of in errors.
-
-    Raises
-    ------
-    UnsupportedError
-        If H is not quadratic in p.
-    SolveError
-        If the motion has no end within reach, is at rest, or takes for ever.
-    """
+    """Return the level of H through a state of one coordinate and its momentum."""
     total = float(energy(np.array([q]), np.array([p]))[0])
     unit = _unit(energy, q, p, total)
     here = max(abs(total), abs(float(energy(np.array([q]), np.zeros(1))[0])), 1e-300)

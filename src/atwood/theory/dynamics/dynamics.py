@@ -405,22 +405,7 @@ def dynamics(scene: Model | Assembly, *, form: str | None = None, orientation: s
 
 
 def velocity_jacobian(assembly: Assembly, equations: Equations, path: str) -> tuple[list[Expression], tuple[int, ...]]:
-    """Return the derivatives of a quantity's rate, or of a velocity, by the speeds, and the shape of what they make.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    equations
-        Its equations, in the coordinates that are wanted.
-    path
-        A quantity, or a vector of them.
-
-    Raises
-    ------
-    UsageError
-        If there is no such quantity, or it depends on accelerations or reactions.
-    """
+    """Return the derivatives of a quantity's rate, or of a velocity, by the speeds, and the shape of what they make."""
     e, observables = equations, assembly.observables
     vector = [f"{path}.{axis}" for axis in "xyz" if f"{path}.{axis}" in observables]
     if path not in observables and not vector:

@@ -32,22 +32,7 @@ def as_time(t: Any, where: str) -> float:
 
 
 def as_numbers(given: Numbers, size: int, name: str, where: str) -> FloatArray:
-    """Return what was given for a state as an array of floats, or refuse it.
-
-    Parameters
-    ----------
-    given
-        Numbers, shape (..., size).
-    size
-        How many there are of one state.
-    name, where
-        What they are called, and of what.
-
-    Raises
-    ------
-    UsageError
-        If it is no array of real numbers, or has another shape.
-    """
+    """Return what was given for a state as an array of floats, or refuse it."""
     if type(given) is np.ndarray and given.dtype == np.float64:
         array = given
     else:

@@ -29,15 +29,7 @@ from atwood.theory.formulas.tree import Sum
 
 
 def read_equations(assembly: Assembly, parameters: Parameters = "symbolic") -> EquationsOfMotion:
-    """Return the equations of motion of an assembly, to be read.
-
-    Parameters
-    ----------
-    assembly
-        The scene, in the form that the equations are to have.
-    parameters
-        Whether parameters are symbols, or their values are put in.
-    """
+    """Return the equations of motion of an assembly, to be read."""
     found = lagrangian_of(assembly)
     return EquationsOfMotion(assembly, found, notation_of(assembly, found), parameters)
 

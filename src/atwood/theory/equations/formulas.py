@@ -229,20 +229,7 @@ _LONGEST = 250
 
 
 def solve_closures(equations: Sequence[Sympy], unknowns: Sequence[Sympy]) -> list[dict[Sympy, Sympy]] | None:
-    """Return the solutions of closed loops, one for each way in which they can be put together.
-
-    Parameters
-    ----------
-    equations
-        What is zero.
-    unknowns
-        As many coordinates.
-
-    Returns
-    -------
-    list
-        What each unknown is, in terms of the coordinates that are left; None if there is no closed form of this kind.
-    """
+    """Return the solutions of closed loops, one for each way in which they can be put together."""
     if not unknowns:
         return [{}] if not equations else None
     for size, solve in ((1, _alone), (2, _pair)):

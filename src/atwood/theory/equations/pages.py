@@ -213,13 +213,7 @@ class Structure:
         return "\n".join("".join("█" if one else "·" for one in row) for row in cells)
 
     def svg(self, size: int = 320) -> str:
-        """Return the pattern as a picture in SVG: M above, G below and beside it.
-
-        Parameters
-        ----------
-        size
-            Width and height, pixels.
-        """
+        """Return the pattern as a picture in SVG: M above, G below and beside it."""
         cells = _coarse(self.pattern, 160)
         n = max(len(cells), 1)
         side = self.speeds * n / max(len(self.pattern), 1)
@@ -253,15 +247,7 @@ def _coarse(pattern: BoolArray, most: int) -> BoolArray:
 
 
 def structure_of(assembly: Assembly, found: Lagrangian, operations: int) -> Structure:
-    """Return what the equations of a scene are like.
-
-    Parameters
-    ----------
-    assembly, found
-        The scene.
-    operations
-        That one evaluation of its rows takes.
-    """
+    """Return what the equations of a scene are like."""
     n, m = len(found.velocities), len(found.constraints)
     pattern = np.zeros((n + m, n + m), dtype=bool)
     by_acceleration = {a: j for j, a in enumerate(found.accelerations)}

@@ -55,24 +55,6 @@ def curves_through(
 
     They are followed by their length, by the classical Runge-Kutta method (Hairer, Norsett and Wanner, Solving ODEs I,
     section II.1).
-
-    Parameters
-    ----------
-    field
-        The field.
-    points
-        Shape (points, 2).
-    window
-        What is looked at.
-    rest
-        Points of rest, shape (points, 2).
-    both_ways
-        Whether curves are followed backwards too; if not, backwards alone where the second half of the points is.
-
-    Returns
-    -------
-    list
-        A curve for each point, shape (corners, 2).
     """
     size, corner = window.size, window.corner
     count = len(points)
@@ -128,15 +110,6 @@ def spaced_curves(
     """Return curves that fill a window evenly.
 
     Each begins away from all others (in the manner of Jobard and Lefer, Visualization in Scientific Computing, 1997).
-
-    Parameters
-    ----------
-    field, window, rest
-        See `curves_through`.
-    known
-        Curves that are there already.
-    spacing
-        How far new ones begin from all others, relative to the window.
     """
     size, corner = window.size, window.corner
     candidates = qmc.Halton(2, scramble=False).random(_CANDIDATES + 1)[1:]
@@ -162,15 +135,7 @@ def spaced_curves(
 def separatrices(
     field: Field, saddles: Sequence[tuple[FloatArray, FloatArray]], window: Window, rest: FloatArray
 ) -> list[FloatArray]:
-    """Return the curves into and out of saddles.
-
-    Parameters
-    ----------
-    field, window, rest
-        See `curves_through`.
-    saddles
-        Each with its place, and the matrix of the linear field there.
-    """
+    """Return the curves into and out of saddles."""
     size = window.size
     ahead, back = list[FloatArray](), list[FloatArray]()
     for place, matrix in saddles:

@@ -209,17 +209,7 @@ def _products(found: Deviations, times: FloatArray) -> FloatArray:
 
 
 def log_volumes(equations: VariationalEquations, propagators: FloatArray, sizes: FloatArray) -> FloatArray:
-    """Return the logarithm of the factor by which each step changes volumes of phase space, shape (steps,).
-
-    Parameters
-    ----------
-    equations
-        The variational equations at the edges of the steps.
-    propagators
-        What the steps do.
-    sizes
-        Of displacements along each speed.
-    """
+    """Return the logarithm of the factor by which each step changes volumes of phase space, shape (steps,)."""
     into, back = _free_deviations(equations, sizes)
     return np.asarray(np.linalg.slogdet(back[1:] @ propagators @ into[:-1])[1])
 
@@ -252,13 +242,6 @@ def orthonormal_growth(propagators: FloatArray, basis: FloatArray) -> FloatArray
 
     The volume is spanned anew by orthonormal vectors after each step (Benettin, Galgani, Giorgilli and Strelcyn,
     Meccanica 15, 1980).
-
-    Parameters
-    ----------
-    propagators
-        What each step does, shape (steps, m, m), in the scale in which lengths are measured.
-    basis
-        The vectors at the start, shape (m, columns).
     """
     frame = np.linalg.qr(basis)[0]
     found = np.empty((len(propagators), basis.shape[1]))

@@ -91,20 +91,7 @@ def _evaluated(motion: SmoothMotion, number: int, times: FloatArray) -> Variatio
 
 
 def find_deviations(scene: Model | Assembly, outputs: Any, tolerance: float, options: dict[str, Any]) -> Deviations:
-    """Choose steps over the motion of a scene, and find what they do.
-
-    Parameters
-    ----------
-    scene, outputs, options
-        What `atwood.simulate` is given. Outputs are edges of steps.
-    tolerance
-        Of each step, relative to what it does.
-
-    Raises
-    ------
-    UsageError, SolveError
-        As `SmoothMotion` and `find_steps` do.
-    """
+    """Choose steps over the motion of a scene, and find what they do."""
     motion = SmoothMotion(scene, outputs, options)
     first = motion.stretches[0]
     states = motion.states(0, np.linspace(first.begin, first.end, _LOOKS))
@@ -191,22 +178,7 @@ class VariationalEquations:
 
 
 def variational_equations(scene: LinearScene, kept: Sequence[int], states: States) -> VariationalEquations:
-    """Return the variational equations at some states.
-
-    Parameters
-    ----------
-    scene
-        The scene, whose derivatives are those of its expression graph.
-    kept
-        Independent constraints.
-    states
-        Where they are wanted.
-
-    Raises
-    ------
-    SolveError
-        If the forces do not determine the accelerations at one of them.
-    """
+    """Return the variational equations at some states."""
     e, rows = scene.equations, list(kept)
     n, m, count = len(e.speeds), len(rows), len(states)
     still = _Numbers(scene, states, np.zeros((n, count)), np.zeros((len(e.constraints), count)))
@@ -296,26 +268,7 @@ class Steps:
 def find_steps(
     field: Callable[[FloatArray], FloatArray], edges: FloatArray, sizes: FloatArray, tolerance: float, where: str
 ) -> Steps:
-    """Choose steps so that each does the same, within a tolerance, as two of half its length.
-
-    Parameters
-    ----------
-    field
-        Gives the matrices of the equations at times, shape (times, m, m).
-    edges
-        Steps to begin with, s; each is halved until it is short enough.
-    sizes
-        What a deviation is compared with, shape (m,).
-    tolerance
-        Relative to what a step does.
-    where
-        The scene, for the error.
-
-    Raises
-    ------
-    SolveError
-        If steps become too short.
-    """
+    """Choose steps so that each does the same, within a tolerance, as two of half its length."""
 
     def taken(pieces: FloatArray) -> FloatArray:
         matrices = field(node_times(pieces).ravel())
@@ -364,27 +317,13 @@ def _method() -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def node_times(edges: FloatArray) -> FloatArray:
-    """Return the times at which steps want to know A, shape (steps, points).
-
-    Parameters
-    ----------
-    edges
-        Starts and ends of the steps: step k goes from ``edges[k, 0]`` to ``edges[k, 1]``; s.
-    """
+    """Return the times at which steps want to know A, shape (steps, points)."""
     points, _, _ = _method()
     return edges[:, :1] + np.diff(edges, axis=1) * points
 
 
 def propagators(matrices: FloatArray, steps: FloatArray) -> FloatArray:
-    """Return what steps do: z at the end of each from z at its start, shape (steps, m, m).
-
-    Parameters
-    ----------
-    matrices
-        A at the points of each step, shape (steps, points, m, m).
-    steps
-        Their lengths, s.
-    """
+    """Return what steps do: z at the end of each from z at its start, shape (steps, m, m)."""
     _, a, b = _method()
     count, points, size, _ = matrices.shape
     found = np.empty((count, size, size))
@@ -464,15 +403,7 @@ class SmoothMotion:
         return tuple(found)
 
     def states(self, number: int, times: FloatArray) -> States:
-        """Return states in a stretch.
-
-        Parameters
-        ----------
-        number
-            Of the stretch.
-        times
-            Inside it or at its ends, in any order; s.
-        """
+        """Return states in a stretch."""
         wanted, places = np.unique(times, return_inverse=True)
         result = simulate(self.assembly, outputs=wanted, samples=1, **self._options)
         _refuse_jumps(result)

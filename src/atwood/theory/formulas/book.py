@@ -101,22 +101,7 @@ class Book:
     _known: dict[int, Node] = field(default_factory=dict)
 
     def write(self, total: Expression, shares: Mapping[str, Expression] | None = None, grouped: bool = False) -> Sum:
-        """Return an expression as a formula.
-
-        Parameters
-        ----------
-        total
-            The expression.
-        shares
-            What it is the sum of, by part: each term then says from which parts it comes.
-        grouped
-            Whether terms with the same coefficient are put together, and squares of sums may stay, as in energies.
-
-        Raises
-        ------
-        TooLargeError
-            If it has too many terms.
-        """
+        """Return an expression as a formula."""
         values = [total, *(shares or {}).values()]
         best = self._best(values, shares or {}, grouped)
         squares = list(islice(squares_in(total), _SQUARES + 1)) if grouped else []

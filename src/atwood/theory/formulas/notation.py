@@ -152,15 +152,7 @@ class _Wanted:
 
 
 def notation_of(assembly: Assembly, found: Lagrangian) -> Notation:
-    """Return the symbols of a scene.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-    found
-        Its Lagrangian.
-    """
+    """Return the symbols of a scene."""
     merged = _equal_moments(assembly)
     wanted = [*_coordinates(found), *_spins(found), *_multipliers(found)]
     wanted += [*_sampled_values(assembly), *_parameters(assembly, merged)]

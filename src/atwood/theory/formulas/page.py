@@ -67,15 +67,7 @@ def width(written: str) -> int:
 
 
 def with_names(sections: Sequence[Section], taken: Iterable[str]) -> list[Section]:
-    """Return sections in which brackets that stand often have names, if formulas would not fit; and what these are.
-
-    Parameters
-    ----------
-    sections
-        The sections.
-    taken
-        Names of symbols that are in use.
-    """
+    """Return sections in which brackets that stand often have names, if formulas would not fit; and what these are."""
     formulas = [one for section in sections for line in section.lines for one in _formulas(line)]
     if not any(width(text.formula(one)) > _LONG * _WIDTH for one in formulas):
         return list(sections)
@@ -189,17 +181,7 @@ def as_latex(lines: Sequence[Line | Matrix]) -> str:
 
 
 def as_markdown(title: str, sections: Sequence[Section], tables: Sequence[str] = ()) -> str:
-    """Return sections as a page of Markdown with formulas between dollar signs.
-
-    Parameters
-    ----------
-    title
-        Its heading.
-    sections
-        What it says.
-    tables
-        What stands before them.
-    """
+    """Return sections as a page of Markdown with formulas between dollar signs."""
     blocks = [f"# {title}", *tables]
     for section in sections:
         blocks.append(f"## {section.title}")

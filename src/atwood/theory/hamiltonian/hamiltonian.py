@@ -52,23 +52,7 @@ _GOLDSTEIN = "euler-zxz"
 
 
 def read_hamiltonian(assembly: Assembly, parameters: Parameters = "symbolic") -> Hamiltonian:
-    """Return the Hamiltonian of an assembly.
-
-    Parameters
-    ----------
-    assembly
-        The scene. Orientations that are quaternions are taken in Euler angles z, x, z.
-    parameters
-        Whether parameters are symbols, or their values are put in.
-
-    Raises
-    ------
-    UsageError
-        If the assembly is in the dae form.
-    UnsupportedError
-        If the scene has no Hamiltonian: it rolls, its coordinates are tied to each other, or momenta do not determine
-        its velocities.
-    """
+    """Return the Hamiltonian of an assembly."""
     refuse_without_hamiltonian(assembly)
     if any(one.kind == "quaternion" for one in assembly.reduced.orientation_coordinates):
         assembly = assembly.other_mode(assembly.modes, {}, Orientation(_GOLDSTEIN))
@@ -179,20 +163,7 @@ class Hamiltonian:
             ) from error
 
     def __call__(self, q: Numbers, p: Numbers, t: float | None = None) -> FloatArray:
-        """Return H, J; a number, or one for each state.
-
-        Parameters
-        ----------
-        q, p
-            Coordinates and momenta, shape (n,) or (states, n).
-        t
-            Time, s; that of the start if not given.
-
-        Raises
-        ------
-        SolveError
-            If the mass matrix is singular there.
-        """
+        """Return H, J; a number, or one for each state."""
         return self.transform.value(q, p, t)
 
     def momenta_at(self, q: Numbers, v: Numbers, t: float | None = None) -> FloatArray:

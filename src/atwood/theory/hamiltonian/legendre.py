@@ -93,13 +93,7 @@ class LegendreTransform:
         return np.asarray(0.5 * (columns + np.swapaxes(columns, -1, -2)))
 
     def velocities(self, q: Numbers, p: Numbers, t: float | None = None) -> FloatArray:
-        """Return the velocities with given momenta.
-
-        Raises
-        ------
-        SolveError
-            If the momenta do not determine them.
-        """
+        """Return the velocities with given momenta."""
         q, p = (as_numbers(one, self.size, letter, self.assembly.flat.name) for one, letter in ((q, "q"), (p, "p")))
         shape = (*shape_of_states((q, p), "qp", self.assembly.flat.name), self.size)
         q, p = np.broadcast_to(q, shape), np.broadcast_to(p, shape)
@@ -245,20 +239,7 @@ _SAMPLES = 6
 
 
 def refuse_without_hamiltonian(assembly: Assembly) -> None:
-    """Refuse a scene whose motion is not that of free coordinates with a momentum each.
-
-    Parameters
-    ----------
-    assembly
-        The scene.
-
-    Raises
-    ------
-    UsageError
-        If it is in the dae form.
-    UnsupportedError
-        If it rolls, if closed loops tie its coordinates, or if parts have states of their own.
-    """
+    """Refuse a scene whose motion is not that of free coordinates with a momentum each."""
     name = assembly.flat.name
     if assembly.form == "dae":
         raise UsageError(
@@ -310,18 +291,7 @@ def sample_states(transform: LegendreTransform) -> tuple[float, FloatArray, Floa
 
 
 def check_mass(transform: LegendreTransform) -> None:
-    """Refuse a scene whose mass matrix is singular everywhere.
-
-    Parameters
-    ----------
-    transform
-        Its Legendre transform.
-
-    Raises
-    ------
-    UnsupportedError
-        If it is so; the error names a coordinate that has no inertia of its own.
-    """
+    """Refuse a scene whose mass matrix is singular everywhere."""
     t, places, velocities = sample_states(transform)
     worst: FloatArray | None = None
     for q, v in zip(places, velocities, strict=True):
@@ -350,13 +320,7 @@ def check_mass(transform: LegendreTransform) -> None:
 
 
 def is_energy(transform: LegendreTransform) -> bool:
-    """Return whether H is T + V, as compared at random states.
-
-    Parameters
-    ----------
-    transform
-        The Legendre transform of the scene.
-    """
+    """Return whether H is T + V, as compared at random states."""
     t, places, velocities = sample_states(transform)
     for q, v in zip(places, velocities, strict=True):
         try:
@@ -370,13 +334,7 @@ def is_energy(transform: LegendreTransform) -> bool:
 
 
 def changes_in_time(transform: LegendreTransform) -> bool:
-    """Return whether ``dL/dt`` is not zero at some of some random states and times.
-
-    Parameters
-    ----------
-    transform
-        The Legendre transform of the scene.
-    """
+    """Return whether ``dL/dt`` is not zero at some of some random states and times."""
     begin, places, velocities = sample_states(transform)
     span = transform.assembly.flat.t_end - begin
     for k, (q, v) in enumerate(zip(places, velocities, strict=True)):

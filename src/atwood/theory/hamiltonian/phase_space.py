@@ -44,15 +44,7 @@ class PhaseSpace:
     given: tuple[Sympy, ...]
 
     def read(self, value: Sympy, new: Sequence[Sympy] = ()) -> Sympy:
-        """Return an expression on the plain symbols; a symbol with the name of one of the given stands for it.
-
-        Parameters
-        ----------
-        value
-            The expression.
-        new
-            Symbols that stand for themselves.
-        """
+        """Return an expression on the plain symbols; a symbol with the name of one of the given stands for it."""
         import sympy
 
         found = value.xreplace(dict(zip(self.given, self._own, strict=True)))
@@ -78,13 +70,7 @@ class PhaseSpace:
 
 
 def phase_space_of(given: Hamiltonian | tuple[Sequence[Sympy], Sequence[Sympy]]) -> PhaseSpace:
-    """Return the phase space of a Hamiltonian, or of a pair: coordinates and momenta.
-
-    Raises
-    ------
-    UsageError
-        If there are not as many momenta as coordinates.
-    """
+    """Return the phase space of a Hamiltonian, or of a pair: coordinates and momenta."""
     import sympy
 
     q, p = given if isinstance(given, (tuple, list)) else (given.coordinates, given.momenta)
@@ -202,15 +188,7 @@ def _cancelled(value: Sympy) -> Sympy:
 
 
 def collected(value: Sympy, variables: Sequence[Sympy]) -> Sympy:
-    """Return what is a polynomial in some symbols with each of its coefficients as short as it comes.
-
-    Parameters
-    ----------
-    value
-        The expression; where it is no such polynomial, it is made short as a whole.
-    variables
-        The symbols.
-    """
+    """Return what is a polynomial in some symbols with each of its coefficients as short as it comes."""
     import sympy
 
     plain, roots = _with_roots(value)
@@ -262,13 +240,7 @@ def _relative_size(value: Sympy) -> float:
 
 
 def short(value: Sympy) -> Sympy:
-    """Return an expression in the shortest of some forms, as equations are written; as it is where it is long.
-
-    Parameters
-    ----------
-    value
-        The expression, of symbols.
-    """
+    """Return an expression in the shortest of some forms, as equations are written; as it is where it is long."""
     import sympy
 
     if not value.free_symbols:

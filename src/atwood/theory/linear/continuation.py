@@ -94,15 +94,7 @@ class _Point:
 
 
 def follow(problem: Problem, x: FloatArray, p: float, direction: FloatArray) -> Curve:
-    """Return the branch from a solution in one direction, to the end of the parameter's range.
-
-    Parameters
-    ----------
-    problem, x, p
-        What is solved, and a solution.
-    direction
-        Of (x, p), roughly.
-    """
+    """Return the branch from a solution in one direction, to the end of the parameter's range."""
     now = _point(problem, x, p, direction)
     if now is None:
         return Curve(x[None], np.array([p]), (), ())

@@ -102,13 +102,7 @@ class _Field:
 
 
 def follow_null_space(search: RestSearch, rest: Rest) -> Degenerate:
-    """Return what higher derivatives say of a state of rest.
-
-    Parameters
-    ----------
-    search, rest
-        The scene, and the state.
-    """
+    """Return what higher derivatives say of a state of rest."""
     n = len(rest.minimal.displacements)
     if not n or n != len(rest.minimal.speeds) or rest.slopes.shape != (n, n):
         flat = n - rank(rest.slopes, _SOFT * search.slope) if n else 0

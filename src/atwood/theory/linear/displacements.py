@@ -56,17 +56,7 @@ class Minimal:
 
 
 def find_minimal(scene: LinearScene, flow: Flow, kept: Sequence[int], like: Minimal | None = None) -> Minimal:
-    """Choose minimal states.
-
-    Parameters
-    ----------
-    scene, flow
-        The scene, and its flow at the state.
-    kept
-        Independent constraints.
-    like
-        A choice that is to be made again.
-    """
+    """Choose minimal states."""
     now, inputs = flow.variation, len(scene.inputs)
     count, speeds = len(scene.tangents), len(scene.sizes)
     constraints = scene.equations.constraints
@@ -181,23 +171,7 @@ def _places(scene: LinearScene, now: Variation) -> _Places:
 
 
 def image_of(scene: LinearScene, flow: Flow, minimal: Minimal) -> tuple[Image, tuple[int, ...], FloatArray]:
-    """Return the image of minimal states in maximal coordinates, the constraints kept there, and accelerations.
-
-    Parameters
-    ----------
-    scene, flow, minimal
-        The scene in generalized coordinates, its flow at the state, and the minimal states.
-
-    Returns
-    -------
-    image
-        What maximal coordinates do.
-    kept
-        Independent constraints of the dae form.
-    accelerations
-        Variation of the maximal accelerations that minimal states give by themselves, and per generalized
-        acceleration: shape (maximal speeds, columns), (maximal speeds, speeds) side by side.
-    """
+    """Return the image of minimal states in maximal coordinates, the constraints kept there, and accelerations."""
     now = flow.variation
     places = _places(scene, now)
     big = LinearScene(scene.assembly, "dae", scene.inputs)
@@ -219,18 +193,7 @@ def image_of(scene: LinearScene, flow: Flow, minimal: Minimal) -> tuple[Image, t
 
 
 def pulled_back(image: Image, accelerations: FloatArray) -> FloatArray:
-    """Return the variation of generalized accelerations that the equations of the dae form give.
-
-    Parameters
-    ----------
-    image, accelerations
-        What `image_of` gave.
-
-    Returns
-    -------
-    numpy.ndarray
-        Shape (speeds, columns of `Minimal`).
-    """
+    """Return the variation of generalized accelerations that the equations of the dae form give."""
     columns = image.state.shape[1]
     own, by_own = accelerations[:, :columns], accelerations[:, columns:]
     right = (image.acceleration - own) / image.sizes[:, None]

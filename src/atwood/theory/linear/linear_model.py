@@ -350,17 +350,7 @@ class Spectrum:
 
 
 def find_spectrum(matrix: FloatArray, error: FloatArray, sizes: FloatArray) -> Spectrum:
-    """Return the eigenvalues of a matrix.
-
-    Parameters
-    ----------
-    matrix
-        Shape (n, n).
-    error
-        How far its entries may be off.
-    sizes
-        What is large for each state.
-    """
+    """Return the eigenvalues of a matrix."""
     n = len(matrix)
     if n == 0:
         return Spectrum(0, np.zeros(0, dtype=complex), np.zeros((0, 0), dtype=complex))

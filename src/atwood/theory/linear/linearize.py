@@ -250,15 +250,7 @@ class StateSpace:
 
 
 def find_state_space(scene: LinearScene, flow: Flow, steady: Steady, kept: Sequence[int]) -> StateSpace:
-    """Return the linear model about a state in minimal states.
-
-    Parameters
-    ----------
-    scene, flow, steady
-        The scene, its flow at the state, and what that moves along.
-    kept
-        Independent constraints.
-    """
+    """Return the linear model about a state in minimal states."""
     minimal = find_minimal(scene, flow, kept)
     matrix = _matrix(scene, flow, steady, minimal)
     random, largest = np.random.default_rng(1974), np.zeros_like(matrix)
@@ -298,20 +290,7 @@ _SIDES = 4
 
 
 def refuse_switches(scene: LinearScene, flow: Flow, kept: Sequence[int]) -> None:
-    """Refuse a state at which the derivatives of the equations jump.
-
-    Parameters
-    ----------
-    scene, flow
-        The scene, and its flow at the state.
-    kept
-        Independent constraints.
-
-    Raises
-    ------
-    UsageError
-        If a switch is there; it names the speed whose acceleration has two derivatives.
-    """
+    """Refuse a state at which the derivatives of the equations jump."""
     margins = _margins(scene)
     if not margins:
         return

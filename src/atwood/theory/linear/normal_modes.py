@@ -186,15 +186,7 @@ def normal_modes(scene: Model | Assembly, *, at: At = None) -> NormalModes:
 
 
 def modes_of(point: OperatingPoint, is_steady: bool = False) -> NormalModes:
-    """Return the modes about an operating point.
-
-    Parameters
-    ----------
-    point
-        The operating point.
-    is_steady
-        Whether it is known that it stays there, though other things may change with time.
-    """
+    """Return the modes about an operating point."""
     flow = point.scene.flow(point.t, point.q, point.u, point.kept)
     if not is_steady:
         refuse_switches(point.scene, flow, point.kept)
@@ -253,13 +245,7 @@ class ModeValues:
 
 
 def find_modes(flow: Flow, space: StateSpace) -> ModeValues:
-    """Return the modes about a state.
-
-    Parameters
-    ----------
-    flow, space
-        The flow at the state, and the linear model there.
-    """
+    """Return the modes about a state."""
     minimal = space.minimal
     n, m = len(minimal.displacements), len(minimal.speeds)
     a, error = space.matrix[:, : n + m], space.error[:, : n + m]
@@ -353,21 +339,7 @@ def _spaces(values: ComplexArray) -> tuple[tuple[int, ...], ...]:
 def mode_motion(
     point: OperatingPoint, shape: ComplexArray, angular_frequency: float, amplitude: float, frames: int
 ) -> Result:
-    """Return one period of an oscillation about an operating point.
-
-    Parameters
-    ----------
-    point
-        The operating point.
-    shape
-        Complex amplitude of each displacement.
-    angular_frequency
-        rad/s; where it is zero a period takes one second.
-    amplitude
-        Of the largest displacement, relative to the scene's sizes.
-    frames
-        Number of times.
-    """
+    """Return one period of an oscillation about an operating point."""
     linear, balance = point.scene, balance_of(point.assembly, "reduced")
     period = 2.0 * np.pi / angular_frequency if angular_frequency else 1.0
     times = point.t + np.linspace(0.0, period, frames)

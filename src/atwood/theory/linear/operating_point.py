@@ -100,25 +100,7 @@ class OperatingPoint:
 
 
 def find_operating_point(scene: Model | Assembly, at: At, inputs: Sequence[str]) -> OperatingPoint:
-    """Find the state about which to look at a scene.
-
-    Parameters
-    ----------
-    scene
-        The scene, or an assembly of it.
-    at
-        Values by path, of positions and speeds: what is not said stays near the scene's own start, and speeds that
-        are not said are zero as far as the constraints let them. Or a result and a time; or None for the scene's start.
-    inputs
-        Paths of what varies.
-
-    Raises
-    ------
-    StartError
-        If there is no such state, or it is a singular position.
-    ParameterError
-        If there is no such input.
-    """
+    """Find the state about which to look at a scene."""
     if isinstance(scene, Assembly) and scene.orientation.kind == "quaternion":
         base = scene if scene.form == "reduced" else assemble(_scene_of(scene), name=scene.flat.name)
     else:
@@ -231,13 +213,7 @@ def _refuse_singular(linear: LinearScene, finding: RankFinding, t: float, q: Flo
 
 
 def input_paths(flat: FlatScene, paths: Sequence[str]) -> tuple[InputPath, ...]:
-    """Return what is meant by the paths of inputs: an input of a part, or the output of a source that feeds some.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such input.
-    """
+    """Return what is meant by the paths of inputs: an input of a part, or the output of a source that feeds some."""
     own = {f"{path}.{name}": (path, name) for path, part in flat.parts.items() for name in part.signals}
     fed: dict[str, list[tuple[str, str]]] = {}
     for key, (source, name) in flat.links.items():

@@ -15,22 +15,7 @@ from atwood.theory.linear.variations import Flow
 
 
 def output_rows(point: OperatingPoint, flow: Flow, minimal: Minimal, paths: Sequence[str]) -> FloatArray:
-    """Return how quantities change with minimal states and inputs, shape (quantities, columns of `Minimal`).
-
-    Parameters
-    ----------
-    point, flow, minimal
-        The state, its flow, and the minimal states.
-    paths
-        The quantities.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such quantity.
-    UnsupportedError
-        If it is a reaction that is not unique, or inside of a rigid body.
-    """
+    """Return how quantities change with minimal states and inputs, shape (quantities, columns of `Minimal`)."""
     found, known = [], point.assembly.start_observables
     for path in paths:
         if path not in known:

@@ -164,17 +164,7 @@ class RestSearch:
         return one is not None and one.push <= _MET * self.push
 
     def seek(self, q: FloatArray, steps: int = _STEPS, falls: bool = False) -> Rest | None:
-        """Return a state of rest near a place; None if Newton's method finds none.
-
-        Parameters
-        ----------
-        q
-            Where to begin.
-        steps
-            The largest number of steps.
-        falls
-            Whether steps go where forces lead, also where these become stronger on the way: to minima of potentials.
-        """
+        """Return a state of rest near a place; None if Newton's method finds none."""
         best, near, waiting, ratio = None, np.inf, 0, 0.0
         last: FloatArray = np.zeros(0)
         for _ in range(steps):

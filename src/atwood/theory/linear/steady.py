@@ -83,15 +83,7 @@ class Steady:
 
 
 def find_steady(scene: LinearScene, flow: Flow, kept: Sequence[int]) -> Steady:
-    """Find the symmetry along which a state moves.
-
-    Parameters
-    ----------
-    scene, flow
-        The scene, and its flow at the state.
-    kept
-        Independent constraints.
-    """
+    """Find the symmetry along which a state moves."""
     size = len(flow.field)
     pace = pace_of(scene, flow)
     extents = np.concatenate([scene.displacement_sizes, scene.sizes * pace])
@@ -158,15 +150,7 @@ def _near_by(scene: LinearScene, flow: Flow, kept: Sequence[int], pace: float) -
 
 
 def _symmetric(fields: Sequence[_Field], states: Sequence[Flow], sizes: FloatArray, extents: FloatArray) -> FloatArray:
-    """Return the combinations of fields that are symmetries, as columns.
-
-    Parameters
-    ----------
-    fields, states
-        The fields, and the flows at which they are tried.
-    sizes, extents
-        Sizes of the motion's rates, and of displacements and speeds.
-    """
+    """Return the combinations of fields that are symmetries, as columns."""
     n = len(sizes)
     pace = float(np.max(sizes / extents, initial=0.0)) or 1.0
     large = np.array(

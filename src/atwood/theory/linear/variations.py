@@ -273,15 +273,7 @@ class LinearScene:
         return {name: np.asarray(x, dtype=float) for name, x in zip(groups, kernel(*state), strict=True)}
 
     def variation(self, t: float, q: FloatArray, u: FloatArray, a: FloatArray, held: FloatArray) -> Variation:
-        """Return the equations and their derivatives at a state.
-
-        Parameters
-        ----------
-        t, q, u
-            The state.
-        a, held
-            Accelerations and multipliers.
-        """
+        """Return the equations and their derivatives at a state."""
         values = self.evaluate(self._kernel, self.derivatives, (np.array([t]), q, u, a, held))
         by: dict[tuple[str, str], FloatArray] = {}
         for part in self.parts:
@@ -290,20 +282,7 @@ class LinearScene:
         return Variation(t, q, u, a, held, basis, inverse @ values["rates"], values, by)
 
     def flow(self, t: float, q: FloatArray, u: FloatArray, kept: Sequence[int]) -> Flow:
-        """Return how a state and its neighbours move.
-
-        Parameters
-        ----------
-        t, q, u
-            The state; constraints on it need not be met, as its neighbours need not.
-        kept
-            Independent constraints.
-
-        Raises
-        ------
-        SolveError
-            If the forces do not determine the accelerations.
-        """
+        """Return how a state and its neighbours move."""
         n, kept = len(self.equations.speeds), list(kept)
         zero_a, zero_held = np.zeros(n), np.zeros(len(self.equations.constraints))
         still = self.variation(t, q, u, zero_a, zero_held)
@@ -325,17 +304,7 @@ class LinearScene:
         return Flow(now, shift, moved[:n], multiplier)
 
     def shift(self, q: FloatArray, basis: FloatArray, moving: FloatArray, rates: FloatArray) -> FloatArray:
-        """Return how displacements of neighbours change: ``ds' = N^+ (R_q N - N') ds + N^+ R_u du + ...``.
-
-        Parameters
-        ----------
-        q, basis
-            Coordinates and N(q); of one state, or of several along the first axis.
-        moving
-            The rates of the displacements, shape (..., displacements).
-        rates
-            The derivatives of the coordinates' rates along displacements, speeds and what else there is, as columns.
-        """
+        """Return how displacements of neighbours change: ``ds' = N^+ (R_q N - N') ds + N^+ R_u du + ...``."""
         found = rates
         if self.tangents.orientation_coordinates:
             # N is linear in q; coordinates that move by themselves have a constant part of it, which does not change.

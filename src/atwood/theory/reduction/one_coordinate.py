@@ -51,22 +51,7 @@ PartsAt: TypeAlias = Callable[[FloatArray], Parts]
 
 
 def parts_of(assembly: Assembly, along: int, t: float) -> PartsAt:
-    """Return what gives the parts of a scene's Lagrangian at places.
-
-    Parameters
-    ----------
-    assembly
-        The scene, in the reduced form.
-    along
-        Number of the coordinate by which they are differentiated.
-    t
-        Time, which they do not depend on.
-
-    Raises
-    ------
-    UnsupportedError
-        If L is no polynomial of second degree in the velocities.
-    """
+    """Return what gives the parts of a scene's Lagrangian at places."""
     found = lagrangian_of(assembly, "reduced")
     graph, n = found.graph, len(found.velocities)
     still: dict[Expression, Expression | float] = dict.fromkeys(found.velocities, 0.0)
@@ -190,20 +175,7 @@ _TRIALS = 60
 
 
 def transformed_parts(given: PointTransformation, along: int) -> PartsAt:
-    """Return what gives the parts of a Lagrangian in new coordinates at places; see `parts_of`.
-
-    Parameters
-    ----------
-    given
-        The scene in new coordinates.
-    along
-        Number of the coordinate by which they are differentiated.
-
-    Raises
-    ------
-    UnsupportedError
-        If L depends on time, or is of higher degree in the velocities.
-    """
+    """Return what gives the parts of a Lagrangian in new coordinates at places; see `parts_of`."""
     import sympy
 
     name = given.source.name
@@ -231,13 +203,7 @@ def transformed_parts(given: PointTransformation, along: int) -> PartsAt:
 
 
 def start_in(given: PointTransformation) -> tuple[float, FloatArray, FloatArray]:
-    """Return time, new coordinates and their derivatives where a scene starts.
-
-    Raises
-    ------
-    StartError
-        If no new coordinates are found that the start has.
-    """
+    """Return time, new coordinates and their derivatives where a scene starts."""
     import sympy
     from scipy.optimize import least_squares
 

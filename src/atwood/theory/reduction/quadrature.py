@@ -73,28 +73,7 @@ class Path:
 
 
 def find_path(radial: Radial, s: float, rate: float, is_angle: bool, scale: float, name: str) -> Path:
-    """Find the motion of one coordinate from its start.
-
-    Parameters
-    ----------
-    radial
-        Its effective potential.
-    s, rate
-        Coordinate and rate at the start.
-    is_angle
-        Whether a whole turn changes nothing.
-    scale
-        Size of the coordinate, m or rad.
-    name
-        What it is called, for errors.
-
-    Raises
-    ------
-    UnsupportedError
-        If it passes a place where its coordinates are singular.
-    SolveError
-        If it is too near to a separatrix.
-    """
+    """Find the motion of one coordinate from its start."""
     start = radial.at([s])
     if not np.isfinite(start.potential[0]):
         raise UnsupportedError("it starts where its coordinates are singular", where=name, advice="Simulate it.")

@@ -178,13 +178,7 @@ def routhian_of(assembly: Assembly, found: Lagrangian, ignorable: tuple[str, ...
 
 
 def ignorable_of(scene: Model | Assembly, orientation: str | None) -> tuple[Assembly, Lagrangian, tuple[str, ...]]:
-    """Return a scene in coordinates with momenta, its Lagrangian, and the paths of its ignorable coordinates.
-
-    Raises
-    ------
-    UnsupportedError
-        If its coordinates are not free, or its energy function is not conserved.
-    """
+    """Return a scene in coordinates with momenta, its Lagrangian, and the paths of its ignorable coordinates."""
     from atwood.theory.hamiltonian.legendre import refuse_without_hamiltonian
 
     assembly = assembly_of(scene, orientation=orientation)

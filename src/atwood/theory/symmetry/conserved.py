@@ -314,27 +314,7 @@ def conserved(
 
 
 def along_run(quantities: Quantities, values: Sequence[Expression], result: Result) -> tuple[FloatArray, FloatArray]:
-    """Return quantities at the output times of a run, and the sizes of their terms.
-
-    Parameters
-    ----------
-    quantities
-        Of the scene that the quantities are of.
-    values
-        The quantities, on the symbols of its Lagrangian.
-    result
-        The run of that scene, in either form.
-
-    Returns
-    -------
-    values, sizes
-        Shapes (quantities, times) and (quantities,).
-
-    Raises
-    ------
-    UsageError
-        If the run is one of another scene.
-    """
+    """Return quantities at the output times of a run, and the sizes of their terms."""
     assembly = quantities.assembly
     _check_alike(assembly, result.assembly)
     e, own = assembly.reduced, quantities.on_speeds(values)

@@ -72,13 +72,6 @@ def find_symmetries(assembly: Assembly, start: Start) -> tuple[Symmetry, ...]:
     """Return the line and the plane that a motion in space stays parallel to; those that there are.
 
     Nothing is claimed where it cannot be made sure of, or where nothing moves.
-
-    Parameters
-    ----------
-    assembly
-        The scene, in space.
-    start
-        Its start.
     """
     if not assembly.mechanism.space.is_spatial or not 0 < len(assembly.reduced.speeds) <= _LARGEST:
         return ()

@@ -97,17 +97,7 @@ class Findings:
 
 
 def find_conserved(assembly: Assembly, quantities: Quantities, prover: Prover) -> Findings:
-    """Return what is conserved along all motions of a scene.
-
-    Parameters
-    ----------
-    assembly
-        The scene; generalized coordinates are those of its reduced form.
-    quantities
-        What may be conserved.
-    prover
-        What proves identities.
-    """
+    """Return what is conserved along all motions of a scene."""
     return _Search(assembly, quantities, prover).run()
 
 

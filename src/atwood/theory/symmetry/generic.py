@@ -65,17 +65,7 @@ class Loosened:
         return not self.probe.results
 
     def choose(self, probed: Sequence[FloatArray], random: np.random.Generator, number: int) -> FloatArray:
-        """Return values of the further parameters.
-
-        Parameters
-        ----------
-        probed
-            What the probe says at the state.
-        random
-            Where chances come from.
-        number
-            Of the sample: in the first all switches are on one side, in the second on the other.
-        """
+        """Return values of the further parameters."""
         at, sides, arguments = (np.asarray(one, dtype=float) for one in probed)
         # What is zero now may not be at another time.
         clock = np.where(at == 0.0, random.uniform(-1.0, 1.0, len(at)), at * random.uniform(0.5, 1.5, len(at)))
@@ -102,17 +92,7 @@ def _alike(keys: FloatArray, draw: Callable[[], float]) -> FloatArray:
 
 
 def loosen(program: Program, relations: TimeRelations, moving: Collection[Expression]) -> Loosened:
-    """Return a program in which what the clock and switches decide are parameters.
-
-    Parameters
-    ----------
-    program
-        The program.
-    relations
-        Time, and the relations of functions of time.
-    moving
-        The symbols of the state, and of what follows from it.
-    """
+    """Return a program in which what the clock and switches decide are parameters."""
     maker = _Maker(program.graph, relations)
     nodes = program.nodes
     by_clock, by_motion = _followers(nodes, relations.roots), _followers(nodes, moving)
@@ -277,17 +257,7 @@ class LooseScene:
         self.bound = self._exact.bind(self.assembly.parameter_values)
 
     def row_units(self, t: float, q: FloatArray, rows: FloatArray, shifts: int) -> FloatArray:
-        """Return the size of each row, and of one that is rounding alone the size of what it is computed from.
-
-        Parameters
-        ----------
-        t, q
-            Where they belong.
-        rows
-            Those of the constraints on positions, then so many of displacements, then those of rotations.
-        shifts
-            How many belong to displacements.
-        """
+        """Return the size of each row, and of one that is rounding alone the size of what it is computed from."""
         held = self._errors.near(t, q, self.sizes)[self.holonomic] / ROUGHNESS
         turns = len(rows) - len(held) - shifts
         made_of = np.concatenate([held, np.full(shifts, self.start.length), np.ones(turns)])

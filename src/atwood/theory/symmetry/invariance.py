@@ -27,22 +27,7 @@ def is_constant(values: FloatArray) -> bool:
 
 
 def conserved_directions(states: Sequence[State], numbers: Sequence[int], units: FloatArray) -> FloatArray:
-    """Return the combinations of quantities that are conserved, and not constant at all states.
-
-    Parameters
-    ----------
-    states
-        The quantities at random states.
-    numbers
-        Which of them belong to the family.
-    units
-        By what each is divided to be compared with the others.
-
-    Returns
-    -------
-    ndarray
-        Coefficients as columns, of the quantities in their own units.
-    """
+    """Return the combinations of quantities that are conserved, and not constant at all states."""
     own = list(numbers)
     rates = np.array([one.rates[own] for one in states]) / units
     terms = np.array([one.terms[own] for one in states]) / units
@@ -65,21 +50,6 @@ def about_center(
     """Return total momenta with angular ones about another point than the origin, and how these are made of the first.
 
     Far away from the origin, what breaks a symmetry is little beside the angular momentum about it.
-
-    Parameters
-    ----------
-    states
-        The quantities at random states.
-    linear, angular
-        Which of them are total momenta.
-    center, length
-        The point, and the size of the scene.
-
-    Returns
-    -------
-    states, matrix
-        States with the total momenta alone, linear ones first, and their coefficients in terms of those about the
-        origin, as columns.
     """
     n, m, own = len(linear), len(angular), [*linear, *angular]
     matrix = np.eye(n + m)
@@ -102,11 +72,6 @@ def readable_basis(columns: FloatArray) -> FloatArray:
 
     Coordinate axes where they are in it; else orthonormal vectors, the first of them in row echelon form, each with its
     largest component positive.
-
-    Parameters
-    ----------
-    columns
-        Independent vectors.
     """
     rows = _row_echelon(np.asarray(columns, dtype=float).T)
     if not np.all(np.sum(rows != 0.0, axis=1) <= 1):
@@ -146,15 +111,7 @@ _NOTHING = 1e-8
 
 
 def straight_of(kept: FloatArray, count: int) -> FloatArray:
-    """Return the translations among rigid motions, as columns.
-
-    Parameters
-    ----------
-    kept
-        Rigid motions as columns: a velocity of the origin of so many components, then an angular velocity.
-    count
-        Number of components of the velocity.
-    """
+    """Return the translations among rigid motions, as columns."""
     turning = kept[count:]
     if not turning.size:
         return readable_basis(kept[:count])
@@ -166,13 +123,6 @@ def rotations_of(kept: FloatArray, count: int, straight: FloatArray) -> Iterator
     """Yield the rotations among rigid motions: the angular velocity, and the velocity of the origin.
 
     Of these there is one for each direction that a rotation can have; translations are taken out of them.
-
-    Parameters
-    ----------
-    kept, count
-        See `straight_of`.
-    straight
-        The translations among them.
     """
     turning = kept[count:]
     if not turning.size:

@@ -96,17 +96,7 @@ class Prover:
         return is_proven_zero(substitute([value], numbers)[0], self._angles)
 
     def along(self, value: Expression, generator: Generator, with_rates: bool = False) -> bool:
-        """Return whether a quantity is proven to be conserved.
-
-        Parameters
-        ----------
-        value
-            The quantity, on the symbols of the Lagrangian.
-        generator
-            The displacements along its velocities.
-        with_rates
-            Whether the work of constraints is that of their rates, which are zero along motions.
-        """
+        """Return whether a quantity is proven to be conserved."""
         if generator is None:
             return False
         found = self.quantities.found
@@ -137,15 +127,7 @@ class Prover:
     # -- displacements as formulas ------------------------------------------------------------------------------------
 
     def fitted(self, states: Sequence[State], moved: Sequence[FloatArray]) -> Generator:
-        """Return displacements as formulas: affine in coordinates, and of orientations a rotation about an axis.
-
-        Parameters
-        ----------
-        states
-            Where they are known.
-        moved
-            What they are there, along the speeds.
-        """
+        """Return displacements as formulas: affine in coordinates, and of orientations a rotation about an axis."""
         e = self.quantities.found.equations
         if not self.is_small:
             return None
@@ -221,21 +203,7 @@ _ROUNDS = 12
 
 
 def is_proven_zero(value: Expression, angles: Collection[Expression] = ()) -> bool:
-    """Return whether an expression is proven to be zero identically.
-
-    Parameters
-    ----------
-    value
-        The expression.
-    angles
-        Symbols whose sines and cosines are combined.
-
-    Returns
-    -------
-    bool
-        False where it is not zero, and where that is not known: it is too long, or holds functions that are related
-        in ways that are not looked for.
-    """
+    """Return whether an expression is proven to be zero identically."""
     if value.is_zero:
         return True
     try:

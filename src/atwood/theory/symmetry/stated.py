@@ -89,20 +89,7 @@ class Symmetry:
 
 
 def check_symmetry(symmetry: Symmetry, quantities: Quantities, prover: Prover, formulas: EquationFormulas) -> Finding:
-    """Return what a stated symmetry conserves.
-
-    Parameters
-    ----------
-    symmetry
-        The symmetry.
-    quantities, prover, formulas
-        Of the scene.
-
-    Raises
-    ------
-    UsageError
-        If it is no symmetry of the scene, with a state at which it fails; or names something that there is not.
-    """
+    """Return what a stated symmetry conserves."""
     found, scene = quantities.found, quantities.assembly.flat.name
     reader = _Reader(formulas)
     paths = [one.name if place is None else found.names[place].name for one, place in _named(quantities)]
@@ -173,15 +160,7 @@ class _Reader:
         self._scene = formulas.name
 
     def read(self, value: Any, what: str) -> Expression:
-        """Return an expression of the graph.
-
-        Parameters
-        ----------
-        value
-            A sympy expression or a number.
-        what
-            What it belongs to, for errors.
-        """
+        """Return an expression of the graph."""
         import sympy
 
         try:

@@ -147,20 +147,7 @@ class RandomStates:
         return self._free.is_plain
 
     def draw(self, count: int, length: float) -> list[State]:
-        """Return quantities at so many random states; none where constraints or laws allow too few.
-
-        Parameters
-        ----------
-        count
-            How many; as many again for the features of laws.
-        length
-            Size of the scene, m.
-
-        Raises
-        ------
-        StartError
-            If the scene has no consistent start.
-        """
+        """Return quantities at so many random states; none where constraints or laws allow too few."""
         plain = count
         count += self._features.visits + _EACH * sum(len(one) for _, one in self._free.probe.outputs)
         start = find_start(self.assembly)
@@ -361,17 +348,7 @@ class Features:
     def towards(
         self, t: float, q: FloatArray, sizes: FloatArray, span: float, random: np.random.Generator
     ) -> tuple[float, FloatArray]:
-        """Return a time and a place near by at which some arguments, chosen at random, are small; as they were if none.
-
-        Parameters
-        ----------
-        t, q
-            Where to begin.
-        sizes, span
-            Of displacements, and of time.
-        random
-            Where chances come from.
-        """
+        """Return a time and place nearby at which some arguments, chosen at random, are small; unchanged if none."""
         if not self._count:
             return t, q
         chosen = self._choose(random)
