@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from atwood.errors import AtwoodError, UsageError, near_matches, suggestion
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -31,7 +31,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.dae import check_level
 from atwood.forms.reassembly import modes_of
 from atwood.forms.starting import Source, with_constants_of_start
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 from atwood.mechanics.read import LineSigns, read_mechanism
 from atwood.model.compose.composite import Model
 from atwood.model.local.flatten import FlatScene, flatten

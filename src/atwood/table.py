@@ -6,8 +6,8 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from atwood.late import dataclass
-from atwood.showing import fitted
+from atwood.display import fitted
+from atwood.lazy_dataclasses import dataclass
 
 __all__ = ["Column", "Shown", "Table", "facts", "table"]
 

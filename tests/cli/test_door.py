@@ -29,9 +29,9 @@ def printed(code: str, cache: str) -> list[str]:
 
 RUN = """
 from atwood.cli import main
-from atwood import late
-write, written = late._constructor, []
-late._constructor = lambda cls, *given: written.append(cls.__qualname__) or write(cls, *given)
+from atwood import lazy_dataclasses as lazy
+write, written = lazy._constructor, []
+lazy._constructor = lambda cls, *given: written.append(cls.__qualname__) or write(cls, *given)
 main(["run", "double-pendulum", "--t-end", "1"], standalone_mode=False)
 print("written:", *written)
 """

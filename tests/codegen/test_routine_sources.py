@@ -17,7 +17,7 @@ from atwood.codegen.llvm.build import GENERATORS
 from ..size import size
 
 SOURCE = Path(atwood.__file__).parent
-TOOLS = {"late.py", "errors.py"}
+TOOLS = {"lazy_dataclasses.py", "errors.py"}
 """These decide how classes and errors are made, not what is in a routine."""
 
 
@@ -118,7 +118,11 @@ def test_a_source_is_named_by_its_files_and_arguments() -> None:
     module = "codegen.llvm.elimination"
     source = RoutineSource(module)
     assert [one.name for one in source.write()] == [one.name for one in write_routines()]
-    others = [RoutineSource(module, ("late.py",)), RoutineSource(module, (), (1,)), RoutineSource("codegen.once")]
+    others = [
+        RoutineSource(module, ("lazy_dataclasses.py",)),
+        RoutineSource(module, (), (1,)),
+        RoutineSource("codegen.once"),
+    ]
     assert len({source.key, *(one.key for one in others)}) == 4
 
 

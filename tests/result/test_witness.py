@@ -120,7 +120,7 @@ def test_a_second_solution_that_missed_a_law_is_not_believed(monkeypatch: pytest
     original = second_run.run
 
     def run(assembly: Any, start: Any, given: RunOptions, other: Any) -> Any:
-        options.append(atwood.late.replace(given, solver="taylor"))
+        options.append(atwood.lazy_dataclasses.replace(given, solver="taylor"))
         return original(assembly, start, options[-1], other)
 
     monkeypatch.setattr(second_run, "run", run)

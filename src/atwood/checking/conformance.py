@@ -17,7 +17,7 @@ from atwood.checking.units import wrong_units
 from atwood.consistency.check import contradictions, wrong_names
 from atwood.consistency.trials import Trial, make_trial
 from atwood.errors import AtwoodError, ParameterError, SolveError, StartError, TopologyError, UsageError
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 from atwood.model.compose.composite import Model
 from atwood.model.declare.component import Component
 from atwood.model.declare.connectors import Frame, Shaft

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from atwood.checking.samples import Finding
 from atwood.consistency.joints import Unknown, attempt
 from atwood.consistency.trials import Pose, Trial, nudged
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 from atwood.model.declare.connectors import Motion
 from atwood.model.declare.contributions import Load
 from atwood.model.declare.law import Law

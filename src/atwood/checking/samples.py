@@ -7,12 +7,12 @@ import random
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal
 
+from atwood.display import data_of, fitted
 from atwood.errors import AtwoodError, UsageError
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.component import Component
 from atwood.model.declare.fields import MISSING, ParameterSpec
 from atwood.model.local.flatten import Part
-from atwood.showing import data_of, fitted
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from typing import Any
 
 from atwood.checking.samples import Finding
 from atwood.consistency.trials import Body, Trial
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.declare.component import Binding, Component, bind
 from atwood.model.declare.connectors import JointCoordinate, Motion, Slide
 from atwood.model.declare.contributions import BodyInertia, CoordinateLoad, Load, Placement, PointInertia

@@ -9,7 +9,7 @@ from atwood.cli.command import Request, command
 from atwood.cli.output import print_json, progress_bar, warn, writer
 from atwood.cli.scenes import bundled_scenes, prepare
 from atwood.errors import AtwoodError, UsageError
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 from atwood.model.compose.composite import Model
 from atwood.plotting.canvas import check_picture
 from atwood.plotting.comparison_page import check_page, write_page

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from atwood.cli.output import Writer
+from atwood.display import count_of
 from atwood.result.part_energy import PartEnergies, PartEnergy
-from atwood.showing import count_of
 from atwood.table import table
 
 _MOST = 40

@@ -14,7 +14,7 @@ from atwood.cli.output import print_json, progress_bar, warn
 from atwood.cli.scenes import check_applies, prepare
 from atwood.errors import AtwoodError, UsageError
 from atwood.forms.assembly import Assembly
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 from atwood.pipeline import assemble, simulate
 from atwood.result.result import Result
 from atwood.stages import watching

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from atwood.cli.command import Request
 from atwood.cli.output import writer
 from atwood.cli.running import degrees_of_freedom, multiplier_labels
+from atwood.display import count_of, duration
 from atwood.forms.assembly import Assembly
 from atwood.result.about import solver_name
 from atwood.result.result import Result
-from atwood.showing import count_of, duration
 from atwood.stages import STAGES
 from atwood.table import facts, table
 

@@ -14,7 +14,7 @@ from atwood.cli.errors import INTERRUPTED
 from atwood.cli.output import print_json, progress_bar, warn, writer
 from atwood.cli.scenes import check_applies, pairs, prepare, warn_of_radians
 from atwood.errors import UsageError
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 from atwood.pipeline import assemble
 from atwood.plotting.canvas import check_picture
 from atwood.study import Sweep, sweep

@@ -17,13 +17,13 @@ from atwood.arguments import FILE, FLAG, TEXT, Kind
 from atwood.cli.command import Request, command, documented, first_sentence, kinds_of
 from atwood.cli.output import print_json, warn, writer
 from atwood.cli.scenes import pairs, prepare, warn_of_radians
+from atwood.display import plain
 from atwood.errors import AtwoodError, UsageError
 from atwood.forms.assembly import Assembly
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 from atwood.pipeline import assemble
 from atwood.plotting.canvas import check_picture
 from atwood.ranges import range_of
-from atwood.showing import plain
 from atwood.table import Shown, table
 from atwood.theory.hamiltonian.hamiltonian import read_hamiltonian
 from atwood.theory.linear import equilibria, equilibrium_branches

@@ -16,7 +16,7 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 _MAGIC = b"atwood cache 1\n"
 _SUFFIX = ".kernel"

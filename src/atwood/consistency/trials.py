@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from atwood.errors import DeclarationError
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.declare.component import Binding, Component, bind
 from atwood.model.declare.connectors import Frame, JointCoordinate, Motion
 from atwood.model.declare.contributions import Placement

@@ -33,7 +33,7 @@ from atwood.forms.derived import derive_once
 from atwood.forms.kept import Key
 from atwood.forms.places import to_maximal
 from atwood.forms.program import rates_are_speeds, state_groups
-from atwood.late import dataclass, names_of
+from atwood.lazy_dataclasses import dataclass, names_of
 from atwood.mechanics.dynamics.augmented import (
     Step,
     SymmetricSystem,

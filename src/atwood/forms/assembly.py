@@ -13,6 +13,7 @@ import numpy as np
 from atwood.arguments import BY_PATH, optional, takes
 from atwood.arrays import FloatArray
 from atwood.codegen import BoundKernel, CompiledProgram, compile_program
+from atwood.display import count_of, fitted
 from atwood.errors import UsageError
 from atwood.expr import Expression, Program
 from atwood.expr.core.relations import Relation, values_just_after
@@ -26,7 +27,7 @@ from atwood.forms.reassembly import follow, other_mode, recipe, with_flat
 from atwood.forms.reduced import reduced_form
 from atwood.forms.shared import MAXIMAL, REDUCED, REGULAR, Shared
 from atwood.forms.starting import Source, no_start_quantity
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.build import build_equations
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Mechanism, discrete_states_of
@@ -36,7 +37,6 @@ from atwood.mechanics.read import LineSigns
 from atwood.model.local.flatten import FlatScene, flatten
 from atwood.model.local.parts import DiscreteState
 from atwood.model.local.states import declared_starts
-from atwood.showing import count_of, fitted
 from atwood.topology.orientation_coordinates import Orientation
 from atwood.topology.spanning_forest import grow_spanning_forest
 

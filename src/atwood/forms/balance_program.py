@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from atwood.expr import Expression, OutputGroup, Program, SparseMatrix, jacobian, jvp, substitute
 from atwood.forms.program import directions, is_too_long, rates_are_speeds, state_groups
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.topology.orientation_coordinates import OrientationCoordinates
 

@@ -24,7 +24,7 @@ from atwood.forms.lagrangian import Lagrangian, lagrangian_along_speeds
 from atwood.forms.loops.closed_form import ClosedForm, in_terms_of_independent
 from atwood.forms.program import rates_are_speeds
 from atwood.integrators.methods import EXPLICIT, IDA, advise
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.topology.spanning_forest import Coordinate
 
 _CANONICAL: Key[CanonicalPrograms] = Key("canonical equations")

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Sequence
 from atwood.errors import UsageError, suggestion
 from atwood.expr import Expression, depends_on, live, select, sqrt, substitute
 from atwood.forms.program import FormProgram, Level, either_sign, kinematic_rows, make_form_program
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 from atwood.mechanics.dynamics.equations import Equations
 
 LEVELS: tuple[Level, ...] = ("ggl", "index1", "index1-projected")

@@ -28,7 +28,7 @@ from atwood.expr import (
     substitute,
     sweeps_exceed,
 )
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.dynamics.equations import Equations
 
 Level = Literal["", "ggl", "index1", "index1-projected"]

@@ -15,7 +15,7 @@ from atwood.errors import UsageError
 from atwood.forms.kept import Key
 from atwood.forms.shared import Shared
 from atwood.forms.starting import Source, moved_to, with_constants_of_start
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 from atwood.mechanics.read import LineSigns, read_mechanism
 from atwood.model.local.flatten import FlatScene
 from atwood.stages import stage

@@ -25,7 +25,7 @@ from atwood.forms.program import (
     rate_symbols,
     rows_along_speeds,
 )
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.topology.graph import connected_groups
 

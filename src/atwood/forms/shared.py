@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 from atwood.expr import Expression
 from atwood.forms.kept import Key
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Decision, Mechanism, check_closures
 from atwood.mechanics.kinematics.orientation import body_offsets

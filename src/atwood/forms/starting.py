@@ -10,7 +10,7 @@ from atwood.errors import StartError, UsageError, suggestion, suggestion_in_part
 from atwood.expr import Expression
 from atwood.forms.kept import Key
 from atwood.forms.shared import DECIDED, Shared, decided_alike, with_values_of
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.constraints.values import holds_velocities
 from atwood.mechanics.kinematics.mechanism import Mechanism, started_at
 from atwood.model.compose.composite import Model

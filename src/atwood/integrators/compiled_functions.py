@@ -9,7 +9,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from math import sqrt
 
 from atwood.codegen.tangents import FULL, STEEP
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 _HALF = 0.5
 _MOST = 200

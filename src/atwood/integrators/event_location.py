@@ -27,7 +27,7 @@ from atwood.codegen.tangents import SECANT
 from atwood.errors import KernelEvaluationError
 from atwood.integrators.dips import Point, find_dip, may_dip
 from atwood.integrators.protocol import JUST_HAPPENED, ImplicitProblem, Values
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 State = tuple[float, FloatArray, FloatArray]
 Interpolant = Callable[[float], State]

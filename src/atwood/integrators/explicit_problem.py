@@ -18,7 +18,7 @@ from atwood.errors import KernelEvaluationError, UsageError
 from atwood.integrators.compiled_functions import Lookout, StepGuard
 from atwood.integrators.event_location import State
 from atwood.integrators.protocol import SolverOptions, Values
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventData

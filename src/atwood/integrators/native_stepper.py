@@ -16,7 +16,7 @@ from atwood.codegen.llvm.module import CodeOptions
 from atwood.codegen.routines.source import RoutineSource
 from atwood.integrators.event_location import State
 from atwood.integrators.explicit_problem import Counts, Outcome, Stepper, no_interpolation
-from atwood.late import dataclass, names_of
+from atwood.lazy_dataclasses import dataclass, names_of
 
 if TYPE_CHECKING:
     from atwood.integrators.ensemble.batch import BatchPlaces

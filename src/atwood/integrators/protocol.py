@@ -16,7 +16,7 @@ import numpy as np
 from atwood.arrays import FloatArray, IndexArray
 from atwood.errors import UsageError
 from atwood.integrators.compiled_functions import NativeCallbacks
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:

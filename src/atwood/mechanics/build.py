@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 from atwood.errors import DeclarationError
 from atwood.expr import Expression, Graph, depends_on, live, substitute
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 from atwood.mechanics.constraints.elimination import SOLVED, check_held, drop_closed, eliminate_linear
 from atwood.mechanics.constraints.idle_spin import IDLE_SPIN
 from atwood.mechanics.constraints.knots import balance_knots, linear_knots

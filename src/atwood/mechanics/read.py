@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 from atwood.consistency.check import check_laws, check_names
 from atwood.expr import Expression, Graph
 from atwood.expr.core.relations import TimeRelations
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 from atwood.mechanics.constraints.idle_spin import hold_idle_spins
 from atwood.mechanics.dynamics.carried_inertia import inertia_asked_for
 from atwood.mechanics.dynamics.inertia import check_tensors

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import IndexArray
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 
 @dataclass(frozen=True)

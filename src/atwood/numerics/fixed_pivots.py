@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray, IndexArray
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.body_order import Stage
 from atwood.numerics.remainders import Remainders, Residues, Samples
 

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.matrices import Matrix, scaled
 from atwood.numerics.solutions import least_norm
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from atwood.arrays import BoolArray, FloatArray, IntArray
 from atwood.clock import within_time
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.matrices import or_one
 from atwood.tolerances import tolerances
 

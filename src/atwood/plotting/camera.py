@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from atwood.arguments import show
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 View: TypeAlias = Sequence[float] | str
 """Azimuth and elevation of the eye, degrees; as a text with a comma between them."""

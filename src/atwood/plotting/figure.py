@@ -8,7 +8,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 
 class ShownFigure(Figure):

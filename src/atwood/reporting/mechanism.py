@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from atwood.arguments import optional, takes
+from atwood.display import data_of, fitted, plain
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.constraints.idle_spin import IDLE_SPIN
 from atwood.mechanics.constraints.pfaffian import integrable_together
 from atwood.model.compose.composite import Model
@@ -32,7 +33,6 @@ from atwood.reporting.parts import (
     list_ties,
 )
 from atwood.reporting.text import described, overview
-from atwood.showing import data_of, fitted, plain
 from atwood.simulation.dynamics.scales import motion_names
 from atwood.simulation.initialization.mobility import Immobile, find_immobile
 from atwood.simulation.initialization.report import InitializationReport, report_initialization

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from atwood.arrays import FloatArray
+from atwood.display import data_of
 from atwood.errors import AtwoodError
 from atwood.expr import evaluate
 from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import coordinate_program, state_program
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.kinematics.mechanism import world_position
 from atwood.mechanics.kinematics.orientation import node_axes, spin_in_world
 from atwood.model.local.flatten import FlatScene
@@ -22,7 +23,6 @@ from atwood.model.values.vector import Vector
 from atwood.numerics.independence import independent_rows
 from atwood.numerics.matrices import scaled
 from atwood.pipeline import assemble_flat
-from atwood.showing import data_of
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.start import Start, find_start, own_state

@@ -7,7 +7,7 @@ from typing import Any
 
 from atwood.expr import Expression, Scalar, evaluate
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.model.compose.composite import Model
 from atwood.model.compose.scene import Scene

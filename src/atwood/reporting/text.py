@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby, islice
 from typing import TYPE_CHECKING
 
-from atwood.showing import count_of
+from atwood.display import count_of
 from atwood.table import Table, facts, table
 
 if TYPE_CHECKING:

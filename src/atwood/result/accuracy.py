@@ -11,7 +11,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.forms.assembly import Assembly
 from atwood.integrators.methods import METHODS
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.result.second_run import needed_error
 from atwood.simulation.run.made import Run
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from atwood.expr import Program, depends_on, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.quantities import energy_program, known_program
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Constraint, Equations
 from atwood.mechanics.outputs.part_power import MovingMass, applied_power, moving_masses, switched_energy
 from atwood.result.segment_quantities import SegmentQuantities

@@ -26,9 +26,10 @@ import numpy as np
 
 from atwood.arguments import FILE, instance, takes
 from atwood.arrays import FloatArray
+from atwood.display import count_of, listed
 from atwood.errors import UsageError
 from atwood.files import check_directory, read_checked, write_atomically
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.declare.quantities import PATHS, Quantity
 from atwood.result.about import describe_all
@@ -39,7 +40,6 @@ from atwood.result.formats.netcdf import read_netcdf, write_netcdf
 from atwood.result.formats.npz import check_unpacked
 from atwood.result.result import Result
 from atwood.result.trajectories import Trajectories
-from atwood.showing import count_of, listed
 
 
 @dataclass(frozen=True, eq=False)

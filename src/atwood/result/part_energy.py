@@ -12,9 +12,9 @@ import numpy as np
 
 from atwood.arguments import FILE, takes
 from atwood.arrays import FloatArray
+from atwood.display import count_of, fitted, listed
 from atwood.errors import MissingQuantityError, suggestion_in_parts
-from atwood.late import dataclass
-from atwood.showing import count_of, fitted, listed
+from atwood.lazy_dataclasses import dataclass
 from atwood.table import Shown, Table, table
 
 if TYPE_CHECKING:

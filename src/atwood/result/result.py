@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from atwood.arguments import ANYTHING, FILE, instance, takes
 from atwood.arrays import FloatArray
+from atwood.display import count_of, listed
 from atwood.errors import ResultError
 from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import find_observables
@@ -22,7 +23,6 @@ from atwood.result.energy import EnergyLedger, account
 from atwood.result.segment_quantities import SegmentQuantities
 from atwood.result.trajectories import Trajectories
 from atwood.result.work import find_ledger
-from atwood.showing import count_of, listed
 from atwood.simulation.dynamics.numerical_failure import named
 from atwood.simulation.dynamics.orientation_coordinates import CoordinateSwitch
 from atwood.simulation.events.modes import EventRecord

@@ -22,7 +22,7 @@ from atwood.errors import AtwoodError, SolveError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.forms.shared import Shared
 from atwood.integrators.methods import AUTO, METHODS
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 from atwood.result.energy import EnergyLedger, account, energy_near
 from atwood.result.result import Result
 from atwood.result.segment_quantities import SegmentQuantities

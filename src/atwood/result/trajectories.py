@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from atwood.arguments import check, takes, whole
 from atwood.arrays import FloatArray
+from atwood.display import count_of, fitted, listed
 from atwood.errors import MissingGroupError, MissingQuantityError, ResultError, suggestion, suggestion_in_parts
 from atwood.model.declare.quantities import PATH, PATHS, Quantity
-from atwood.showing import count_of, fitted, listed
 from atwood.table import Shown, Table, facts, table
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.clock import Clock, TimeIsUp, check_time
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.result.energy import EnergyLedger, Piece, make_ledger, power_into
 from atwood.result.segment_quantities import SegmentQuantities
 from atwood.simulation.run.made import Run, run_again, times_of_steps

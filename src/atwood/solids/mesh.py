@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from atwood.arguments import FILE, instance, number, optional, show, takes
 from atwood.arrays import FloatArray, IntArray
 from atwood.errors import ParameterError
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.solids.properties import MassProperties
 from atwood.solids.stl import read_stl
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from atwood.arguments import check, instance, number, real, show, takes
 from atwood.arrays import FloatArray
 from atwood.errors import ParameterError
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 _NOTHING_LEFT = 1e-9
 """A body of which holes leave less than this part has nothing left."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from atwood.expr import Expression, Scalar, depends_on, is_zero
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.law import Kind
 from atwood.model.local.parts import LocalConstraint, LocalPart
 from atwood.topology.graph import WORLD, Joint, MechanismGraph

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from atwood.errors import ConnectError, DeclarationError, suggestion
 from atwood.expr import Expression, depends_on
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.connectors import Frame, JointCoordinate
 from atwood.model.local.flatten import FlatScene
 from atwood.model.local.parts import LocalJoint, LocalPart

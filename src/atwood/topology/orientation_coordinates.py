@@ -6,7 +6,7 @@ from itertools import product
 from math import pi
 
 from atwood.errors import UsageError, suggestion
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 _EULER = tuple(f"euler-{a}{b}{c}" for a, b, c in product("xyz", repeat=3) if a != b != c)
 

@@ -13,7 +13,7 @@ from dataclasses import field
 from typing import Literal
 
 from atwood.expr import Expression
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.local.parts import LocalPart
 from atwood.model.values.space import Space
 from atwood.topology.bodies import Bodies, reads_position

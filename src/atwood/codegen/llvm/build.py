@@ -30,7 +30,7 @@ from atwood.codegen.routines.source import RoutineSource
 from atwood.errors import KernelEvaluationError, UnsupportedError
 from atwood.expr.core.operations import ExternalFunction
 from atwood.expr.core.program import Program
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.stages import stage
 
 _GENERATOR = 1

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.program import Program
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 LARGEST_UNROLLED = 3
 """Linear systems up to this size are eliminated in registers; larger ones by a loop over the scratch array."""

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from atwood.codegen.llvm.layout import LARGEST_UNROLLED, MatrixKey, matrix_key
 from atwood.codegen.llvm.text import Writer, literal
 from atwood.expr.core.graph import Expression
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 
 @dataclass(frozen=True)

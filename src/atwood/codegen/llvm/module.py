@@ -25,7 +25,7 @@ from atwood.errors import UnsupportedError
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.operations import ExternalFunction
 from atwood.expr.core.program import Program
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 _ARGUMENTS = (
     "ptr noalias readonly %inputs, ptr noalias readonly %derived, ptr noalias %scratch, ptr noalias readonly %outputs"

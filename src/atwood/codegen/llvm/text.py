@@ -14,7 +14,7 @@ from dataclasses import field
 from atwood.errors import UnsupportedError
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.operations import ExternalFunction
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 LIBRARY_FUNCTIONS: Mapping[str, tuple[str, int]] = {
     "sin": ("sin", 1),

@@ -18,7 +18,7 @@ from atwood.expr.core.analysis import evaluate, live
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.operations import BINARY, UNARY, ExternalFunction, solve_floats, solve_or_nan
 from atwood.expr.core.program import Program
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.stages import stage
 
 _LARGEST_PLAIN_SOLVE = 3

@@ -14,7 +14,7 @@ from typing import Literal
 
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.operations import UNARY
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 Flavour = Literal["fast", "careful", "vectorized"]
 """``fast`` raises outside a function's domain; ``careful`` gives nan there; ``vectorized`` works on arrays."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple, TypeAlias
 
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 
 class Scalar(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from atwood.codegen.routines.language import Value

@@ -26,7 +26,7 @@ from atwood.codegen.sundials.layout import SundialsLayout, sundials_layout
 from atwood.codegen.tangents import SECANT, STEEP
 from atwood.errors import UsageError
 from atwood.expr.core.program import Program
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 EVENTS_PLACE = 31
 """Which of the pointers of IDA's user data leads to the data of the events."""

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from atwood.errors import UnsupportedError
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from atwood.codegen.routines.source import RoutineSource
 from atwood.codegen.sundials.lookout_routines import AT, CAPACITY, CARRIED, FIELDS, LISTS, STATE, Shape
 from atwood.errors import UsageError
 from atwood.expr.core.program import Program
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 _LOOK = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, *[ctypes.c_void_p] * 3)
 

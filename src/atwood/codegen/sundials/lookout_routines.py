@@ -9,7 +9,7 @@ import numpy as np
 from atwood.codegen.routines.kernels import call_kernel, place_of
 from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER
 from atwood.codegen.routines.language import Record, Routine, Value
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 NOTICED = 98
 """The flag of `LookoutCode.drive` where somebody should look at what was noted; IDA has none of this number."""

@@ -24,7 +24,7 @@ from atwood.codegen.routines.language import Operand, Routine, Value, Variable
 from atwood.codegen.routines.source import RoutineSource
 from atwood.codegen.sundials.ida_routines import JACOBIAN, RESIDUAL, array_of, index_kind, write_weights
 from atwood.codegen.sundials.layout import SundialsLayout
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 FIELDS = (
     "derived_residual",

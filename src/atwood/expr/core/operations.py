@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 from atwood.arguments import CALLBACK, NAME, check_fields, each, instance, optional, takes_names
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 INF = math.inf
 NAN = math.nan

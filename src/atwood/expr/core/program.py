@@ -6,12 +6,12 @@ from collections.abc import Iterable
 from functools import cached_property
 from typing import NamedTuple
 
+from atwood.display import brief
 from atwood.errors import AtwoodError
 from atwood.expr.core.analysis import count_operations, live, varying
 from atwood.expr.core.graph import Expression, Graph
 from atwood.expr.core.operations import COMMUTATIVE
-from atwood.late import dataclass
-from atwood.showing import brief
+from atwood.lazy_dataclasses import dataclass
 
 
 class InputGroup(NamedTuple):

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from atwood.arguments import check, each, instance, takes_names
+from atwood.display import fitted
 from atwood.errors import AtwoodError
 from atwood.expr.core import algebra
 from atwood.expr.core.analysis import evaluate, live
 from atwood.expr.core.functions import Scalar, graph_of
 from atwood.expr.core.graph import Expression, Graph
 from atwood.expr.formulas.sympy_bridge import from_sympy
-from atwood.showing import fitted
 
 
 class Formula:

@@ -22,7 +22,7 @@ from atwood.errors import UnsupportedError
 from atwood.expr.core import algebra
 from atwood.expr.core.analysis import live
 from atwood.expr.core.graph import Expression, Graph
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 
 @dataclass(eq=False)

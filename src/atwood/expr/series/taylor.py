@@ -27,7 +27,7 @@ from atwood.errors import UsageError
 from atwood.expr.core.graph import Expression, Graph
 from atwood.expr.core.program import InputGroup, OutputGroup, Program
 from atwood.expr.series.recurrence import Convolution, Recurrence
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 NUMBERS = ("order", "inverse", "step", "tick")
 """What the program of an order is told of it: k, 1/k, the unit of time over (k + 1), and the coefficient of time."""

@@ -28,7 +28,7 @@ from atwood.expr.simplify.polynomial import (
     volume,
 )
 from atwood.expr.simplify.trigonometry import join_squares, products_of_waves, sum_of_waves
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 _WEIGHTS = {"add": 1, "sub": 1, "mul": 1, "neg": 1, "div": 4, "sqrt": 6}
 _OTHER_WEIGHT = 12

@@ -15,7 +15,7 @@ from typing import NamedTuple, TypeAlias
 
 from atwood.expr.core.analysis import live, varying
 from atwood.expr.core.graph import Expression
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 Monomial: TypeAlias = tuple[tuple[int, int], ...]
 """Pairs of an atom and its exponent, sorted by atom."""

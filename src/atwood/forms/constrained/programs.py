@@ -22,7 +22,7 @@ from atwood.expr import Expression, OutputGroup, Program, jacobian, solve, subst
 from atwood.forms.dae import keep_constraints
 from atwood.forms.derived import derive_once
 from atwood.forms.program import rates_are_speeds, state_groups
-from atwood.late import dataclass, names_of
+from atwood.lazy_dataclasses import dataclass, names_of
 from atwood.mechanics.dynamics.augmented import SymmetricSystem, back_substitute, eliminate, fill_of
 from atwood.mechanics.dynamics.equations import Equations
 

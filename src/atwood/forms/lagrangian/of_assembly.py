@@ -10,7 +10,7 @@ from atwood.expr import Expression, jacobian, jvp, substitute, vjp
 from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.kept import Key
 from atwood.forms.lagrangian.terms import Contribution, Lagrangian, contribution, inertial_terms
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.orientation import euler_spin

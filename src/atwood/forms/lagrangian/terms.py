@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from atwood.expr import Expression, Graph, Scalar, SparseMatrix, depends_on, jacobian, jvp, substitute, vjp
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.dynamics.equations import Constraint, Equations, balance_rows, inertia_forces
 from atwood.mechanics.dynamics.forces import Forces, in_joint_coordinates, local_map, part_forces
 from atwood.mechanics.outputs.observables import add_up, part_energies

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import field
 
 from atwood.expr import Expression, absolute, floor, sign, substitute
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 
 _WHOLE = 1e-3
 """An angle that is not so near to the formula's but for whole turns is not on its branch."""

@@ -25,7 +25,7 @@ from atwood.expr import (
 )
 from atwood.forms.accelerations import AccelerationProgram
 from atwood.forms.loops.branches import ClosedLoops, Group
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 
 Matrix = dict[tuple[int, int], Expression]

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 from atwood.expr import Expression, cos, evaluate, jvp, sin, substitute
 from atwood.forms.loops.branches import Group
 from atwood.forms.loops.roots import Vector, at, dot, harmonics, solved_for, total
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from atwood.forms.loops.assur_groups import Loops

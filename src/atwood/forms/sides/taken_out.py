@@ -20,7 +20,7 @@ from atwood.forms.kept import Key
 from atwood.forms.places import to_maximal
 from atwood.forms.program import state_groups
 from atwood.forms.shared import MAXIMAL, REDUCED, REGULAR, Shared
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.dynamics.equations import Equations
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from atwood.codegen.routines.source import RoutineSource
 from atwood.errors import UnsupportedError
 from atwood.expr.core.program import Program
 from atwood.integrators.explicit_problem import MET, STEPS, CompiledRates
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 
 def rates_source(coordinates: int, speeds: int, given: bool, projects: bool = False) -> RoutineSource:

@@ -16,7 +16,7 @@ from atwood.codegen.llvm.module import CodeOptions
 from atwood.codegen.once import once
 from atwood.codegen.routines.source import RoutineSource
 from atwood.integrators.ensemble.code import FIELDS
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 ENDS = {0: "reached", 1: "step limit", 2: "too small", 3: "no value between", 4: "no rates"}
 """How a run can end."""

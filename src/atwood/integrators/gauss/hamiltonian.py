@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from atwood.arrays import FloatArray
 from atwood.expr import Program
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from atwood.integrators.gauss.layout import Layout

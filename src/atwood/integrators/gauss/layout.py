@@ -7,7 +7,7 @@ from itertools import accumulate
 
 from atwood.codegen.routines.kinds import ADDRESS, INTEGER, NUMBER, Kind
 from atwood.codegen.routines.language import Record, Routine, Value
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 POINTERS = ("derived", "scratch", "rates", "rates_data", "derived_2", "guard", "guard_data")
 NUMBERS = ("t", "t_old", "stop", "step", "origin")

@@ -20,7 +20,7 @@ from atwood.errors import KernelEvaluationError
 from atwood.integrators.event_location import State
 from atwood.integrators.ida.library import SundialsLibrary
 from atwood.integrators.protocol import ImplicitProblem, LinearSolver
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 NO_VALUE = (KernelEvaluationError, ArithmeticError)
 """What a function raises where it has no value."""

@@ -19,7 +19,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.codegen.sundials.fixed_pivots import AGAIN, SLOTS, fixed_pivots_addresses
 from atwood.integrators.ida.callbacks import address
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.fixed_pivots import FixedPivots
 
 if TYPE_CHECKING:

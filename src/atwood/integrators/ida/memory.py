@@ -19,7 +19,7 @@ from atwood.integrators.ida.callbacks import JACOBIAN, Record
 from atwood.integrators.ida.library import SundialsLibrary
 from atwood.integrators.ida.sparse import SparseSolver
 from atwood.integrators.protocol import ChoosePivots
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from atwood.integrators.ida.fixed import FixedSolver

@@ -40,7 +40,7 @@ from atwood.integrators.protocol import (
 )
 from atwood.integrators.session import Session, copied
 from atwood.interrupts import InterruptLater
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 
 NO_EVENT_VALUE = -10
 """IDA's flag when the event functions did not return 0."""

@@ -8,7 +8,7 @@ from math import inf
 
 from atwood.integrators.event_location import ROUNDING
 from atwood.integrators.ida.sundae import STALLED_STEPS
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 MOMENT = 0.02
 """IDA is left alone for about so long, in seconds."""

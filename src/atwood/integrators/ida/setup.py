@@ -12,7 +12,7 @@ from atwood.integrators.ida.callbacks import Record, address, jacobian_function,
 from atwood.integrators.ida.library import library
 from atwood.integrators.ida.memory import IdaMemory
 from atwood.integrators.protocol import ImplicitProblem, LinearSolver, SolverOptions
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 LOOSE_NEWTON, TIGHT_NEWTON, FIXED_NEWTON = 0.33, 0.01, 0.1
 """IDA's own choice of the Newton coefficient, that for problems with multipliers, and for large ones of them."""

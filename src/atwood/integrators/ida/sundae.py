@@ -38,7 +38,7 @@ from atwood.integrators.protocol import (
     choose_linear_solver,
 )
 from atwood.integrators.session import Session, copied
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 
 NO_VALUE = (KernelEvaluationError, ArithmeticError)
 """What a function raises where it has no value."""

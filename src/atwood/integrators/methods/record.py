@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from atwood.arrays import FloatArray
 from atwood.integrators.explicit_problem import LOOSEST, ExplicitProblem
 from atwood.integrators.protocol import Budget, ImplicitProblem, SolverOptions
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from atwood.integrators.embedded.tableau import Tableau

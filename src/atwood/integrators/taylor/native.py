@@ -35,7 +35,7 @@ from atwood.integrators.taylor.memory import (
     positions,
 )
 from atwood.integrators.taylor.problem import DEFECT, FLOOR, TaylorProblem, choose_order, share_of_radius
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 
 if TYPE_CHECKING:
     from atwood.integrators.ensemble.batch import BatchPlaces

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from atwood.arrays import FloatArray
 from atwood.integrators.protocol import SolverOptions
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from atwood.expr.series.taylor import TaylorPrograms

@@ -14,7 +14,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.expr import Expression, Scalar, depends_on, evaluate, is_zero, jacobian, substitute
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.dynamics.inertia import RigidMass, add_masses
 from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide, derivation_of, place_of_largest
 from atwood.mechanics.kinematics.motion import Movement

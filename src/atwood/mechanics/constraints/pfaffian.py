@@ -24,7 +24,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.expr import Expression, evaluate, jacobian, jvp, live, substitute
 from atwood.expr.core.operations import PIECEWISE_CONSTANT
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.constraints.elimination import rounds_to_zero
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide, extent

@@ -18,7 +18,7 @@ from collections.abc import Mapping, Sequence
 
 from atwood.errors import AtwoodError, UnsupportedError
 from atwood.expr import Expression, absolute, depends_on, jacobian, select, solve, sqrt, substitute
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 from atwood.mechanics.dynamics.augmented import SymmetricSystem, back_substitute, eliminate, fill_of, minimum_degree
 from atwood.mechanics.dynamics.equations import Constraint, Equations
 from atwood.mechanics.kinematics.mechanism import Mechanism

@@ -14,7 +14,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.expr import Expression, evaluate, jacobian
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.constraints.spin_places import Place, places_of
 from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.model.local.parts import LocalPart

@@ -9,7 +9,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.expr import Expression, evaluate
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.model.local.parts import LocalPart
 from atwood.model.values.rotation import FREE, as_rotation

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from atwood.errors import UnsupportedError
 from atwood.expr import Expression, depends_on, jvp, live, substitute
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Constraint, Integral, constraint_levels, put_in_place
 from atwood.mechanics.dynamics.forces import (
     Site,

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from atwood.expr import Expression, Graph, live
 from atwood.expr.core import algebra
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 Tidy = Callable[[list[Expression]], list[Expression]]
 Place = tuple[int, int]

@@ -7,7 +7,7 @@ from functools import cached_property
 
 from atwood.errors import TopologyError
 from atwood.expr import Scalar, is_zero
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.inertia import shifted_tensor, sum_vectors, tensor_of, turned_tensor
 from atwood.mechanics.kinematics.orientation import NodeTurn, body_offsets, rotate
 from atwood.model.declare.contributions import BodyInertia

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import field
 
 from atwood.expr import Expression, Graph, Scalar, jvp, substitute, vjp
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.forces import Forces, Site, constraint_forces, local_map, part_forces
 from atwood.mechanics.dynamics.inertia import Masses, tensor_of, turned_tensor
 from atwood.mechanics.kinematics.mechanism import Constant, Decision

@@ -10,7 +10,7 @@ from dataclasses import field
 
 from atwood.errors import TopologyError
 from atwood.expr import Expression, Graph, Scalar, depends_on, is_zero, jvp, substitute, vjp
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.kinematics.orientation import NodeTurn, node_axes, spin_in_world, torque_components
 from atwood.mechanics.kinematics.positions import Kinematics, Placements
 from atwood.model.local.parts import LocalConstraint, LocalPart

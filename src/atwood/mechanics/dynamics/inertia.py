@@ -8,7 +8,7 @@ import numpy as np
 
 from atwood.errors import DeclarationError, ParameterError
 from atwood.expr import Expression, Scalar, evaluate, is_zero
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.kinematics.orientation import NodeTurn, rotate
 from atwood.model.declare.contributions import BodyInertia
 from atwood.model.local.parts import LocalPart

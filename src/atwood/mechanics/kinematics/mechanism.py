@@ -12,7 +12,7 @@ import numpy as np
 from atwood.errors import TopologyError
 from atwood.expr import Expression, Scalar, evaluate
 from atwood.expr.core.relations import TimeRelations, values_just_after
-from atwood.late import dataclass, names_of, replace
+from atwood.lazy_dataclasses import dataclass, names_of, replace
 from atwood.mechanics.kinematics.orientation import NodeTurn, body_offsets, plain, rotate
 from atwood.model.local.bound import ParameterTable
 from atwood.model.local.parts import DiscreteState, LocalPart

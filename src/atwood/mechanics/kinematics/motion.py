@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from atwood.expr import Expression, jvp, substitute
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.mechanics.kinematics.orientation import orientation_rates
 from atwood.mechanics.kinematics.positions import (

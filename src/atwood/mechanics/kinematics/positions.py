@@ -13,7 +13,7 @@ from typing import Any
 
 from atwood.errors import UnsupportedError
 from atwood.expr import Expression, Graph, Scalar, affine_coefficients, depends_on, jvp, live, substitute
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.kinematics.orientation import NodeTurn, node_axes, rotate
 from atwood.model.local.parts import LocalJoint, LocalPart
 from atwood.model.values.rotation import Axes, from_axes

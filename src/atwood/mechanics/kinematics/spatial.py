@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 from atwood.expr import Expression, Graph, Scalar, jvp, substitute
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.kinematics.orientation import (
     Quaternion,
     node_quaternions,

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from atwood.expr import Expression, Graph
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.mechanics.outputs.observables import Reaction

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, Scalar
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations, push_body
 from atwood.mechanics.dynamics.forces import Forces, constraint_forces, in_coordinates, local_map, part_forces

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from atwood.expr import Expression, Scalar, jvp, live, substitute, vjp
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.carried_inertia import CarriedInertia
 from atwood.mechanics.dynamics.equations import Equations

@@ -12,7 +12,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Literal
 
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, Scalar, depends_on, jvp, substitute
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import Forces, in_joint_coordinates, local_map, part_forces

@@ -10,9 +10,10 @@ from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from typing import Any
 
+from atwood.display import count_of
 from atwood.errors import AtwoodError, MissingNameError
 from atwood.expr import Expression, is_zero
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Mechanism
@@ -22,7 +23,6 @@ from atwood.model.declare.component import Binding, bind
 from atwood.model.local.parts import LocalPart
 from atwood.model.returned import call_law, law_value, not_evaluated, one_scalar
 from atwood.model.values.vector import Vector
-from atwood.showing import count_of
 
 MOMENTUM = "p:"
 """What the path of a momentum begins with, before that of its coordinate."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from atwood.expr import Expression, Scalar, jvp
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.inertia import tensor_of, turned_tensor
 from atwood.mechanics.kinematics.mechanism import Mechanism, world_position

@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, overload
 
 from atwood.arguments import NAME, Kind, check, takes_names
+from atwood.display import count_of, field_text, fitted, listed
 from atwood.errors import DeclarationError, ParameterError, UsageError, suggestion
 from atwood.model.compose.connection_rules import (
     Connection,
@@ -33,7 +34,6 @@ from atwood.model.compose.differences import (
 from atwood.model.declare.component import Component
 from atwood.model.declare.declaring import no_such_parameter
 from atwood.model.declare.parameter_expressions import ParameterExpression
-from atwood.showing import count_of, field_text, fitted, listed
 from atwood.table import table
 
 PATH = Kind("a dotted path, such as 'left.rod'", NAME.read)

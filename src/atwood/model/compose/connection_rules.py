@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 from atwood.arguments import NAME, check, show
 from atwood.errors import ConnectError, DeclarationError, UsageError, suggestion
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.component import Component
 from atwood.model.declare.connectors import Connector, ConnectorSpec, InputRef, OutputRef
 from atwood.model.declare.declaring import check_reserved

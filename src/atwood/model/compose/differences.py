@@ -12,7 +12,7 @@ from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
 from atwood.errors import ConnectError, UsageError
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.connection_rules import Parts, find_end, named_parts
 from atwood.model.declare.component import Component
 

@@ -6,13 +6,13 @@ from collections.abc import Iterator, Mapping, MutableMapping
 from typing import Any, Self
 
 from atwood.arguments import show
+from atwood.display import fitted, listed
 from atwood.errors import AtwoodError, StartError
 from atwood.model.compose.composite import Model
 from atwood.model.declare.field_functions import Number, Triple, parameter
 from atwood.model.declare.fields import ParameterSpec
 from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.values.units import parse_unit, split_quantity
-from atwood.showing import fitted, listed
 
 
 class _Beginning:

@@ -7,9 +7,10 @@ from dataclasses import field
 from typing import Any, ClassVar, Self, dataclass_transform
 
 from atwood.arguments import NAME, check
+from atwood.display import field_text, fitted
 from atwood.errors import DeclarationError, MissingNameError, ParameterError, UsageError, suggestion
 from atwood.expr import Scalar
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.connectors import Connector, ConnectorSpec, InputRef, Motion, OutputRef, connector
 from atwood.model.declare.declaring import (
     ComponentType,
@@ -28,7 +29,6 @@ from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.declare.quantities import Quantity
 from atwood.model.values.outline import Outline
 from atwood.model.values.vector import Vector, dot, norm
-from atwood.showing import field_text, fitted
 from atwood.table import table
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
 from atwood.arguments import ANYTHING, BY_PATH, DOC, NAME, TEXT, Kind, Refused, optional, takes
 from atwood.errors import DeclarationError, UsageError
 from atwood.expr import Scalar
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.values.vector import Vector, dot
 
 if TYPE_CHECKING:

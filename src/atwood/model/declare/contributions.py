@@ -13,7 +13,7 @@ from atwood.arguments import Kind, Refused, check_fields, each, either, instance
 from atwood.errors import DeclarationError
 from atwood.expr import Graph, Scalar
 from atwood.expr.core.functions import SCALAR
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.connectors import Frame, JointCoordinate, Point
 from atwood.model.values.rotation import Axes, FreeRotation, Rotation
 from atwood.model.values.vector import ZERO, Vector, as_vector

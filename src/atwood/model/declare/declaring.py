@@ -11,12 +11,12 @@ from collections.abc import Collection, Iterable, Iterator
 from typing import Any
 
 from atwood.arguments import NAME, check, each, one_of, show
+from atwood.display import field_text
 from atwood.errors import DeclarationError, MissingNameError, ParameterError, near_matches, suggestion
 from atwood.model.declare.connectors import ConnectorSpec
 from atwood.model.declare.field_functions import StateSpec
 from atwood.model.declare.fields import MISSING, Field, ParameterSpec, SignalSpec
 from atwood.model.declare.law import Law, ObservableOptions
-from atwood.showing import field_text
 
 _WORDS = {
     "spaces": each(one_of(("line", "plane", "space")), "a tuple of 'line', 'plane' and 'space'", 1, single=False),

@@ -8,7 +8,7 @@ from typing import Any, Literal, TypeVar
 
 from atwood.arguments import NAME, Kind as ArgumentKind, Refused
 from atwood.errors import DeclarationError
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 F = TypeVar("F", bound=Callable[..., Any])
 

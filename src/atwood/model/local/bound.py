@@ -8,7 +8,7 @@ from typing import Any
 
 from atwood.errors import AtwoodError, DeclarationError, ParameterError
 from atwood.expr import Expression, Graph, Scalar
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.component import Binding, bind
 from atwood.model.declare.connectors import Frame, JointCoordinate, Motion
 from atwood.model.declare.fields import ParameterSpec

@@ -10,7 +10,7 @@ from types import FrameType
 from typing import Any
 
 from atwood.errors import AtwoodError, DeclarationError, ParameterError, StartError, UsageError
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.compose.connection_rules import find_end
 from atwood.model.compose.scene import Scene

@@ -11,7 +11,7 @@ from typing import Any
 
 from atwood.errors import ConnectError, DeclarationError, UnsupportedError, suggestion
 from atwood.expr import Expression, Graph, live, tan
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.component import bind
 from atwood.model.declare.connectors import JointCoordinate
 from atwood.model.declare.law import ConstraintOptions, Law

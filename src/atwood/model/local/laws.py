@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from atwood.errors import AtwoodError, DeclarationError, UnsupportedError, suggestion
 from atwood.expr import Expression, Graph, Scalar, depends_on, live
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.declare.component import Binding, bind
 from atwood.model.declare.contributions import (
     Asked,

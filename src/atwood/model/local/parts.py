@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import field
 
 from atwood.expr import Expression, Graph
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.component import Binding
 from atwood.model.declare.contributions import Asked, BodyInertia, Load, Placement, PointInertia
 from atwood.model.declare.law import Law

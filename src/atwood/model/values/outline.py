@@ -10,7 +10,7 @@ import numpy as np
 
 from atwood.arguments import FLAG, NAME, Kind, Refused, check, number, one_of, real, show, takes_names
 from atwood.errors import DeclarationError, UsageError
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from atwood.arguments import check, check_fields, each, instance, show
 from atwood.errors import DeclarationError, UsageError
 from atwood.expr import Expression, Scalar, cos, sin
 from atwood.expr.core.functions import SCALAR
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.values.vector import Vector, as_vector, cross
 
 Axes: TypeAlias = tuple[Vector, Vector, Vector]

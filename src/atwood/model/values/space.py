@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from atwood.expr import Scalar, cos, is_zero, sin
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.values.vector import Vector, dot
 
 _AXIAL_UNITS = ("rad/s", "rad/s^2", "N*m", "kg*m^2/s")

@@ -10,7 +10,7 @@ import re
 from functools import lru_cache
 
 from atwood.errors import DeclarationError, ParameterError, suggestion
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 Exponents = tuple[int, int, int, int]
 """Powers of mass, length, time and electric current."""

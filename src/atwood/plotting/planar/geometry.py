@@ -15,7 +15,7 @@ from atwood.errors import UsageError, suggestion
 from atwood.expr import Expression, Scalar, depends_on, evaluate
 from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import state_program
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.kinematics.mechanism import Mechanism, world_position
 from atwood.mechanics.kinematics.orientation import body_offsets, plain
 from atwood.model.declare.connectors import Groove

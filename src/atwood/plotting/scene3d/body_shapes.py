@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.plotting.scene3d.reading import Lump
 from atwood.plotting.shapes.meshes import Mesh, box, cylinder, frame_along, outline_mesh
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.plotting.canvas import COLOURS
 from atwood.plotting.scene3d.body_shapes import BodyShape, shape_of
 from atwood.plotting.scene3d.pieces import Bench, Piece, Tip

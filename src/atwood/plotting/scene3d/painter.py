@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from atwood.arrays import FloatArray
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.plotting.camera import Camera
 from atwood.plotting.canvas import INK
 from atwood.plotting.shapes.meshes import Mesh

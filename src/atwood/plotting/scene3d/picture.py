@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.plotting.camera import Camera
 from atwood.plotting.canvas import COLOURS
 from atwood.plotting.scene3d.model import SpaceModel, build_model

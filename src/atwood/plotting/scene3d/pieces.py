@@ -7,7 +7,7 @@ from dataclasses import field
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.plotting.scene3d.body_shapes import BodyShape
 from atwood.plotting.scene3d.reading import Joining, Reading
 from atwood.plotting.shapes.meshes import Mesh, cylinder, frame_along

@@ -12,7 +12,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.expr import Expression, depends_on, is_zero
 from atwood.forms.quantities import state_program
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.kinematics.mechanism import Mechanism, world_position
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.model.declare.contributions import BodyInertia

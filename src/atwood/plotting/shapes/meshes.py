@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from atwood.arrays import FloatArray, IndexArray
 from atwood.expr import Expression, Scalar, depends_on, evaluate
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.model.declare.component import Binding, bind
 from atwood.model.local.parts import LocalJoint, LocalPart

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.errors import UsageError
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 
 @dataclass(frozen=True, eq=False)

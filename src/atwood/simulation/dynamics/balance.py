@@ -14,7 +14,7 @@ from atwood.codegen import BoundKernel
 from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.balance_program import BalanceProgram
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.independence import row_scales
 from atwood.numerics.matrices import (
     Matrix,

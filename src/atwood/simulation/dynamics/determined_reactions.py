@@ -8,7 +8,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import UnsupportedError
 from atwood.expr import Expression, depends_on, evaluate
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.matrices import to_array
 from atwood.numerics.rank import decompose
 from atwood.simulation.dynamics.balance import Balance, balance_of

@@ -20,7 +20,7 @@ from atwood.expr import Expression, OutputGroup, Program, evaluate, live, substi
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.program import state_groups
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import local_map

@@ -13,7 +13,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.orientation import (
     FARTHEST_COSINE,

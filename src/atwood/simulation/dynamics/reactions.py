@@ -20,7 +20,7 @@ from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.balance_program import BalanceProgram
 from atwood.forms.kept import Key
 from atwood.forms.places import internal_reactions_of, to_maximal
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.matrices import is_best_full, or_one
 from atwood.numerics.solutions import least_size, solve_even
 from atwood.simulation.dynamics.balance import balance_of, masses_at

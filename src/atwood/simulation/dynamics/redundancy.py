@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.codegen.rounding import ROUGHNESS
 from atwood.errors import KernelEvaluationError
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.numerics.independence import independent_rows, review_rows, row_sizes
 from atwood.numerics.matrices import is_full, scaled, to_array
 from atwood.numerics.rank import is_clear, lost_rank, open_directions, singular_values

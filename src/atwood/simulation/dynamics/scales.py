@@ -10,7 +10,7 @@ from atwood.arrays import FloatArray
 from atwood.expr import InputGroup, OutputGroup, Program, depends_on, evaluate
 from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.kept import Key
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.constraints.knots import BALANCES
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import extent

@@ -14,7 +14,7 @@ from atwood.errors import KernelEvaluationError, SolveError
 from atwood.expr import depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 from atwood.mechanics.constraints.knots import BALANCES
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.numerics.matrices import scaled, to_array

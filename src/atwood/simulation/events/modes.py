@@ -16,7 +16,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.quantities import known_program
 from atwood.integrators.protocol import StepResult
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.outputs.event_functions import UPDATE, EventFunction, list_event_functions
 from atwood.simulation.dynamics.orientation_coordinates import (
     COORDINATE_SWITCH,

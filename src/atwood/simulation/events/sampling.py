@@ -15,7 +15,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, DeclarationError, ParameterError, SolveError, UsageError
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.component import Binding, Component, bind
 from atwood.model.declare.law import Law
 

@@ -20,7 +20,7 @@ from atwood.expr.core.intervals import Bounds, bounds
 from atwood.expr.core.relations import relation_value
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 _RELATION: Key[Program] = Key("relation of functions of time")
 _RATE_OF_RELATION: Key[list[Expression]] = Key("its derivative")

@@ -14,7 +14,7 @@ from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.program import state_groups
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.build import resolve_signals
 
 _BOUND_KERNELS: Key[dict[bytes, BoundKernel]] = Key("what updates read, with parameters")

@@ -16,7 +16,7 @@ from atwood.expr import Expression, Program, Scalar, depends_on, evaluate, live,
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.quantities import coordinate_program
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.constraints.knots import BALANCES
 from atwood.mechanics.dynamics.equations import Equations

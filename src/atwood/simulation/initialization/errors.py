@@ -10,7 +10,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, StartError
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.numerics.independence import independent_rows
 from atwood.numerics.matrices import scaled

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.numerics.matrices import LARGEST_FULL, scaled, to_array
 from atwood.numerics.solutions import least_norm

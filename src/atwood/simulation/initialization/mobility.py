@@ -13,7 +13,7 @@ from atwood.expr import Program, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.quantities import known_program
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.model.declare.component import Component
 from atwood.model.declare.law import Kind

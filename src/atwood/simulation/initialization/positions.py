@@ -13,7 +13,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, StartError
 from atwood.forms.assembly import Assembly
 from atwood.forms.places import to_maximal
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.model.local.states import declared_starts
 from atwood.numerics.independence import row_scales, row_sizes

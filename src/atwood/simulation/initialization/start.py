@@ -16,7 +16,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.places import to_maximal
 from atwood.forms.starting import starting
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of, reference_coordinates
 from atwood.simulation.dynamics.line_signs import actual_line_signs, line_signs_differ
 from atwood.simulation.dynamics.numerical_failure import (

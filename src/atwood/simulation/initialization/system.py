@@ -14,7 +14,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.program import state_groups
 from atwood.forms.starting import no_start_quantity
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.outputs.observables import Observable
 from atwood.model.values.units import parse_unit

@@ -28,7 +28,7 @@ from atwood.forms.kept import Key
 from atwood.forms.loops.assur_groups import Loops
 from atwood.forms.loops.branches import Place
 from atwood.forms.loops.closed_form import ClosedForm, closed_form
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import misses_of

@@ -10,7 +10,7 @@ from atwood.errors import AtwoodError, UsageError, near_matches, suggestion, sug
 from atwood.expr import Expression, cos, sin
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.outputs.event_functions import EventFunction
 from atwood.model.values.units import parse_quantity, parse_unit
 

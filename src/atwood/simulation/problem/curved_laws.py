@@ -21,7 +21,7 @@ from atwood.expr.core.functions import Scalar, absolute, exp, log, maximum, mini
 from atwood.expr.core.intervals import bounds
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import in_joint_coordinates, local_map

@@ -15,7 +15,7 @@ from atwood.codegen.sundials.null_space_residuals import NullSpaceCallbacks, Nul
 from atwood.forms.reduced import NullSpaceProgram
 from atwood.integrators.compiled_functions import NativeCallbacks
 from atwood.integrators.protocol import LinearSolver
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.simulation.dynamics.partitioning import POOR
 from atwood.topology.graph import connected_groups
 

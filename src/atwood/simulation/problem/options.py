@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.integrators.methods import AUTO, METHODS
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.simulation.problem.conditions import Condition
 from atwood.tolerances import tolerances
 

@@ -10,7 +10,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, KernelEvaluationError, StartError, UnsupportedError
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 from atwood.numerics.matrices import to_array
 from atwood.simulation.dynamics.balance import balance_of, solve_balance
 from atwood.simulation.dynamics.determined_reactions import check_read_reactions

@@ -19,7 +19,7 @@ from atwood.forms.program import FormProgram
 from atwood.integrators.compiled_functions import NativeCallbacks
 from atwood.integrators.methods import Method
 from atwood.integrators.protocol import ImplicitProblem, LinearSolver
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.numerics.matrices import to_array
 from atwood.simulation.dynamics.balance import Balance, balance_of, columns_of
 from atwood.simulation.dynamics.partitioning import choose_dependent_coordinates, review_partitioning

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.forms.kept import Key
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.independence import trusted_sizes
 from atwood.numerics.matrices import is_best_full
 from atwood.simulation.problem.problem import Plan

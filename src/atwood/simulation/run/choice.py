@@ -19,7 +19,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.integrators.explicit_problem import ExplicitProblem
 from atwood.integrators.methods import AUTO, EXPLICIT, IDA, IDA_SUNDAE, METHODS, TAYLOR, Method, advise
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.simulation.problem.explicit_scene import explicit_problem, explicit_problem_of
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.problem.problem import Plan

@@ -20,7 +20,7 @@ from atwood.integrators.explicit_session import Leave
 from atwood.integrators.methods import Method, Task
 from atwood.integrators.protocol import Budget, SolverOptions, Statistics, Status, StepResult
 from atwood.integrators.session import Session
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 from atwood.simulation.problem.closed_loops import Solved, levels, on_branch, solve_at
 from atwood.simulation.problem.explicit_scene import explicit_problem_of
 

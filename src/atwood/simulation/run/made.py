@@ -17,7 +17,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, SolveError
 from atwood.forms.assembly import Assembly
 from atwood.integrators.protocol import Statistics
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.simulation.dynamics.orientation_coordinates import (
     CoordinateSwitch,
 )

@@ -12,7 +12,7 @@ from atwood.arrays import FloatArray
 from atwood.clock import TimeIsUp, more_time
 from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import misses_of, project_safely, project_states
 

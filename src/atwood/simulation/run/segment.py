@@ -15,7 +15,7 @@ from atwood.errors import AtwoodError, SolveError, StartError
 from atwood.integrators.methods import AUTO, Method
 from atwood.integrators.protocol import Budget, Statistics, Status, StepResult
 from atwood.integrators.session import Session
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 from atwood.simulation.dynamics.numerical_failure import (
     find_undefined_value,
     is_numerical,

@@ -16,7 +16,7 @@ from atwood.integrators.explicit_session import ExplicitSession, Leave
 from atwood.integrators.methods import EXPLICIT, IDA, LEAST, Method, Task, advise
 from atwood.integrators.protocol import Budget, ImplicitProblem, LinearSolver, SolverOptions
 from atwood.integrators.session import Session
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.simulation.dynamics.orientation_coordinates import longest_step
 from atwood.simulation.events.modes import EventProbe
 from atwood.simulation.problem.options import RunOptions

@@ -10,7 +10,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.shared import Shared
 from atwood.forms.sides.taken_out import in_pieces
 from atwood.integrators.methods import AUTO, METHODS
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 from atwood.simulation.events.sides import find_sides, layers, plain_sides
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.problem.problem import Plan

@@ -22,7 +22,7 @@ from atwood.expr import Expression, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.integrators.protocol import Values
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 RATIO = 300.0
 """A decay that is so many times as fast as anything else is left to an implicit method."""

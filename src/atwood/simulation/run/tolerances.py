@@ -9,7 +9,7 @@ from atwood.errors import AtwoodError, SolveError
 from atwood.forms.assembly import Assembly
 from atwood.integrators.methods import LEAST, Method
 from atwood.integrators.protocol import Budget, Status, StepResult
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 from atwood.simulation.events.sampling import remembering
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.made import Run

@@ -17,7 +17,7 @@ from numpy.polynomial import legendre
 
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.simulation.dynamics.reactions import accelerations_at
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import ProjectedStates, nearly_projected, project_safely, project_states

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError
 from atwood.integrators.event_location import EventLocator, Root, State
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.simulation.events.modes import EventProbe
 from atwood.simulation.problem.problem import Plan

@@ -16,7 +16,7 @@ from atwood.simulation.problem.problem import Plan
 
 if TYPE_CHECKING:
     from atwood.codegen.sundials.lookout import LookoutCode, LookoutData
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 _LOOKOUT: Key[LookoutCode] = Key("machine code of the singularity monitor")
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from atwood.arrays import FloatArray
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.matrices import scaled, to_array
 from atwood.numerics.rank import decompose, lost_rank, rank, singular_values
 from atwood.simulation.problem.problem import Plan

@@ -16,7 +16,7 @@ from atwood.forms.canonical import is_canonical
 from atwood.forms.dae import LEVELS
 from atwood.integrators.methods import EXPLICIT, GAUSS, METHODS
 from atwood.integrators.protocol import Statistics
-from atwood.late import replace
+from atwood.lazy_dataclasses import replace
 from atwood.model.compose.composite import Model
 from atwood.model.local.flatten import flatten
 from atwood.pipeline import assemble_flat

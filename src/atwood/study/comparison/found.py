@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 
 from atwood.arguments import FILE, takes
+from atwood.display import count_of, data_of, duration, fitted
 from atwood.errors import UsageError
 from atwood.files import check_directory
-from atwood.late import dataclass, names_of
+from atwood.lazy_dataclasses import dataclass, names_of
 from atwood.result.about import versions
 from atwood.result.formats.companion import write_with_companion
-from atwood.showing import count_of, data_of, duration, fitted
 from atwood.simulation.problem.options import how_solved
 from atwood.study.comparison.reference import Reference
 from atwood.table import Shown, Table, table

@@ -12,16 +12,16 @@ import numpy as np
 
 from atwood.arguments import instance, number, optional, takes, whole
 from atwood.arrays import FloatArray
+from atwood.display import fitted, plain
 from atwood.errors import AtwoodError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.forms.canonical import is_canonical
 from atwood.integrators.methods import EXPLICIT, GAUSS, IDA, TAYLOR
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.compose.composite import Model
 from atwood.pipeline import assemble, simulate
 from atwood.progress import told
 from atwood.result.result import Result
-from atwood.showing import fitted, plain
 from atwood.simulation.problem.arguments import LIMITS, NAME, PROGRESS
 from atwood.simulation.problem.options import how_solved
 from atwood.study.comparison.found import environment

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, SolveError
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.local.flatten import FlatScene
 from atwood.pipeline import simulate

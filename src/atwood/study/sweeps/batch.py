@@ -18,7 +18,7 @@ from atwood.errors import AtwoodError
 from atwood.forms.sides.taken_out import has_sides
 from atwood.integrators.ensemble.batch import Batch, BatchPlaces
 from atwood.integrators.methods import AUTO, METHODS
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.simulation.events.modes import find_event_functions
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.curved_laws import find_curved

@@ -14,7 +14,7 @@ from atwood.expr import Expression
 from atwood.forms.assembly import Assembly
 from atwood.forms.shared import Slot, decisions_of, find_slots
 from atwood.forms.starting import starting
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import extent, sizing_parameters
 from atwood.model.declare.component import Component

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from atwood.arguments import show
 from atwood.errors import UsageError
 from atwood.forms.starting import change_scene
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.compose.scene import Scene
 from atwood.model.local.flatten import flatten

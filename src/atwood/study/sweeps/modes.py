@@ -17,7 +17,7 @@ from atwood.forms.sides.taken_out import has_sides
 from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
 from atwood.integrators.explicit_session import ExplicitSession
 from atwood.integrators.protocol import Budget, Statistics, Status, StepResult
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.outputs.event_functions import EventFunction
 from atwood.simulation.dynamics.orientation_coordinates import COORDINATE_SWITCH
 from atwood.simulation.dynamics.scales import size_of, total_masses

@@ -22,7 +22,7 @@ from atwood.integrators.embedded.rates import OwnRates
 from atwood.integrators.ensemble.batch import BatchPlaces
 from atwood.integrators.methods import Method, Task
 from atwood.integrators.protocol import SolverOptions
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.outputs.event_functions import EventFunction
 from atwood.simulation.dynamics.balance import masses_at
 from atwood.simulation.dynamics.reactions import accelerations_at

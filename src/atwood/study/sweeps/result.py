@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from atwood.arguments import check
 from atwood.arrays import FloatArray
+from atwood.display import count_of, data_of, listed
 from atwood.errors import ResultError, near_matches, suggestion
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.quantities import PATH
-from atwood.showing import count_of, data_of, listed
 from atwood.table import Shown, Table, facts
 
 

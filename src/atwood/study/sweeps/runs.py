@@ -17,7 +17,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, ResultError, UsageError, suggestion_in_parts
 from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import find_observables
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.local.flatten import flatten
 from atwood.pipeline import simulate, solve_as_asked
 from atwood.result.result import Result

@@ -14,7 +14,7 @@ from atwood.arguments import BY_PATH, instance, one_of, optional, takes, whole
 from atwood.errors import AtwoodError, TopologyError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import find_observables
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.compose.composite import Model
 from atwood.model.declare.quantities import PATHS
 from atwood.pipeline import SCENE, assembly_of

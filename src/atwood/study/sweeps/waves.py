@@ -18,7 +18,7 @@ from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
 from atwood.integrators.methods import AUTO
 from atwood.integrators.protocol import Budget, Status
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.outputs.event_functions import UPDATE, EventFunction
 from atwood.simulation.dynamics.orientation_coordinates import COORDINATE_SWITCH
 from atwood.simulation.events.mode_change import enter_mode

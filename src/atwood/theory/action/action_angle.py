@@ -9,11 +9,11 @@ import numpy as np
 
 from atwood.arguments import instance, takes
 from atwood.arrays import FloatArray
+from atwood.display import data_of
 from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
-from atwood.showing import data_of
 from atwood.simulation.initialization.start import find_start
 from atwood.theory.action.quadrature import Level, level_through
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian

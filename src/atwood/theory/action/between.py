@@ -9,17 +9,17 @@ import numpy as np
 
 from atwood.arguments import BY_PATH, command, optional, takes
 from atwood.arrays import FloatArray
+from atwood.display import count_of
 from atwood.errors import AtwoodError, SolveError, StartError, UnsupportedError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.forms.program import rates_are_speeds
 from atwood.integrators.methods import EXPLICIT, Task
 from atwood.integrators.protocol import SolverOptions, Status
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.pipeline import SCENE, assembly_of
 from atwood.result.result import Result
-from atwood.showing import count_of
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.arguments import T_END, check_span
 from atwood.simulation.problem.explicit_scene import explicit_problem

@@ -17,7 +17,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.lagrangian import lagrangian_along_speeds
 from atwood.forms.program import rates_are_speeds, state_groups
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.compose.composite import Model
 from atwood.pipeline import assembly_of, simulate
 from atwood.result.result import Result

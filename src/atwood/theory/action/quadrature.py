@@ -14,7 +14,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError, UnsupportedError
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 Energy = Callable[[FloatArray, FloatArray], FloatArray]
 """H of arrays of q and p."""

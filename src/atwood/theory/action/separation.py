@@ -15,7 +15,7 @@ from atwood.arguments import BY_PATH, check, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UnsupportedError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.theory.action.quadrature import Level, level_through
 from atwood.theory.formulas.objects import Sympy

@@ -19,7 +19,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.places import to_maximal
 from atwood.forms.program import is_too_long, state_groups
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.model.compose.composite import Model
 from atwood.numerics.independence import independent_rows

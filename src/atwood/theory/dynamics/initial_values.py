@@ -10,17 +10,17 @@ import numpy as np
 
 from atwood.arguments import BY_PATH, PATHS, takes
 from atwood.arrays import FloatArray
+from atwood.display import fitted
 from atwood.errors import AtwoodError, SolveError, UsageError, suggestion_in_parts
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jvp
 from atwood.forms.assembly import Assembly
 from atwood.forms.program import state_groups
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.numerics.matrices import or_one
 from atwood.numerics.newton import Missing, newton
 from atwood.pipeline import SCENE, assembly_of
-from atwood.showing import fitted
 from atwood.theory.dynamics.dynamics import Dynamics
 from atwood.theory.dynamics.functions import Function
 from atwood.tolerances import tolerances

@@ -14,7 +14,7 @@ from atwood.errors import UnsupportedError, UsageError, suggestion
 from atwood.expr import Expression
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import lagrangian_of, rows_by_part
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of
 from atwood.simulation.problem.arguments import FORM, ORIENTATION

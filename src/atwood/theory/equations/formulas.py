@@ -20,7 +20,7 @@ from atwood.expr.core.relations import Relation
 from atwood.expr.simplify.polynomial import TooLargeError
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.theory.equations.pages import Structure, structure_of
 from atwood.theory.formulas.book import Book
 from atwood.theory.formulas.notation import Notation

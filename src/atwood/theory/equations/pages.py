@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from atwood.arrays import BoolArray
+from atwood.display import count_of
 from atwood.expr import dependencies
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian, rows_by_part
-from atwood.late import dataclass
-from atwood.showing import count_of
+from atwood.lazy_dataclasses import dataclass
 from atwood.theory.formulas import code, latex, page, text
 from atwood.theory.formulas.page import Line, Matrix, Section
 from atwood.theory.formulas.tree import Sum, Symbol, names_in

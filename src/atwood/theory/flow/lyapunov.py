@@ -8,12 +8,12 @@ import numpy as np
 
 from atwood.arguments import check, command, number, optional, takes, whole
 from atwood.arrays import FloatArray
+from atwood.display import data_of, fitted
 from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE
-from atwood.showing import data_of, fitted
 from atwood.simulation.problem.arguments import RTOL, SOLVER, T_END
 from atwood.theory.flow.tangent_flow import orthonormal_growth
 from atwood.theory.flow.variational_equations import find_deviations

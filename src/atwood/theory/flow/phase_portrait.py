@@ -10,14 +10,14 @@ from scipy.optimize import brentq
 
 from atwood.arguments import Kind, Refused, command, optional, real, takes
 from atwood.arrays import FloatArray
+from atwood.display import count_of, data_of, fitted
 from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.pipeline import SCENE, assemble
 from atwood.ranges import range_of
-from atwood.showing import count_of, data_of, fitted
 from atwood.simulation.dynamics.scales import scene_length
 from atwood.simulation.events.modes import find_event_functions
 from atwood.table import Shown, Table, facts, table

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from atwood.arrays import FloatArray
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 
 Field: TypeAlias = Callable[[FloatArray], FloatArray]
 """Gives the rates at points, both of shape (points, 2)."""

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from atwood.arguments import BY_PATH, TEXT, command, each, optional, takes
 from atwood.arrays import FloatArray
+from atwood.display import count_of, data_of, fitted
 from atwood.errors import SolveError, UsageError
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assemble, simulate
-from atwood.showing import count_of, data_of, fitted
 from atwood.simulation.problem.arguments import RTOL, SOLVER, T_END
 
 

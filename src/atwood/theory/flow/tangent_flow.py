@@ -16,15 +16,15 @@ import numpy as np
 
 from atwood.arguments import takes
 from atwood.arrays import FloatArray
+from atwood.display import fitted
 from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.numerics.rank import null_space
 from atwood.numerics.solutions import least_norm
 from atwood.pipeline import SCENE
 from atwood.result.result import Result
-from atwood.showing import fitted
 from atwood.simulation.problem.arguments import OUTPUTS, RTOL, SOLVER, T_END
 from atwood.theory.flow.variational_equations import Deviations, VariationalEquations, find_deviations
 

@@ -20,7 +20,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import SolveError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.integrators.gauss.tableau import tableau
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import assemble, simulate
 from atwood.result.result import Result

@@ -25,7 +25,7 @@ from atwood.expr.simplify.polynomial import (
     TooLargeError,
     expand,
 )
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.theory.formulas.forms import (
     LIMIT,
     Owners,

@@ -24,7 +24,7 @@ from atwood.expr.simplify.trigonometry import (
     sum_of_waves,
     without_squares,
 )
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.theory.formulas.tree import Number
 
 LIMIT = 300

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from atwood.expr import Expression
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.theory.formulas.tree import Symbol
 
 _LETTERS: Mapping[str, tuple[str, ...]] = {

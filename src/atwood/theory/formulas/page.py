@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from html import escape
 
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.theory.formulas import latex, text
 from atwood.theory.formulas.tree import Call, Name, Node, Sum, Symbol, Term, replaced
 

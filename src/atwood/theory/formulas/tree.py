@@ -8,7 +8,7 @@ from dataclasses import field
 from fractions import Fraction
 from typing import TypeAlias
 
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 
 Number: TypeAlias = Fraction | float
 """An exact fraction, or a number that is none."""

@@ -12,16 +12,16 @@ import numpy as np
 
 from atwood.arguments import optional, takes
 from atwood.arrays import FloatArray
+from atwood.display import count_of
 from atwood.errors import KernelEvaluationError, StartError, UnsupportedError
 from atwood.expr import Expression, Program, depends_on, jacobian, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.lagrangian import Lagrangian, lagrangian_of
 from atwood.forms.quantities import known_program
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of
-from atwood.showing import count_of
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.arguments import ORIENTATION

@@ -13,12 +13,12 @@ from functools import cached_property
 import numpy as np
 
 from atwood.arrays import FloatArray
+from atwood.display import count_of
 from atwood.errors import AtwoodError, KernelEvaluationError, SolveError, UnsupportedError, UsageError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, jvp, substitute, vjp
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
 from atwood.forms.lagrangian import Lagrangian
-from atwood.showing import count_of
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
 from atwood.theory.dynamics.functions import Function, Numbers, as_numbers, shape_of_states

@@ -10,7 +10,7 @@ from atwood.errors import AtwoodError, UsageError
 from atwood.expr import Expression, Graph, sqrt
 from atwood.expr.formulas.sympy_bridge import from_sympy
 from atwood.expr.simplify.polynomial import TooLargeError
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.theory.formulas import objects
 from atwood.theory.formulas.book import Book
 from atwood.theory.formulas.tree import Name, Symbol

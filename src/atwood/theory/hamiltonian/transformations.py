@@ -13,7 +13,7 @@ from typing import Any
 from atwood.arguments import BY_PATH, check, command, takes, whole
 from atwood.errors import UnsupportedError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE
 from atwood.theory.equations.equations import equations

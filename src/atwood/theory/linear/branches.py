@@ -9,14 +9,14 @@ import numpy as np
 
 from atwood.arguments import TEXT, Kind, Refused, real, takes
 from atwood.arrays import BoolArray, FloatArray
+from atwood.display import data_of
 from atwood.errors import AtwoodError, UsageError
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.numerics.matrices import or_one
 from atwood.pipeline import SCENE, assemble
 from atwood.ranges import range_of
-from atwood.showing import data_of
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.table import Shown, Table, table
 from atwood.theory.linear.continuation import Curve, Problem, Residual, branch_directions, follow

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.matrices import or_one
 from atwood.numerics.newton import Missing, largest, newton
 from atwood.numerics.rank import decompose

@@ -14,7 +14,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.expr import Expression, jvp
 from atwood.forms.places import to_maximal
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.solutions import least_squares
 from atwood.simulation.dynamics.partitioning import choose_dependent_coordinates
 from atwood.theory.linear.variations import Flow, LinearScene, Variation

@@ -10,15 +10,15 @@ import numpy as np
 
 from atwood.arguments import BY_PATH, optional, takes
 from atwood.arrays import FloatArray
+from atwood.display import count_of, data_of
 from atwood.errors import AtwoodError, ParameterError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.kinematics.mechanism import extent
 from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.pipeline import SCENE
 from atwood.ranges import range_of
-from atwood.showing import count_of, data_of
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.table import Shown, Table, table
 from atwood.theory.linear.degenerate import Degenerate, follow_null_space

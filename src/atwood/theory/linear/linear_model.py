@@ -16,11 +16,11 @@ import numpy as np
 
 from atwood.arguments import ARRAY, check
 from atwood.arrays import ComplexArray, FloatArray
+from atwood.display import data_of
 from atwood.errors import UsageError
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.rank import decompose, null_space, rank, span
 from atwood.numerics.solutions import least_squares
-from atwood.showing import data_of
 from atwood.table import Shown, Table, facts, table
 
 

@@ -15,7 +15,7 @@ from atwood.codegen.rounding import ROUGHNESS
 from atwood.errors import AtwoodError, UsageError
 from atwood.expr import Expression, OutputGroup, Program, live
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE
 from atwood.simulation.problem.arguments import FORM

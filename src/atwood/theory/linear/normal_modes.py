@@ -15,13 +15,13 @@ import numpy as np
 
 from atwood.arguments import check, command, number, takes, whole
 from atwood.arrays import ComplexArray, FloatArray
+from atwood.display import data_of, plain
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.compose.composite import Model
 from atwood.numerics.rank import null_space
 from atwood.pipeline import SCENE
 from atwood.result.result import Result
-from atwood.showing import data_of, plain
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.initialization.start import Start
 from atwood.simulation.problem.options import RunOptions

@@ -12,7 +12,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import ParameterError, StartError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.forms.kept import Key
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.compose.composite import Model
 from atwood.model.local.bound import variation_names
 from atwood.model.local.flatten import FlatScene

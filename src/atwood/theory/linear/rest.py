@@ -15,7 +15,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.forms.places import to_maximal
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.matrices import to_array
 from atwood.numerics.rank import null_space
 from atwood.numerics.solutions import least_norm

@@ -9,13 +9,13 @@ import numpy as np
 
 from atwood.arguments import TEXT, Kind, takes
 from atwood.arrays import ComplexArray, FloatArray
+from atwood.display import fitted
 from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assemble
 from atwood.ranges import values_of
-from atwood.showing import fitted
 from atwood.theory.linear.linearize import linearize
 from atwood.theory.linear.operating_point import AT
 

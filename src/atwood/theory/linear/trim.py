@@ -9,14 +9,14 @@ import numpy as np
 
 from atwood.arguments import PATHS, takes
 from atwood.arrays import FloatArray
+from atwood.display import fitted
 from atwood.errors import ParameterError, SolveError, suggestion
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.numerics.matrices import or_one
 from atwood.numerics.newton import Missing, largest, newton
 from atwood.pipeline import SCENE
-from atwood.showing import fitted
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.theory.linear.displacements import Minimal
 from atwood.theory.linear.operating_point import (

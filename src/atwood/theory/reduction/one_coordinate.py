@@ -21,7 +21,7 @@ from atwood.errors import StartError, UnsupportedError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, jvp, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import lagrangian_of
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
 from atwood.theory.hamiltonian.transformations import PointTransformation

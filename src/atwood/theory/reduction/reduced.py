@@ -16,7 +16,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import observer
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start

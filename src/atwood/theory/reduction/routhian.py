@@ -9,7 +9,7 @@ from atwood.arguments import PATHS, TEXT, optional, takes
 from atwood.errors import UnsupportedError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian, lagrangian_of
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of
 from atwood.theory.equations.formulas import EquationFormulas

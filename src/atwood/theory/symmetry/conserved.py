@@ -10,17 +10,17 @@ import numpy as np
 
 from atwood.arguments import Kind, check, each, instance, optional, takes
 from atwood.arrays import FloatArray
+from atwood.display import data_of, fitted, listed
 from atwood.errors import UsageError
 from atwood.expr import Expression, OutputGroup, Program, vjp
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import lagrangian_of
 from atwood.forms.program import state_groups
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of
 from atwood.result.conserved import ConservedLedger, ConservedValues
 from atwood.result.result import Result
-from atwood.showing import data_of, fitted, listed
 from atwood.simulation.dynamics.orientation_coordinates import from_regular, to_regular
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.events.mode_change import generalized_state

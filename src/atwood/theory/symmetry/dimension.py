@@ -18,7 +18,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.newton import Missing, newton
 from atwood.numerics.rank import decompose, null_space
 from atwood.numerics.solutions import least_norm

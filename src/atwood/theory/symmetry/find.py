@@ -15,7 +15,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.expr import Expression, depends_on
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.outputs.observables import add_up
 from atwood.numerics.matrices import or_one
 from atwood.numerics.solutions import least_norm

@@ -19,7 +19,7 @@ from atwood.expr import Expression, Graph, InputGroup, OutputGroup, Program, jac
 from atwood.expr.core import algebra
 from atwood.expr.core.relations import TimeRelations
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.orientation import spin_in_world
 from atwood.numerics.independence import certain, independent_rows

@@ -29,7 +29,7 @@ from atwood.expr.simplify.polynomial import (
     multiply_polynomials,
 )
 from atwood.expr.simplify.trigonometry import sum_of_waves, without_squares
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.outputs.observables import add_up
 from atwood.numerics.matrices import or_one
 from atwood.numerics.solutions import least_norm, least_squares

@@ -17,7 +17,7 @@ from atwood.expr import Expression, affine_coefficients, evaluate, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian, lagrangian_of
 from atwood.forms.places import to_maximal
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.kinematics.mechanism import extent
 from atwood.mechanics.kinematics.orientation import spin_in_world
 from atwood.mechanics.outputs.observables import add_up

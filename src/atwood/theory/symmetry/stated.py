@@ -11,7 +11,7 @@ from atwood.arguments import BY_PATH, NAME, TEXT, Kind, Refused, check_fields, s
 from atwood.errors import UsageError, suggestion
 from atwood.expr import Expression
 from atwood.expr.formulas.sympy_bridge import from_sympy
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.outputs.observables import add_up
 from atwood.model.values.units import parse_unit
 from atwood.theory.equations.formulas import EquationFormulas

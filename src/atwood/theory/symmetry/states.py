@@ -23,7 +23,7 @@ from atwood.expr.core.analysis import dependents, live
 from atwood.expr.core.relations import Relation, TimeRelations
 from atwood.forms.assembly import Assembly
 from atwood.forms.program import state_groups
-from atwood.late import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.numerics.independence import independent_rows
 from atwood.numerics.matrices import from_entries, to_array

@@ -13,8 +13,8 @@ import atwood.plotting
 import atwood.reporting
 import atwood.solids
 import atwood.study
+from atwood.display import LINES, WIDTH, fitted
 from atwood.result.trajectories import Group
-from atwood.showing import LINES, WIDTH, fitted
 from atwood.table import Table, facts, table
 from atwood_library import Ground, PointMass, Rod
 from atwood_library.scenes import Chain, DoublePendulum, FourBar, HeavyTop, Kepler, SimplePendulum

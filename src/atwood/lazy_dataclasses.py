@@ -15,7 +15,7 @@ from reprlib import recursive_repr
 from threading import RLock
 from typing import TYPE_CHECKING, Any
 
-from atwood.showing import brief
+from atwood.display import brief
 
 __all__ = ["dataclass", "names_of", "replace"]
 

@@ -11,7 +11,7 @@ from typing import ClassVar, Generic, TypeVar
 
 import pytest
 
-from atwood import UsageError, late
+from atwood import UsageError, lazy_dataclasses as late
 from atwood.arguments import takes_names
 
 T = TypeVar("T")
