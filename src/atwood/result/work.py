@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.clock import Clock, TimeIsUp, check_time
 from atwood.lazy_dataclasses import dataclass, replace
+from atwood.lazy_modules import scipy
 from atwood.result.energy import EnergyLedger, Piece, make_ledger, power_into
 from atwood.result.segment_quantities import SegmentQuantities
 from atwood.simulation.run.made import Run, run_again, times_of_steps
@@ -53,11 +54,9 @@ def _apart(one: FloatArray, other: FloatArray) -> float:
 def _spline(t: FloatArray, values: FloatArray) -> FloatArray:
     if len(t) < 2:
         return np.zeros(len(t))
-    from scipy.interpolate import make_interp_spline
-
     degree = min(7, len(t) - 1)
     degree -= 1 - degree % 2  # an odd degree needs no choice at the ends
-    spline = make_interp_spline(t, values, k=degree).antiderivative()
+    spline = scipy.interpolate.make_interp_spline(t, values, k=degree).antiderivative()
     return np.asarray(spline(t) - spline(t[0]), dtype=float)
 
 

@@ -19,6 +19,7 @@ from atwood.errors import AtwoodError, KernelEvaluationError, UsageError
 from atwood.expr.core import algebra
 from atwood.expr.core.graph import Expression, Graph
 from atwood.expr.core.operations import ExternalFunction, floor as _floor_of_float, sign as _sign_of_float, solve_floats
+from atwood.lazy_modules import sympy
 
 Scalar: TypeAlias = Any
 """A ``float``, an :class:`Expression`, or a ``sympy.Expr``: what laws compute with."""
@@ -74,8 +75,6 @@ def _unary(operation: str, x: Scalar, on_float: Callable[[float], float], numpy_
             ) from None
     _checked(operation, x=x)
     if _is_sympy(x):
-        import sympy
-
         return getattr(sympy, sympy_name)(x)
     array = np.asarray(x)
     if array.dtype == object:
@@ -178,8 +177,6 @@ def atan2(y: Scalar, x: Scalar) -> Scalar:
     if graph is not None and not _is_array(y, x):
         return algebra.binary("atan2", *_operands(graph, y, x))
     if _is_sympy(y) or _is_sympy(x):
-        import sympy
-
         return sympy.atan2(y, x)
     if isinstance(y, (float, int)) and isinstance(x, (float, int)):
         return math.atan2(y, x)
@@ -202,8 +199,6 @@ def _extremum(operation: str, sympy_name: str, a: Scalar, b: Scalar) -> Scalar:
     if graph is not None and not _is_array(a, b):
         return algebra.binary(operation, *_operands(graph, a, b))
     if _is_sympy(a) or _is_sympy(b):
-        import sympy
-
         return getattr(sympy, sympy_name)(a, b)
     if isinstance(a, (float, int)) and isinstance(b, (float, int)):
         return min(a, b) if operation == "minimum" else max(a, b)
@@ -229,8 +224,6 @@ def select(condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
     if graph is not None and not _is_array(condition, a, b):
         return algebra.select(*_operands(graph, condition, a, b))
     if any(_is_sympy(value) for value in (condition, a, b)):
-        import sympy
-
         return sympy.Piecewise((a, condition), (b, True))
     if isinstance(condition, (float, int, np.bool_)):
         return a if condition else b
@@ -290,8 +283,6 @@ def solve(matrix: Sequence[Sequence[Scalar]], right: Sequence[Scalar]) -> list[S
     if graph is not None:
         return list(algebra.solve(_operands(graph, *values), _operands(graph, *right)))
     if any(_is_sympy(value) for value in (*values, *right)):
-        import sympy
-
         return list(sympy.Matrix([list(row) for row in matrix]).LUsolve(sympy.Matrix(list(right))))
     if size and not _is_array(*values, *right):
         try:
@@ -339,8 +330,6 @@ def external(function: ExternalFunction, *arguments: Scalar) -> Scalar:
     if graph is not None and not _is_array(*arguments):
         return algebra.external(function, _operands(graph, *arguments))
     if any(_is_sympy(value) for value in arguments):
-        import sympy
-
         return sympy.Function(function.name)(*arguments)
     if _is_array(*arguments):
         result = _elementwise(lambda *items: external(function, *items), *arguments)

@@ -13,6 +13,7 @@ from atwood.expr.core.analysis import evaluate, live
 from atwood.expr.core.functions import Scalar, graph_of
 from atwood.expr.core.graph import Expression, Graph
 from atwood.expr.formulas.sympy_bridge import from_sympy
+from atwood.lazy_modules import sympy
 
 
 class Formula:
@@ -22,8 +23,6 @@ class Formula:
     """
 
     def __init__(self, expression: Any, arguments: Sequence[Any]) -> None:
-        import sympy
-
         self.expression = check(instance("an expression of sympy", sympy.Expr), expression, "expression", "formula")
         symbols = each(instance("a symbol", sympy.Symbol), "the symbols of the formula, each a sympy.Symbol")
         self.arguments = check(symbols, arguments, "arguments", "formula")

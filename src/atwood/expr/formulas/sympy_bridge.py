@@ -17,6 +17,7 @@ from atwood.expr.core import algebra
 from atwood.expr.core.analysis import live
 from atwood.expr.core.graph import Expression, Graph
 from atwood.expr.core.operations import LEAVES, ExternalFunction
+from atwood.lazy_modules import sympy
 
 SympyExpression: TypeAlias = Any
 """A ``sympy.Expr``."""
@@ -48,8 +49,6 @@ def to_sympy_shared(
 def _translate(
     expressions: Sequence[Expression | float], symbols: Mapping[Expression, SympyExpression], prefix: str | None
 ) -> tuple[list[tuple[SympyExpression, SympyExpression]], list[SympyExpression]]:
-    import sympy
-
     nodes = live(expressions)
     uses = Counter(argument.index for node in nodes for argument in node.arguments)
     known: dict[int, SympyExpression] = {node.index: text for node, text in symbols.items()}
@@ -82,8 +81,6 @@ def _free_name(prefix: str, position: int, taken: set[str]) -> str:
 
 def _number(value: float) -> SympyExpression:
     """Return a float as an exact small fraction or multiple of pi if it is one, else as a float."""
-    import sympy
-
     if not math.isfinite(value):
         return sympy.nan if value != value else sympy.oo if value > 0 else -sympy.oo
     fraction = Fraction(value).limit_denominator(_LARGEST_DENOMINATOR)
@@ -97,8 +94,6 @@ def _number(value: float) -> SympyExpression:
 
 def _write(node: Expression, arguments: list[SympyExpression]) -> SympyExpression:
     """Return one node in sympy.  Conditions become sympy booleans, solves become lists of unknowns."""
-    import sympy
-
     operation = node.operation
     if operation == "constant":
         return _number(node.payload)
@@ -135,8 +130,6 @@ def _write(node: Expression, arguments: list[SympyExpression]) -> SympyExpressio
 
 def _as_value(item: SympyExpression) -> SympyExpression:
     """Return a condition as 1 or 0, other things as they are."""
-    import sympy
-
     if isinstance(item, (sympy.logic.boolalg.Boolean, bool)) and not isinstance(item, sympy.Symbol):
         return sympy.Piecewise((1, item), (0, True))
     return item
@@ -144,8 +137,6 @@ def _as_value(item: SympyExpression) -> SympyExpression:
 
 def _as_condition(item: SympyExpression) -> SympyExpression:
     """Return a number as the condition that it is not zero, other things as they are."""
-    import sympy
-
     if isinstance(item, sympy.logic.boolalg.Boolean) and not isinstance(item, sympy.Symbol):
         return item
     return sympy.Ne(item, 0)
@@ -158,8 +149,6 @@ def from_sympy(
     functions: Mapping[str, ExternalFunction] | None = None,
 ) -> Expression:
     """Return a sympy expression as an expression of a graph."""
-    import sympy
-
     known: dict[SympyExpression, Expression] = {}
     names: dict[str, Expression] = {}
     for key, value in (mapping or {}).items():

@@ -20,6 +20,7 @@ from atwood.arrays import FloatArray
 from atwood.codegen.sundials.fixed_pivots import AGAIN, SLOTS, fixed_pivots_addresses
 from atwood.integrators.ida.callbacks import address
 from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_modules import scipy
 from atwood.numerics.fixed_pivots import FixedPivots
 
 if TYPE_CHECKING:
@@ -175,14 +176,13 @@ class FixedSolver:
         return (c_double * len(self._pivots.positions)).from_address(self._block[SLOTS.index("entries")])
 
     def _factorise(self, entries: FloatArray) -> int:
-        from scipy.sparse import csc_array
-        from scipy.sparse.linalg import splu
-
         pivots, self._factors = self._pivots, None
         rows = np.repeat(np.arange(pivots.size), np.diff(pivots.row_starts))
-        matrix = csc_array((entries[pivots.by_row], (rows, pivots.row_columns)), shape=(pivots.size, pivots.size))
+        matrix = scipy.sparse.csc_array(
+            (entries[pivots.by_row], (rows, pivots.row_columns)), shape=(pivots.size, pivots.size)
+        )
         try:
-            self._factors = splu(matrix)
+            self._factors = scipy.sparse.linalg.splu(matrix)
         except (RuntimeError, ValueError):  # a pivot is exactly zero, or something is not finite
             return _RECOVERABLE
         return 0

@@ -39,6 +39,7 @@ from atwood.integrators.protocol import (
 )
 from atwood.integrators.session import Session, copied
 from atwood.lazy_dataclasses import dataclass, replace
+from atwood.lazy_modules import scipy
 
 NO_VALUE = (KernelEvaluationError, ArithmeticError)
 """What a function raises where it has no value."""
@@ -273,12 +274,10 @@ def _create_solver(problem: ImplicitProblem, options: SolverOptions, record: _Re
 
 def _sparsity(problem: ImplicitProblem) -> Any:
     """Return the pattern as a SciPy matrix, entry by entry in the pattern's order."""
-    from scipy.sparse import csc_matrix
-
     rows, columns = problem.pattern
     starts = np.searchsorted(columns, np.arange(problem.size + 1))
     parts = (np.ones(len(rows)), rows.astype(np.int32), starts.astype(np.int32))
-    return csc_matrix(parts, shape=(problem.size, problem.size))
+    return scipy.sparse.csc_matrix(parts, shape=(problem.size, problem.size))
 
 
 def _residual_callback(problem: ImplicitProblem, record: _Record) -> Callable[..., None]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.lazy_modules import scipy
 from atwood.result.formats.dataset import Dataset, Variable, json_text, unique_name
 from atwood.result.formats.npz import check_unpacked
 
@@ -31,8 +32,6 @@ def write_matlab(data: Dataset, file: Path, checksum: str) -> None:
     The variable ``atwood`` is a text in JSON, for ``jsondecode``: paths, units and meanings by name, and what else is
     known.
     """
-    from scipy.io import savemat
-
     taken = {_ABOUT, *_WORDS}
     names = [_name(one.path, taken) for one in data.variables]
     heads = [
@@ -50,7 +49,7 @@ def write_matlab(data: Dataset, file: Path, checksum: str) -> None:
     about = {"title": data.title, "checksum": checksum, "variables": heads, "about": data.about}
     arrays: dict[str, Any] = {name: _column(one.values) for name, one in zip(names, data.variables, strict=True)}
     arrays[_ABOUT] = json_text(about)
-    savemat(str(file), arrays, appendmat=False, long_field_names=True, do_compression=True, oned_as="column")
+    scipy.io.savemat(str(file), arrays, appendmat=False, long_field_names=True, do_compression=True, oned_as="column")
 
 
 def _name(path: str, taken: set[str]) -> str:
@@ -67,10 +66,8 @@ def _column(values: NDArray[Any]) -> NDArray[Any]:
 
 def read_matlab(file: Path) -> tuple[Dataset, str]:
     """Return arrays that were written, and their checksum."""
-    from scipy.io import loadmat
-
     check_unpacked(file)
-    found = loadmat(str(file), chars_as_strings=True)
+    found = scipy.io.loadmat(str(file), chars_as_strings=True)
     about = json.loads(str(found[_ABOUT].item()))
     variables = []
     for head in about["variables"]:

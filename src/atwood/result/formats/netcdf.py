@@ -10,19 +10,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.lazy_modules import scipy
 from atwood.result.formats.dataset import Dataset, Variable, json_text, unique_name
 
 
 def write_netcdf(data: Dataset, file: Path, checksum: str) -> None:
     """Write arrays; text becomes arrays of characters."""
-    from scipy.io import netcdf_file
-
     taken: set[str] = set()
     names = {one.path: _name(one.path, taken) for one in data.variables}
     dimensions = {name: names.get(name, name) for name in data.sizes}
     beside = [one for one in data.variables if one.is_coordinate and one.dimensions != (one.path,)]
     to: Any
-    with netcdf_file(str(file), "w", version=2) as to:
+    with scipy.io.netcdf_file(str(file), "w", version=2) as to:
         to.title, to.Conventions = data.title.encode(), b"CF-1.11"
         to.atwood, to.checksum = json_text(data.about).encode(), checksum.encode()
         for name, size in data.sizes.items():
@@ -64,10 +63,8 @@ def _name(path: str, taken: set[str]) -> str:
 
 def read_netcdf(file: Path) -> tuple[Dataset, str | None]:
     """Return arrays that were written, and their checksum; files of old versions have none."""
-    from scipy.io import netcdf_file
-
     source: Any
-    with netcdf_file(str(file), "r", mmap=False) as source:
+    with scipy.io.netcdf_file(str(file), "r", mmap=False) as source:
         about = json.loads(source.atwood.decode())
         checksum = source.checksum.decode() if hasattr(source, "checksum") else None
         paths = {name: one.path.decode() for name, one in source.variables.items()}

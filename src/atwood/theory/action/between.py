@@ -16,6 +16,7 @@ from atwood.forms.program import rates_are_speeds
 from atwood.integrators.methods import EXPLICIT, Task
 from atwood.integrators.protocol import SolverOptions, Status
 from atwood.lazy_dataclasses import dataclass, replace
+from atwood.lazy_modules import scipy
 from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.pipeline import SCENE, assembly_of
@@ -198,8 +199,6 @@ def _joining(shooter: Shooter, target: FloatArray, name: str) -> list[FloatArray
 
 def _brackets(miss: Any, fastest: float) -> Iterator[FloatArray]:
     """Yield the zeros of what is missed by one coordinate, between velocities at which it changes its sign."""
-    from scipy.optimize import brentq
-
     # Closer together where velocities are small, and the same for motions there and back.
     grid = fastest * np.sinh(np.linspace(-4.0, 4.0, _GRID)) / np.sinh(4.0)
     values = np.array([miss(np.array([one]))[0] for one in grid])
@@ -209,14 +208,14 @@ def _brackets(miss: Any, fastest: float) -> Iterator[FloatArray]:
     for k in np.flatnonzero(np.sign(values[1:]) * np.sign(values[:-1]) < 0.0):
         if np.all(np.abs(values) < _JOINED):
             return
-        root = brentq(lambda v: miss(np.array([v]))[0], grid[k], grid[k + 1], xtol=1e-15 * fastest, rtol=4e-16 * 4)
+        root = scipy.optimize.brentq(
+            lambda v: miss(np.array([v]))[0], grid[k], grid[k + 1], xtol=1e-15 * fastest, rtol=4e-16 * 4
+        )
         yield np.array([root])
 
 
 def _guesses(miss: Any, target: FloatArray, shooter: Shooter, fastest: FloatArray) -> Iterator[FloatArray]:
     """Yield where Newton's method ends from many velocities."""
-    from scipy.optimize import root
-
     random = np.random.default_rng(7)
     straight = (target - shooter.place) / (shooter.end - shooter.begin)
     begins = [straight, *(0.5 * fastest * random.uniform(-1.0, 1.0, (_TRIES, shooter.size)) ** 3 + straight)]
@@ -227,7 +226,7 @@ def _guesses(miss: Any, target: FloatArray, shooter: Shooter, fastest: FloatArra
             return np.where(np.all(np.isfinite(found)), found, 1e3)
 
         try:
-            ended = root(scaled, begin / fastest, method="hybr", options={"xtol": 1e-14})
+            ended = scipy.optimize.root(scaled, begin / fastest, method="hybr", options={"xtol": 1e-14})
         except (AtwoodError, ArithmeticError):
             continue
         yield ended.x * fastest
@@ -235,14 +234,12 @@ def _guesses(miss: Any, target: FloatArray, shooter: Shooter, fastest: FloatArra
 
 def _conjugate_times(shooter: Shooter, velocity: FloatArray) -> tuple[tuple[float, ...], bool]:
     """Return when neighbours from the same place come together again, and whether they do at the end."""
-    from scipy.interpolate import CubicSpline
-
     span = shooter.end - shooter.begin
     times = shooter.begin + span * np.arange(1, _TIMES + 1) / _TIMES
     spread = np.linalg.det(shooter.fields(velocity, times) / (times - shooter.begin)[:, None, None])
     if not np.all(np.isfinite(spread)):
         return (), False
-    found = CubicSpline(times, spread).roots(extrapolate=False)
+    found = scipy.interpolate.CubicSpline(times, spread).roots(extrapolate=False)
     at_end = abs(spread[-1]) < _CONJUGATE * float(np.max(np.abs(spread)))
     inside = [float(t) for t in found if not (at_end and t > shooter.end - 2.0 * span / _TIMES)]
     return tuple(inside), bool(at_end)

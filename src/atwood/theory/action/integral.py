@@ -18,6 +18,7 @@ from atwood.forms.kept import Key
 from atwood.forms.lagrangian import lagrangian_along_speeds
 from atwood.forms.program import rates_are_speeds, state_groups
 from atwood.lazy_dataclasses import dataclass, replace
+from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
 from atwood.pipeline import assembly_of, simulate
 from atwood.result.result import Result
@@ -436,8 +437,6 @@ def _read(given: Any, name: str) -> tuple[Function, Function | None]:
     """Return a function, and its derivative where that is known."""
     if callable(given) and not hasattr(given, "free_symbols"):
         return given, None
-    import sympy
-
     t = sympy.Symbol("t")
     try:
         made = as_expression(given)

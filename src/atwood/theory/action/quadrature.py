@@ -15,6 +15,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError, UnsupportedError
 from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_modules import scipy
 
 Energy = Callable[[FloatArray, FloatArray], FloatArray]
 """H of arrays of q and p."""
@@ -206,8 +207,6 @@ def _turning_point(
     turn: float | None,
 ) -> float | None:
     """Return where the discriminant comes to zero first, on one side; None where it does not."""
-    from scipy.optimize import brentq
-
     step = _FIRST * size
     places, values = [q], [discriminant(q)]
     if values[0] <= 0.0:  # at a turning point itself: is the motion on this side?
@@ -229,12 +228,12 @@ def _turning_point(
         if not np.isfinite(values[-1]):
             return None
         if not values[-1] > 0.0:
-            return float(brentq(discriminant, places[-2], places[-1], xtol=1e-15 * size, rtol=1e-15))
+            return float(scipy.optimize.brentq(discriminant, places[-2], places[-1], xtol=1e-15 * size, rtol=1e-15))
         if len(values) > 2 and values[-2] < min(values[-1], values[-3]):  # it may dip below zero between two steps
             lowest = _lowest(discriminant, places[-3], places[-1])
             dip = discriminant(lowest)
             if not dip > 0.0:
-                return float(brentq(discriminant, places[-3], lowest, xtol=1e-15 * size, rtol=1e-15))
+                return float(scipy.optimize.brentq(discriminant, places[-3], lowest, xtol=1e-15 * size, rtol=1e-15))
             if dip <= rounding(lowest) + _TOUCHES * max(values):
                 return lowest
         step = min(step * _STEEPER, longest)
@@ -242,10 +241,8 @@ def _turning_point(
 
 
 def _lowest(discriminant: Callable[[float], float], one: float, other: float) -> float:
-    from scipy.optimize import minimize_scalar
-
     way = other - one  # shares of it are known to more digits than places are
-    found = minimize_scalar(
+    found = scipy.optimize.minimize_scalar(
         lambda share: discriminant(one + share * way), bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-12}
     )
     return float(one + found.x * way)

@@ -16,6 +16,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import UnsupportedError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_modules import mpmath, sympy
 from atwood.model.compose.composite import Model
 from atwood.theory.action.quadrature import Level, level_through
 from atwood.theory.formulas.objects import Sympy
@@ -176,8 +177,6 @@ class Separation:
         UnsupportedError
             If H has a term linear in that momentum, or two or more other coordinates are left.
         """
-        import sympy
-
         names = [str(one) for one in self.coordinates]
         if coordinate not in names:
             raise UsageError("it is none of the coordinates", where=coordinate, advice=suggestion(coordinate, names))
@@ -207,8 +206,6 @@ class Separation:
 
     @cached_property
     def _function(self) -> Any:
-        import sympy
-
         made = self.expression.subs(self.values)
         return sympy.lambdify((*self.coordinates, *self.momenta), made, "numpy")
 
@@ -243,8 +240,6 @@ def separation(scene: Model | Assembly | Hamiltonian, coordinates: Mapping[str, 
     UnsupportedError
         If the scene has no Hamiltonian, none that is short enough to be written down, or one that depends on time.
     """
-    import sympy
-
     h = scene if isinstance(scene, Hamiltonian) else hamiltonian(scene)
     if h.depends_on_time:
         raise UnsupportedError("H depends on time", where=h.name)
@@ -279,16 +274,12 @@ def separation(scene: Model | Assembly | Hamiltonian, coordinates: Mapping[str, 
 
 def _decimals(value: Sympy) -> list[Sympy]:
     """Return the numbers of an expression that are known to 16 digits."""
-    import sympy
-
     every = value.atoms(sympy.Number)
     return sorted((one for one in every if one.is_Float or (one.is_Rational and one.q > _LONG)), key=float)
 
 
 def _old_momenta(transposed: Sequence[Sequence[Sympy]], momenta: Sequence[Sympy]) -> list[Sympy]:
     """Return the old momenta in terms of the new ones, ``P = J^T p``, over one determinant."""
-    import sympy
-
     matrix = sympy.Matrix(transposed)
     if len(momenta) > _FEW:
         return list(matrix.LUsolve(sympy.Matrix(momenta)))
@@ -304,7 +295,6 @@ def _tidied(made: Sympy) -> Sympy:
 
     `sympy.trigsimp` finds more, and can take hours.
     """
-    import sympy
 
     def without(e: Sympy) -> Sympy:
         base, power = e.base, int(e.exp)
@@ -346,8 +336,6 @@ def worst_condition(
     h: Sympy, q: Sequence[Sympy], p: Sequence[Sympy], values: Mapping[Sympy, float], where: str
 ) -> tuple[str, str, float]:
     """Return by how much Levi-Civita's conditions are missed at random states, relative to their terms."""
-    import sympy
-
     held = {symbol: float(value) for symbol, value in values.items()}
     by_q, by_p = [h.diff(one) for one in q], [h.diff(one) for one in p]
     worst = (str(q[0]), str(q[0]), 0.0)
@@ -382,8 +370,6 @@ def worst_condition(
 
 def _variants(values: Sequence[float]) -> list[tuple[int, list[Any]]]:
     """Return numbers of digits, and parameters as they are and off by rounding, to see what is known of a condition."""
-    import mpmath  # type: ignore[import-untyped]
-
     random = np.random.default_rng(5)
     exact = [mpmath.mpf(one) for one in values]
     made = [(DIGITS, exact), (DIGITS + 20, exact)]
@@ -393,8 +379,6 @@ def _variants(values: Sequence[float]) -> list[tuple[int, list[Any]]]:
 
 def _states(evaluate: Any, n: int, where: str) -> list[tuple[list[Sympy], list[Any]]]:
     """Return random states at which H is real, with H and its derivatives there."""
-    import sympy
-
     random = np.random.default_rng(3)
     found: list[tuple[list[Sympy], list[Any]]] = []
     for _ in range(_TRIALS):
@@ -411,8 +395,6 @@ def _evaluated(
     evaluate: Any, state: Sequence[Sympy], digits: int = DIGITS, values: Sequence[Any] = ()
 ) -> list[Any] | None:
     """Return real values with many digits, None where there are none."""
-    import mpmath
-
     with mpmath.workdps(digits):
         try:
             found = evaluate(*[mpmath.mpf(one.p) / one.q for one in state], *values)

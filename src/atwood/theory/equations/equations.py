@@ -15,6 +15,7 @@ from atwood.expr import Expression
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import lagrangian_of, rows_by_part
 from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of
 from atwood.simulation.problem.arguments import FORM, ORIENTATION
@@ -325,8 +326,6 @@ class EquationsOfMotion(EquationFormulas):
 
 
 def _sympy_matrix(entries: Sequence[Sequence[Sum]]) -> Sympy:
-    import sympy
-
     columns = len(entries[0]) if entries else 0
     return sympy.ImmutableMatrix(len(entries), columns, [objects.formula(one) for row in entries for one in row])
 

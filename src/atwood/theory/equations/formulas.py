@@ -21,6 +21,7 @@ from atwood.expr.simplify.polynomial import TooLargeError
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian
 from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_modules import sympy
 from atwood.theory.equations.pages import Structure, structure_of
 from atwood.theory.formulas.book import Book
 from atwood.theory.formulas.notation import Notation
@@ -262,8 +263,6 @@ def _alone(equations: Sequence[Sympy], unknowns: Sequence[Sympy]) -> list[dict[S
 
 def _values(equation: Sympy, unknown: Sympy) -> list[Sympy] | None:
     """Return the values of the only unknown of an equation."""
-    import sympy
-
     parts = _linear(equation, unknown)
     if parts is not None:
         a, b, c = parts
@@ -279,8 +278,6 @@ def _values(equation: Sympy, unknown: Sympy) -> list[Sympy] | None:
 
 def _linear(equation: Sympy, angle: Sympy) -> tuple[Sympy, Sympy, Sympy] | None:
     """Return A, B and C of ``A cos + B sin + C``, if an equation is that in an angle."""
-    import sympy
-
     if equation.count_ops() > _LONGEST:
         return None
     c, s = sympy.Dummy("c"), sympy.Dummy("s")
@@ -296,8 +293,6 @@ def _linear(equation: Sympy, angle: Sympy) -> tuple[Sympy, Sympy, Sympy] | None:
 
 def _pair(equations: Sequence[Sympy], unknowns: Sequence[Sympy]) -> list[dict[Sympy, Sympy]] | None:
     """Return the solutions of two equations in two unknowns."""
-    import sympy
-
     for angle, other in (tuple(unknowns), tuple(unknowns)[::-1]):
         parts = [_linear(one, angle) for one in equations]
         if parts[0] is None or parts[1] is None:

@@ -10,6 +10,7 @@ from scipy.stats import qmc
 
 from atwood.arrays import FloatArray
 from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_modules import scipy
 
 Field: TypeAlias = Callable[[FloatArray], FloatArray]
 """Gives the rates at points, both of shape (points, 2)."""
@@ -152,8 +153,6 @@ def separatrices(
 
 def _distance(points: FloatArray, others: FloatArray) -> FloatArray:
     """Return how far each point is from the nearest of some others."""
-    from scipy.spatial import KDTree
-
     if not len(others):
         return np.full(len(points), np.inf)
-    return np.asarray(KDTree(others).query(points)[0])
+    return np.asarray(scipy.spatial.KDTree(others).query(points)[0])

@@ -8,6 +8,7 @@ from functools import lru_cache
 from math import isqrt
 from typing import Any, TypeAlias
 
+from atwood.lazy_modules import sympy
 from atwood.theory.formulas.tree import Call, Name, Node, Number, Symbol, Term
 
 Sympy: TypeAlias = Any
@@ -18,8 +19,6 @@ _NAMES: Mapping[str, str] = {"absolute": "Abs", "minimum": "Min", "maximum": "Ma
 
 def symbol_of(symbol: Symbol) -> Sympy:
     """Return a symbol; what moves is a function of time, so that it can be differentiated, without assumptions."""
-    import sympy
-
     if symbol.letter == "pi" and symbol.kind == "time":
         return sympy.pi
     return sympy.Function(symbol.name)(sympy.Symbol("t")) if symbol.moves else sympy.Symbol(symbol.name)
@@ -28,16 +27,12 @@ def symbol_of(symbol: Symbol) -> Sympy:
 @lru_cache(maxsize=4096)
 def derivative(symbol: Symbol, dots: int) -> Sympy:
     """Return a symbol or one of its derivatives by time."""
-    import sympy
-
     made = symbol_of(symbol)
     return sympy.Derivative(made, (sympy.Symbol("t"), dots)) if dots else made
 
 
 def formula(node: Node) -> Sympy:
     """Return a formula as a sympy expression."""
-    import sympy
-
     if isinstance(node, Name):
         return derivative(node.symbol, node.dots)
     if isinstance(node, Call):
@@ -46,23 +41,17 @@ def formula(node: Node) -> Sympy:
 
 
 def _term(term: Term) -> Sympy:
-    import sympy
-
     powers = [_value(formula(node)) ** _number(power) for node, power in term.factors]
     return sympy.Mul(_number(term.number), *powers)
 
 
 def _number(value: Number) -> Sympy:
-    import sympy
-
     if isinstance(value, Fraction):
         return sympy.Rational(value.numerator, value.denominator)
     return sympy.Float(value)
 
 
 def _call(node: Call) -> Sympy:
-    import sympy
-
     name, arguments = node.function, [formula(one) for one in node.arguments]
     if name == "component":
         size = isqrt(len(arguments) - 1)
@@ -80,19 +69,13 @@ def _call(node: Call) -> Sympy:
 
 def _value(item: Sympy) -> Sympy:
     """Return a condition as 1 or 0, other things as they are."""
-    import sympy
-
     return sympy.Piecewise((1, item), (0, True)) if _is_condition(item) else item
 
 
 def _condition(item: Sympy) -> Sympy:
     """Return a number as the condition that it is not zero, conditions as they are."""
-    import sympy
-
     return item if _is_condition(item) else sympy.Ne(item, 0)
 
 
 def _is_condition(item: Sympy) -> bool:
-    import sympy
-
     return isinstance(item, sympy.logic.boolalg.Boolean) and not isinstance(item, sympy.Symbol)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from atwood.arguments import command, takes
+from atwood.lazy_modules import sympy
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian
 from atwood.theory.hamiltonian.phase_space import (
     EXPRESSION,
@@ -60,8 +61,6 @@ def poisson_brackets(
     hamiltonian
         See `poisson_bracket`.
     """
-    import sympy
-
     space = phase_space_of(hamiltonian)
     read = [space.read(one) for one in functions]
     return sympy.ImmutableMatrix(
@@ -100,8 +99,6 @@ def total_derivative(f: Any, hamiltonian: Hamiltonian) -> Sympy:
     hamiltonian
         The Hamiltonian; forces that do not follow from it are not in it.
     """
-    import sympy
-
     space = phase_space_of(hamiltonian)
     read = space.read(f)
     found = bracket(read, space.read(hamiltonian.expression), space) + read.diff(sympy.Symbol("t"))
@@ -110,7 +107,5 @@ def total_derivative(f: Any, hamiltonian: Hamiltonian) -> Sympy:
 
 def bracket(f: Sympy, g: Sympy, space: PhaseSpace) -> Sympy:
     """Return the Poisson bracket of functions on the plain symbols of a phase space, as it comes."""
-    import sympy
-
     pairs = zip(space.coordinates, space.momenta, strict=True)
     return sympy.Add(*(f.diff(q) * g.diff(p) - f.diff(p) * g.diff(q) for q, p in pairs))

@@ -11,6 +11,7 @@ from atwood.expr import Expression, Graph, sqrt
 from atwood.expr.formulas.sympy_bridge import from_sympy
 from atwood.expr.simplify.polynomial import TooLargeError
 from atwood.lazy_dataclasses import dataclass, replace
+from atwood.lazy_modules import mpmath, sympy
 from atwood.theory.formulas import objects
 from atwood.theory.formulas.book import Book
 from atwood.theory.formulas.tree import Name, Symbol
@@ -45,8 +46,6 @@ class PhaseSpace:
 
     def read(self, value: Sympy, new: Sequence[Sympy] = ()) -> Sympy:
         """Return an expression on the plain symbols; a symbol with the name of one of the given stands for it."""
-        import sympy
-
         found = value.xreplace(dict(zip(self.given, self._own, strict=True)))
         named = {sympy.Symbol(_plain(given)): own for given, own in zip(self.given, self._own, strict=True)}
         found = found.xreplace({name: own for name, own in named.items() if name not in new})
@@ -71,8 +70,6 @@ class PhaseSpace:
 
 def phase_space_of(given: Hamiltonian | tuple[Sequence[Sympy], Sequence[Sympy]]) -> PhaseSpace:
     """Return the phase space of a Hamiltonian, or of a pair: coordinates and momenta."""
-    import sympy
-
     q, p = given if isinstance(given, (tuple, list)) else (given.coordinates, given.momenta)
     q, p = tuple(q), tuple(p)
     if len(q) != len(p) or not q or len({*q, *p}) != 2 * len(q):
@@ -141,8 +138,6 @@ def vanishes(values: Iterable[Sympy]) -> Verdict:
 
 
 def _is_proven(value: Sympy) -> bool:
-    import sympy
-
     symbols = sorted(value.free_symbols, key=str)  # two of them may have one name
     value = value.xreplace({one: sympy.Symbol(f"s{k}") for k, one in enumerate(symbols)})
     plain, roots = _with_roots(value)
@@ -158,8 +153,6 @@ def _is_proven(value: Sympy) -> bool:
 
 def _with_roots(value: Sympy) -> tuple[Sympy, dict[Sympy, Sympy]]:
     """Return an expression with symbols in place of square roots, and what is under each, of earlier ones."""
-    import sympy
-
     roots: dict[Sympy, Sympy] = {}
     known: dict[Sympy, Sympy] = {}
 
@@ -179,8 +172,6 @@ def _signs(value: Sympy) -> int:
 
 def _cancelled(value: Sympy) -> Sympy:
     """Return a rational function in lowest terms; other things as they are."""
-    import sympy
-
     try:
         return sympy.cancel(value) if value.count_ops() <= _LONG else value
     except sympy.PolynomialError:
@@ -189,8 +180,6 @@ def _cancelled(value: Sympy) -> Sympy:
 
 def collected(value: Sympy, variables: Sequence[Sympy]) -> Sympy:
     """Return what is a polynomial in some symbols with each of its coefficients as short as it comes."""
-    import sympy
-
     plain, roots = _with_roots(value)
     if not plain.is_polynomial(*variables) or any(one.has(*variables) for one in roots.values()):
         return short(value)
@@ -208,8 +197,6 @@ def collected(value: Sympy, variables: Sequence[Sympy]) -> Sympy:
 
 def _in_waves(value: Sympy) -> list[Sympy]:
     """Return the symbols in arguments of sines and cosines."""
-    import sympy
-
     inside = [one.free_symbols for one in value.atoms(sympy.sin, sympy.cos)]
     return sorted(set().union(*inside), key=str)
 
@@ -217,9 +204,6 @@ def _in_waves(value: Sympy) -> list[Sympy]:
 def _relative_size(value: Sympy) -> float:
     """Return the largest value at random points, relative to the terms that it is the sum of."""
     import random
-
-    import mpmath  # type: ignore[import-untyped]
-    import sympy
 
     numbers = random.Random(19)
     terms = sympy.Add.make_args(sympy.expand(value))
@@ -241,8 +225,6 @@ def _relative_size(value: Sympy) -> float:
 
 def short(value: Sympy) -> Sympy:
     """Return an expression in the shortest of some forms, as equations are written; as it is where it is long."""
-    import sympy
-
     if not value.free_symbols:
         return value
     value = value.replace(sympy.tan, lambda x: sympy.sin(x) / sympy.cos(x))
@@ -254,8 +236,6 @@ def _with_roots_cancelled(value: Sympy) -> Sympy:
 
     What is under a root is put in place of its like.
     """
-    import sympy
-
     if value.count_ops() > _LONG or not value.has(sympy.Pow):
         return value
     plain, roots = _with_roots(value)
@@ -280,8 +260,6 @@ def _with_roots_cancelled(value: Sympy) -> Sympy:
 
 def _as_written(value: Sympy) -> Sympy:
     """Return an expression as equations are written."""
-    import sympy
-
     if any(one.base.is_number for one in value.atoms(sympy.Pow) if not one.exp.is_Integer):
         return value  # an irrational number would become a decimal
     symbols = sorted(value.free_symbols, key=str)
@@ -304,8 +282,6 @@ _LETTERS = ("beta", "gamma", "zeta", "C", "N", "O", "Q", "S")
 
 def as_expression(value: Any) -> Any:
     """Return an expression of sympy from one, a number, or text of one; raise any error if it is none."""
-    import sympy
-
     if value is None or isinstance(value, (bool, bytes, type)):
         raise Refused
     try:
@@ -321,8 +297,6 @@ def as_expression(value: Any) -> Any:
 
 def as_symbol(value: Any) -> Any:
     """Return a symbol of sympy from one or from its name; raise any error if it is none."""
-    import sympy
-
     if isinstance(value, str):
         if not value.isidentifier():
             raise Refused(f"{value!r} is no name.")

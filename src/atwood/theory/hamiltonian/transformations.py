@@ -14,6 +14,7 @@ from atwood.arguments import BY_PATH, check, command, takes, whole
 from atwood.errors import UnsupportedError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE
 from atwood.theory.equations.equations import equations
@@ -69,8 +70,6 @@ class CanonicalTransformation:
     @cached_property
     def matrix(self) -> Sympy:
         """J: derivatives of new coordinates and momenta by the old, shape (2n, 2n)."""
-        import sympy
-
         new = [self.space.read(one) for one in (*self.new_coordinates, *self.new_momenta)]
         old = (*self.space.coordinates, *self.space.momenta)
         return sympy.ImmutableMatrix([[self.space.shown(one.diff(x)) for x in old] for one in new])
@@ -78,8 +77,6 @@ class CanonicalTransformation:
     @cached_property
     def verdict(self) -> Verdict:
         """Whether ``J Omega J^T = Omega``, and how that is known."""
-        import sympy
-
         n = len(self.coordinates)
         omega = sympy.zeros(2 * n, 2 * n)
         for k in range(n):
@@ -208,8 +205,6 @@ def generated_transformation(
     UsageError
         If the function holds variables of the wrong kind, or leaves new variables undetermined.
     """
-    import sympy
-
     space = phase_space_of(hamiltonian)
     n, new_q, new_p = len(space.coordinates), tuple(coordinates), tuple(momenta)
     f = space.read(function, (*new_q, *new_p))
@@ -267,8 +262,6 @@ def _old_hamiltonian(given: Space, space: PhaseSpace) -> Sympy | None:
 
 def _solved(equations: Sequence[Sympy], unknowns: Sequence[Sympy]) -> dict[Sympy, Sympy]:
     """Return a solution of equations; empty where none is found. Linear ones are solved as such, others in turn."""
-    import sympy
-
     if any(one.has(*unknowns) for equation in equations for one in equation.atoms(sympy.Integral)):
         return {}
     try:
@@ -300,7 +293,6 @@ def _in_turn(
 
 def _without_arcs(value: Sympy) -> Sympy:
     """Return an expression with roots of fractions as fractions of roots, so that what arcs leave behind cancels."""
-    import sympy
 
     def split(power: Sympy) -> Sympy:
         above, below = sympy.fraction(sympy.together(power.base))
@@ -315,7 +307,6 @@ def _without_arcs(value: Sympy) -> Sympy:
 
 def _is_real(values: Iterable[Sympy]) -> bool:
     """Return whether expressions are real where all symbols are some positive numbers."""
-    import sympy
 
     def at(value: Sympy) -> complex:
         symbols = sorted(value.free_symbols, key=str)
@@ -332,8 +323,6 @@ def _added(values: Sequence[Sympy], new: Sequence[Sympy], inverse: Mapping[Sympy
     That motion is the one of dF/dt as a Hamiltonian, which is found along straight lines from the origin: for what is a
     polynomial in the new variables.
     """
-    import sympy
-
     t = sympy.Symbol("t")
     rates = [one.diff(t) for one in values]
     if all(one == 0 for one in rates):
@@ -416,8 +405,6 @@ def point_transformation(
     UnsupportedError
         If the scene has no Hamiltonian in symbols.
     """
-    import sympy
-
     h: Hamiltonian = hamiltonian(scene)
     old = {path: check(EXPRESSION, value, path, "point_transformation") for path, value in old.items()}
     for path in old:

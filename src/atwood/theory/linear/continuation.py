@@ -14,6 +14,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_modules import scipy
 from atwood.numerics.matrices import or_one
 from atwood.numerics.newton import Missing, largest, newton
 from atwood.numerics.rank import decompose
@@ -196,10 +197,8 @@ def _located(
         point = now if length == 0.0 else _step(problem, now, length)
         return np.nan if point is None else value(point)
 
-    from scipy.optimize import brentq
-
     try:
-        length = brentq(at, 0.0, step, xtol=1e-13, rtol=1e-13)
+        length = scipy.optimize.brentq(at, 0.0, step, xtol=1e-13, rtol=1e-13)
     except (ValueError, RuntimeError):
         return []
     point = _step(problem, now, float(length)) or now

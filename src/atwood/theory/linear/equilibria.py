@@ -14,6 +14,7 @@ from atwood.display import count_of, data_of
 from atwood.errors import AtwoodError, ParameterError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, replace
+from atwood.lazy_modules import scipy
 from atwood.mechanics.kinematics.mechanism import extent
 from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
@@ -267,10 +268,8 @@ def _places(point: OperatingPoint, bounds: FloatArray, count: int) -> list[Float
     size = len(bounds)
     if not size:
         return []
-    from scipy.stats import qmc  # a third of a second
-
     # Each kind of start has a sequence of its own: every so many of one lie in one part of the region.
-    wide, close = (qmc.Halton(size, seed=seed).random(count) for seed in (7, 8))
+    wide, close = (scipy.stats.qmc.Halton(size, seed=seed).random(count) for seed in (7, 8))
     made = []
     for number in range(count):
         is_near, turn = number % _NEARBY == _NEARBY - 1, number // _NEARBY

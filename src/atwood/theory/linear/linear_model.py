@@ -19,6 +19,7 @@ from atwood.arrays import ComplexArray, FloatArray
 from atwood.display import data_of
 from atwood.errors import UsageError
 from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_modules import scipy
 from atwood.numerics.rank import decompose, null_space, rank, span
 from atwood.numerics.solutions import least_squares
 from atwood.table import Shown, Table, facts, table
@@ -156,9 +157,7 @@ class LinearModel(Shown):
 
     def to_scipy(self) -> Any:
         """Return it as `scipy.signal.StateSpace`."""
-        from scipy.signal import StateSpace
-
-        return StateSpace(*self.matrices)
+        return scipy.signal.StateSpace(*self.matrices)
 
     def to_control(self) -> Any:
         """Return it as `control.StateSpace`, with the names of states, inputs and outputs.
@@ -253,9 +252,7 @@ def balanced(model: Matrices) -> Matrices:
     a, b, c, d = model
     if not len(a):
         return model
-    from scipy.linalg import matrix_balance
-
-    _, (scale, _) = matrix_balance(a, permute=False, separate=True)
+    _, (scale, _) = scipy.linalg.matrix_balance(a, permute=False, separate=True)
     return a * scale / scale[:, None], b / scale[:, None], c * scale, d
 
 

@@ -18,6 +18,7 @@ from atwood.arrays import ComplexArray, FloatArray
 from atwood.display import data_of, plain
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, replace
+from atwood.lazy_modules import scipy
 from atwood.model.compose.composite import Model
 from atwood.numerics.rank import null_space
 from atwood.pipeline import SCENE
@@ -273,10 +274,8 @@ def _undamped(flow: Flow, space: StateSpace) -> ModeValues | None:
     error = np.abs(mass) @ space.error[n:, :n] + 1e-12 * np.max(np.abs(stiffness / size), initial=0.0) * size
     if np.any(np.abs(stiffness - stiffness.T) > error + error.T):
         return None
-    from scipy.linalg import eigh  # a fifth of a second
-
     try:
-        squares, vectors = eigh(0.5 * (stiffness + stiffness.T), mass)
+        squares, vectors = scipy.linalg.eigh(0.5 * (stiffness + stiffness.T), mass)
     except np.linalg.LinAlgError:  # the mass matrix is not positive: something without mass is free
         return None
     noise = np.sqrt(np.sum((error / size) ** 2))

@@ -13,6 +13,7 @@ from atwood.display import fitted
 from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_modules import scipy
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assemble
 from atwood.ranges import values_of
@@ -114,11 +115,9 @@ def root_locus(
 
 def _followed(rows: list[ComplexArray]) -> ComplexArray:
     """Return eigenvalues sorted so that each column changes little from row to row."""
-    from scipy.optimize import linear_sum_assignment
-
     found = np.array(rows)
     for i in range(1, len(found)):
         guess = found[i - 1] if i == 1 else 2.0 * found[i - 1] - found[i - 2]
         cost = np.abs(guess[:, None] - found[i][None, :]) + np.abs(found[i - 1][:, None] - found[i][None, :])
-        found[i] = found[i][linear_sum_assignment(cost)[1]]
+        found[i] = found[i][scipy.optimize.linear_sum_assignment(cost)[1]]
     return found

@@ -22,6 +22,7 @@ from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import lagrangian_of
 from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_modules import scipy, sympy
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
 from atwood.theory.hamiltonian.transformations import PointTransformation
@@ -176,8 +177,6 @@ _TRIALS = 60
 
 def transformed_parts(given: PointTransformation, along: int) -> PartsAt:
     """Return what gives the parts of a Lagrangian in new coordinates at places; see `parts_of`."""
-    import sympy
-
     name = given.source.name
     whole = given.lagrangian.xreplace(given.source.values)
     if whole.has(sympy.Symbol("t")):
@@ -204,9 +203,6 @@ def transformed_parts(given: PointTransformation, along: int) -> PartsAt:
 
 def start_in(given: PointTransformation) -> tuple[float, FloatArray, FloatArray]:
     """Return time, new coordinates and their derivatives where a scene starts."""
-    import sympy
-    from scipy.optimize import least_squares
-
     h = given.source
     start = find_start(h.assembly)
     q = from_regular(h.assembly, start.coordinates)
@@ -226,7 +222,7 @@ def start_in(given: PointTransformation) -> tuple[float, FloatArray, FloatArray]
     for trial in range(_TRIALS):
         guess = start.length * random.uniform(0.1, 2.0, len(q)) if trial else np.abs(q) + 0.1 * start.length
         with np.errstate(all="ignore"):
-            found = least_squares(missing, guess, xtol=3e-16, ftol=3e-16, gtol=3e-16)
+            found = scipy.optimize.least_squares(missing, guess, xtol=3e-16, ftol=3e-16, gtol=3e-16)
         is_met = np.max(np.abs(found.fun)) <= 1e-13 * (np.max(np.abs(q)) + start.length)
         if is_met and all(x > 0.0 or not one.is_positive for x, one in zip(found.x, given.coordinates, strict=True)):
             matrix = np.array(slope(*found.x, start.time), dtype=float)

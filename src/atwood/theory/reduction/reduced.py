@@ -17,6 +17,7 @@ from atwood.forms.lagrangian import Lagrangian
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import observer
 from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
@@ -250,8 +251,6 @@ def reduced(
 
 def _transformed(given: PointTransformation) -> ReducedMotion:
     """Return the motion of a scene in other coordinates, of which all but one are ignorable."""
-    import sympy
-
     h, gone = given.source, given.ignorable
     left = [k for k, one in enumerate(given.coordinates) if one not in gone]
     if len(left) != 1 or h.other_forces or given.hamiltonian.has(sympy.Symbol("t")):

@@ -10,6 +10,7 @@ from atwood.errors import UnsupportedError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian, lagrangian_of
 from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of
 from atwood.theory.equations.formulas import EquationFormulas
@@ -61,15 +62,11 @@ class Routhian:
     @property
     def momenta(self) -> tuple[Sympy, ...]:
         """Symbols of the momenta of the ignorable coordinates, which are constants."""
-        import sympy
-
         return tuple(sympy.Symbol(f"p_{self._letters[k].func}") for k in self._numbers()[1])
 
     @cached_property
     def _parts(self) -> tuple[Sympy, Sympy, Sympy, dict[Sympy, Sympy], tuple[Sympy, ...], tuple[Sympy, ...]]:
         """L on plain symbols, the rates of the ignorable coordinates, and what the symbols stand for."""
-        import sympy
-
         left, gone = self._numbers()
         found, t = self._found, sympy.Symbol("t")
         linear = found.lagrangian - found.kinetic + found.potential
@@ -98,8 +95,6 @@ class Routhian:
     @cached_property
     def expression(self) -> Sympy:
         """The Routhian ``R = sum p c' - L`` in what is left (Goldstein, equation 8.48)."""
-        import sympy
-
         plain, solved, _, back, own, others = self._parts
         rates = dict(zip(own, solved, strict=True))
         total = sympy.Add(*(p * w for p, w in zip(self.momenta, solved, strict=True))) - plain.xreplace(rates)
@@ -108,8 +103,6 @@ class Routhian:
     @cached_property
     def effective_potential(self) -> Sympy:
         """The Routhian where the coordinates that are left are at rest: their effective potential, J."""
-        import sympy
-
         plain, solved, _, back, own, others = self._parts
         still = dict.fromkeys(others, sympy.Integer(0))
         rates = {rate: w.xreplace(still) for rate, w in zip(own, solved, strict=True)}
@@ -126,8 +119,6 @@ class Routhian:
     @property
     def equations(self) -> tuple[Sympy, ...]:
         """The equations of motion of what is left, each zero: ``d/dt dR/ds' - dR/ds`` (Goldstein, equation 8.50)."""
-        import sympy
-
         t, r = sympy.Symbol("t"), self.expression
         return tuple(r.diff(one.diff(t)).diff(t) - r.diff(one) for one in self.coordinates)
 

@@ -12,6 +12,7 @@ from atwood.errors import UsageError, suggestion
 from atwood.expr import Expression
 from atwood.expr.formulas.sympy_bridge import from_sympy
 from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_modules import sympy
 from atwood.mechanics.outputs.observables import add_up
 from atwood.model.values.units import parse_unit
 from atwood.theory.equations.formulas import EquationFormulas
@@ -27,8 +28,6 @@ _STATES = 16
 def _readable(value: Any) -> Any:
     if value is None or isinstance(value, (bool, bytes, type)) or not (value == value):
         raise Refused
-    import sympy
-
     if not isinstance(sympy.sympify(value), sympy.Expr):
         raise Refused
     return value
@@ -161,8 +160,6 @@ class _Reader:
 
     def read(self, value: Any, what: str) -> Expression:
         """Return an expression of the graph."""
-        import sympy
-
         try:
             whole = sympy.sympify(value).doit()
         except (sympy.SympifyError, TypeError, AttributeError):
