@@ -18,7 +18,7 @@ import atwood
 from atwood import UsageError
 from atwood.codegen import cache as disk
 from atwood.files import check_directory, check_readable, write_atomically
-from atwood.forms import derived
+from atwood.forms import caches as derived
 from atwood.result.formats import npz as packed
 from atwood.solids import read_stl
 from atwood_library import Table

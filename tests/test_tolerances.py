@@ -26,7 +26,7 @@ from atwood import (
     simulate,
 )
 from atwood.forms.assembly import Assembly
-from atwood.forms.places import to_maximal
+from atwood.forms.quantities import to_maximal
 from atwood.integrators.ida import library as sundials_library
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.preparation import make_plan

@@ -1,4 +1,4 @@
-"""Modules that take long to import and that few processes need: each is imported when it is first asked for something."""
+"""Modules that take long to import and few processes need: each is imported when it is first asked for something."""
 
 from __future__ import annotations
 

@@ -28,9 +28,9 @@ from atwood.arguments import instance, number, optional, takes
 from atwood.clock import GRACE, Clock, TimeIsUp
 from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
-from atwood.forms.dae import check_level
+from atwood.forms.other_values import Source, with_constants_of_start
 from atwood.forms.reassembly import modes_of
-from atwood.forms.starting import Source, with_constants_of_start
+from atwood.forms.residuals import check_level
 from atwood.lazy_dataclasses import replace
 from atwood.mechanics.read import LineSigns, read_mechanism
 from atwood.model.compose.composite import Model

@@ -11,10 +11,10 @@ import pytest
 from atwood.codegen.sundials.null_space import NullSpaceShape
 from atwood.codegen.sundials.null_space_residuals import compile_null_space_callbacks
 from atwood.errors import KernelEvaluationError, UsageError
-from atwood.forms.reduced import null_space_program
+from atwood.forms.residuals import null_space_program
 from atwood.integrators.ida import library as sundials_library
 from atwood.integrators.ida.callbacks import JACOBIAN, RESIDUAL, WEIGHTS
-from atwood.simulation.dynamics.partitioning import POOR, choose_dependent_coordinates
+from atwood.simulation.dynamics.redundancy import POOR, choose_dependent_coordinates
 from atwood.simulation.problem.native_null_space import choice_lists, null_space_shape
 from atwood_library.scenes import FourBar, SliderCrank
 

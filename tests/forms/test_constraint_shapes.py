@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from atwood.expr import Graph, cos, sin
-from atwood.forms.loops.branches import Place
+from atwood.forms.loops.closed_form import Place
 from atwood.forms.loops.roots import ConstraintShapes
 
 

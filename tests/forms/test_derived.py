@@ -24,9 +24,9 @@ from atwood import (
 )
 from atwood.codegen.cache import Cache
 from atwood.errors import UnsupportedError
-from atwood.forms import accelerations, derived
+from atwood.forms import accelerations, caches as derived
 from atwood.forms.accelerations import acceleration_program
-from atwood.forms.derived import SOURCES, derivation_key, hash_of_sources
+from atwood.forms.caches import SOURCES, derivation_key, hash_of_sources
 from atwood_library import PointMass
 from atwood_library.scenes import SCENES
 
@@ -158,7 +158,7 @@ def test_what_derives_is_in_the_sources_that_the_key_covers(name, monkeypatch):
             sys.setprofile(None)
 
     monkeypatch.setattr(accelerations, "derive_once", watched)
-    monkeypatch.setattr("atwood.forms.derived.derive_once", watched)
+    monkeypatch.setattr("atwood.forms.caches.derive_once", watched)
     _ = assembly.reduced, assembly.maximal, assembly.parameters
     acceleration_program(assembly)
     files = {Path(file) for file in ran if str(PACKAGE) in file}
@@ -188,10 +188,10 @@ def test_the_key_changes_with_versions_and_code(monkeypatch):
     before = key(scene())
     for place, value in (("sys.version", "3.99"), ("sys.platform", "plan9")):
         with monkeypatch.context() as patch:
-            patch.setattr(f"atwood.forms.derived.{place}", value)
+            patch.setattr(f"atwood.forms.caches.{place}", value)
             assert key(scene()) != before
     with monkeypatch.context() as patch:
-        patch.setattr("atwood.forms.derived.platform.machine", lambda: "vax")
+        patch.setattr("atwood.forms.caches.platform.machine", lambda: "vax")
         assert key(scene()) != before
     with monkeypatch.context() as patch:
         patch.setattr(derived, "hash_of_sources", lambda: "other")

@@ -13,9 +13,9 @@ from typing import Any
 from atwood import Model
 from atwood.expr import Expression, OutputGroup, Program, atan2, cos, sin, substitute
 from atwood.forms.assembly import Assembly
-from atwood.forms.places import TO_MAXIMAL, to_maximal
+from atwood.forms.other_values import MAXIMAL, REDUCED
 from atwood.forms.program import state_groups
-from atwood.forms.shared import MAXIMAL, REDUCED
+from atwood.forms.quantities import TO_MAXIMAL, to_maximal
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.pipeline import assemble
 from atwood.topology.orientation_coordinates import OrientationCoordinates

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from atwood import Model, Result, Scene
 from atwood.arrays import FloatArray
 from atwood.forms.assembly import Assembly
-from atwood.forms.places import to_maximal
+from atwood.forms.quantities import to_maximal
 from atwood.pipeline import assemble, simulate
 from atwood.simulation.initialization.start import Start, find_start
 from atwood.simulation.problem.preparation import make_plan, pack_state

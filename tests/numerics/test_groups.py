@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from atwood.numerics.groups import independent_by_groups
+from atwood.numerics.rank import independent_by_groups
 from atwood.tolerances import tolerances
 
 RNG = np.random.default_rng(8)

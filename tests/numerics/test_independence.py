@@ -8,9 +8,8 @@ import pytest
 from atwood import StartError, simulate
 from atwood.codegen.rounding import ROUGHNESS, WAYS, RoughProgram, roughly
 from atwood.expr import Graph, InputGroup, OutputGroup, Program, cos, sin
-from atwood.numerics.independence import certain, independent_rows, review_rows, row_scales
-from atwood.numerics.rank import open_directions
-from atwood.numerics.solutions import least_norm, least_size
+from atwood.numerics.matrices import least_norm, least_size
+from atwood.numerics.rank import certain, independent_rows, open_directions, review_rows, row_scales
 from atwood.numerics.sparse import csr_of
 from atwood_library.scenes import FourBar
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from atwood.numerics.solutions import least_norm, least_squares
+from atwood.numerics.matrices import least_norm, least_squares
 
 RANDOM = np.random.default_rng(5)
 

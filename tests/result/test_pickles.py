@@ -10,7 +10,7 @@ import pytest
 
 import atwood
 from atwood import AtwoodError, Component, Load, Point, Result, Scene, Vector, connector, force, select, simulate
-from atwood.forms.starting import starting
+from atwood.forms.other_values import starting
 from atwood_library import PointMass
 from atwood_library.scenes import (
     DoubleAtwood,

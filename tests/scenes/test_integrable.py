@@ -247,7 +247,7 @@ def test_what_is_integrable_without_a_simple_integral_is_said() -> None:
 
 def test_rolling_is_not_integrable() -> None:
     """Neither a disc's rolling nor a ball's is, with orientations as coordinates."""
-    from atwood.forms.starting import starting
+    from atwood.forms.other_values import starting
     from atwood.mechanics.constraints.pfaffian import integrable_together
     from atwood_library.scenes import RollingBall, RollingDisc as RollingDiscScene
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from atwood import Component, Point, Result, Scalar, Scene, connector, parameter, simulate
-from atwood.forms.places import to_maximal
+from atwood.forms.quantities import to_maximal
 from atwood.model.declare.laws import event
 from atwood.pipeline import assemble
 from atwood.simulation.events.modes import EventProbe

@@ -9,9 +9,8 @@ import pytest
 
 from atwood import Scene, StartError, simulate
 from atwood.numerics import matrices
-from atwood.numerics.independence import independent_rows
-from atwood.numerics.matrices import from_entries
-from atwood.numerics.solutions import least_norm
+from atwood.numerics.matrices import from_entries, least_norm
+from atwood.numerics.rank import independent_rows
 from atwood.numerics.sparse import csr_of, free_columns, smallest_direction, solve_bordered
 from atwood.numerics.sparse_batch import Borders, Elimination, Normal, Pattern
 from atwood.pipeline import assemble

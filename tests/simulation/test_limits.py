@@ -16,7 +16,7 @@ from atwood.errors import ResultError
 from atwood.integrators import explicit_session, session
 from atwood.integrators.ida import native as ida_native
 from atwood.integrators.protocol import Budget, Status, StepResult
-from atwood.simulation.initialization import massless as massless_directions
+from atwood.simulation.initialization import mobility as massless_directions
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run import tolerances as run_tolerances
 from atwood.simulation.run.session import SolverRequest

@@ -12,7 +12,7 @@ from atwood.codegen.python.backend import BoundKernel
 from atwood.codegen.sundials.lookout import slope_lists
 from atwood.integrators.ida import library as sundials_library
 from atwood.numerics.matrices import to_array
-from atwood.simulation.singular.looks import Look
+from atwood.simulation.singular.branches import Look
 from atwood.simulation.singular.monitor import SingularityMonitor
 from atwood_library.scenes import Bricard, FourBar, SliderCrank
 

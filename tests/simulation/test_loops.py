@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from atwood import simulate
-from atwood.forms.reduced import null_space_program
+from atwood.forms.residuals import null_space_program
 from atwood.integrators.ida import library as sundials_library
-from atwood.simulation.dynamics.partitioning import POOR, choose_dependent_coordinates, review_partitioning
+from atwood.simulation.dynamics.redundancy import POOR, choose_dependent_coordinates, review_partitioning
 from atwood.simulation.problem.native_null_space import choice_lists, null_space_shape
 from atwood.simulation.problem.problem import Plan
 from atwood_library.scenes import FourBar, SliderCrank

@@ -29,10 +29,9 @@ from atwood.expr import (
 )
 from atwood.expr.simplify.collect import cost
 from atwood.expr.simplify.polynomial import Effort
-from atwood.forms.derived import derive_once
-from atwood.forms.kept import Key
-from atwood.forms.places import to_maximal
+from atwood.forms.caches import Key, derive_once
 from atwood.forms.program import rates_are_speeds, state_groups
+from atwood.forms.quantities import to_maximal
 from atwood.lazy_dataclasses import dataclass, names_of
 from atwood.mechanics.dynamics.augmented import (
     Step,

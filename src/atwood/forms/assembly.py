@@ -18,15 +18,12 @@ from atwood.errors import UsageError
 from atwood.expr import Expression, Program
 from atwood.expr.core.relations import Relation, values_just_after
 from atwood.forms.balance_program import BalanceProgram, RatesProgram, balance_program, rates_program
-from atwood.forms.dae import dae_form, keep_constraints
-from atwood.forms.derived import as_by_hand
-from atwood.forms.kept import Kept, Key
-from atwood.forms.places import with_reactions
+from atwood.forms.caches import Kept, Key, Shared, as_by_hand
+from atwood.forms.other_values import MAXIMAL, REDUCED, REGULAR, Source, no_start_quantity
 from atwood.forms.program import FormProgram
+from atwood.forms.quantities import with_reactions
 from atwood.forms.reassembly import follow, other_mode, recipe, with_flat
-from atwood.forms.reduced import reduced_form
-from atwood.forms.shared import MAXIMAL, REDUCED, REGULAR, Shared
-from atwood.forms.starting import Source, no_start_quantity
+from atwood.forms.residuals import dae_form, keep_constraints, reduced_form
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.build import build_equations
 from atwood.mechanics.dynamics.equations import Equations
@@ -42,7 +39,7 @@ from atwood.topology.spanning_forest import grow_spanning_forest
 
 if TYPE_CHECKING:
     from atwood.codegen.llvm.columns import ColumnKernel, ColumnProgram
-    from atwood.forms.sides.taken_out import Sides
+    from atwood.forms.sides import Sides
 
 
 FormName = Literal["reduced", "dae"]
@@ -393,5 +390,5 @@ class Assembly:
 
     def _observe(self, equations: Equations) -> Mapping[str, Observable]:
         # The Lagrangian is made of assemblies, and looked up when a momentum is wanted.
-        momenta = lambda: import_module("atwood.forms.lagrangian.of_assembly").momenta_of(self, equations)  # noqa: E731
+        momenta = lambda: import_module("atwood.forms.lagrangian").momenta_of(self, equations)  # noqa: E731
         return observe(self.mechanism, equations, self.reactions, self.shared.lock, momenta)

@@ -18,8 +18,7 @@ from atwood.errors import UnsupportedError, UsageError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, substitute, vjp
 from atwood.forms.accelerations import solve_symmetric
 from atwood.forms.assembly import Assembly
-from atwood.forms.derived import as_by_hand
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key, as_by_hand
 from atwood.forms.lagrangian import Lagrangian, lagrangian_along_speeds
 from atwood.forms.loops.closed_form import ClosedForm, in_terms_of_independent
 from atwood.forms.program import rates_are_speeds

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, solve, substitute
 from atwood.forms.assembly import Assembly
-from atwood.forms.places import internal_reactions_of, to_maximal
 from atwood.forms.program import state_groups
+from atwood.forms.quantities import internal_reactions_of, to_maximal
 from atwood.mechanics.dynamics.equations import Equations
 
 _LARGEST = 120

@@ -12,9 +12,8 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from atwood.errors import UsageError
-from atwood.forms.kept import Key
-from atwood.forms.shared import Shared
-from atwood.forms.starting import Source, moved_to, with_constants_of_start
+from atwood.forms.caches import Key, Shared
+from atwood.forms.other_values import Source, moved_to, with_constants_of_start
 from atwood.lazy_dataclasses import replace
 from atwood.mechanics.read import LineSigns, read_mechanism
 from atwood.model.local.flatten import FlatScene

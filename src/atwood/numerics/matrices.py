@@ -1,15 +1,18 @@
-"""Matrices of small scenes as arrays, of large ones by their entries; the same questions asked of both.
+"""Matrices as arrays where scenes are small, by their entries where they are large, and solutions of their systems.
 
-What touches what in a mechanism is local, so that a matrix of thousands of rows has a handful of entries in each.
+What touches what in a mechanism is local, so that a matrix of thousands of rows has a handful of entries in each. A
+system need not be square: its solution is the shortest, or the best.
 """
 
 from __future__ import annotations
 
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from atwood.arrays import FloatArray
+from atwood.arrays import ComplexArray, FloatArray
+from atwood.tolerances import tolerances
 
 Matrix: TypeAlias = Any
 """An array of shape (rows, columns), or for large scenes a `scipy.sparse.csr_array`."""
@@ -69,3 +72,79 @@ def scaled(matrix: Matrix, columns: FloatArray, rows: FloatArray | None = None) 
     from atwood.numerics.sparse import csr_scaled
 
     return csr_scaled(matrix, columns, rows)
+
+
+_Numbers = TypeVar("_Numbers", FloatArray, ComplexArray)
+
+_UNCLEAR = 1e-4
+"""Where a place misses what is to be met by more, all directions help; what rounding makes of them is little then."""
+
+_FLAT = 1e-3
+"""Columns are scaled alike down to this share of the largest: one in which only rounding is stays as small as it is."""
+
+
+def least_norm(
+    matrix: Matrix, right: FloatArray, unit: float = 0.0, miss: float = 0.0, errors: float | None = None
+) -> FloatArray:
+    """Return the shortest solution of a linear system, or the best where there is none.
+
+    Directions whose singular values are errors of the matrix are not followed (G. Golub and C. Van Loan, *Matrix
+    Computations*, section 5.5.3).
+    """
+    least = tolerances.RANK if errors is None else errors
+    if not is_full(matrix):
+        from atwood.numerics.sparse import csr_least_norm
+
+        is_nothing = unit and np.abs(matrix.data).max(initial=0.0) < least * unit
+        return np.zeros(matrix.shape[1]) if is_nothing else csr_least_norm(matrix, right)
+    if matrix.ndim > 2:
+        return np.asarray(np.linalg.pinv(matrix, rcond=least) @ right, dtype=float)
+    _check_finite(matrix, right)
+    if unit and np.abs(matrix).max(initial=0.0) < least * unit:
+        return np.zeros(matrix.shape[1])
+    least = max(least, miss if miss < _UNCLEAR else 0.0)
+    return np.asarray(np.linalg.lstsq(matrix, right, rcond=least)[0], dtype=float)
+
+
+def least_squares(matrix: _Numbers, right: _Numbers) -> _Numbers:
+    """Return what solves a linear system best, where columns are independent by construction and no rank is asked."""
+    _check_finite(matrix, right)
+    return np.asarray(np.linalg.lstsq(matrix, right, rcond=None)[0])
+
+
+def solve_even(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    """Return the solution of a square system, with rows and columns scaled alike so that singular means singular."""
+    if not matrix.size:
+        return np.zeros(right.shape)
+    size = or_one(np.sqrt(np.maximum(np.max(np.abs(matrix), axis=-1), np.max(np.abs(matrix), axis=-2))))
+    columns = right if right.ndim == matrix.ndim else right[..., None]
+    found = np.linalg.solve(matrix / size[..., :, None] / size[..., None, :], columns / size[..., None])
+    return np.asarray((found / size[..., None]).reshape(right.shape))
+
+
+def _check_finite(*arrays: _Numbers) -> None:
+    """Refuse what some machines' libraries would work on for ever."""
+    if not all(np.isfinite(one).all() for one in arrays):
+        raise np.linalg.LinAlgError("a linear system has entries that are not finite")
+
+
+def least_size(jacobian: FloatArray, kept: NDArray[np.intp], multipliers: FloatArray) -> FloatArray:
+    """Return the multipliers of all rows of least size that have the force of some of the independent ones.
+
+    What other rows are made of, ``G_r = W G_k``, gives all that exert no force: no small number has to be called zero.
+    """
+    others = np.setdiff1d(np.arange(jacobian.shape[1]), kept)
+    found = np.zeros(jacobian.shape[:2])
+    if not len(kept):
+        return found
+    columns = np.max(np.abs(jacobian[:, kept]), axis=1)
+    columns = np.maximum(columns, _FLAT * np.max(columns, axis=1, keepdims=True))
+    even = jacobian / or_one(columns)[:, None, :]
+    rows = np.max(np.abs(even[:, kept]), axis=2)[:, :, None]
+    weights = even[:, others] @ np.linalg.pinv(even[:, kept] / rows) / np.swapaxes(rows, 1, 2)
+    found[:, kept] = multipliers
+    without_force = np.zeros((*found.shape, len(others)))
+    without_force[:, kept], without_force[:, others] = -np.swapaxes(weights, 1, 2), np.eye(len(others))
+    basis = np.linalg.qr(without_force)[0]
+    left: FloatArray = found - (basis @ (np.swapaxes(basis, 1, 2) @ found[:, :, None]))[:, :, 0]
+    return left

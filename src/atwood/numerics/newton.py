@@ -15,8 +15,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.lazy_dataclasses import dataclass
-from atwood.numerics.matrices import Matrix, scaled
-from atwood.numerics.solutions import least_norm
+from atwood.numerics.matrices import Matrix, least_norm, scaled
 
 _Place = TypeVar("_Place")
 

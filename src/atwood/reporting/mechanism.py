@@ -14,9 +14,8 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.constraints.idle_spin import IDLE_SPIN
 from atwood.mechanics.constraints.pfaffian import integrable_together
 from atwood.model.compose.composite import Model
-from atwood.numerics.independence import row_scales
 from atwood.numerics.matrices import scaled, to_array
-from atwood.numerics.rank import null_space
+from atwood.numerics.rank import null_space, row_scales
 from atwood.pipeline import SCENE, assemble_flat, assembly_of
 from atwood.reporting.offers import Offer, find_offers
 from atwood.reporting.parts import (

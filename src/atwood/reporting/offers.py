@@ -20,8 +20,8 @@ from atwood.mechanics.kinematics.mechanism import world_position
 from atwood.mechanics.kinematics.orientation import node_axes, spin_in_world
 from atwood.model.local.flatten import FlatScene
 from atwood.model.values.vector import Vector
-from atwood.numerics.independence import independent_rows
 from atwood.numerics.matrices import scaled
+from atwood.numerics.rank import independent_rows
 from atwood.pipeline import assemble_flat
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.scales import motion_scales

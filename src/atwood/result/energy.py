@@ -14,7 +14,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.expr import Program, depends_on, substitute
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.forms.quantities import energy_program, known_program
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Constraint, Equations

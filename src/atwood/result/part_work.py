@@ -13,10 +13,9 @@ from atwood.arrays import FloatArray
 from atwood.clock import Clock, TimeIsUp, check_time
 from atwood.expr import Program
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.mechanics.outputs.part_power import Flow, PartPowers, part_energy_program, part_powers
-from atwood.numerics.matrices import to_array
-from atwood.numerics.solutions import least_norm
+from atwood.numerics.matrices import least_norm, to_array
 from atwood.result.part_connectors import Connectors, Ends
 from atwood.result.part_energy import PartEnergies, PartEnergy
 from atwood.result.work import integral_in_steps, integral_of_samples, nodes_in_steps, samples_in_steps

@@ -20,7 +20,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, SolveError, UsageError
 from atwood.forms.assembly import Assembly
-from atwood.forms.shared import Shared
+from atwood.forms.caches import Shared
 from atwood.integrators.methods import AUTO, METHODS
 from atwood.lazy_dataclasses import replace
 from atwood.result.energy import EnergyLedger, account, energy_near

@@ -7,8 +7,8 @@ import itertools
 import numpy as np
 import pytest
 
-from atwood.simulation.dynamics import partitioning
-from atwood.simulation.dynamics.partitioning import POOR, choose_dependent_coordinates, review_partitioning
+from atwood.simulation.dynamics import redundancy as partitioning
+from atwood.simulation.dynamics.redundancy import POOR, choose_dependent_coordinates, review_partitioning
 
 ONES = np.ones(3)
 

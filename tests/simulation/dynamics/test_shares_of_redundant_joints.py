@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from atwood import Scene, assemble
-from atwood.numerics.solutions import least_size
+from atwood.numerics.matrices import least_size
 from atwood.simulation.dynamics.reactions import ReactionSolver
 from atwood.simulation.initialization.start import find_start, own_state
 from atwood_library import Cylindrical, Ground, RigidBody, Slider, Weld

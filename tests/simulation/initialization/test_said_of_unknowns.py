@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from atwood import Scene, assemble
 from atwood.forms.assembly import Assembly
-from atwood.simulation.initialization import positions, speeds
+from atwood.simulation.initialization import positions, positions as speeds
 from atwood.simulation.initialization.start import Start, find_start
 from atwood_library import Ground, PointMass, Rod
 from atwood_library.scenes import SCENES

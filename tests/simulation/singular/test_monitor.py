@@ -11,9 +11,9 @@ import pytest
 import atwood
 from atwood import simulate
 from atwood.integrators.protocol import Status
-from atwood.simulation.singular import monitor as module, ways
+from atwood.simulation.singular import branches as ways, monitor as module
+from atwood.simulation.singular.branches import Look
 from atwood.simulation.singular.crossing import SingularCrossing
-from atwood.simulation.singular.looks import Look
 from atwood.simulation.singular.monitor import SingularityMonitor, singularity_monitor_of
 from atwood_library.scenes import DoublePendulum, FourBar, FourBarRow
 

@@ -10,8 +10,8 @@ import pytest
 
 from atwood.errors import SolveError
 from atwood.integrators.protocol import Status
-from atwood.simulation.singular import ways as module
-from atwood.simulation.singular.looks import Look
+from atwood.simulation.singular import branches as module
+from atwood.simulation.singular.branches import Look
 from atwood.simulation.singular.monitor import SingularityMonitor
 
 from .test_monitor import Asked, crossing, given

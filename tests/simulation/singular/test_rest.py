@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from atwood.simulation.singular.crossing import slowest
-from atwood.simulation.singular.rank_measure import zero_ahead
+from atwood.simulation.singular.crossing import slowest, zero_ahead
 
 TIMES = np.linspace(0.0, 1.2, 13)
 

@@ -77,7 +77,7 @@ class NullSpaceShape:
 
     @cached_property
     def choice(self) -> dict[str, int]:
-        """Where the lists of a choice begin; see `atwood.simulation.dynamics.partitioning.Choice`."""
+        """Where the lists of a choice begin; see `atwood.simulation.dynamics.redundancy.Choice`."""
         lengths = {
             "source": self.size,
             "target": self.free,

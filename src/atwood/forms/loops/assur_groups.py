@@ -1,7 +1,7 @@
 """Closed loops that can be solved by formulas: one after another, as the Assur groups of class II of a linkage.
 
 Given the independent coordinates, a group is one constraint with one unknown coordinate, or the constraints of one
-joint with two (`atwood.forms.loops.planar_groups`) or three (`atwood.forms.loops.spatial_groups`). Eliminating all
+joint with two (`atwood.forms.loops.joint_groups`) or three (`atwood.forms.loops.joint_groups`). Eliminating all
 unknowns but one leaves ``p cos x + q sin x = w`` for an angle, with ``x = atan2(q, p) +- acos(w / sqrt(p^2 + q^2))``,
 or an equation of second degree for a length; the sign is that of the position from which a run starts (J. M. McCarthy
 and G. S. Soh, Geometric Design of Linkages, 2nd edition, Springer 2011, section 2.3). Where the root vanishes, two
@@ -21,10 +21,9 @@ import numpy as np
 
 from atwood.errors import AtwoodError
 from atwood.expr import Expression, atan2, cos, depends_on, evaluate, hypot, jacobian, jvp, sin
-from atwood.forms.loops.branches import ClosedLoops, Group, Heading, Place
-from atwood.forms.loops.planar_groups import two_unknowns
+from atwood.forms.loops.closed_form import ClosedLoops, Group, Heading, Place
+from atwood.forms.loops.joint_groups import three_unknowns, two_unknowns
 from atwood.forms.loops.roots import ConstraintShapes, Vector, Wave, one_unknown, sum_of_waves, waves_of
-from atwood.forms.loops.spatial_groups import three_unknowns
 from atwood.mechanics.constraints.elimination import rounds_to_zero
 from atwood.mechanics.dynamics.equations import Equations
 

@@ -15,8 +15,8 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.codegen.rounding import WAYS, RoughProgram
 from atwood.expr import Expression, atan2, cos, jvp, minimum, sin, sqrt, substitute
-from atwood.forms.loops.branches import Group, Place
-from atwood.numerics.solutions import least_squares
+from atwood.forms.loops.closed_form import Group, Place
+from atwood.numerics.matrices import least_squares
 
 if TYPE_CHECKING:
     from atwood.forms.loops.assur_groups import Loops

@@ -80,7 +80,7 @@ class CompiledAccelerations:
         A program of (t, q, u) with the accelerations, and before them the rates of the coordinates unless these are
         the speeds.
     projection
-        A step onto the constraints; see `atwood.forms.constrained.programs.ConstrainedProgram`.
+        A step onto the constraints; see `atwood.forms.constrained.ConstrainedProgram`.
 
     Raises
     ------

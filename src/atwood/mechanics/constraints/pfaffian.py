@@ -30,8 +30,8 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide, extent
 from atwood.mechanics.kinematics.motion import Movement
 from atwood.model.local.parts import LocalConstraint
+from atwood.numerics.matrices import least_squares
 from atwood.numerics.rank import null_space
-from atwood.numerics.solutions import least_squares
 from atwood.tolerances import tolerances
 
 _ASKED, NEEDED = 7, 4

@@ -15,16 +15,17 @@ from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.balance_program import BalanceProgram
 from atwood.lazy_dataclasses import dataclass
-from atwood.numerics.independence import row_scales
 from atwood.numerics.matrices import (
     Matrix,
     from_entries,
     is_best_full,
     is_full,
+    least_norm,
     scaled,
+    solve_even,
 )
 from atwood.numerics.newton import Missing, newton
-from atwood.numerics.solutions import least_norm, solve_even
+from atwood.numerics.rank import row_scales
 from atwood.simulation.dynamics.kinematic_map import KinematicMap, kinematic_map_of
 from atwood.simulation.dynamics.rounding import RowErrors
 from atwood.tolerances import tolerances
@@ -172,7 +173,7 @@ class Balance:
     def row_scales(
         self, now: BalanceValues | ConstraintValues, t: float, q: FloatArray, scales: FloatArray
     ) -> FloatArray:
-        """Return the size of each constraint at a place; see `atwood.numerics.independence.row_scales`."""
+        """Return the size of each constraint at a place; see `atwood.numerics.rank.row_scales`."""
         return row_scales(now.jacobian, scales, self.errors.near(t, q, scales))
 
     def holding(self, chosen: Sequence[int]) -> list[int]:

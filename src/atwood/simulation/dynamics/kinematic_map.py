@@ -18,7 +18,7 @@ from atwood.expr import Program
 from atwood.forms.assembly import Assembly, Coordinates
 from atwood.forms.balance_program import RatesProgram
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.numerics.solutions import least_squares
+from atwood.numerics.matrices import least_squares
 
 
 class KinematicMap:

@@ -18,7 +18,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, SolveError
 from atwood.expr import Expression, OutputGroup, Program, evaluate, live, substitute, vjp
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.forms.program import state_groups
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.build import resolve_signals

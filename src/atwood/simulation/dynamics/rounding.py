@@ -17,7 +17,7 @@ from atwood.arrays import FloatArray
 from atwood.codegen.rounding import ROUGHNESS, RoughProgram, roughly
 from atwood.expr import Program
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.simulation.dynamics.kinematic_map import KinematicMap
 from atwood.tolerances import tolerances
 

@@ -13,7 +13,7 @@ from atwood.arrays import BoolArray, FloatArray
 from atwood.errors import KernelEvaluationError, SolveError
 from atwood.expr import depends_on
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import replace
 from atwood.mechanics.constraints.knots import BALANCES
 from atwood.mechanics.dynamics.equations import Constraint

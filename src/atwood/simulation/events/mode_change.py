@@ -11,17 +11,14 @@ from atwood.arrays import FloatArray
 from atwood.errors import SolveError
 from atwood.expr import Expression, OutputGroup, Program, depends_on, evaluate, jacobian
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
-from atwood.forms.places import to_maximal
-from atwood.forms.quantities import observer
+from atwood.forms.caches import Key
+from atwood.forms.quantities import observer, to_maximal
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.mechanics.outputs.event_functions import UPDATE, EventFunction, list_event_functions
-from atwood.numerics.matrices import is_full, scaled, to_array
+from atwood.numerics.matrices import is_full, least_norm, scaled, to_array
 from atwood.numerics.newton import Missing, newton
-from atwood.numerics.solutions import least_norm
 from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_of
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of, reference_coordinates
-from atwood.simulation.dynamics.line_signs import actual_line_signs
 from atwood.simulation.dynamics.orientation_coordinates import (
     Reassemble,
     switch_coordinates,
@@ -29,6 +26,7 @@ from atwood.simulation.dynamics.orientation_coordinates import (
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales
 from atwood.simulation.events.modes import EventRecord
+from atwood.simulation.initialization.start import actual_line_signs
 from atwood.tolerances import tolerances
 
 _REACTION_EVENTS: Key[tuple[EventFunction, ...]] = Key("event functions that read reactions")

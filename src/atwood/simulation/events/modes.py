@@ -13,7 +13,7 @@ import numpy as np
 from atwood.arrays import BoolArray, FloatArray
 from atwood.expr import Program, depends_on
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.forms.quantities import known_program
 from atwood.integrators.protocol import StepResult
 from atwood.lazy_dataclasses import dataclass, replace

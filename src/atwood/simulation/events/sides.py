@@ -14,7 +14,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.expr.core.relations import relation_value
 from atwood.forms.assembly import Assembly
-from atwood.forms.sides.taken_out import guards
+from atwood.forms.sides import guards
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.outputs.event_functions import EventFunction
 from atwood.simulation.problem.problem import Plan

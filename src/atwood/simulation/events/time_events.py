@@ -19,7 +19,7 @@ from atwood.expr import Expression, InputGroup, OutputGroup, Program, jvp, live
 from atwood.expr.core.intervals import Bounds, bounds
 from atwood.expr.core.relations import relation_value
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import dataclass
 
 _RELATION: Key[Program] = Key("relation of functions of time")

@@ -12,7 +12,7 @@ from atwood.codegen import BoundKernel
 from atwood.errors import DeclarationError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.forms.program import state_groups
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.build import resolve_signals

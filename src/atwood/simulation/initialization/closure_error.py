@@ -14,7 +14,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError
 from atwood.expr import Expression, Program, Scalar, depends_on, evaluate, live, substitute
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.forms.quantities import coordinate_program
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.build import resolve_signals
@@ -25,7 +25,7 @@ from atwood.mechanics.kinematics.orientation import node_axes
 from atwood.model.local.parts import LocalConnector, LocalConstraint, LocalPart
 from atwood.model.values.rotation import as_rotation, compose
 from atwood.model.values.vector import dot
-from atwood.numerics.solutions import least_norm
+from atwood.numerics.matrices import least_norm
 from atwood.tolerances import tolerances
 from atwood.topology.graph import Joint
 

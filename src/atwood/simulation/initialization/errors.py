@@ -12,8 +12,8 @@ from atwood.errors import KernelEvaluationError, StartError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.numerics.independence import independent_rows
 from atwood.numerics.matrices import scaled
+from atwood.numerics.rank import independent_rows
 from atwood.simulation.initialization.closure_error import ClosureError, find_closure_errors
 from atwood.simulation.initialization.loop_closure import Nearest, closest, closest_of_all, units_of_rows
 from atwood.simulation.initialization.system import Level, System, Target, as_said

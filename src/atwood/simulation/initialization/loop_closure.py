@@ -20,8 +20,7 @@ from atwood.errors import KernelEvaluationError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.numerics.matrices import LARGEST_FULL, scaled, to_array
-from atwood.numerics.solutions import least_norm
+from atwood.numerics.matrices import LARGEST_FULL, least_norm, scaled, to_array
 from atwood.simulation.dynamics.kinematic_map import KinematicMap, orientations
 from atwood.simulation.dynamics.scales import is_length
 from atwood.simulation.initialization.system import System

@@ -7,9 +7,8 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.forms.assembly import Assembly
-from atwood.numerics.matrices import or_one
+from atwood.numerics.matrices import least_norm, or_one
 from atwood.numerics.rank import ranks
-from atwood.numerics.solutions import least_norm
 from atwood.simulation.initialization.system import Conditions
 from atwood.tolerances import tolerances
 

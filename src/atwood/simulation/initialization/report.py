@@ -17,15 +17,13 @@ from atwood.arrays import FloatArray
 from atwood.display import data_of
 from atwood.expr import Expression, OutputGroup, Program, jacobian
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import coordinate_program
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.numerics.independence import independent_rows, row_scales
-from atwood.numerics.matrices import scaled, to_array
-from atwood.numerics.rank import open_directions
-from atwood.numerics.solutions import least_norm
+from atwood.numerics.matrices import least_norm, scaled, to_array
+from atwood.numerics.rank import independent_rows, open_directions, row_scales
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.closure_error import ClosureError, find_closure_errors

@@ -2,7 +2,7 @@
 
 Positions first: Newton's method finds the configuration nearest to the guesses that fulfils the constraints and
 everything that is fixed. Then speeds, a linear problem of the same kind. Accelerations and multipliers follow from the
-balance of forces.
+balance of forces. On a line, lengths take their signs from where things then are.
 """
 
 from __future__ import annotations
@@ -11,14 +11,13 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, KernelEvaluationError, StartError
-from atwood.expr import Expression, SparseMatrix, evaluate, jacobian
+from atwood.expr import Expression, Program, SparseMatrix, evaluate, jacobian
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
-from atwood.forms.places import to_maximal
-from atwood.forms.starting import starting
+from atwood.forms.caches import Key
+from atwood.forms.other_values import starting
+from atwood.forms.quantities import coordinate_program, to_maximal
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of, reference_coordinates
-from atwood.simulation.dynamics.line_signs import actual_line_signs, line_signs_differ
 from atwood.simulation.dynamics.numerical_failure import (
     ADVICE_AT_START,
     is_numerical,
@@ -27,10 +26,47 @@ from atwood.simulation.dynamics.numerical_failure import (
 )
 from atwood.simulation.dynamics.orientation_coordinates import Reassemble, from_regular, own_names, switch_coordinates
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales, scene_length
-from atwood.simulation.initialization.positions import solve_positions
-from atwood.simulation.initialization.speeds import solve_speeds
+from atwood.simulation.initialization.positions import solve_positions, solve_speeds
 from atwood.simulation.initialization.system import sort_targets
 from atwood.tolerances import tolerances
+
+_POSITIONS: Key[Program] = Key("positions of nodes on the line")
+
+LineSigns = dict[tuple[str, str, str], float]
+
+
+def actual_line_signs(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, form: str) -> LineSigns:
+    """Return, for pairs of connectors of each part, the sign of the second's position minus the first's."""
+    if not assembly.mechanism.space.is_line:
+        return {}
+    equations = assembly.reduced if form == "reduced" else assembly.maximal
+    positions = equations.kinematics.placements.positions
+    nodes = list(positions)
+    program = assembly.shared.get(
+        _POSITIONS,
+        lambda: coordinate_program(assembly, "places", equations, [positions[node][0] for node in nodes]),
+        form,
+    )
+    places = dict(zip(nodes, assembly.kernel(program)([t], q, u)[0], strict=True))
+    found: LineSigns = {}
+    for path, local in assembly.mechanism.locals_.items():
+        for a in local.connectors:
+            for b in local.connectors:
+                gap = places[equations.site.node(path, b)] - places[equations.site.node(path, a)]
+                if gap != 0.0:
+                    found[path, a, b] = 1.0 if gap > 0.0 else -1.0
+    return found
+
+
+def line_signs_differ(assembly: Assembly, actual: LineSigns) -> bool:
+    """Return whether the signs that lengths were given differ from where things are."""
+    for (path, a, b), sign in actual.items():
+        given = assembly.mechanism.locals_[path].binding.line_signs or {}
+        order = list(assembly.mechanism.locals_[path].connectors)
+        usual = 1.0 if order.index(a) < order.index(b) else -1.0  # what laws take where the start does not tell
+        if given.get((a, b), usual) != sign:
+            return True
+    return False
 
 
 @dataclass(frozen=True)
@@ -75,10 +111,10 @@ def own_state(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatArray]
     """Return a start in the coordinates of the form of an assembly."""
     if assembly.form == "reduced":
         return from_regular(assembly, start.coordinates), start.speeds
-    return maximal_state(assembly, start)
+    return start_in_maximal(assembly, start)
 
 
-def maximal_state(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatArray]:
+def start_in_maximal(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatArray]:
     """Return a start in maximal coordinates, whatever the form of an assembly."""
     q, u = assembly.kernel(to_maximal(assembly, "regular"))([start.time], start.coordinates, start.speeds)
     return kinematic_map_of(assembly, "dae").normalized(np.asarray(q, dtype=float)), np.asarray(u, dtype=float)

@@ -11,14 +11,13 @@ from atwood.arrays import FloatArray
 from atwood.errors import StartError
 from atwood.expr import Expression, OutputGroup, Program, depends_on, jacobian, jvp, live
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
+from atwood.forms.other_values import no_start_quantity
 from atwood.forms.program import state_groups
-from atwood.forms.starting import no_start_quantity
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.outputs.observables import Observable
 from atwood.model.values.units import parse_unit
-from atwood.numerics.independence import certain, independent_rows, row_scales
 from atwood.numerics.matrices import (
     Matrix,
     from_entries,
@@ -27,7 +26,7 @@ from atwood.numerics.matrices import (
     to_array,
 )
 from atwood.numerics.newton import Missing, newton
-from atwood.numerics.rank import open_directions
+from atwood.numerics.rank import certain, independent_rows, open_directions, row_scales
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.rounding import RowErrors
 from atwood.tolerances import tolerances

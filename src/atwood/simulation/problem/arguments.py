@@ -23,7 +23,7 @@ from atwood.arguments import (
     whole,
 )
 from atwood.errors import AtwoodError, UsageError
-from atwood.forms.dae import LEVELS
+from atwood.forms.residuals import LEVELS
 from atwood.integrators.methods import AUTO, GAUSS, METHODS
 from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.tolerances import tolerances

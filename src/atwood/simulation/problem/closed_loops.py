@@ -1,6 +1,6 @@
 """Runs of mechanisms whose loops are solved by formulas: only the independent coordinates are integrated.
 
-Which coordinates these are is a choice, as in the numeric loop (`atwood.simulation.dynamics.partitioning`). Of all that
+Which coordinates these are is a choice, as in the numeric loop (`atwood.simulation.dynamics.redundancy`). Of all that
 formulas can do with, one is preferred that meets no dead centre in a whole turn; else the one that is farthest from
 any. Where a dead centre comes near, others take over; where none are better, the position is singular or nearly so, and
 constraints are kept from there on. Branches are found at one position and at many in the same way.
@@ -24,10 +24,9 @@ from atwood.codegen import BoundKernel
 from atwood.errors import KernelEvaluationError
 from atwood.expr import DivisionByExactZeroError, Expression, Program, dependencies
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.forms.loops.assur_groups import Loops
-from atwood.forms.loops.branches import Place
-from atwood.forms.loops.closed_form import ClosedForm, closed_form
+from atwood.forms.loops.closed_form import ClosedForm, Place, closed_form
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales
 from atwood.simulation.problem.problem import Plan

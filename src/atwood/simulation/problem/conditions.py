@@ -9,7 +9,7 @@ from typing import Any
 from atwood.errors import AtwoodError, UsageError, near_matches, suggestion, suggestion_in_parts
 from atwood.expr import Expression, cos, sin
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.outputs.event_functions import EventFunction
 from atwood.model.values.units import parse_quantity, parse_unit

@@ -16,9 +16,9 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.codegen import BoundKernel
 from atwood.errors import KernelEvaluationError
-from atwood.forms.constrained.programs import ConstrainedProgram, constrained_program
-from atwood.forms.kept import Key
-from atwood.forms.places import to_maximal
+from atwood.forms.caches import Key
+from atwood.forms.constrained import ConstrainedProgram, constrained_program
+from atwood.forms.quantities import to_maximal
 from atwood.integrators.explicit_problem import MET, STEPS, CompiledRates, ExplicitProblem
 from atwood.integrators.protocol import Values
 from atwood.simulation.problem.explicit_scene import first_order

@@ -20,7 +20,7 @@ from atwood.expr.core.enclosures import Pair, enclose, magnitude
 from atwood.expr.core.functions import Scalar, absolute, exp, log, maximum, minimum, select, sign, sqrt
 from atwood.expr.core.intervals import bounds
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations

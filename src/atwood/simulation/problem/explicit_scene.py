@@ -10,7 +10,7 @@ from atwood.arrays import FloatArray
 from atwood.codegen import BoundKernel
 from atwood.forms.accelerations import AccelerationProgram, accelerations_of
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.integrators.explicit_problem import CompiledRates, ExplicitProblem
 from atwood.integrators.protocol import Values
 

@@ -12,8 +12,8 @@ from atwood.codegen import BoundKernel
 from atwood.errors import UsageError
 from atwood.expr import Program
 from atwood.forms.assembly import Assembly
+from atwood.forms.caches import Key
 from atwood.forms.canonical import CanonicalPrograms, canonical_programs, closed_canonical_programs, separable_programs
-from atwood.forms.kept import Key
 from atwood.integrators.explicit_problem import ExplicitProblem
 from atwood.integrators.gauss.hamiltonian import CompiledMethod, Hamiltonian
 from atwood.integrators.methods import IDA, advise

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.codegen.sundials.null_space import NullSpaceShape
 from atwood.codegen.sundials.null_space_residuals import NullSpaceCallbacks, NullSpaceData, compile_null_space_callbacks
-from atwood.forms.reduced import NullSpaceProgram
+from atwood.forms.residuals import NullSpaceProgram
 from atwood.integrators.compiled_functions import NativeCallbacks
 from atwood.integrators.protocol import LinearSolver
 from atwood.lazy_dataclasses import dataclass
-from atwood.simulation.dynamics.partitioning import POOR
+from atwood.simulation.dynamics.redundancy import POOR
 from atwood.topology.graph import connected_groups
 
 

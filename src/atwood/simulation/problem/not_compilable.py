@@ -14,7 +14,7 @@ from typing import Any
 from atwood.expr import Expression, live
 from atwood.expr.core.program import Program
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.model.declare.component import bind
 from atwood.model.local.parts import LocalPart
 from atwood.model.values.vector import Vector

@@ -9,16 +9,15 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, KernelEvaluationError, StartError, UnsupportedError
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import replace
 from atwood.numerics.matrices import to_array
 from atwood.simulation.dynamics.balance import balance_of, solve_balance
-from atwood.simulation.dynamics.determined_reactions import check_read_reactions
-from atwood.simulation.dynamics.floating import seen_from_afar
 from atwood.simulation.dynamics.numerical_failure import ADVICE_AT_START, undefined_value_at
+from atwood.simulation.dynamics.reactions import check_read_reactions
 from atwood.simulation.dynamics.redundancy import RankFinding, find_rank
-from atwood.simulation.dynamics.scales import coordinate_scales, find_scales, motion_scales
-from atwood.simulation.initialization.massless import check_massless_directions
+from atwood.simulation.dynamics.scales import coordinate_scales, find_scales, motion_scales, seen_from_afar
+from atwood.simulation.initialization.mobility import check_massless_directions
 from atwood.simulation.problem.not_compilable import announce, find_not_compilable
 
 if TYPE_CHECKING:

@@ -13,17 +13,21 @@ from atwood.arrays import FloatArray
 from atwood.codegen import BoundKernel, compile_ida_callbacks
 from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly
-from atwood.forms.dae import keep_constraints
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.forms.program import FormProgram
+from atwood.forms.residuals import keep_constraints
 from atwood.integrators.compiled_functions import NativeCallbacks
 from atwood.integrators.methods import Method
 from atwood.integrators.protocol import ImplicitProblem, LinearSolver
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.numerics.matrices import to_array
 from atwood.simulation.dynamics.balance import Balance, balance_of, columns_of
-from atwood.simulation.dynamics.partitioning import choose_dependent_coordinates, review_partitioning
-from atwood.simulation.dynamics.redundancy import RankFinding, review_kept
+from atwood.simulation.dynamics.redundancy import (
+    RankFinding,
+    choose_dependent_coordinates,
+    review_kept,
+    review_partitioning,
+)
 from atwood.simulation.dynamics.scales import Scales
 from atwood.tolerances import tolerances
 
@@ -31,7 +35,7 @@ if TYPE_CHECKING:
     from atwood.codegen import IdaCallbacks
     from atwood.codegen.sundials.null_space_residuals import NullSpaceCallbacks
     from atwood.expr import Program
-    from atwood.forms.reduced import NullSpaceProgram
+    from atwood.forms.residuals import NullSpaceProgram
     from atwood.numerics.fixed_pivots import FixedPivots
     from atwood.simulation.problem.native_null_space import CompiledNullSpace
 
@@ -350,7 +354,7 @@ def _restored(
 
 
 def _null_space_program(assembly: Assembly, kept: tuple[int, ...]) -> NullSpaceProgram:
-    from atwood.forms.reduced import null_space_program
+    from atwood.forms.residuals import null_space_program
 
     equations = keep_constraints(assembly.own_equations, kept)
     return null_space_program(f"{assembly.flat.name} (reduced)", equations, assembly.parameters, assembly.rows)

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import dataclass
-from atwood.numerics.independence import trusted_sizes
 from atwood.numerics.matrices import is_best_full
+from atwood.numerics.rank import trusted_sizes
 from atwood.simulation.problem.problem import Plan
 from atwood.tolerances import tolerances
 

@@ -13,7 +13,7 @@ from atwood.codegen import BoundKernel
 from atwood.codegen.python.backend import compile_program
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, substitute
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.forms.program import state_groups
 from atwood.integrators.compiled_functions import StepGuard
 from atwood.simulation.problem.curved_laws import find_curved, find_external, is_needed, watched_program

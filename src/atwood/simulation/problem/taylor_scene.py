@@ -15,7 +15,7 @@ from atwood.expr import Expression, live, substitute
 from atwood.expr.series.taylor import TaylorPrograms, taylor_programs
 from atwood.forms.accelerations import AccelerationProgram, accelerations_of
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.integrators.methods import EXPLICIT, IDA, advise
 from atwood.integrators.taylor.problem import REACH, TaylorProblem
 

@@ -16,7 +16,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.integrators.explicit_problem import ExplicitProblem
 from atwood.integrators.methods import AUTO, EXPLICIT, IDA, IDA_SUNDAE, METHODS, TAYLOR, Method, advise
 from atwood.lazy_dataclasses import dataclass

@@ -14,7 +14,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, substitute
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.integrators.explicit_problem import LOOSEST, ExplicitProblem
 from atwood.integrators.explicit_session import Leave
 from atwood.integrators.methods import Method, Task

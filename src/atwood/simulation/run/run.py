@@ -11,7 +11,7 @@ from atwood.arrays import FloatArray
 from atwood.clock import GRACE, Clock, TimeIsUp
 from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
-from atwood.forms.shared import Shared
+from atwood.forms.caches import Shared
 from atwood.integrators.protocol import Statistics
 from atwood.mechanics.outputs.event_functions import UPDATE
 from atwood.simulation.dynamics.numerical_failure import is_numerical, named, numerical_failure

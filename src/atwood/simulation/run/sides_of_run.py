@@ -7,8 +7,8 @@ from collections.abc import Iterable
 
 from atwood.arrays import FloatArray
 from atwood.forms.assembly import Assembly
-from atwood.forms.shared import Shared
-from atwood.forms.sides.taken_out import in_pieces
+from atwood.forms.caches import Shared
+from atwood.forms.sides import in_pieces
 from atwood.integrators.methods import AUTO, METHODS
 from atwood.lazy_dataclasses import replace
 from atwood.simulation.events.sides import find_sides, layers, plain_sides

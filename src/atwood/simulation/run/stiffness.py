@@ -20,7 +20,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError
 from atwood.expr import Expression, depends_on
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.integrators.protocol import Values
 from atwood.lazy_dataclasses import dataclass
 

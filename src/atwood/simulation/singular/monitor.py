@@ -16,10 +16,8 @@ from atwood.arrays import FloatArray
 from atwood.integrators.compiled_functions import Lookout
 from atwood.integrators.protocol import Status, StepResult
 from atwood.simulation.problem.problem import Plan
-from atwood.simulation.singular.crossing import SingularCrossing
-from atwood.simulation.singular.looks import Look, as_lookout, compiled_looks, going_on, stride_from
-from atwood.simulation.singular.rank_measure import zero_ahead
-from atwood.simulation.singular.ways import WaysOver
+from atwood.simulation.singular.branches import Look, WaysOver, as_lookout, compiled_looks, going_on, stride_from
+from atwood.simulation.singular.crossing import SingularCrossing, zero_ahead
 from atwood.tolerances import tolerances
 
 _REVIEW = 8

@@ -13,7 +13,7 @@ import numpy as np
 from atwood.arguments import each, instance, takes, whole
 from atwood.errors import AtwoodError
 from atwood.forms.canonical import is_canonical
-from atwood.forms.dae import LEVELS
+from atwood.forms.residuals import LEVELS
 from atwood.integrators.methods import EXPLICIT, GAUSS, METHODS
 from atwood.integrators.protocol import Statistics
 from atwood.lazy_dataclasses import replace

@@ -12,8 +12,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.expr import Expression
 from atwood.forms.assembly import Assembly
-from atwood.forms.shared import Slot, decisions_of, find_slots
-from atwood.forms.starting import starting
+from atwood.forms.other_values import Slot, decisions_of, find_slots, starting
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import extent, sizing_parameters

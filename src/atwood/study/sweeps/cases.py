@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from atwood.arguments import show
 from atwood.errors import UsageError
-from atwood.forms.starting import change_scene
+from atwood.forms.other_values import change_scene
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.compose.scene import Scene

@@ -12,8 +12,8 @@ from atwood.codegen.sundials.events import EventCode, EventData
 from atwood.errors import AtwoodError
 from atwood.expr import Program
 from atwood.forms.assembly import Assembly
-from atwood.forms.shared import decisions_of
-from atwood.forms.sides.taken_out import has_sides
+from atwood.forms.other_values import decisions_of
+from atwood.forms.sides import has_sides
 from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
 from atwood.integrators.explicit_session import ExplicitSession
 from atwood.integrators.protocol import Budget, Statistics, Status, StepResult

@@ -14,7 +14,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, UnsupportedError, UsageError, suggestion
 from atwood.expr import OutputGroup, Program, vjp
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.forms.lagrangian import lagrangian_along_speeds
 from atwood.forms.program import rates_are_speeds, state_groups
 from atwood.lazy_dataclasses import dataclass, replace

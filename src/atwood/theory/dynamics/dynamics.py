@@ -16,13 +16,13 @@ from atwood.arrays import FloatArray
 from atwood.errors import SolveError, UnsupportedError, UsageError, suggestion_in_parts
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, jvp, substitute
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
-from atwood.forms.places import to_maximal
+from atwood.forms.caches import Key
 from atwood.forms.program import is_too_long, state_groups
+from atwood.forms.quantities import to_maximal
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.model.compose.composite import Model
-from atwood.numerics.independence import independent_rows
+from atwood.numerics.rank import independent_rows
 from atwood.pipeline import SCENE, assembly_of
 from atwood.simulation.dynamics.balance import BalanceValues, balance_of, mass_at, solve_balance
 from atwood.simulation.dynamics.scales import motion_scales

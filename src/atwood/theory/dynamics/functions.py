@@ -14,7 +14,7 @@ from atwood.errors import KernelEvaluationError, UsageError
 from atwood.expr import Program
 from atwood.expr.core.relations import values_just_after
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.simulation.problem.not_compilable import find_not_compilable
 
 _NATIVE: Key[NativeProgram] = Key("machine code for one state")

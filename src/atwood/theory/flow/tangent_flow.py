@@ -21,8 +21,8 @@ from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
+from atwood.numerics.matrices import least_norm
 from atwood.numerics.rank import null_space
-from atwood.numerics.solutions import least_norm
 from atwood.pipeline import SCENE
 from atwood.result.result import Result
 from atwood.simulation.problem.arguments import OUTPUTS, RTOL, SOLVER, T_END

@@ -16,7 +16,7 @@ from atwood.display import count_of
 from atwood.errors import KernelEvaluationError, StartError, UnsupportedError
 from atwood.expr import Expression, Program, depends_on, jacobian, substitute
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.forms.lagrangian import Lagrangian, lagrangian_of
 from atwood.forms.quantities import known_program
 from atwood.lazy_dataclasses import dataclass, replace

@@ -17,7 +17,7 @@ from atwood.display import count_of
 from atwood.errors import AtwoodError, KernelEvaluationError, SolveError, UnsupportedError, UsageError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, jvp, substitute, vjp
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.forms.lagrangian import Lagrangian
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start

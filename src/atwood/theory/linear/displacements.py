@@ -13,10 +13,10 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.expr import Expression, jvp
-from atwood.forms.places import to_maximal
+from atwood.forms.quantities import to_maximal
 from atwood.lazy_dataclasses import dataclass
-from atwood.numerics.solutions import least_squares
-from atwood.simulation.dynamics.partitioning import choose_dependent_coordinates
+from atwood.numerics.matrices import least_squares
+from atwood.simulation.dynamics.redundancy import choose_dependent_coordinates
 from atwood.theory.linear.variations import Flow, LinearScene, Variation
 
 

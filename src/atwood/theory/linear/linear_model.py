@@ -20,8 +20,8 @@ from atwood.display import data_of
 from atwood.errors import UsageError
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import scipy
+from atwood.numerics.matrices import least_squares
 from atwood.numerics.rank import decompose, null_space, rank, span
-from atwood.numerics.solutions import least_squares
 from atwood.table import Shown, Table, facts, table
 
 

@@ -11,7 +11,7 @@ from atwood.arguments import Kind, Refused
 from atwood.arrays import FloatArray
 from atwood.errors import ParameterError, StartError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.compose.composite import Model
 from atwood.model.local.bound import variation_names

@@ -14,11 +14,10 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
-from atwood.forms.places import to_maximal
+from atwood.forms.quantities import to_maximal
 from atwood.lazy_dataclasses import dataclass
-from atwood.numerics.matrices import to_array
+from atwood.numerics.matrices import least_norm, to_array
 from atwood.numerics.rank import null_space
-from atwood.numerics.solutions import least_norm
 from atwood.simulation.dynamics.balance import Balance, balance_of
 from atwood.theory.linear.displacements import Minimal, find_minimal
 from atwood.theory.linear.variations import Flow, LinearScene

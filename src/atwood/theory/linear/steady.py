@@ -16,8 +16,8 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.lazy_dataclasses import dataclass
+from atwood.numerics.matrices import least_norm
 from atwood.numerics.rank import null_space
-from atwood.numerics.solutions import least_norm
 from atwood.theory.linear.variations import Flow, LinearScene
 
 _STEADY = 1e-7

@@ -26,7 +26,7 @@ from atwood.codegen import BoundKernel
 from atwood.codegen.rounding import ROUGHNESS
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, SparseMatrix, jacobian
 from atwood.forms.assembly import Assembly, FormName
-from atwood.forms.kept import Key
+from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.simulation.dynamics.balance import balance_of, solve_determined

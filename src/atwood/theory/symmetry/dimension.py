@@ -19,9 +19,9 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
+from atwood.numerics.matrices import least_norm
 from atwood.numerics.newton import Missing, newton
 from atwood.numerics.rank import decompose, null_space
-from atwood.numerics.solutions import least_norm
 from atwood.simulation.initialization.start import Start, find_start
 from atwood.theory.symmetry.generic import Bodies, LooseScene
 from atwood.tolerances import tolerances

@@ -22,8 +22,8 @@ from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.orientation import spin_in_world
-from atwood.numerics.independence import certain, independent_rows
 from atwood.numerics.matrices import from_entries, to_array
+from atwood.numerics.rank import certain, independent_rows
 from atwood.simulation.dynamics.balance import BalanceValues, balance_of, solve_balance
 from atwood.simulation.dynamics.kinematic_map import KinematicMap, kinematic_map_of
 from atwood.simulation.dynamics.scales import motion_scales

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from atwood.arrays import FloatArray
+from atwood.numerics.matrices import least_norm
 from atwood.numerics.rank import null_space, span
-from atwood.numerics.solutions import least_norm
 from atwood.theory.symmetry.states import KEPT, State
 
 _ROUND = 1e-8

@@ -16,7 +16,7 @@ from atwood.arrays import FloatArray
 from atwood.expr import Expression, affine_coefficients, evaluate, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian, lagrangian_of
-from atwood.forms.places import to_maximal
+from atwood.forms.quantities import to_maximal
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.kinematics.mechanism import extent
 from atwood.mechanics.kinematics.orientation import spin_in_world

@@ -25,9 +25,8 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.program import state_groups
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.numerics.independence import independent_rows
-from atwood.numerics.matrices import from_entries, to_array
-from atwood.numerics.solutions import least_norm
+from atwood.numerics.matrices import from_entries, least_norm, to_array
+from atwood.numerics.rank import independent_rows
 from atwood.simulation.dynamics.balance import BalanceValues, balance_of, mass_at, solve_balance
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.orientation_coordinates import from_regular

@@ -1,9 +1,9 @@
-"""Derivations that are kept on disk: rewriting equations as by hand, and solving them for accelerations.
+"""Caches: of what is made from one assembly, from all assemblies of one structure, and of derivations on disk.
 
-A derivation reads expressions and adds nodes to their graph. What it adds depends on the whole graph, since products
-meet products that are there already; on what it reads; and on its code. All of that is the name of its entry, so a
-change of any of it is another entry. What is kept are the nodes themselves in their order, so that the graph is
-afterwards just as if they had been derived.
+A derivation, as of equations rewritten as by hand or solved for accelerations, reads expressions and adds nodes to
+their graph. What it adds depends on the whole graph, since products meet products that are there already; on what it
+reads; and on its code. All of that is the name of its entry on disk, so a change of any of it is another entry. What
+is kept there are the nodes themselves in their order, so that the graph is afterwards just as if they had been derived.
 """
 
 from __future__ import annotations
@@ -12,12 +12,13 @@ import marshal
 import pickle
 import platform
 import sys
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Hashable, Sequence
 from functools import cache
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from atwood.codegen.cache import default_cache, make_key
 from atwood.errors import UnsupportedError
@@ -25,6 +26,86 @@ from atwood.expr import Expression, Graph
 from atwood.expr.core.operations import BINARY, UNARY
 from atwood.expr.simplify.collect import collect
 from atwood.mechanics.dynamics.equations import Equations
+from atwood.stages import stage
+
+T = TypeVar("T")
+
+
+class Key(Generic[T]):
+    """Under which something of one type is kept; no two keys are equal.
+
+    Parameters
+    ----------
+    name
+        What it is, in words.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def __repr__(self) -> str:
+        return f"<{self.name}>"
+
+
+class Kept:
+    """What was made from one value. It is not part of the value, and is made again for a copy."""
+
+    def __init__(self) -> None:
+        self._made: dict[Hashable, Any] = {}
+
+    def get(self, key: Key[T], make: Callable[[], T], *about: Hashable) -> T:
+        """Return what was made under a key, making it if it is not there."""
+        known = self._made.get(key)
+        if known is not None and known[0] == about:
+            found: T = known[1]
+            return found
+        made = make()
+        self._made[key] = about, made
+        return made
+
+
+class Shared:
+    """What is made once for all assemblies of one structure, when it is first asked for; any thread may ask.
+
+    Parameters
+    ----------
+    family
+        What the other modes of the scene share with it; its own if not given.
+
+    Attributes
+    ----------
+    lock
+        Held while something is made: the expressions of one structure live in one graph.
+    """
+
+    def __init__(self, family: Shared | None = None) -> None:
+        self.family = family or self
+        self._made: dict[Hashable, Any] = {}
+        self.lock = threading.RLock()
+
+    def __repr__(self) -> str:
+        return f"<Shared: {len(self._made)} of equations, programs and the like>"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Shared, ()  # what was made belongs to the process; who shared it does so again
+
+    def get(self, key: Key[T], make: Callable[[], T], *about: Hashable) -> T:
+        """Return what was made under a key, making it if it is not there."""
+        place = (key, *about) if about else key
+        try:
+            found: T = self._made[place]
+        except KeyError:
+            with self.lock, stage("equations"):
+                if place not in self._made:
+                    self._made[place] = make()
+                found = self._made[place]
+        return found
+
+    def known(self, key: Key[T]) -> T | None:
+        """Return what was made under a key; None if nothing was."""
+        found: T | None = self._made.get(key)
+        return found
+
 
 _FORMAT = 1
 """Counts changes to what an entry holds."""

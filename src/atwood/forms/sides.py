@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, live
 from atwood.expr.core.algebra import build
 from atwood.expr.core.relations import MotionRelations, Relation
-from atwood.forms.kept import Key
-from atwood.forms.places import to_maximal
+from atwood.forms.caches import Key, Shared
+from atwood.forms.other_values import MAXIMAL, REDUCED, REGULAR
 from atwood.forms.program import state_groups
-from atwood.forms.shared import MAXIMAL, REDUCED, REGULAR, Shared
+from atwood.forms.quantities import to_maximal
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.dynamics.equations import Equations
 

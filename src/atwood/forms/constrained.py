@@ -19,9 +19,9 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 from atwood.expr import Expression, OutputGroup, Program, jacobian, solve, substitute
-from atwood.forms.dae import keep_constraints
-from atwood.forms.derived import derive_once
+from atwood.forms.caches import derive_once
 from atwood.forms.program import rates_are_speeds, state_groups
+from atwood.forms.residuals import keep_constraints
 from atwood.lazy_dataclasses import dataclass, names_of
 from atwood.mechanics.dynamics.augmented import SymmetricSystem, back_substitute, eliminate, fill_of
 from atwood.mechanics.dynamics.equations import Equations

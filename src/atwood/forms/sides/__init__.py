@@ -1,1 +1,0 @@
-"""Relations of what moves as parameters of the programs that are run."""
