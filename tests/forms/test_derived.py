@@ -24,7 +24,7 @@ from atwood import (
 )
 from atwood.codegen.cache import Cache
 from atwood.errors import UnsupportedError
-from atwood.forms import accelerations, caches as derived
+from atwood.forms import accelerations, caches
 from atwood.forms.accelerations import acceleration_program
 from atwood.forms.caches import SOURCES, derivation_key, hash_of_sources
 from atwood_library import PointMass
@@ -35,7 +35,7 @@ PACKAGE = Path(atwood.__file__).parent
 
 @pytest.fixture
 def own_cache(monkeypatch, tmp_path):
-    monkeypatch.setattr(derived, "default_cache", lambda: Cache(tmp_path))
+    monkeypatch.setattr(caches, "default_cache", lambda: Cache(tmp_path))
     return Cache(tmp_path)
 
 
@@ -169,9 +169,9 @@ def test_what_derives_is_in_the_sources_that_the_key_covers(name, monkeypatch):
 @pytest.mark.parametrize("name", ["double-pendulum", "double-pendulum-3d", "rolling-ball"])
 def test_other_processes_find_the_same_entries(name):
     code = (
-        "from atwood.forms import derived; from atwood import assemble, simulate;"
-        "from atwood_library.scenes import SCENES; make = derived.derivation_key;"
-        "derived.derivation_key = lambda *a: print(make(*a)) or make(*a);"
+        "from atwood.forms import caches; from atwood import assemble, simulate;"
+        "from atwood_library.scenes import SCENES; make = caches.derivation_key;"
+        "caches.derivation_key = lambda *a: print(make(*a)) or make(*a);"
         f"simulate(SCENES['{name}'](), t_end=0.01)"
     )
     outputs = set()
@@ -194,6 +194,6 @@ def test_the_key_changes_with_versions_and_code(monkeypatch):
         patch.setattr("atwood.forms.caches.platform.machine", lambda: "vax")
         assert key(scene()) != before
     with monkeypatch.context() as patch:
-        patch.setattr(derived, "hash_of_sources", lambda: "other")
+        patch.setattr(caches, "hash_of_sources", lambda: "other")
         assert key(scene()) != before
     assert key(scene()) == before
