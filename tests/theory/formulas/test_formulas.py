@@ -34,7 +34,7 @@ from atwood import (
 from atwood.expr import evaluate
 from atwood.model.declare.contributions import Load
 from atwood.theory.equations.equations import EquationsOfMotion
-from atwood.theory.formulas import code
+from atwood.theory.formulas.printers import code
 from atwood_library import PointMass
 from atwood_library.scenes import SCENES
 
@@ -57,8 +57,8 @@ def names_of(eq: EquationsOfMotion, seed: int = 5) -> tuple[dict[Any, float], di
     values |= dict(zip(eq.assembly.parameters, eq.assembly.parameter_values.tolist(), strict=True))
     values[found.time] = eq.assembly.flat.t_start
     names: dict[str, Any] = {name: getattr(math, name) for name in code.MATH}
-    names |= {code.identifier(symbol): values[e] for e, symbol in notation.symbols.items()}
-    names |= {code.identifier(symbol, dots): values[e] for e, (symbol, dots) in notation.velocities.items()}
+    names |= {code.letter(symbol): values[e] for e, symbol in notation.symbols.items()}
+    names |= {code.letter(symbol, dots): values[e] for e, (symbol, dots) in notation.velocities.items()}
     names |= {"np": np, "solve": np.linalg.solve}
     return values, names
 

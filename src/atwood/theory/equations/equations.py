@@ -22,10 +22,10 @@ from atwood.simulation.problem.arguments import FORM, ORIENTATION
 from atwood.theory.equations.formulas import EquationFormulas, Parameters, solve_closures
 from atwood.theory.equations.modules import module_of
 from atwood.theory.equations.pages import as_data, equation_lines, html_of, sections_of, symbol_lines, symbol_table
-from atwood.theory.formulas import objects, page
+from atwood.theory.formulas import page
 from atwood.theory.formulas.notation import notation_of
-from atwood.theory.formulas.objects import Sympy
 from atwood.theory.formulas.page import Section
+from atwood.theory.formulas.printers import Sympy, objects
 from atwood.theory.formulas.tree import Sum
 
 
@@ -93,36 +93,36 @@ class EquationsOfMotion(EquationFormulas):
         """
         for one in self.legend:
             if one.path == path:
-                return objects.symbol_of(one)
+                return objects.letter(one)
         merged = {other.name: self.notation.symbols[first] for other, first in self.notation.merged.items()}
         if path in merged and self.parameters == "symbolic":
-            return objects.symbol_of(merged[path])
+            return objects.letter(merged[path])
         raise UsageError("it has no symbol", where=path, advice=suggestion(path, [one.path for one in self.legend]))
 
     @property
     def values(self) -> dict[Sympy, float]:
         """The value of each parameter's symbol, in SI units."""
-        return {objects.symbol_of(one): one.value for one in self.legend if one.value is not None}
+        return {objects.letter(one): one.value for one in self.legend if one.value is not None}
 
     @property
     def coordinates(self) -> tuple[Sympy, ...]:
         """The coordinates q, functions of t."""
-        return tuple(objects.symbol_of(self.notation.symbols[q]) for q in self.expressions.coordinates)
+        return tuple(objects.letter(self.notation.symbols[q]) for q in self.expressions.coordinates)
 
     @property
     def velocities(self) -> tuple[Sympy, ...]:
         """The velocities: derivatives of coordinates, and components of angular velocities in the axes of a body."""
-        return tuple(objects.derivative(*self.notation.velocities[u]) for u in self.expressions.velocities)
+        return tuple(objects.letter(*self.notation.velocities[u]) for u in self.expressions.velocities)
 
     @property
     def accelerations(self) -> tuple[Sympy, ...]:
         """The derivatives of the velocities."""
-        return tuple(objects.derivative(*self.notation.velocities[a]) for a in self.expressions.accelerations)
+        return tuple(objects.letter(*self.notation.velocities[a]) for a in self.expressions.accelerations)
 
     @property
     def multipliers(self) -> tuple[Sympy, ...]:
         """One for each constraint; the generalized force of the constraints is ``G^T lambda``."""
-        return tuple(objects.symbol_of(self.notation.symbols[one.multiplier]) for one in self.expressions.constraints)
+        return tuple(objects.letter(self.notation.symbols[one.multiplier]) for one in self.expressions.constraints)
 
     @property
     def rates(self) -> tuple[Sympy, ...]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from atwood.errors import UnsupportedError
 from atwood.expr import substitute
-from atwood.theory.formulas import code
+from atwood.theory.formulas.printers import code
 from atwood.theory.formulas.tree import Call, Name, Node, Sum, names_in
 from atwood.tolerances import tolerances
 
@@ -42,7 +42,7 @@ def module_of(eq: EquationsOfMotion) -> str:
     if found.constraints:
         head += [f"RANK = {tolerances.CLEAR!r}  # smaller singular values of constraints are rounding and drift", ""]
     head += [
-        f"{code.identifier(one)} = {one.value!r}  # {one.path}" + (f", {one.unit}" if one.unit else "")
+        f"{code.letter(one)} = {one.value!r}  # {one.path}" + (f", {one.unit}" if one.unit else "")
         for one in eq.legend
         if one.kind == "parameter"
     ]
@@ -56,8 +56,8 @@ def _statement(eq: EquationsOfMotion) -> str:
 
 def _listing(eq: EquationsOfMotion) -> list[str]:
     found, notation = eq.expressions, eq.notation
-    q = (f"{code.identifier(notation.symbols[one])} ({notation.symbols[one].path})" for one in found.coordinates)
-    u = (code.identifier(*notation.velocities[one]) for one in found.velocities)
+    q = (f"{code.letter(notation.symbols[one])} ({notation.symbols[one].path})" for one in found.coordinates)
+    u = (code.letter(*notation.velocities[one]) for one in found.velocities)
     return [f"q: {', '.join(q)}", f"u: {', '.join(u)}"]
 
 
@@ -71,9 +71,9 @@ def _function(eq: EquationsOfMotion, name: str, arguments: str, said: str, formu
             wanted |= {one.symbol for one in names_in([value])}
             needed.insert(0, f"    {code.formula(shared)} = {code.formula(value)}")
     lines = [f"def {name}({arguments}):", f'    """{said}"""']
-    lines += _unpacked([code.identifier(notation.symbols[one]) for one in found.coordinates], "q")
+    lines += _unpacked([code.letter(notation.symbols[one]) for one in found.coordinates], "q")
     if "u" in arguments:
-        lines += _unpacked([code.identifier(*notation.velocities[one]) for one in found.velocities], "u")
+        lines += _unpacked([code.letter(*notation.velocities[one]) for one in found.velocities], "u")
     rows = [f"        {code.formula(one)}," for one in formulas]
     shape = {"mass_matrix": len(found.velocities), "constraint_jacobian": len(found.constraints)}.get(name)
     end = f"]).reshape({shape}, -1)" if shape else "])"

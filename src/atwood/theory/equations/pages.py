@@ -12,8 +12,9 @@ from atwood.expr import dependencies
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian, rows_by_part
 from atwood.lazy_dataclasses import dataclass
-from atwood.theory.formulas import code, latex, page, text
+from atwood.theory.formulas import page
 from atwood.theory.formulas.page import Line, Matrix, Section
+from atwood.theory.formulas.printers import code, latex, text
 from atwood.theory.formulas.tree import Sum, Symbol, names_in
 
 if TYPE_CHECKING:

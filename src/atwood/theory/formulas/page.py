@@ -9,7 +9,7 @@ from fractions import Fraction
 from html import escape
 
 from atwood.lazy_dataclasses import dataclass
-from atwood.theory.formulas import latex, text
+from atwood.theory.formulas.printers import latex, text
 from atwood.theory.formulas.tree import Call, Name, Node, Sum, Symbol, Term, replaced
 
 _WIDTH = 88

@@ -28,10 +28,10 @@ from atwood.simulation.problem.arguments import ORIENTATION
 from atwood.theory.dynamics.functions import Numbers
 from atwood.theory.equations.equations import PARAMETERS
 from atwood.theory.equations.formulas import EquationFormulas, Parameters
-from atwood.theory.formulas import latex, objects, page, text
+from atwood.theory.formulas import page
 from atwood.theory.formulas.notation import Notation, notation_of
-from atwood.theory.formulas.objects import Sympy
 from atwood.theory.formulas.page import Line, Section
+from atwood.theory.formulas.printers import Sympy, latex, objects, text
 from atwood.theory.formulas.tree import Sum, Symbol, Term, cost, in_brackets, in_order, names_in, product
 from atwood.theory.hamiltonian.legendre import (
     LegendreTransform,
@@ -226,17 +226,17 @@ class Hamiltonian:
     @property
     def coordinates(self) -> tuple[Sympy, ...]:
         """The coordinates q, functions of t."""
-        return tuple(objects.symbol_of(self.formulas.notation.symbols[q]) for q in self._lagrangian.coordinates)
+        return tuple(objects.letter(self.formulas.notation.symbols[q]) for q in self._lagrangian.coordinates)
 
     @property
     def momenta(self) -> tuple[Sympy, ...]:
         """The momenta p, functions of t."""
-        return tuple(map(objects.symbol_of, self._letters))
+        return tuple(map(objects.letter, self._letters))
 
     @property
     def values(self) -> dict[Sympy, float]:
         """The value of each parameter's symbol, in SI units."""
-        return {objects.symbol_of(one): one.value for one in self.formulas.legend if one.value is not None}
+        return {objects.letter(one): one.value for one in self.formulas.legend if one.value is not None}
 
     @cached_property
     def is_short(self) -> bool:

@@ -12,8 +12,8 @@ from atwood.expr.formulas.sympy_bridge import from_sympy
 from atwood.expr.simplify.polynomial import TooLargeError
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import mpmath, sympy
-from atwood.theory.formulas import objects
 from atwood.theory.formulas.book import Book
+from atwood.theory.formulas.printers import objects
 from atwood.theory.formulas.tree import Name, Symbol
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, read_hamiltonian
 from atwood.theory.symmetry.proof import is_proven_zero

@@ -14,8 +14,8 @@ from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of
 from atwood.theory.equations.formulas import EquationFormulas
-from atwood.theory.formulas import objects
 from atwood.theory.formulas.notation import notation_of
+from atwood.theory.formulas.printers import objects
 from atwood.theory.formulas.tree import Sum
 from atwood.theory.hamiltonian.phase_space import Sympy, collected, short
 from atwood.theory.symmetry.find import find_conserved
@@ -52,7 +52,7 @@ class Routhian:
 
     @cached_property
     def _letters(self) -> tuple[Sympy, ...]:
-        return tuple(objects.symbol_of(self.formulas.notation.symbols[q]) for q in self._found.coordinates)
+        return tuple(objects.letter(self.formulas.notation.symbols[q]) for q in self._found.coordinates)
 
     @property
     def coordinates(self) -> tuple[Sympy, ...]:

@@ -28,9 +28,8 @@ from atwood.simulation.problem.arguments import ORIENTATION
 from atwood.simulation.run.record import SegmentRecord
 from atwood.table import Shown, Table, table
 from atwood.theory.equations.formulas import EquationFormulas
-from atwood.theory.formulas import latex, objects, text
 from atwood.theory.formulas.notation import notation_of
-from atwood.theory.formulas.objects import Sympy
+from atwood.theory.formulas.printers import Sympy, latex, objects, text
 from atwood.theory.formulas.tree import Sum
 from atwood.theory.symmetry.find import Finding, find_conserved
 from atwood.theory.symmetry.proof import Prover

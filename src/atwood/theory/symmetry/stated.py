@@ -16,7 +16,7 @@ from atwood.lazy_modules import sympy
 from atwood.mechanics.outputs.observables import add_up
 from atwood.model.values.units import parse_unit
 from atwood.theory.equations.formulas import EquationFormulas
-from atwood.theory.formulas import objects
+from atwood.theory.formulas.printers import objects
 from atwood.theory.symmetry.find import Finding
 from atwood.theory.symmetry.proof import Prover
 from atwood.theory.symmetry.quantities import Quantities
@@ -153,9 +153,9 @@ class _Reader:
         notation, self._graph = formulas.notation, formulas.expressions.graph
         self._known: dict[Any, Expression] = {}
         for expression, symbol in notation.symbols.items():
-            self._known[objects.derivative(symbol, 0)] = expression
+            self._known[objects.letter(symbol, 0)] = expression
         for expression, (symbol, dots) in notation.velocities.items():
-            self._known[objects.derivative(symbol, dots)] = expression
+            self._known[objects.letter(symbol, dots)] = expression
         self._scene = formulas.name
 
     def read(self, value: Any, what: str) -> Expression:
