@@ -187,10 +187,10 @@ class _Latex(_Lines):
         below = [(node, -power) for node, power in term.factors if power < 0]
         if not below:
             return super()._term(term)
-        value = abs(term.number)
-        top, bottom = value, 1
-        if isinstance(value, Fraction):
-            top, bottom = Fraction(value.numerator), value.denominator
+        top: Number = abs(term.number)
+        bottom = 1
+        if isinstance(top, Fraction):
+            top, bottom = Fraction(top.numerator), top.denominator
         upper = [] if top == 1 and above else [self._number(top)]
         lower = [] if bottom == 1 else [str(bottom)]
         upper += [self._power(node, power, len(above) == 1 and not upper) for node, power in above]
