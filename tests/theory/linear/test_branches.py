@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from atwood import Scene, UsageError, connect, equilibrium_branches, parameter
-from atwood.theory.linear.continuation import Problem, Residual, branch_directions, follow
+from atwood.theory.linear.branches import Problem, Residual, branch_directions, follow
 from atwood_library import Ground, Mass1D, Pivot, PointMass, Ramp, RotaryDrive, Spring, Weld
 
 

@@ -18,7 +18,7 @@ from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import mpmath, sympy
 from atwood.model.compose.composite import Model
-from atwood.theory.action.quadrature import Level, level_through
+from atwood.theory.action.action_angle import Level, level_through
 from atwood.theory.formulas.printers import Sympy
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian
 from atwood.theory.hamiltonian.phase_space import EXPRESSION

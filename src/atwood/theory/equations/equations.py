@@ -20,8 +20,15 @@ from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of
 from atwood.simulation.problem.arguments import FORM, ORIENTATION
 from atwood.theory.equations.formulas import EquationFormulas, Parameters, solve_closures
-from atwood.theory.equations.modules import module_of
-from atwood.theory.equations.pages import as_data, equation_lines, html_of, sections_of, symbol_lines, symbol_table
+from atwood.theory.equations.pages import (
+    as_data,
+    equation_lines,
+    html_of,
+    module_of,
+    sections_of,
+    symbol_lines,
+    symbol_table,
+)
 from atwood.theory.formulas import page
 from atwood.theory.formulas.notation import notation_of
 from atwood.theory.formulas.page import Section

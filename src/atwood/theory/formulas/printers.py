@@ -187,7 +187,7 @@ class _Latex(_Lines):
         below = [(node, -power) for node, power in term.factors if power < 0]
         if not below:
             return super()._term(term)
-        top: Number = abs(term.number)
+        top = term.times(Fraction(1 if term.number > 0 else -1)).number
         bottom = 1
         if isinstance(top, Fraction):
             top, bottom = Fraction(top.numerator), top.denominator

@@ -1,18 +1,16 @@
 """Hamiltonian mechanics: the Legendre transform, Poisson brackets, canonical and point transformations."""
 
-from atwood.theory.hamiltonian.brackets import (
-    fundamental_brackets,
-    poisson_bracket,
-    poisson_brackets,
-    total_derivative,
-)
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian
 from atwood.theory.hamiltonian.transformations import (
     CanonicalTransformation,
     PointTransformation,
     canonical_transformation,
+    fundamental_brackets,
     generated_transformation,
     point_transformation,
+    poisson_bracket,
+    poisson_brackets,
+    total_derivative,
 )
 
 __all__ = [

@@ -9,9 +9,8 @@ from atwood.theory.linear.branches import (
 from atwood.theory.linear.equilibria import Equilibria, Equilibrium, equilibria
 from atwood.theory.linear.linear_model import LinearModel
 from atwood.theory.linear.linearize import linearize
-from atwood.theory.linear.normal_modes import NormalModes, normal_modes
-from atwood.theory.linear.root_locus import RootLocus, root_locus
-from atwood.theory.linear.trim import Trim, trim
+from atwood.theory.linear.normal_modes import NormalModes, RootLocus, normal_modes, root_locus
+from atwood.theory.linear.steady import Trim, trim
 
 __all__ = [
     "BranchPoint",

@@ -22,10 +22,9 @@ from atwood.pipeline import SCENE
 from atwood.ranges import range_of
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.table import Shown, Table, table
-from atwood.theory.linear.degenerate import Degenerate, follow_null_space
 from atwood.theory.linear.normal_modes import NormalModes, modes_of, values_text
 from atwood.theory.linear.operating_point import OperatingPoint, find_operating_point, moved_to, values_at
-from atwood.theory.linear.rest import Rest, RestSearch, difference, wrapped
+from atwood.theory.linear.rest import Degenerate, Rest, RestSearch, difference, follow_null_space, wrapped
 
 _STARTS = 32
 """For each independent coordinate, so many starts of Newton's method, spread evenly over the region."""

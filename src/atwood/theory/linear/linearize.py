@@ -1,6 +1,7 @@
 """`linearize`: the linear model of a scene about a state, with the errors that rounding makes in its matrices.
 
-At a switch, where a law changes from one side to the other, there is no linear model.
+At a switch, where a law changes from one side to the other, there is no linear model. Outputs are coordinates or
+quantities of components.
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ import numpy as np
 from atwood.arguments import PATHS, takes
 from atwood.arrays import FloatArray
 from atwood.codegen.rounding import ROUGHNESS
-from atwood.errors import AtwoodError, UsageError
-from atwood.expr import Expression, OutputGroup, Program, live
+from atwood.errors import AtwoodError, ParameterError, UnsupportedError, UsageError, suggestion_in_parts
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, jacobian, live
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
@@ -29,7 +30,6 @@ from atwood.theory.linear.operating_point import (
     speed_name,
     values_at,
 )
-from atwood.theory.linear.quantities import output_rows
 from atwood.theory.linear.steady import Steady, find_steady, pace_of, still
 from atwood.theory.linear.variations import Flow, LinearScene
 from atwood.tolerances import tolerances
@@ -342,3 +342,63 @@ def _margins(scene: LinearScene) -> tuple[Expression, ...]:
                 first = node.arguments[0]
                 found[first if len(node.arguments) == 1 else first - node.arguments[1]] = None
     return tuple(found)
+
+
+def output_rows(point: OperatingPoint, flow: Flow, minimal: Minimal, paths: Sequence[str]) -> FloatArray:
+    """Return how quantities change with minimal states and inputs, shape (quantities, columns of `Minimal`)."""
+    found, known = [], point.assembly.start_observables
+    for path in paths:
+        if path not in known:
+            raise ParameterError("there is no such quantity", where=path, advice=suggestion_in_parts(path, known))
+        found.append(known[path].value)
+    scene, now, inputs = point.scene, flow.variation, len(point.scene.inputs)
+    total = np.zeros((len(found), minimal.states + inputs))
+    if not found:
+        return total
+    parts = scene.differentiated("quantity", found)
+    reads = {node for node in live(found) if node.is_symbol}
+    reactions = [one for one in point.assembly.reactions if one.symbol in reads]
+    by_reaction = jacobian(found, [one.symbol for one in reactions])
+    outputs = [OutputGroup(f"quantity by {by}", tuple(matrix.entries)) for by, matrix in parts.places.items()]
+    outputs.append(OutputGroup("by reactions", tuple(by_reaction.entries)))
+    groups = (*scene.groups, InputGroup("reactions", tuple(one.symbol for one in reactions)))
+    program = Program(f"{point.assembly.flat.name} outputs, varied", groups, point.assembly.parameters, tuple(outputs))
+    values, changes = _reactions(point, flow, minimal, [one.path for one in reactions])
+    state = (np.array([now.t]), now.q, now.u, now.a, now.multipliers, values)
+    numbers = scene.evaluate(point.assembly.kernel(program), program, state)
+    by = scene.matrices(parts, numbers)
+    columns = minimal.states
+    acceleration = flow.acceleration[:, : len(flow.field)] @ minimal.state
+    acceleration[:, columns:] += flow.acceleration[:, len(flow.field) + 1 :]
+    total += by["quantity", "q"] @ now.basis @ minimal.shift + by["quantity", "u"] @ minimal.speed
+    total += by["quantity", "a"] @ acceleration
+    total[:, columns:] += by["quantity", "w"]
+    np.add.at(total, list(by_reaction.rows), numbers["by reactions"][:, None] * changes[list(by_reaction.columns)])
+    return total
+
+
+def _reactions(
+    point: OperatingPoint, flow: Flow, minimal: Minimal, paths: Sequence[str]
+) -> tuple[FloatArray, FloatArray]:
+    """Return the values of reactions, and how they change with minimal states and inputs."""
+    if not paths:
+        return np.zeros(0), np.zeros((0, minimal.states + len(point.scene.inputs)))
+    image, kept, _ = image_of(point.scene, flow, minimal)
+    number = {one.key: i for i, one in enumerate(point.assembly.maximal.constraints)}
+    of_path = {one.path: one for one in point.assembly.reactions}
+    values, changes = [], []
+    for path in paths:
+        one = of_path[path]
+        if one.key not in number or len(kept) < len(number):
+            why = (
+                "it is inside of a rigid body"
+                if one.key not in number
+                else "constraints are redundant, so that \
+reactions are not unique"
+            )
+            raise UnsupportedError(
+                f"it cannot be an output of a linear model: {why}", where=path, advice="Take another quantity."
+            )
+        values.append(one.sign * image.flow.variation.multipliers[number[one.key]])
+        changes.append(one.sign * image.multiplier[number[one.key]])
+    return np.array(values), np.array(changes)

@@ -17,7 +17,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError, UnsupportedError
 from atwood.lazy_dataclasses import dataclass
-from atwood.theory.reduction.one_coordinate import Radial
+from atwood.theory.reduction.routhian import Radial
 
 _FULL = 2.0 * np.pi
 _LEGENDRE = 24

@@ -22,9 +22,16 @@ from atwood.model.compose.composite import Model
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
 from atwood.theory.hamiltonian.transformations import PointTransformation
-from atwood.theory.reduction.one_coordinate import Radial, parts_of, start_in, transformed_parts
 from atwood.theory.reduction.quadrature import Path, find_path
-from atwood.theory.reduction.routhian import Routhian, ignorable_of, routhian_of
+from atwood.theory.reduction.routhian import (
+    Radial,
+    Routhian,
+    ignorable_of,
+    parts_of,
+    routhian_of,
+    start_in,
+    transformed_parts,
+)
 from atwood.theory.symmetry.quantities import Quantities
 
 

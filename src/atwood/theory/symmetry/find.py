@@ -20,7 +20,9 @@ from atwood.mechanics.outputs.observables import add_up
 from atwood.numerics.matrices import least_norm, or_one
 from atwood.simulation.dynamics.orientation_coordinates import COORDINATE_SWITCH
 from atwood.simulation.events.modes import find_event_functions
-from atwood.theory.symmetry.invariance import (
+from atwood.theory.symmetry.proof import Generator, Prover
+from atwood.theory.symmetry.quantities import (
+    Quantities,
     about_center,
     axis_name,
     axis_text,
@@ -32,8 +34,6 @@ from atwood.theory.symmetry.invariance import (
     rotations_of,
     straight_of,
 )
-from atwood.theory.symmetry.proof import Generator, Prover
-from atwood.theory.symmetry.quantities import Quantities
 from atwood.theory.symmetry.states import KEPT, RandomStates, State
 
 _FEW = 24
