@@ -107,7 +107,7 @@ def roots(tmp_path_factory) -> dict[str, object]:
         "section": atwood.poincare_section(DoublePendulum(), "rod1.angle crosses 0", ["rod2.angle"]),
         "action": atwood.action(DoublePendulum(), t_end=0.1),
         "variation": atwood.action(DoublePendulum(), t_end=0.1).variation(),
-        "joining": atwood.motions_between(SimplePendulum(), {"rod.angle": 0.5}, t_end=0.3),
+        "joining": atwood.boundary_value_motions(SimplePendulum(), {"rod.angle": 0.5}, t_end=0.3),
         "separated": _separated(),
         "action and angle": atwood.action_angle(SimplePendulum()),
         "linear": atwood.linearize(scene, at=hanging, inputs=[], outputs=["bob[0].position.x"]),
@@ -120,7 +120,7 @@ def roots(tmp_path_factory) -> dict[str, object]:
         "equilibria": list(atwood.equilibria(DoublePendulum())),
         "equilibria of a loop": atwood.equilibria(FourBar()),
         "trim": atwood.trim(scene, at=hanging),
-        "start": atwood.solve_start(
+        "start": atwood.solve_initial_values(
             SimplePendulum(), unknowns=["rod.angular_velocity"], conditions={"bob.velocity.x": 1.0}
         ),
         "locus": atwood.root_locus(scene, "gravity", [9.0, 10.0, 11.0], at=hanging),

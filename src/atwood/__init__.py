@@ -9,6 +9,8 @@ and `atwood.checking`.
 from __future__ import annotations
 
 import importlib
+import sys
+import warnings
 from typing import TYPE_CHECKING, Any
 
 from atwood.errors import (
@@ -109,10 +111,10 @@ if TYPE_CHECKING:
         Variation,
         action,
         action_angle,
-        motions_between,
+        boundary_value_motions,
         separation,
     )
-    from atwood.theory.dynamics import Dynamics, StartSolution, dynamics, solve_start
+    from atwood.theory.dynamics import Dynamics, StartSolution, dynamics, solve_initial_values
     from atwood.theory.equations import EquationsOfMotion, PartOfEquations, equations
     from atwood.theory.flow import (
         LyapunovExponents,
@@ -230,6 +232,7 @@ __all__ += [
     "Variation",
     "action",
     "action_angle",
+    "boundary_value_motions",
     "canonical_transformation",
     "conserved",
     "dynamics",
@@ -241,7 +244,6 @@ __all__ += [
     "hamiltonian",
     "linearize",
     "lyapunov_exponents",
-    "motions_between",
     "normal_modes",
     "phase_portrait",
     "poincare_section",
@@ -252,7 +254,7 @@ __all__ += [
     "root_locus",
     "routhian",
     "separation",
-    "solve_start",
+    "solve_initial_values",
     "tangent_flow",
     "total_derivative",
     "trim",
@@ -322,14 +324,14 @@ _ROOMS = {
     "atwood.study.comparison.long_runs": ("LongComparison", "compare_long"),
     "atwood.theory.action": (
         "Action", "ActionAngle", "JoiningMotion", "SeparatedMotion", "Separation", "Variation",
-        "action", "action_angle", "motions_between", "separation",
+        "action", "action_angle", "boundary_value_motions", "separation",
     ),
     "atwood.theory.hamiltonian": (
         "CanonicalTransformation", "Hamiltonian", "PointTransformation",
         "canonical_transformation", "fundamental_brackets", "generated_transformation", "hamiltonian",
         "point_transformation", "poisson_bracket", "poisson_brackets", "total_derivative",
     ),
-    "atwood.theory.dynamics": ("Dynamics", "StartSolution", "dynamics", "solve_start"),
+    "atwood.theory.dynamics": ("Dynamics", "StartSolution", "dynamics", "solve_initial_values"),
     "atwood.theory.equations": ("EquationsOfMotion", "PartOfEquations", "equations"),
     "atwood.theory.flow": (
         "LyapunovExponents", "PhasePortrait", "PoincareSection", "RestPoint", "TangentFlow",
@@ -347,6 +349,9 @@ _ROOMS = {
 _LATER = {name: room for room, names in _ROOMS.items() for name in names}
 """Names whose modules are imported when they are first used; each also stands in `__all__` and above."""
 
+_RENAMED = {"motions_between": "boundary_value_motions", "solve_start": "solve_initial_values"}
+"""Names that were others before; the earlier ones work, and warn."""
+
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
@@ -356,6 +361,10 @@ def __getattr__(name: str) -> Any:
             found: Any = version("atwood")
         except PackageNotFoundError:  # a checkout that is not installed
             found = "0+unknown"
+    elif name in _RENAMED:
+        told = f"atwood.{name} is called atwood.{_RENAMED[name]} now; the earlier name will go"
+        warnings.warn(told, DeprecationWarning, stacklevel=2)
+        return getattr(sys.modules[__name__], _RENAMED[name])
     elif name in _LATER:
         found = getattr(importlib.import_module(_LATER[name]), name)
     else:

@@ -44,6 +44,12 @@ def test_every_public_name_is_there():
         _ = atwood.nonsense
 
 
+@pytest.mark.parametrize("name", atwood._RENAMED)
+def test_earlier_names_work_and_warn(name):
+    with pytest.warns(DeprecationWarning, match=atwood._RENAMED[name]):
+        assert getattr(atwood, name) is getattr(atwood, atwood._RENAMED[name])
+
+
 def test_public_names_stay_what_they_are_when_everything_is_loaded():
     """A module of the package must not take the place of a function of the same name."""
     code = """

@@ -138,8 +138,8 @@ def _linear() -> Iterator[Call]:
         },
     )
     yield Call(
-        "solve_start",
-        atwood.solve_start,
+        "solve_initial_values",
+        atwood.solve_initial_values,
         {**scene, "unknowns": ["rod.angle"], "conditions": {"bob.position.x": 0.5}},
         {**_SCENE, "unknowns": "some texts", "conditions": "mapping"},
         {"conditions": ({"bob9.position.x": 1.0}, {"bob.position.x": "x"}, {3: 1.0}, {"bob.position.x": "1 kg"})},
@@ -206,8 +206,8 @@ def _mechanics() -> Iterator[Call]:
     )
     yield Call("action_angle", atwood.action_angle, scene, _SCENE)
     yield Call(
-        "motions_between",
-        atwood.motions_between,
+        "boundary_value_motions",
+        atwood.boundary_value_motions,
         {**scene, "end": {"rod.angle": 0.5}, "t_end": 0.5},
         {**_SCENE, "end": "mapping", "t_end": "time", "start": "optional object"},
         {"end": ({"rod.angle": "x"}, {"rod9.angle": 1.0}, {3: 1.0}, {}), "start": ({"rod.angle": "x"}, {3: 1.0})},

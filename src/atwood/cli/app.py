@@ -25,6 +25,9 @@ _COMMANDS = {
 }
 """Commands that are no functions of theory: where they are, and what they do."""
 
+_RENAMED = {"solve-start": "solve-initial-values"}
+"""Commands that had other names before, which still work."""
+
 _THEORY = Path(__file__).parents[1] / "theory"
 
 _FUNCTION = re.compile(
@@ -87,6 +90,7 @@ class _Commands(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Find the command that is called, or say which there are that are called nearly so."""
+        args = [_RENAMED.get(args[0], args[0]), *args[1:]]
         if args[0] not in _COMMANDS:
             near = near_matches(args[0], known := self.list_commands(ctx))
             if args[0] not in known and near:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from atwood import Scene, SolveError, UnsupportedError, UsageError, action, connect, motions_between, simulate
+from atwood import Scene, SolveError, UnsupportedError, UsageError, action, boundary_value_motions, connect, simulate
 from atwood_library import Ground, Mass1D, Spring
 from atwood_library.scenes import (
     ChargedParticle,
@@ -42,7 +42,7 @@ def test_derivatives_of_s_are_momentum_and_energy():
     end, step = float(simulate(pendulum(), t_end=3.0, rtol=1e-12)["rod.angle"][-1]), 1e-3
 
     def value(angle, t):
-        (motion,) = motions_between(pendulum(), {"rod.angle": angle}, t_end=t)
+        (motion,) = boundary_value_motions(pendulum(), {"rod.angle": angle}, t_end=t)
         return motion.action.value
 
     by_angle = (value(end + step, 3.0) - value(end - step, 3.0)) / (2.0 * step)
@@ -84,7 +84,7 @@ def test_a_path_that_is_no_motion_has_a_first_variation():
 
 def test_the_action_of_a_motion_is_less_than_that_of_its_neighbours():
     """As long as no conjugate point lies between: here S of the motion and of paths beside it."""
-    (motion,) = motions_between(pendulum(), {"rod.angle": 1.0}, t_end=1.5)
+    (motion,) = boundary_value_motions(pendulum(), {"rod.angle": 1.0}, t_end=1.5)
     assert motion.is_minimum
     t, angle = motion.result.time, motion.result["rod.angle"]
     curve = np.polynomial.Polynomial.fit(t, angle, 16)
@@ -121,7 +121,7 @@ def test_wrong_paths_are_named():
 
 def test_several_motions_join_two_places():
     """A pendulum that has time for it swings over, once or twice, or waits; each has its conjugate points."""
-    found = motions_between(pendulum(), {"rod.angle": 0.3}, t_end=12.0)
+    found = boundary_value_motions(pendulum(), {"rod.angle": 0.3}, t_end=12.0)
     assert len(found) >= 5
     assert [one.action.value for one in found] == sorted(one.action.value for one in found)
     for one in found:
@@ -133,9 +133,11 @@ def test_several_motions_join_two_places():
 
 def test_conjugate_points_of_the_small_pendulum():
     """Neighbours from the lowest place meet there again after half a period each."""
-    (motion,) = motions_between(pendulum(), {"rod.angle": 1e-4 * np.sin(7.0)}, t_end=7.0, start={"rod.angle": 0.0})[:1]
+    (motion,) = boundary_value_motions(
+        pendulum(), {"rod.angle": 1e-4 * np.sin(7.0)}, t_end=7.0, start={"rod.angle": 0.0}
+    )[:1]
     slow = min(
-        motions_between(pendulum(), {"rod.angle": 1e-4 * np.sin(7.0)}, t_end=7.0),
+        boundary_value_motions(pendulum(), {"rod.angle": 1e-4 * np.sin(7.0)}, t_end=7.0),
         key=lambda one: abs(one.velocities["rod.angle"]),
     )
     assert motion.action.value <= slow.action.value
@@ -160,18 +162,18 @@ def test_ends_that_no_motion_joins_are_one_error():
     with pytest.raises(
         SolveError, match=r"no motion was found that joins these ends in 1\.5708 s: of 4\d\d that were tried"
     ):
-        motions_between(Oscillator(), {path: 1.3}, t_end=0.5 * np.pi)
+        boundary_value_motions(Oscillator(), {path: 1.3}, t_end=0.5 * np.pi)
     with pytest.raises(SolveError, match="they are conjugate points"):
-        motions_between(Oscillator(), {path: 0.5}, t_end=0.5 * np.pi)
-    (motion,) = motions_between(Oscillator(), {path: 1.3}, t_end=0.4 * np.pi)
+        boundary_value_motions(Oscillator(), {path: 0.5}, t_end=0.5 * np.pi)
+    (motion,) = boundary_value_motions(Oscillator(), {path: 1.3}, t_end=0.4 * np.pi)
     assert motion.is_minimum
-    (later,) = motions_between(Oscillator(), {path: 1.3}, t_end=1.2 * np.pi)
+    (later,) = boundary_value_motions(Oscillator(), {path: 1.3}, t_end=1.2 * np.pi)
     np.testing.assert_allclose(later.conjugate_times, [0.5 * np.pi, np.pi], rtol=1e-6)
 
 
 def test_the_principal_function_of_the_oscillator():
     """``S = m w ((a^2 + b^2) cos(w T) - 2 a b)/(2 sin(w T))`` from a to b (Landau and Lifshitz, section 43)."""
-    (motion,) = motions_between(Oscillator(), {"mass.displacement": 1.3}, t_end=1.0)
+    (motion,) = boundary_value_motions(Oscillator(), {"mass.displacement": 1.3}, t_end=1.0)
     a, b, w = 0.5, 0.3, 2.0
     value = w * ((a * a + b * b) * np.cos(w) - 2.0 * a * b) / (2.0 * np.sin(w))
     assert motion.action.value == pytest.approx(value, rel=1e-10)
@@ -179,10 +181,10 @@ def test_the_principal_function_of_the_oscillator():
 
 def test_ends_are_coordinates_of_the_scene():
     with pytest.raises(UsageError, match=r"leaves out bob\.position\.z"):
-        motions_between(ElasticPendulum(), {"bob.position.x": 0.1}, t_end=1.0)
+        boundary_value_motions(ElasticPendulum(), {"bob.position.x": 0.1}, t_end=1.0)
     with pytest.raises(UsageError, match=r"Did you mean 'rod\.angle'"):
-        motions_between(pendulum(), {"rod.angel": 0.1}, t_end=1.0)
+        boundary_value_motions(pendulum(), {"rod.angel": 0.1}, t_end=1.0)
     with pytest.raises(UnsupportedError, match="not those of free coordinates"):
-        motions_between(LagrangeTop(), {"top.theta": 0.1}, t_end=1.0)
-    (motion,) = motions_between(pendulum(), {"rod.angle": "30 deg"}, t_end=1.0)
+        boundary_value_motions(LagrangeTop(), {"top.theta": 0.1}, t_end=1.0)
+    (motion,) = boundary_value_motions(pendulum(), {"rod.angle": "30 deg"}, t_end=1.0)
     assert motion.result["rod.angle"][-1] == pytest.approx(np.pi / 6.0, abs=1e-9)

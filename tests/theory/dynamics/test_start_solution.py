@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import atwood_library as lib
-from atwood import Scene, SolveError, UsageError, assemble, simulate, solve_start
+from atwood import Scene, SolveError, UsageError, assemble, simulate, solve_initial_values
 from atwood_library.scenes import FourBar
 
 
@@ -24,7 +24,7 @@ def held_link(space: str = "plane") -> Scene:
 
 @pytest.mark.parametrize("space", ["plane", "space"])
 def test_a_spring_that_holds_a_link_at_rest(space: str) -> None:
-    found = solve_start(held_link(space), unknowns=["pivot.stiffness"], conditions={"pivot.angle''": 0.0})
+    found = solve_initial_values(held_link(space), unknowns=["pivot.stiffness"], conditions={"pivot.angle''": 0.0})
     assert found.values["pivot.stiffness"] == pytest.approx(3.0 * 9.81 * 0.6 * cos(0.4) / 0.4, rel=1e-10)
     assert np.ptp(simulate(found.assembly, t_end=1.0)["pivot.angle"]) < 1e-9
 
@@ -32,7 +32,7 @@ def test_a_spring_that_holds_a_link_at_rest(space: str) -> None:
 def test_a_parameter_and_a_start_value_at_once() -> None:
     conditions = {"pivot.angular_velocity'": 2.0, "link.velocity.x": "0.3 m/s"}
     unknowns = ["pivot.natural_angle", "pivot.angular_velocity"]
-    values = solve_start(held_link(), unknowns=unknowns, conditions=conditions).values
+    values = solve_initial_values(held_link(), unknowns=unknowns, conditions=conditions).values
     rate = 0.3 / (0.6 * np.sin(0.4))
     assert values["pivot.angular_velocity"] == pytest.approx(rate, rel=1e-10)
     # J angle'' = -k (angle - natural) - m g l/2 cos(angle)
@@ -42,8 +42,8 @@ def test_a_parameter_and_a_start_value_at_once() -> None:
 
 def test_a_loop_starts_with_an_acceleration() -> None:
     scene = FourBar()
-    found = solve_start(assemble(scene), unknowns=["gravity"], conditions={"crank.angle''": -3.0})
-    again = solve_start(found.assembly, unknowns=["gravity"], conditions={"crank.angle''": -3.0})
+    found = solve_initial_values(assemble(scene), unknowns=["gravity"], conditions={"crank.angle''": -3.0})
+    again = solve_initial_values(found.assembly, unknowns=["gravity"], conditions={"crank.angle''": -3.0})
     assert again.values["gravity"] == pytest.approx(found.values["gravity"], rel=1e-9)
     early = simulate(found.assembly, t_end=0.01, rtol=1e-10, outputs=3)
     rates = early["crank.angular_velocity"]
@@ -53,10 +53,10 @@ def test_a_loop_starts_with_an_acceleration() -> None:
 def test_what_cannot_be_is_refused() -> None:
     scene = held_link()
     with pytest.raises(UsageError, match="1 unknowns have 2 conditions"):
-        solve_start(scene, unknowns=["gravity"], conditions={"pivot.angle''": 0.0, "link.velocity.x": 1.0})
+        solve_initial_values(scene, unknowns=["gravity"], conditions={"pivot.angle''": 0.0, "link.velocity.x": 1.0})
     with pytest.raises(UsageError, match="no such quantity"):
-        solve_start(scene, unknowns=["gravity"], conditions={"pivot.angel": 0.0})
+        solve_initial_values(scene, unknowns=["gravity"], conditions={"pivot.angel": 0.0})
     with pytest.raises(UsageError, match="no parameter with a number"):
-        solve_start(scene, unknowns=["pivot.axis"], conditions={"pivot.angle''": 0.0})
+        solve_initial_values(scene, unknowns=["pivot.axis"], conditions={"pivot.angle''": 0.0})
     with pytest.raises(SolveError, match="no values near by"):  # a length cannot make it fall upwards
-        solve_start(scene, unknowns=["link.length"], conditions={"pivot.angle''": 50.0})
+        solve_initial_values(scene, unknowns=["link.length"], conditions={"pivot.angle''": 50.0})

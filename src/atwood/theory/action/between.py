@@ -1,4 +1,4 @@
-"""`motions_between`: the motions of a scene that join two places in a given time, found by shooting."""
+"""`boundary_value_motions`: the motions of a scene that join two places in a given time, found by shooting."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class JoiningMotion:
 
 @command("motions")
 @takes(scene=SCENE, end=BY_PATH, t_end=T_END, start=optional(BY_PATH))
-def motions_between(
+def boundary_value_motions(
     scene: Model | Assembly,
     end: Mapping[str, Any],
     *,

@@ -1,4 +1,4 @@
-"""`solve_start`: parameters and start values with which a scene starts as it is said to."""
+"""`solve_initial_values`: parameters and start values with which a scene starts as it is said to."""
 
 from __future__ import annotations
 
@@ -54,7 +54,9 @@ class StartSolution:
 
 
 @takes(scene=SCENE, unknowns=PATHS, conditions=BY_PATH)
-def solve_start(scene: Model | Assembly, *, unknowns: Sequence[str], conditions: Mapping[str, Any]) -> StartSolution:
+def solve_initial_values(
+    scene: Model | Assembly, *, unknowns: Sequence[str], conditions: Mapping[str, Any]
+) -> StartSolution:
     """Find parameters, and start values, with which quantities at the start have given values.
 
     So a spring's stiffness follows from where the scene hangs at rest, and a speed from an acceleration: of any
