@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import ComplexArray, FloatArray
+from atwood.numerics.sparse import csr_least_norm, csr_of, csr_scaled
 from atwood.tolerances import tolerances
 
 Matrix: TypeAlias = Any
@@ -48,8 +49,6 @@ def from_entries(rows: Any, columns: Any, entries: Any, shape: tuple[int, int], 
         made = np.zeros(shape)
         made[rows, columns] = entries
         return made
-    from atwood.numerics.sparse import csr_of
-
     return csr_of(rows, columns, entries, shape)
 
 
@@ -69,8 +68,6 @@ def scaled(matrix: Matrix, columns: FloatArray, rows: FloatArray | None = None) 
     if is_full(matrix):
         wide = matrix * columns
         return wide if rows is None else wide / rows[:, None]
-    from atwood.numerics.sparse import csr_scaled
-
     return csr_scaled(matrix, columns, rows)
 
 
@@ -93,8 +90,6 @@ def least_norm(
     """
     least = tolerances.RANK if errors is None else errors
     if not is_full(matrix):
-        from atwood.numerics.sparse import csr_least_norm
-
         is_nothing = unit and np.abs(matrix.data).max(initial=0.0) < least * unit
         return np.zeros(matrix.shape[1]) if is_nothing else csr_least_norm(matrix, right)
     if matrix.ndim > 2:

@@ -26,6 +26,7 @@ from atwood.clock import within_time
 from atwood.codegen.rounding import ROUGHNESS
 from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.matrices import Matrix, is_full, least_squares, or_one, scaled, to_array
+from atwood.numerics.sparse import csr_made_of, csr_row_sizes, rows_are_independent
 from atwood.tolerances import tolerances
 
 Errors: TypeAlias = float | FloatArray | None
@@ -155,8 +156,6 @@ def row_sizes(jacobian: Matrix, scales: FloatArray) -> FloatArray:
     """Return the largest entry of each row after its columns are scaled, shape (rows,)."""
     if is_full(jacobian):
         return np.asarray(np.abs(jacobian * scales).max(axis=1, initial=0.0))
-    from atwood.numerics.sparse import csr_row_sizes
-
     return csr_row_sizes(jacobian, scales)
 
 
@@ -266,15 +265,11 @@ def _made_of(kept: Matrix, others: Matrix) -> FloatArray:
     if is_full(kept):
         found: FloatArray = least_squares(kept.T, others.T).T
         return found
-    from atwood.numerics.sparse import csr_made_of
-
     return csr_made_of(kept, others)
 
 
 def _is_clear(matrix: Matrix, errors: FloatArray) -> bool:
     """Return whether it is certain, for a large matrix, that no row depends on others."""
-    from atwood.numerics.sparse import rows_are_independent
-
     sizes = row_sizes(matrix, np.ones(matrix.shape[1]))
     return bool(np.all(sizes > errors / _LOOK)) and rows_are_independent(matrix, tolerances.CLEAR)
 

@@ -1,4 +1,4 @@
-"""Linear algebra on the entries of large matrices; imported only where there are such.
+"""Linear algebra on the entries of large matrices; SciPy is loaded only where there are such.
 
 Least-norm solutions come from the normal equations with a small multiple of the unit matrix added, whose influence
 later passes take out again: each multiplies what is missing in a direction by ``d / (s^2 + d)``, where s is its
@@ -8,15 +8,16 @@ Directions in which nothing acts keep their zero.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import block_array, csc_array, csr_array, diags_array, eye_array
-from scipy.sparse.linalg import splu
 
 from atwood.arrays import FloatArray
-from atwood.numerics.matrices import or_one
+from atwood.lazy_modules import scipy
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 _SHARE = 1e-10
 """What is added to the normal equations, relative to their largest diagonal entry."""
@@ -27,14 +28,14 @@ _BLOCK = 256
 
 def csr_of(rows: Any, columns: Any, entries: Any, shape: tuple[int, int]) -> csr_array:
     """Return the matrix with the given entries."""
-    values = np.asarray(entries, dtype=float)
-    return csr_array((values, (np.asarray(rows, dtype=np.int32), np.asarray(columns, dtype=np.int32))), shape=shape)
+    places = np.asarray(rows, dtype=np.int32), np.asarray(columns, dtype=np.int32)
+    return scipy.sparse.csr_array((np.asarray(entries, dtype=float), places), shape=shape)
 
 
 def csr_scaled(matrix: Any, columns: FloatArray, rows: FloatArray | None) -> csr_array:
     """Return a matrix with each column multiplied by one number, and each row divided by another."""
-    wide = csr_array(matrix @ diags_array(columns))
-    return wide if rows is None else csr_array(diags_array(1.0 / rows) @ wide)
+    wide = scipy.sparse.csr_array(matrix @ scipy.sparse.diags_array(columns))
+    return wide if rows is None else scipy.sparse.csr_array(scipy.sparse.diags_array(1.0 / rows) @ wide)
 
 
 def csr_row_sizes(matrix: Any, scales: FloatArray) -> FloatArray:
@@ -48,9 +49,9 @@ def _factorised(square: Any, share: float) -> Any:
     """Return a solver for a symmetric matrix that is positive definite once a share of its size is added."""
     diagonal = square.diagonal()
     size = float(np.max(diagonal, initial=0.0)) or 1.0
-    shifted = csc_array(square + (share * size) * eye_array(square.shape[0]))
+    shifted = scipy.sparse.csc_array(square + (share * size) * scipy.sparse.eye_array(square.shape[0]))
     options = {"SymmetricMode": True}
-    return splu(shifted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    return scipy.sparse.linalg.splu(shifted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
 
 
 def csr_least_norm(matrix: Any, right: FloatArray) -> FloatArray:
@@ -75,7 +76,7 @@ def csr_least_norm(matrix: Any, right: FloatArray) -> FloatArray:
 
 def _row_normalised(matrix: Any) -> csr_array | None:
     sizes = np.sqrt((matrix * matrix).sum(axis=1))
-    return None if np.any(sizes == 0.0) else csr_array(diags_array(1.0 / sizes) @ matrix)
+    return None if np.any(sizes == 0.0) else scipy.sparse.csr_array(scipy.sparse.diags_array(1.0 / sizes) @ matrix)
 
 
 def rows_are_independent(matrix: Any, tolerance: float) -> bool:
@@ -114,20 +115,20 @@ def smallest_direction(square: Any, iterations: int = 40) -> tuple[float, FloatA
 
 def massless_directions(mass: Any, jacobian: Any, sizes: FloatArray) -> FloatArray | None:
     """Return how much each coordinate moves in a direction that nothing gives inertia to; None if there is none."""
-    weight = diags_array(sizes)
+    weight = scipy.sparse.diags_array(sizes)
     square = weight @ mass @ weight
     square = square / (float(np.max(square.diagonal(), initial=0.0)) or 1.0)
     if jacobian.shape[0]:
         held = jacobian @ weight
-        held = diags_array(1.0 / np.maximum(csr_row_sizes(jacobian, sizes), 1e-300)) @ held
+        held = scipy.sparse.diags_array(1.0 / np.maximum(csr_row_sizes(jacobian, sizes), 1e-300)) @ held
         square = square + held.T @ held
-    value, vector = smallest_direction(csr_array(square))
+    value, vector = smallest_direction(scipy.sparse.csr_array(square))
     return np.abs(vector) if value <= 1e-14 else None
 
 
 def csr_made_of(kept: Any, others: Any) -> FloatArray:
     """Return how often each of some independent rows is in others, shape (others, kept)."""
-    solver = _factorised(csr_array(kept @ kept.T), 1e-15)
+    solver = _factorised(scipy.sparse.csr_array(kept @ kept.T), 1e-15)
     found: FloatArray = solver.solve((kept @ others.T).toarray()).T
     return found
 
@@ -145,8 +146,8 @@ def free_columns(matrix: Any) -> NDArray[np.bool_]:
     rest = np.setdiff1d(np.arange(matrix.shape[1]), own)
     if not len(rest):
         return found
-    left = csr_array(matrix[:, rest])
-    left = csr_array(left[np.diff(left.indptr) > 0])
+    left = scipy.sparse.csr_array(matrix[:, rest])
+    left = scipy.sparse.csr_array(left[np.diff(left.indptr) > 0])
     if not left.shape[0]:
         found[rest] = True
         return found
@@ -162,14 +163,16 @@ def solve_bordered(
     mass: Any, jacobian: Any, bias: FloatArray, gamma: FloatArray
 ) -> tuple[FloatArray, FloatArray] | None:
     """Return a and lambda of ``M a + bias = G^T lambda``, ``G a + gamma = 0``; None where they are not determined."""
-    matrix = csc_array(block_array([[mass, -jacobian.T], [jacobian, None]])) if jacobian.shape[0] else csc_array(mass)
+    blocks = [[mass, -jacobian.T], [jacobian, None]]
+    matrix = scipy.sparse.csc_array(scipy.sparse.block_array(blocks) if jacobian.shape[0] else mass)
     right = np.concatenate([-bias, -gamma])
     large = abs(matrix)
-    size = or_one(np.sqrt(np.maximum(large.max(axis=1).toarray(), large.max(axis=0).toarray()).ravel()))
-    scale = diags_array(1.0 / size)
-    balanced = csc_array(scale @ matrix @ scale)
+    size = np.sqrt(np.maximum(large.max(axis=1).toarray(), large.max(axis=0).toarray()).ravel())
+    size = np.where(size > 0.0, size, 1.0)
+    scale = scipy.sparse.diags_array(1.0 / size)
+    balanced = scipy.sparse.csc_array(scale @ matrix @ scale)
     try:
-        solver = splu(balanced)
+        solver = scipy.sparse.linalg.splu(balanced)
     except RuntimeError:  # a pivot is exactly zero
         return None
     found = solver.solve(right / size)

@@ -26,6 +26,7 @@ from atwood.numerics.matrices import (
 )
 from atwood.numerics.newton import Missing, newton
 from atwood.numerics.rank import row_scales
+from atwood.numerics.sparse import solve_bordered
 from atwood.simulation.dynamics.kinematic_map import KinematicMap, kinematic_map_of
 from atwood.simulation.dynamics.rounding import RowErrors
 from atwood.tolerances import tolerances
@@ -208,8 +209,6 @@ def solve_balance(now: BalanceValues, kept: NDArray[np.intp] | None, t: float) -
     gamma = now.gamma if kept is None else now.gamma[kept]
     m = len(gamma)
     if not is_full(now.mass):
-        from atwood.numerics.sparse import solve_bordered
-
         solved = solve_bordered(now.mass, jacobian, now.bias, gamma)
         if solved is None:
             raise _undetermined(t)

@@ -20,6 +20,7 @@ from atwood.errors import KernelEvaluationError
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.numerics.matrices import is_full, or_one, scaled, to_array
 from atwood.numerics.rank import (
+    independent_by_groups,
     independent_rows,
     is_clear,
     lost_rank,
@@ -117,8 +118,6 @@ def _hangs_together(balance: Balance, t: float, q: FloatArray, scales: FloatArra
     slopes = balance.constraints_at(t, q, np.zeros_like(scales)).jacobian
     if is_full(slopes):
         return False
-    from atwood.numerics.rank import independent_by_groups
-
     rows = row_sizes(slopes, scales)
     units = np.maximum(rows, balance.errors.of_jacobian(t, q, scales, 0.0) / ROUGHNESS)
     return bool(np.all(rows > 0.0)) and independent_by_groups(scaled(slopes, scales, units), balance.errors.laws)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError
 from atwood.forms.balance_program import BalanceProgram
+from atwood.numerics.sparse import csr_least_norm, csr_of, solve_bordered
 from atwood.numerics.sparse_batch import Augmented, Borders, Normal, Pattern
 
 _CHUNK = 8_000_000
@@ -53,8 +54,6 @@ class States:
         if len(bad):
             self._again(slice(None) if len(bad) == len(t) else bad, values, (found_a, found_l, good))
         for i in np.flatnonzero(~good):
-            from atwood.numerics.sparse import csr_of, solve_bordered
-
             n, m = program.speeds, program.constraints
             full_mass = csr_of(program.mass_rows, program.mass_columns, mass[:, i], (n, n))
             full_jacobian = csr_of(program.jacobian_rows, program.jacobian_columns, jacobian[:, i], (m, n))
@@ -94,8 +93,6 @@ class States:
             found[:, part] = self._normal.least_size(jacobian[:, part], multipliers[:, part])
         bad = np.flatnonzero(~np.all(np.isfinite(found), axis=0))
         if len(bad):
-            from atwood.numerics.sparse import csr_least_norm, csr_of
-
             for i in bad:
                 full = csr_of(
                     self._program.jacobian_rows,

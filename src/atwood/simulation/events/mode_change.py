@@ -17,6 +17,7 @@ from atwood.mechanics.dynamics.equations import Constraint
 from atwood.mechanics.outputs.event_functions import UPDATE, EventFunction, list_event_functions
 from atwood.numerics.matrices import is_full, least_norm, scaled, to_array
 from atwood.numerics.newton import Missing, newton
+from atwood.numerics.sparse import solve_bordered
 from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_of
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of, reference_coordinates
 from atwood.simulation.dynamics.orientation_coordinates import (
@@ -178,8 +179,6 @@ def _solve_impact(
     beside the rest is then small in truth, and not in its unit.
     """
     if not is_full(now.mass):
-        from atwood.numerics.sparse import solve_bordered
-
         solved = solve_bordered(now.mass, now.jacobian, -(now.mass @ u), now.explicit_rate)
         if solved is not None:
             return solved[0], solved[1] * rows

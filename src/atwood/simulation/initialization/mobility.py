@@ -19,6 +19,7 @@ from atwood.model.declare.component import Component
 from atwood.model.declare.law import Kind
 from atwood.numerics.matrices import LARGEST_FULL, Matrix, is_full, scaled, to_array
 from atwood.numerics.rank import independent_rows, open_directions
+from atwood.numerics.sparse import massless_directions
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.scales import is_length, motion_names, motion_scales, scene_length
@@ -189,8 +190,6 @@ def check_massless_directions(
         return
     sizes = _sizes_of_inertia(mass, sizes)
     if not is_full(mass):
-        from atwood.numerics.sparse import massless_directions
-
         moving = massless_directions(mass, jacobian, sizes)
         if moving is not None:
             raise _massless_directions(assembly, moving, state)

@@ -27,6 +27,7 @@ from atwood.numerics.matrices import (
 )
 from atwood.numerics.newton import Missing, newton
 from atwood.numerics.rank import certain, independent_rows, open_directions, row_scales
+from atwood.numerics.sparse import free_columns
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.rounding import RowErrors
 from atwood.tolerances import tolerances
@@ -174,8 +175,6 @@ def counted(
     if len(kept) == matrix.shape[1]:
         return (), repeated
     if not is_full(matrix):
-        from atwood.numerics.sparse import free_columns
-
         rows = row_scales(matrix, np.ones(matrix.shape[1]), errors)
         found = free_columns(scaled(matrix, np.ones(matrix.shape[1]), rows))
         return tuple(n for n, is_free in zip(names, found, strict=True) if is_free), repeated
