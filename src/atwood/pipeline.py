@@ -62,9 +62,9 @@ from atwood.simulation.problem.arguments import (
 )
 from atwood.simulation.problem.conditions import conditions_of
 from atwood.simulation.problem.options import RunOptions, sizes_of
-from atwood.simulation.run.made import Run, run_out_of_time
 from atwood.simulation.run.run import choice_at_start, run
-from atwood.simulation.run.tolerances import raised_where_too_tight
+from atwood.simulation.run.run_record import Run, run_out_of_time
+from atwood.simulation.run.stall_diagnosis import raised_where_too_tight
 from atwood.stages import stage, watching
 from atwood.tolerances import tolerances
 from atwood.topology.orientation_coordinates import Orientation, check_orientation
@@ -341,7 +341,7 @@ def _solve_to(
     """Run an assembly, with tolerances for the accuracy that was asked for, if any; see `accurate_run`."""
     if accuracy is None:
         return raised_where_too_tight(lambda given: _solve(assembly, given, clock), assembly, options), None, ""
-    from atwood.result.second_run import accurate_run
+    from atwood.result.accuracy import accurate_run
     from atwood.simulation.events.sampling import refuse_updates
 
     refuse_updates(assembly)

@@ -15,7 +15,7 @@ from atwood.forms.residuals import null_space_program
 from atwood.integrators.ida import library as sundials_library
 from atwood.integrators.ida.callbacks import JACOBIAN, RESIDUAL, WEIGHTS
 from atwood.simulation.dynamics.redundancy import POOR, choose_dependent_coordinates
-from atwood.simulation.problem.native_null_space import choice_lists, null_space_shape
+from atwood.simulation.problem.implicit_scene import choice_lists, null_space_shape
 from atwood_library.scenes import FourBar, SliderCrank
 
 from ..helpers.mechanisms import double_four_bar, two_four_bars

@@ -8,7 +8,7 @@ import numpy as np
 
 from atwood import Result
 from atwood.simulation.problem.projection import project_safely
-from atwood.simulation.run.record import SegmentRecord
+from atwood.simulation.run.recorder import SegmentRecord
 from atwood.simulation.singular.collocation import find_arc
 
 __all__ = ["by_arcs"]

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from atwood import Scene, assemble
 from atwood.numerics.body_order import elimination_stages
 from atwood.numerics.fixed_pivots import FixedPivots, fix_pivots
-from atwood.simulation.problem.elimination import pivots_of
+from atwood.simulation.problem.implicit_scene import pivots_of
 from atwood_library import Ground, PointMass, Rod, scenes
 
 RNG = np.random.default_rng(3)

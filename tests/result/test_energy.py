@@ -15,7 +15,7 @@ from atwood.errors import ResultError
 from atwood.expr import ExternalFunction
 from atwood.result.work import integral_in_steps, integral_of_samples, nodes_between
 from atwood.simulation.problem.options import RunOptions
-from atwood.simulation.run.made import Run, run_again, times_of_steps
+from atwood.simulation.run.run_record import Run, run_again, times_of_steps
 from atwood_library.scenes import SCENES
 
 from ..helpers.runs import FORMS

@@ -14,8 +14,8 @@ from scipy.special import erf
 
 import atwood
 from atwood import Result, Scene, simulate
-from atwood.result import second_run
-from atwood.result.second_run import needed_error
+from atwood.result import accuracy as second_run
+from atwood.result.accuracy import needed_error
 from atwood.simulation.problem.options import RunOptions
 from atwood_library import Force, Mass1D, Potential
 from atwood_library.scenes import SCENES, FourBar, SimplePendulum

@@ -18,7 +18,7 @@ from atwood.integrators.explicit_session import ExplicitSession
 from atwood.integrators.methods.dormand_prince import TABLEAU
 from atwood.integrators.protocol import SolverOptions
 from atwood.simulation.initialization.start import find_start, own_state
-from atwood.simulation.problem.constrained_scene import constrained_problem
+from atwood.simulation.problem.explicit_scene import constrained_problem
 from atwood.simulation.problem.preparation import make_plan
 from atwood.simulation.problem.problem import Plan
 from atwood_library import PointMass

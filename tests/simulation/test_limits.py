@@ -18,7 +18,7 @@ from atwood.integrators.ida import native as ida_native
 from atwood.integrators.protocol import Budget, Status, StepResult
 from atwood.simulation.initialization import mobility as massless_directions
 from atwood.simulation.problem.options import RunOptions
-from atwood.simulation.run import tolerances as run_tolerances
+from atwood.simulation.run import stall_diagnosis as run_tolerances
 from atwood.simulation.run.session import SolverRequest
 from atwood_library.scenes import DoublePendulum, FourBar, FourBarRow, SimplePendulum
 

@@ -13,7 +13,7 @@ from atwood import simulate
 from atwood.forms.residuals import null_space_program
 from atwood.integrators.ida import library as sundials_library
 from atwood.simulation.dynamics.redundancy import POOR, choose_dependent_coordinates, review_partitioning
-from atwood.simulation.problem.native_null_space import choice_lists, null_space_shape
+from atwood.simulation.problem.implicit_scene import choice_lists, null_space_shape
 from atwood.simulation.problem.problem import Plan
 from atwood_library.scenes import FourBar, SliderCrank
 

@@ -14,7 +14,7 @@ from atwood import AtwoodError, Scene, SolveError, StartError, assemble, simulat
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.numerical_failure import is_numerical, named
 from atwood.simulation.initialization.start import find_start, own_state
-from atwood.simulation.run import record
+from atwood.simulation.run import recorder as record
 from atwood_library import Damper, Ground, PointMass, Rod, Rope
 from atwood_library.scenes import DoublePendulum, FourBar, FreeBody, SliderCrank
 

@@ -1,11 +1,11 @@
-"""The energy of a run, sample by sample: kinetic, potential, the work that was put in, and how far digits reach."""
+"""Ledgers along a run: kinetic and potential energy, the work that was put in, and other conserved quantities."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from random import Random
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +20,10 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Constraint, Equations
 from atwood.mechanics.outputs.part_power import MovingMass, applied_power, moving_masses, switched_energy
 from atwood.result.segment_quantities import SegmentQuantities
-from atwood.simulation.run.record import SegmentRecord
+from atwood.simulation.run.recorder import SegmentRecord
 
 if TYPE_CHECKING:
     from atwood.result.part_energy import PartEnergies
-
 
 _SHARE = 1e-6
 """Of the kinetic energy: no less counts as exchanged, since steady motion has errors of rounding, too."""
@@ -370,3 +369,76 @@ def _changed(segment: SegmentRecord, sizes: Sequence[FloatArray], share: float, 
         apart = np.abs(np.sum(_values(turned, program, time, *states), axis=0) - energy)
         largest = max(largest, float(np.max(apart, initial=0.0, where=np.isfinite(apart))))
     return largest
+
+
+@dataclass(frozen=True, eq=False)
+class ConservedValues:
+    """A conserved quantity along a run.
+
+    Attributes
+    ----------
+    name, kind, unit
+        See `atwood.ConservedQuantity`.
+    values
+        At the output times; not known (nan) in modes whose coordinates it is not made of.
+    size
+        What deviations are compared with: the most that the terms of the quantity came to.
+    """
+
+    name: str
+    kind: str
+    unit: str
+    values: FloatArray
+    size: float
+
+    @property
+    def max_drift(self) -> float:
+        """Largest deviation from the start, relative to `size`."""
+        known = self.values[np.isfinite(self.values)]
+        moved = float(np.max(np.abs(known - known[:1]), initial=0.0))
+        return moved / self.size if self.size > 0.0 else 0.0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return start, end and drift as plain data."""
+        ends = {"start": float(self.values[0]), "end": float(self.values[-1])}
+        return {"kind": self.kind, "unit": self.unit, **ends, "max_drift": self.max_drift, "size": self.size}
+
+
+class ConservedLedger(Mapping[str, ConservedValues]):
+    """The conserved quantities of a run by name.
+
+    Parameters
+    ----------
+    items
+        The quantities.
+    """
+
+    def __init__(self, items: tuple[ConservedValues, ...]) -> None:
+        self._items = {one.name: one for one in items}
+
+    def __getitem__(self, name: str) -> ConservedValues:
+        return self._items[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._items)
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    @property
+    def max_drift(self) -> float:
+        """The largest of their relative deviations."""
+        return max((one.max_drift for one in self.values()), default=0.0)
+
+    def describe(self) -> str:
+        """Return by how much each drifts, in words."""
+        if not self:
+            return "nothing is conserved"
+        return ", ".join(f"{one.name} drifts by {one.max_drift:.1e}" for one in self.values()) + " of their sizes"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return {one.name: one.to_dict() for one in self.values()}
+
+    def __repr__(self) -> str:
+        return f"<ConservedLedger: {self.describe()}>"

@@ -22,8 +22,8 @@ from atwood.result.work import integral_in_steps, integral_of_samples, nodes_in_
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.reactions import ReactionSolver, maximal_state
 from atwood.simulation.dynamics.scales import motion_scales, multiplier_sizes, scene_length
-from atwood.simulation.run.made import Run
-from atwood.simulation.run.record import SegmentRecord
+from atwood.simulation.run.recorder import SegmentRecord
+from atwood.simulation.run.run_record import Run
 
 _ENERGIES: Key[Program] = Key("energies by part")
 _POWERS: Key[PartPowers] = Key("powers by part")

@@ -32,12 +32,12 @@ from atwood.simulation.initialization.start import Start, own_state
 from atwood.simulation.problem.options import how_solved
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import misses_of
-from atwood.simulation.run.made import Run
-from atwood.simulation.run.record import SegmentRecord
+from atwood.simulation.run.recorder import SegmentRecord
+from atwood.simulation.run.run_record import Run
 
 if TYPE_CHECKING:
     from atwood.result.accuracy import Accuracy
-    from atwood.result.conserved import ConservedLedger
+    from atwood.result.energy import ConservedLedger
     from atwood.result.turns import TurnCounter
     from atwood.simulation.singular.crossing import SingularCrossing
 
@@ -187,7 +187,7 @@ class Result(Trajectories):
             If there is none: of a scene whose parts call functions at sample times, and where nothing more accurate
             can be solved.
         """
-        from atwood.result.second_run import second_run
+        from atwood.result.accuracy import second_run
 
         if self._second_run is None:
             self._second_run = second_run(self.run, np.unique(self.time), lambda o: Result(self.run, None, o).accuracy)

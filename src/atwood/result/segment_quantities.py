@@ -10,7 +10,7 @@ from atwood.arrays import FloatArray
 from atwood.expr import depends_on
 from atwood.forms.quantities import find_observables, observer
 from atwood.simulation.dynamics.reactions import ReactionSolver
-from atwood.simulation.run.record import SegmentRecord
+from atwood.simulation.run.recorder import SegmentRecord
 
 
 class SegmentQuantities:

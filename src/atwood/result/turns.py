@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.result.segment_quantities import SegmentQuantities
-from atwood.simulation.run.made import Run, run_again
-from atwood.simulation.run.record import SegmentRecord
+from atwood.simulation.run.recorder import SegmentRecord
+from atwood.simulation.run.run_record import Run, run_again
 
 _CHANGE = 1.0
 """rad: rates may change so much times the distance of samples, or an angle is not continued by them."""

@@ -15,8 +15,8 @@ from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import scipy
 from atwood.result.energy import EnergyLedger, Piece, make_ledger, power_into
 from atwood.result.segment_quantities import SegmentQuantities
-from atwood.simulation.run.made import Run, run_again, times_of_steps
-from atwood.simulation.run.record import SegmentRecord
+from atwood.simulation.run.recorder import SegmentRecord
+from atwood.simulation.run.run_record import Run, run_again, times_of_steps
 
 if TYPE_CHECKING:
     from atwood.result.part_energy import PartEnergies

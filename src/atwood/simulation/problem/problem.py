@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from atwood.expr import Program
     from atwood.forms.residuals import NullSpaceProgram
     from atwood.numerics.fixed_pivots import FixedPivots
-    from atwood.simulation.problem.native_null_space import CompiledNullSpace
+    from atwood.simulation.problem.implicit_scene import CompiledNullSpace
 
 
 _IDA: Key[IdaCallbacks] = Key("machine code for IDA")
@@ -255,7 +255,7 @@ class Plan:
 
     def _pivots(self, samples: Sequence[FloatArray]) -> FixedPivots | None:
         """Return how the Newton matrix of the dae form is eliminated."""
-        from atwood.simulation.problem.elimination import pivots_of
+        from atwood.simulation.problem.implicit_scene import pivots_of
 
         shared, program = self.assembly.shared, self.program
         about = program, *(one.tobytes() for one in samples)
@@ -270,7 +270,7 @@ class Plan:
 
     def compiled_null_space(self, linear_solver: LinearSolver) -> NativeCallbacks:
         """Return residual and Jacobian of the reduced form with loops as machine code, for one session."""
-        from atwood.simulation.problem.native_null_space import CompiledNullSpace, compile_null_space
+        from atwood.simulation.problem.implicit_scene import CompiledNullSpace, compile_null_space
 
         shared, kept = self.assembly.shared, self.finding.kept
         if self._null_space is None:
@@ -329,7 +329,7 @@ class Plan:
         shifts = np.full(program.extra, 1e3 * max(scales.length, 1.0 / scales.length) / scales.time)
         motion = self.coordinate_sizes, self.sizes / scales.time
         if nominal:
-            from atwood.simulation.problem.nominal import with_nominal
+            from atwood.simulation.problem.options import with_nominal
 
             motion = with_nominal(self.assembly, self.assembly.own_equations, motion, nominal)
         return np.concatenate([*(relative * one for one in motion), forces, shifts])

@@ -7,8 +7,8 @@ import numpy as np
 from atwood.clock import TimeIsUp, check_time
 from atwood.integrators.protocol import Statistics
 from atwood.simulation.events.modes import EventRecord
-from atwood.simulation.run.made import Outcome, Segment
-from atwood.simulation.run.record import Recorder
+from atwood.simulation.run.recorder import Recorder
+from atwood.simulation.run.run_record import Outcome, Segment
 
 
 def follow(segment: Segment, recorder: Recorder, t: float) -> Outcome:

@@ -33,12 +33,12 @@ from atwood.simulation.problem.options import RunOptions, Samples, sample_times
 from atwood.simulation.problem.preparation import plan_of_run
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.run.choice import Choice, check_solver, choose
-from atwood.simulation.run.made import Outcome, Run, Segment, as_asked, run_out_of_time, shortest_mode
-from atwood.simulation.run.record import Recorder, SegmentRecord
+from atwood.simulation.run.recorder import Recorder, SegmentRecord
+from atwood.simulation.run.run_record import Outcome, Run, Segment, as_asked, run_out_of_time, shortest_mode
 from atwood.simulation.run.segment import run_segment
 from atwood.simulation.run.session import KeptSession
 from atwood.simulation.run.sides_of_run import SidesOfRun
-from atwood.simulation.run.tolerances import allowed
+from atwood.simulation.run.stall_diagnosis import allowed
 from atwood.stages import stage
 from atwood.topology.orientation_coordinates import Orientation
 
@@ -362,7 +362,7 @@ class _Walk:
             message = outcome.error.message
         made = self._run_so_far(status, message)
         if status == "failed":
-            from atwood.simulation.run.stuck import failed  # few runs fail
+            from atwood.simulation.run.stall_diagnosis import failed  # few runs fail
 
             error = outcome.error or failed(message, self.assembly.flat.name, self.t > self.start.time)
             error.run = made  # type: ignore[attr-defined]

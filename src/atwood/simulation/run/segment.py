@@ -32,10 +32,10 @@ from atwood.simulation.problem.preparation import pack_state
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import project_safely
 from atwood.simulation.run.choice import dead_centre, stiffness_of, turned_stiff
-from atwood.simulation.run.made import Outcome, Segment
-from atwood.simulation.run.record import Recorder
+from atwood.simulation.run.recorder import Recorder
+from atwood.simulation.run.run_record import Outcome, Segment
 from atwood.simulation.run.session import SolverRequest, open_session
-from atwood.simulation.run.tolerances import too_tight
+from atwood.simulation.run.stall_diagnosis import too_tight
 
 if TYPE_CHECKING:
     from atwood.simulation.singular.crossing import SingularCrossing
@@ -231,7 +231,7 @@ class _Runner:
                 if stuck or self.request is None
                 else too_tight(self.request, self.method, step_result, self.opened)
             )
-            from atwood.simulation.run.stuck import explain_stuck
+            from atwood.simulation.run.stall_diagnosis import explain_stuck
 
             return stuck or tight or explain_stuck(self.segment.plan, step_result)
         return SolveError(

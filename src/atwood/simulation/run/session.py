@@ -288,7 +288,7 @@ def equations_of(
 
 def _constrained_task(request: SolverRequest, method: Method, t: float, y: FloatArray, leave: Leave | None) -> Task:
     """Return a task with steps that end on the constraints."""
-    from atwood.simulation.problem.constrained_scene import constrained_problem
+    from atwood.simulation.problem.explicit_scene import constrained_problem
 
     plan, probe = request.plan, request.probe
     plan.keep_better(t, plan.program.split(y)[0])

@@ -14,7 +14,7 @@ from atwood.lazy_dataclasses import replace
 from atwood.simulation.events.sides import find_sides, layers, plain_sides
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.problem.problem import Plan
-from atwood.simulation.run.record import SegmentRecord
+from atwood.simulation.run.recorder import SegmentRecord
 
 _ASIDE = 1e-12
 """Of the scene's time: so far from a switch, on the side that a stretch is on, the states at its ends are recorded."""

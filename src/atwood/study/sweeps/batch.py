@@ -24,10 +24,17 @@ from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.curved_laws import find_curved
 from atwood.study.sweeps.batch_values import ParameterRows, StartRows, read_starts
 from atwood.study.sweeps.modes import find_mode
-from atwood.study.sweeps.motions import Way, find_way, open_places
+from atwood.study.sweeps.motions import (
+    Way,
+    absolute_tolerances,
+    are_stiff,
+    find_way,
+    have_inertia,
+    open_places,
+    time_scales,
+)
 from atwood.study.sweeps.readout import read_quantities, reads
 from atwood.study.sweeps.runs import Records, SweepRequest, shared_work
-from atwood.study.sweeps.sizes import absolute_tolerances, are_stiff, have_inertia, time_scales
 from atwood.study.sweeps.waves import Waves
 
 _PIECE, _NUMBERS = 2_000, 2_000_000

@@ -27,8 +27,7 @@ from atwood.result.formats.dataset import Dataset, Variable
 from atwood.result.formats.matlab import read_matlab, write_matlab
 from atwood.result.formats.netcdf import read_netcdf, write_netcdf
 from atwood.result.formats.npz import read_npz, write_npz
-from atwood.study.sweeps.data import about_sweep, as_dataset, from_dataset, from_parts, labels
-from atwood.study.sweeps.result import Sweep
+from atwood.study.sweeps.result import Sweep, about_sweep, as_dataset, from_dataset, from_parts, labels
 
 
 @takes(sweep=instance("a Sweep", Sweep), file=FILE)

@@ -1,4 +1,4 @@
-"""What the runs of a sweep integrate: all coordinates and speeds, or the independent ones of closed loops.
+"""What the runs of a sweep integrate: all coordinates and speeds, or the independent ones of closed loops; their sizes.
 
 Everything here is worked out for many runs at once, one row each. What a run by itself does is in
 `atwood.simulation.problem.preparation` and `atwood.simulation.problem.closed_loops`.
@@ -20,12 +20,14 @@ from atwood.forms.accelerations import AccelerationProgram, accelerations_of
 from atwood.forms.assembly import Assembly
 from atwood.integrators.embedded.rates import OwnRates
 from atwood.integrators.ensemble.batch import BatchPlaces
-from atwood.integrators.methods import Method, Task
+from atwood.integrators.explicit_problem import LOOSEST
+from atwood.integrators.methods import AUTO, Method, Task
 from atwood.integrators.protocol import SolverOptions
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.outputs.event_functions import EventFunction
 from atwood.simulation.dynamics.balance import masses_at
 from atwood.simulation.dynamics.reactions import accelerations_at
+from atwood.simulation.dynamics.scales import coordinate_scales, find_times, motion_scales
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.closed_loops import ManyBranches, Solved, solve_at
 from atwood.simulation.problem.explicit_scene import compiled_rates, explicit_problem, explicit_problem_of
@@ -33,7 +35,7 @@ from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.problem.preparation import make_plan
 from atwood.simulation.problem.step_guard import step_guard
 from atwood.simulation.problem.taylor_scene import taylor_problem
-from atwood.simulation.run.choice import choose
+from atwood.simulation.run.choice import can_be_stiff, choose, find_stiff_rows
 from atwood.study.sweeps.runs import SweepRequest
 
 
@@ -290,3 +292,78 @@ def _masses(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArray, val
     found = np.zeros((len(t), program.speeds, program.speeds))
     found[:, program.mass_rows, program.mass_columns] = np.broadcast_to(entries.T, (len(t), entries.shape[0]))
     return found
+
+
+def time_scales(
+    motion: Motion,
+    t: FloatArray,
+    q: FloatArray,
+    u: FloatArray,
+    lengths: FloatArray,
+    values: FloatArray | None,
+    span: float,
+) -> FloatArray:
+    """Return in what time something happens in each run, as `find_scales` has it; nan where that has no value."""
+    assembly = motion.assembly
+    if not len(t):
+        return np.zeros(0)
+    a = motion.accelerations(t, q.T, u.T, values).T
+    sizes = motion_scales(assembly.reduced, lengths)
+    symbols = [one.name for one in assembly.parameters]
+    given = assembly.parameter_values if values is None else values.T
+    gravity = given[symbols.index("gravity")] if "gravity" in symbols else 0.0
+    time = find_times(lengths, u, a, sizes, gravity, span)
+    return np.where(np.all(np.isfinite(a), axis=1), time, np.nan)
+
+
+def absolute_tolerances(assembly: Assembly, lengths: FloatArray, time: FloatArray, relative: float) -> FloatArray:
+    """Return the absolute tolerances of coordinates and speeds of each run, as `Plan.tolerances` has them."""
+    share, equations = min(relative, LOOSEST), assembly.reduced
+    sizes = coordinate_scales(equations, lengths), motion_scales(equations, lengths) / time[:, None]
+    return np.concatenate([share * one for one in sizes], axis=1)
+
+
+def have_inertia(
+    motion: Motion, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None, lengths: FloatArray
+) -> NDArray[np.bool_]:
+    """Return where nothing can move without inertia, by the measure of `make_plan`; see `time_scales`."""
+    mass = motion.masses(t, q.T, u.T, values)
+    directions = motion.open_directions(t, q.T, u.T, values)
+    if directions is None:
+        sizes = motion_scales(motion.assembly.reduced, lengths)
+    else:
+        mass = np.swapaxes(directions, 1, 2) @ mass @ directions
+        sizes = 1.0 / np.sqrt(np.abs(np.diagonal(mass, axis1=1, axis2=2)))
+    mass = mass * sizes[:, :, None] * sizes[:, None, :]
+    usable = np.all(np.isfinite(mass), axis=(1, 2))
+    mass[~usable] = np.eye(mass.shape[1])
+    found = np.linalg.eigvalsh(mass)
+    good: NDArray[np.bool_] = usable & (found[:, 0] > 1e-14 * np.maximum(found[:, -1], 1e-300))
+    return good
+
+
+def are_stiff(
+    motion: Motion,
+    t: FloatArray,
+    y: FloatArray,
+    values: FloatArray | None,
+    tolerances: FloatArray,
+    time: FloatArray,
+    options: RunOptions,
+) -> NDArray[np.bool_]:
+    """Return which runs `choose` would give to an implicit method; none where a method was asked for."""
+    assembly = motion.assembly
+    if not len(t) or options.solver != AUTO or not can_be_stiff(assembly):
+        return np.zeros(len(t), dtype=np.bool_)
+    program = motion.program.program
+    kernel = assembly.compiled(program, vectorized=True).bind(assembly.parameter_values if values is None else values.T)
+    n = len(program.inputs[1].symbols)
+
+    def rates(states: FloatArray) -> FloatArray:
+        found = kernel(t[None, :], states[:, :n].T, states[:, n:].T)
+        first = states[:, n:].T if len(found) == 1 else found[0]
+        both = [np.broadcast_to(one, (len(one), len(t))) for one in (first, found[-1])]
+        return np.asarray(np.concatenate(both).T, dtype=np.float64)
+
+    relative = options.relative_tolerance
+    return find_stiff_rows(rates, y, tolerances / min(relative, LOOSEST), time, options.t_end - t, relative)

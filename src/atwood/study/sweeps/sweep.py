@@ -38,7 +38,7 @@ from atwood.simulation.problem.arguments import (
 from atwood.simulation.problem.conditions import condition_functions, conditions_of
 from atwood.simulation.problem.options import RunOptions, sample_times
 from atwood.simulation.run.choice import check_solver
-from atwood.simulation.run.tolerances import allowed
+from atwood.simulation.run.stall_diagnosis import allowed
 from atwood.study.sweeps.batch import run_batches, why_not_batched
 from atwood.study.sweeps.cases import COMBINATIONS, Cases, make_cases
 from atwood.study.sweeps.result import Sweep, SweepStatistics

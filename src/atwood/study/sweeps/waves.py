@@ -25,9 +25,9 @@ from atwood.simulation.events.mode_change import enter_mode
 from atwood.simulation.events.modes import EventRecord
 from atwood.study.sweeps.batch_values import ParameterRows, StartRows, read_starts
 from atwood.study.sweeps.modes import SweepMode, find_mode
+from atwood.study.sweeps.motions import absolute_tolerances, are_stiff, have_inertia, time_scales
 from atwood.study.sweeps.readout import read_quantities
 from atwood.study.sweeps.runs import Records, SweepRequest
-from atwood.study.sweeps.sizes import absolute_tolerances, are_stiff, have_inertia, time_scales
 
 _CHATTER = 20
 """A run with so many stretches in a row that hardly last is left to be made, and judged, by itself."""

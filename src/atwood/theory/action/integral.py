@@ -24,7 +24,7 @@ from atwood.pipeline import assembly_of, simulate
 from atwood.result.result import Result
 from atwood.result.work import joined_times
 from atwood.simulation.problem.arguments import RTOL, T_END, check_span
-from atwood.simulation.run.made import Run, run_again, times_of_steps
+from atwood.simulation.run.run_record import Run, run_again, times_of_steps
 from atwood.theory.hamiltonian.phase_space import as_expression
 
 PATH = replace(instance("a dictionary of functions of time by path", Mapping), word="PATH=EXPRESSION", is_many=True)

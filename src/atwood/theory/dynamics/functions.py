@@ -15,7 +15,7 @@ from atwood.expr import Program
 from atwood.expr.core.relations import values_just_after
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
-from atwood.simulation.problem.not_compilable import find_not_compilable
+from atwood.simulation.problem.preparation import find_not_compilable
 
 _NATIVE: Key[NativeProgram] = Key("machine code for one state")
 

@@ -26,8 +26,8 @@ from atwood.pipeline import assemble, simulate
 from atwood.result.result import Result
 from atwood.simulation.dynamics.balance import solve_determined
 from atwood.simulation.dynamics.orientation_coordinates import to_regular
-from atwood.simulation.problem.not_compilable import find_not_compilable
-from atwood.simulation.run.record import SegmentRecord
+from atwood.simulation.problem.preparation import find_not_compilable
+from atwood.simulation.run.recorder import SegmentRecord
 from atwood.theory.linear.displacements import Minimal, find_minimal
 from atwood.theory.linear.steady import pace_of
 from atwood.theory.linear.variations import LinearScene

@@ -19,13 +19,13 @@ from atwood.forms.program import state_groups
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of
-from atwood.result.conserved import ConservedLedger, ConservedValues
+from atwood.result.energy import ConservedLedger, ConservedValues
 from atwood.result.result import Result
 from atwood.simulation.dynamics.orientation_coordinates import from_regular, to_regular
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.events.mode_change import generalized_state
 from atwood.simulation.problem.arguments import ORIENTATION
-from atwood.simulation.run.record import SegmentRecord
+from atwood.simulation.run.recorder import SegmentRecord
 from atwood.table import Shown, Table, table
 from atwood.theory.equations.formulas import EquationFormulas
 from atwood.theory.formulas.notation import notation_of

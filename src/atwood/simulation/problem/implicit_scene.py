@@ -1,9 +1,9 @@
-"""Compiled functions of a mechanism with loops, which follow changes of its dependent coordinates."""
+"""What IDA is given of a scene: residual and Jacobian as machine code, and the order of elimination."""
 
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import field
 
 import numpy as np
@@ -12,10 +12,14 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.codegen.sundials.null_space import NullSpaceShape
 from atwood.codegen.sundials.null_space_residuals import NullSpaceCallbacks, NullSpaceData, compile_null_space_callbacks
+from atwood.forms.program import FormProgram
 from atwood.forms.residuals import NullSpaceProgram
 from atwood.integrators.compiled_functions import NativeCallbacks
 from atwood.integrators.protocol import LinearSolver
 from atwood.lazy_dataclasses import dataclass
+from atwood.mechanics.dynamics.equations import Equations
+from atwood.numerics.body_order import elimination_stages
+from atwood.numerics.fixed_pivots import FixedPivots, fix_pivots
 from atwood.simulation.dynamics.redundancy import POOR
 from atwood.topology.graph import connected_groups
 
@@ -134,3 +138,41 @@ def _blocks(program: NullSpaceProgram, dependent: tuple[int, ...]) -> list[tuple
     if all(len(constraints) == len(speeds) for constraints, speeds in blocks):
         return blocks
     return [(list(range(program.rates)), list(dependent))]  # it cannot be solved, which the numbers will say
+
+
+def pivots_of(equations: Equations, program: FormProgram, samples: Sequence[FloatArray] = ()) -> FixedPivots | None:
+    """Return how the matrix ``dF/dy + cj dF/dy'`` of the dae form is eliminated; None if its pattern forbids it.
+
+    Coordinates and speeds have their pivots in their kinematic and dynamic rows, whose masses and rates make them
+    positive; the multiplier of a constraint force in the constraint on velocities (or accelerations), and that which
+    keeps positions in the constraint on positions.
+    """
+    first = program.coordinates + program.speeds
+    rows = np.arange(program.size, dtype=np.intp)
+    rows[first : first + program.multipliers] += program.extra
+    rows[first + program.multipliers :] -= program.multipliers
+    stages = elimination_stages(program.rows, program.columns, rows, _bodies(equations, program))
+    return fix_pivots(program.rows, program.columns, rows, stages, samples)
+
+
+def _bodies(equations: Equations, program: FormProgram) -> NDArray[np.intp]:
+    """Return the number of the body of each unknown; -1 for multipliers."""
+    forest = equations.forest
+    number = {one.name: i for i, one in enumerate(equations.names)}
+    speeds = {one.name: program.coordinates + i for i, one in enumerate(equations.speed_names)}
+    found = np.full(program.size, -1, dtype=np.intp)
+
+    def note(body: int, coordinates: tuple[int, ...], along: tuple[int, ...]) -> None:
+        names = (forest.coordinates[i].name for i in coordinates), (forest.speeds[i].name for i in along)
+        for numbers, those in zip((number, speeds), names, strict=True):
+            found[[numbers[name] for name in those if name in numbers]] = body
+
+    for one in forest.attachments:
+        note(one.body, (*one.coordinates, *one.orientation), (*one.speeds, *one.spin))
+    for step in forest.orientations:
+        if step.coordinate is not None:
+            note(step.body, (step.coordinate,), (step.coordinate,))
+    # What belongs to no body, such as the states of parts, is eliminated by itself.
+    alone = np.flatnonzero(found[: program.coordinates + program.speeds] < 0)
+    found[alone] = len(forest.coordinates) + alone
+    return np.where(found < 0, -1, np.unique(found, return_inverse=True)[1] - int(np.any(found < 0)))

@@ -1,4 +1,4 @@
-"""The record of a run and of its segments, and the same run made once more to look between its samples.
+"""The record of a run, and the same run made once more to look between its samples.
 
 Samples change nothing in a run, and runs are deterministic: so the states between the samples of a run, which nobody
 kept, are found by making it again.
@@ -26,7 +26,7 @@ from atwood.simulation.initialization.start import Start
 from atwood.simulation.problem.options import RunOptions, Samples
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.run.choice import Choice, describe_choices
-from atwood.simulation.run.record import SegmentRecord
+from atwood.simulation.run.recorder import SegmentRecord
 from atwood.simulation.run.session import KeptSession
 
 if TYPE_CHECKING:
@@ -173,7 +173,7 @@ class Outcome:
     t
         When.
     status, message
-        Why: ``"finished"``, ``"event"``, or as in `atwood.simulation.run.made.Run`.
+        Why: ``"finished"``, ``"event"``, or as in `atwood.simulation.run.run_record.Run`.
     statistics
         What it cost.
     event
