@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,11 +15,8 @@ from atwood.arrays import FloatArray
 from atwood.display import count_of, fitted, listed
 from atwood.errors import MissingQuantityError, suggestion_in_parts
 from atwood.lazy_dataclasses import dataclass
+from atwood.result.files import SavedResult, write_trajectories
 from atwood.table import Shown, Table, table
-
-if TYPE_CHECKING:
-    from atwood.result.files import SavedResult
-
 
 _BALANCED = 1e-3
 """Of the energy that is exchanged: by less a part may fail to balance, and a constraint may put in, unnamed."""
@@ -208,8 +205,6 @@ class PartEnergies(Shown, Mapping[str, PartEnergy]):
 
     def trajectories(self) -> SavedResult:
         """Return all energies by path, such as ``rod.energy.work.a``, to be plotted, saved or made a table of."""
-        from atwood.result.files import SavedResult
-
         found, meanings = dict[str, FloatArray](), dict[str, str]()
         for path, one in {**self._parts, **self._models}.items():
             for name, values in one.table().items():
@@ -220,8 +215,6 @@ class PartEnergies(Shown, Mapping[str, PartEnergy]):
     @takes(file=FILE)
     def save(self, file: str | os.PathLike[str]) -> Path:
         """Save all energies as NetCDF-3 (``.nc``), NumPy (``.npz``), MATLAB (``.mat``) or ``.csv``."""
-        from atwood.result.files import write_trajectories
-
         return write_trajectories(self.trajectories(), file)
 
     def plot(self, file: str | os.PathLike[str] | None = None) -> Any:

@@ -19,9 +19,10 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import find_observables
 from atwood.integrators.protocol import Statistics
 from atwood.model.declare.quantities import PATHS, Quantity
-from atwood.result.energy import EnergyLedger, account
+from atwood.result.energy import ConservedLedger, EnergyLedger, account
 from atwood.result.segment_quantities import SegmentQuantities
 from atwood.result.trajectories import Trajectories
+from atwood.result.turns import TurnCounter
 from atwood.result.work import find_ledger
 from atwood.simulation.dynamics.numerical_failure import named
 from atwood.simulation.dynamics.orientation_coordinates import CoordinateSwitch
@@ -37,8 +38,6 @@ from atwood.simulation.run.run_record import Run
 
 if TYPE_CHECKING:
     from atwood.result.accuracy import Accuracy
-    from atwood.result.energy import ConservedLedger
-    from atwood.result.turns import TurnCounter
     from atwood.simulation.singular.crossing import SingularCrossing
 
 
@@ -297,8 +296,6 @@ class Result(Trajectories):
 
     @cached_property
     def _turns(self) -> TurnCounter:
-        from atwood.result.turns import TurnCounter
-
         return TurnCounter(self.run)
 
     @cached_property

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,13 +20,11 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.constrained import ConstrainedProgram, constrained_program
 from atwood.forms.quantities import to_maximal
+from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
 from atwood.integrators.explicit_problem import MET, STEPS, CompiledRates, ExplicitProblem
 from atwood.integrators.protocol import Values
 from atwood.simulation.problem.problem import Plan
 from atwood.topology.graph import connected_groups
-
-if TYPE_CHECKING:
-    from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
 
 _EXTERNAL: Key[bool] = Key("whether accelerations call functions in Python")
 _COMPILED: Key[CompiledAccelerations] = Key("machine code of accelerations")
@@ -80,8 +77,6 @@ def first_order(kernel: BoundKernel, coordinates: int) -> Callable[[float, Float
 
 def compiled_rates(assembly: Assembly, found: AccelerationProgram) -> CompiledAccelerations:
     """Return the accelerations of a scene as machine code, for any parameter values."""
-    from atwood.integrators.embedded.rates import CompiledAccelerations
-
     return assembly.shared.get(_COMPILED, lambda: CompiledAccelerations(found.program), found)
 
 
@@ -219,6 +214,4 @@ def _code(program: ConstrainedProgram) -> CompiledAccelerations | None:
     """Return the machine code; None where there is none."""
     if any(node.operation == "external" for node in (*program.accelerations.nodes, *program.projection.nodes)):
         return None
-    from atwood.integrators.embedded.rates import CompiledAccelerations
-
     return CompiledAccelerations(program.accelerations, program.projection)

@@ -28,7 +28,7 @@ from atwood.simulation.dynamics.balance import balance_of, solve_balance
 from atwood.simulation.dynamics.numerical_failure import ADVICE_AT_START, undefined_value_at
 from atwood.simulation.dynamics.reactions import check_read_reactions
 from atwood.simulation.dynamics.redundancy import RankFinding, find_rank
-from atwood.simulation.dynamics.scales import coordinate_scales, find_scales, motion_scales
+from atwood.simulation.dynamics.scales import coordinate_scales, find_scales, motion_scales, seen_from_afar
 from atwood.simulation.initialization.mobility import check_massless_directions
 from atwood.simulation.problem.problem import Plan, dependent_speeds_of, kept_rows
 

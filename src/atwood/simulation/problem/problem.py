@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.codegen import BoundKernel, compile_ida_callbacks
 from atwood.errors import SolveError
+from atwood.expr import Program
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.program import FormProgram
-from atwood.forms.residuals import keep_constraints
+from atwood.forms.residuals import NullSpaceProgram, null_space_program
 from atwood.integrators.compiled_functions import NativeCallbacks
 from atwood.integrators.methods import Method
 from atwood.integrators.protocol import ImplicitProblem, LinearSolver
@@ -29,13 +30,12 @@ from atwood.simulation.dynamics.redundancy import (
     review_partitioning,
 )
 from atwood.simulation.dynamics.scales import Scales
+from atwood.simulation.problem.options import with_nominal
 from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
     from atwood.codegen import IdaCallbacks
     from atwood.codegen.sundials.null_space_residuals import NullSpaceCallbacks
-    from atwood.expr import Program
-    from atwood.forms.residuals import NullSpaceProgram
     from atwood.numerics.fixed_pivots import FixedPivots
     from atwood.simulation.problem.implicit_scene import CompiledNullSpace
 
@@ -329,8 +329,6 @@ class Plan:
         shifts = np.full(program.extra, 1e3 * max(scales.length, 1.0 / scales.length) / scales.time)
         motion = self.coordinate_sizes, self.sizes / scales.time
         if nominal:
-            from atwood.simulation.problem.options import with_nominal
-
             motion = with_nominal(self.assembly, self.assembly.own_equations, motion, nominal)
         return np.concatenate([*(relative * one for one in motion), forces, shifts])
 
@@ -354,8 +352,6 @@ def _restored(
 
 
 def _null_space_program(assembly: Assembly, kept: tuple[int, ...]) -> NullSpaceProgram:
-    from atwood.forms.residuals import null_space_program
-
     equations = keep_constraints(assembly.own_equations, kept)
     return null_space_program(f"{assembly.flat.name} (reduced)", equations, assembly.parameters, assembly.rows)
 

@@ -26,11 +26,11 @@ from atwood.errors import AtwoodError, KernelEvaluationError, UsageError, sugges
 from atwood.expr import Expression, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
-from atwood.integrators.explicit_problem import ExplicitProblem
 from atwood.integrators.methods import AUTO, EXPLICIT, IDA, IDA_SUNDAE, METHODS, TAYLOR, Method, advise
 from atwood.integrators.protocol import Values
 from atwood.lazy_dataclasses import dataclass
-from atwood.simulation.problem.explicit_scene import explicit_problem, explicit_problem_of
+from atwood.simulation.events.modes import find_event_functions
+from atwood.simulation.problem.explicit_scene import constrained_problem, explicit_problem, explicit_problem_of
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.problem.problem import Plan
 
@@ -90,11 +90,8 @@ def check_solver(asked: str) -> None:
     """Refuse a solver that there is not, or that cannot be had."""
     if asked not in (AUTO, *METHODS):
         raise UsageError(f"there is no solver {asked!r}", advice=suggestion(asked, (AUTO, *METHODS)))
-    if asked == IDA.key:
-        from atwood.integrators.ida.library import available, why_not
-
-        if not available():
-            raise UsageError(f"IDA cannot be driven directly: {why_not()}", advice=advise(IDA_SUNDAE))
+    if asked == IDA.key and (missing := _missing_library()):
+        raise UsageError(f"IDA cannot be driven directly: {missing}", advice=advise(IDA_SUNDAE))
 
 
 def implicit_solver() -> str:
@@ -102,12 +99,18 @@ def implicit_solver() -> str:
 
     The second is said in a warning.
     """
-    from atwood.integrators.ida.library import available, why_not
-
-    if available():
+    missing = _missing_library()
+    if not missing:
         return IDA.key
-    warnings.warn(f"running through scikit-sundae, which is slower: {why_not()}", stacklevel=2)
+    warnings.warn(f"running through scikit-sundae, which is slower: {missing}", stacklevel=2)
     return IDA_SUNDAE.key
+
+
+def _missing_library() -> str:
+    """Return why the libraries of SUNDIALS cannot be used; empty if they can."""
+    from atwood.integrators.ida.library import available, why_not  # explicit runs need none
+
+    return "" if available() else why_not()
 
 
 def choose(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArray) -> Choice:
@@ -133,11 +136,16 @@ def choose(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArr
     return Choice(t, EXPLICIT.key, "its coordinates are independent, and the problem is not stiff")
 
 
+def solved_loops(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> Solved | None:
+    """Return closed loops solved by formulas on the branch of a state; None where no formulas do."""
+    from atwood.simulation.problem.closed_loops import solve_at  # few scenes have loops
+
+    return solve_at(plan, t, q, u)
+
+
 def _choose_for_loops(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArray) -> Choice:
     """Return what solves a mechanism with closed loops: an explicit method where formulas solve these."""
-    from atwood.simulation.problem.closed_loops import solve_at
-
-    solved = solve_at(plan, t, q, u)
+    solved = solved_loops(plan, t, q, u)
     if solved is None:
         return _choose_on_constraints(plan, options, t, q, u, "closed loops leave constraints among the coordinates")
     found = stiffness_of(plan, options, t, q, u)
@@ -178,7 +186,6 @@ def _choose_on_constraints(
 
 def _has_closed_series(plan: Plan, options: RunOptions, solved: Solved) -> bool:
     """Return whether accelerations with solved loops have Taylor series that pay: no event keeps them short."""
-    from atwood.simulation.events.modes import find_event_functions
     from atwood.simulation.problem.taylor_scene import recurrences_of
 
     watches = solved.form.loops.counted or options.conditions or find_event_functions(plan.assembly)
@@ -237,16 +244,14 @@ def stiffness_of(
     y, count, time = np.concatenate([q, u]), len(q), plan.scales.time
     scale = np.concatenate([plan.coordinate_sizes, plan.sizes / plan.scales.time])
     if plan.balance.constraints:
-        from atwood.simulation.problem.closed_loops import solve_at
-
-        solved = solve_at(plan, t, q, u)
+        solved = solved_loops(plan, t, q, u)
         if solved is not None:
             problem = explicit_problem_of(assembly, solved.form.accelerations, solved.values)
             y, scale, count = solved.reduced(y), solved.reduced(scale), len(solved.independent)
         else:
-            problem = _on_constraints(plan, t, y)
+            problem = constrained_problem(plan, t, y)
     elif assembly.form == "dae":
-        problem = _on_constraints(plan, t, y)
+        problem = constrained_problem(plan, t, y)
     else:
         found = explicit_problem(assembly)
         if found is None:
@@ -256,12 +261,6 @@ def stiffness_of(
     if goes_on:
         time = present_time(problem.rates, t, y, scale, count, time, span)
     return find_stiffness(problem.rates, t, y, scale, time, span, options.relative_tolerance)
-
-
-def _on_constraints(plan: Plan, t: float, y: FloatArray) -> ExplicitProblem:
-    from atwood.simulation.problem.explicit_scene import constrained_problem
-
-    return constrained_problem(plan, t, y)
 
 
 def describe_choices(choices: Sequence[Choice]) -> str:

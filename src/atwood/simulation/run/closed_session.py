@@ -23,10 +23,10 @@ from atwood.integrators.session import Session
 from atwood.lazy_dataclasses import replace
 from atwood.simulation.problem.closed_loops import Solved, levels, on_branch, solve_at
 from atwood.simulation.problem.explicit_scene import explicit_problem_of
+from atwood.simulation.run.session import SolverRequest, equations_of
 
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventCode
-    from atwood.simulation.run.session import SolverRequest
 
 
 _BETTER = 2.0
@@ -219,8 +219,6 @@ class ClosedLoopSession(Session):
         longest = np.inf if solved.is_clear else self._longest_step(solved, t, y)
         if self._before.steps and np.isfinite(longest):  # steps grow by themselves from one that is surely short
             settings = replace(settings, first_step=min(_FIRST * longest, settings.horizon))
-        from atwood.simulation.run.session import equations_of
-
         given = self._leave
 
         def leave(t: float, y: FloatArray) -> bool:

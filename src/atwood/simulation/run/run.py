@@ -38,7 +38,7 @@ from atwood.simulation.run.run_record import Outcome, Run, Segment, as_asked, ru
 from atwood.simulation.run.segment import run_segment
 from atwood.simulation.run.session import KeptSession
 from atwood.simulation.run.sides_of_run import SidesOfRun
-from atwood.simulation.run.stall_diagnosis import allowed
+from atwood.simulation.run.stall_diagnosis import allowed, failed
 from atwood.stages import stage
 from atwood.topology.orientation_coordinates import Orientation
 
@@ -362,8 +362,6 @@ class _Walk:
             message = outcome.error.message
         made = self._run_so_far(status, message)
         if status == "failed":
-            from atwood.simulation.run.stall_diagnosis import failed  # few runs fail
-
             error = outcome.error or failed(message, self.assembly.flat.name, self.t > self.start.time)
             error.run = made  # type: ignore[attr-defined]
             raise error

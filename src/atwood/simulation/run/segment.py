@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.clock import TimeIsUp, more_time, time_left
+from atwood.clock import TimeIsUp, check_time, more_time, time_left
 from atwood.errors import AtwoodError, SolveError, StartError
 from atwood.integrators.methods import AUTO, Method
 from atwood.integrators.protocol import Budget, Statistics, Status, StepResult
@@ -35,7 +35,7 @@ from atwood.simulation.run.choice import dead_centre, stiffness_of, turned_stiff
 from atwood.simulation.run.recorder import Recorder
 from atwood.simulation.run.run_record import Outcome, Segment
 from atwood.simulation.run.session import SolverRequest, open_session
-from atwood.simulation.run.stall_diagnosis import too_tight
+from atwood.simulation.run.stall_diagnosis import explain_stuck, too_tight
 
 if TYPE_CHECKING:
     from atwood.simulation.singular.crossing import SingularCrossing
@@ -65,10 +65,37 @@ def run_segment(segment: Segment, recorder: Recorder, t: float, q: FloatArray, u
     if t >= segment.end:  # what has changed at the end of the run is shown
         return Outcome(t, "finished", "", Statistics(), (segment.choice,))
     if n == 0:
-        from atwood.simulation.run.nothing_free import follow
-
-        return follow(segment, recorder, t)
+        return _follow_time(segment, recorder, t)
     return _Runner(segment, recorder).run(t, y, yp)
+
+
+def _follow_time(segment: Segment, recorder: Recorder, t: float) -> Outcome:
+    """Go through a mode in which nothing is free to move: its state is a function of time, its events still happen."""
+    nothing, last, options = np.zeros(0), t, segment.options
+    noted: list[EventRecord] = []
+
+    def ended(t: float, status: str, message: str = "", event: EventRecord | None = None) -> Outcome:
+        return Outcome(t, status, message, Statistics(), (segment.choice,), event, noted=tuple(noted))
+
+    try:
+        for moment, show in zip(segment.samples.times, segment.samples.shown, strict=True):
+            check_time()
+            event = segment.probe.between(last, float(moment))
+            while event is not None and not event.target:
+                noted.append(event)
+                recorder.take(event.time, nothing, True)
+                event = segment.probe.between(event.time, float(moment))
+            if event is not None:
+                recorder.take(event.time, nothing, True)
+                return ended(event.time, "event", event=event)
+            last = float(moment)
+            recorder.take(last, nothing, bool(show))
+            if options.progress is not None:
+                options.progress(last)
+    except TimeIsUp:
+        last = recorder.close()
+        return ended(last, "time_limit", options.out_of_time(last))
+    return ended(last, "finished")
 
 
 def _first_state(segment: Segment, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -231,8 +258,6 @@ class _Runner:
                 if stuck or self.request is None
                 else too_tight(self.request, self.method, step_result, self.opened)
             )
-            from atwood.simulation.run.stall_diagnosis import explain_stuck
-
             return stuck or tight or explain_stuck(self.segment.plan, step_result)
         return SolveError(
             f"{found.describe()}, so that the run cannot go on: {step_result.message}",

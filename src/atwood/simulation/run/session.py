@@ -19,9 +19,11 @@ from atwood.integrators.session import Session
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.simulation.dynamics.orientation_coordinates import longest_step
 from atwood.simulation.events.modes import EventProbe
+from atwood.simulation.problem.explicit_scene import constrained_problem, explicit_problem, own_rates
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.step_guard import step_guard
+from atwood.simulation.run.choice import solved_loops
 
 if TYPE_CHECKING:
     from atwood.forms.loops.closed_form import ClosedForm
@@ -99,10 +101,9 @@ def open_session(
     if method.is_implicit:
         return method.open(_implicit_task(request, method, t, y, yp))
     if plan.balance.constraints and not keeps_constraints:
-        from atwood.simulation.problem.closed_loops import solve_at
         from atwood.simulation.run.closed_session import ClosedLoopSession
 
-        solved = solve_at(plan, t, *plan.program.split(y))
+        solved = solved_loops(plan, t, *plan.program.split(y))
         if solved is not None:
             return ClosedLoopSession(request, method, t, y, solved, leave, give_up)
     if method.keeps_constraints and (plan.balance.constraints or plan.assembly.form == "dae"):
@@ -228,8 +229,6 @@ def _opened_with(request: SolverRequest, method: Method, leave: Leave | None) ->
 
 def _open_tree(request: SolverRequest, method: Method, t: float, y: FloatArray, leave: Leave | None) -> Session:
     """Start a method on independent coordinates, and keep its session if that can be begun again."""
-    from atwood.simulation.problem.explicit_scene import own_rates
-
     kept, plan = request.kept, request.plan
     session = kept.begin_again(request, method, t, y, leave)
     if session is not None:
@@ -288,8 +287,6 @@ def equations_of(
 
 def _constrained_task(request: SolverRequest, method: Method, t: float, y: FloatArray, leave: Leave | None) -> Task:
     """Return a task with steps that end on the constraints."""
-    from atwood.simulation.problem.explicit_scene import constrained_problem
-
     plan, probe = request.plan, request.probe
     plan.keep_better(t, plan.program.split(y)[0])
     problem = constrained_problem(plan, t, y, probe.function(), probe.directions)
@@ -302,8 +299,6 @@ def _constrained_task(request: SolverRequest, method: Method, t: float, y: Float
 
 def _explicit_problem(request: SolverRequest, method: Method) -> ExplicitProblem:
     """Return the equations for an explicit method, with what is watched."""
-    from atwood.simulation.problem.explicit_scene import explicit_problem
-
     assembly, probe = request.plan.assembly, request.probe
     problem = explicit_problem(assembly, probe.function(), probe.directions) if assembly.form == "reduced" else None
     if problem is None:
