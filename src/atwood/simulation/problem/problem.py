@@ -16,7 +16,7 @@ from atwood.expr import Program
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.program import FormProgram
-from atwood.forms.residuals import NullSpaceProgram, null_space_program
+from atwood.forms.residuals import NullSpaceProgram, keep_constraints, null_space_program
 from atwood.integrators.compiled_functions import NativeCallbacks
 from atwood.integrators.methods import Method
 from atwood.integrators.protocol import ImplicitProblem, LinearSolver
