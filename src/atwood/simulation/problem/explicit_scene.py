@@ -34,10 +34,9 @@ def explicit_problem(
     assembly: Assembly,
     events: Callable[[float, FloatArray, FloatArray], Values] | None = None,
     directions: tuple[int, ...] = (),
-    found: AccelerationProgram | None = None,
 ) -> ExplicitProblem | None:
     """Return the equations of a scene in the reduced form for an explicit method, with ``y = (q, u)``."""
-    program = found or accelerations_of(assembly)
+    program = accelerations_of(assembly)
     if program is None or len(assembly.reduced.coordinates) == 0:
         return None
     return explicit_problem_of(assembly, program, assembly.parameter_values, events, directions)

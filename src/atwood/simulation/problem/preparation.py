@@ -9,7 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -31,9 +31,6 @@ from atwood.simulation.dynamics.redundancy import RankFinding, find_rank
 from atwood.simulation.dynamics.scales import coordinate_scales, find_scales, motion_scales, seen_from_afar
 from atwood.simulation.initialization.mobility import check_massless_directions
 from atwood.simulation.problem.problem import Plan, dependent_speeds_of, kept_rows
-
-if TYPE_CHECKING:
-    pass
 
 _PLAN: Key[Plan] = Key("plan")
 

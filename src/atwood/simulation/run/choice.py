@@ -186,16 +186,10 @@ def _choose_on_constraints(
 
 def _has_closed_series(plan: Plan, options: RunOptions, solved: Solved) -> bool:
     """Return whether accelerations with solved loops have Taylor series that pay: no event keeps them short."""
-    from atwood.simulation.problem.taylor_scene import recurrences_of
-
     watches = solved.form.loops.counted or options.conditions or find_event_functions(plan.assembly)
     if options.relative_tolerance > VERY_ACCURATE and (watches or not solved.is_clear):
         return False
-    try:
-        recurrences_of(plan.assembly, solved.form.accelerations)
-    except AtwoodError:
-        return False
-    return True
+    return _can_be_recurrences(plan.assembly, solved)
 
 
 def dead_centre(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArray) -> Choice:
@@ -213,16 +207,18 @@ _HAS_SERIES: Key[bool] = Key("whether accelerations have Taylor series")
 
 def _has_series(assembly: Assembly) -> bool:
     """Return whether the accelerations of a scene have Taylor series: nothing switches, nothing is called in Python."""
-    from atwood.simulation.problem.taylor_scene import recurrences
+    return assembly.shared.get(_HAS_SERIES, lambda: _can_be_recurrences(assembly, None))
 
-    def find() -> bool:
-        try:
-            recurrences(assembly)
-        except AtwoodError:
-            return False
-        return True
 
-    return assembly.shared.get(_HAS_SERIES, find)
+def _can_be_recurrences(assembly: Assembly, solved: Solved | None) -> bool:
+    """Return whether accelerations, with loops solved by formulas if there are any, can be written as recurrences."""
+    from atwood.simulation.problem.taylor_scene import recurrences, recurrences_of  # many runs need no series
+
+    try:
+        recurrences(assembly) if solved is None else recurrences_of(assembly, solved.form.accelerations)
+    except AtwoodError:
+        return False
+    return True
 
 
 def turned_stiff(t: float, found: Stiffness) -> Choice:
