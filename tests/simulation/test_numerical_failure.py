@@ -104,7 +104,7 @@ def test_eigenvalues_that_do_not_come_out_tell_nothing_of_stiffness(break_down: 
 
 
 def test_inertia_that_cannot_be_decomposed(break_down: Break) -> None:
-    calls = break_down("eigh", "initialization.massless")
+    calls = break_down("eigh", "initialization.mobility")
     scene = hung_from(Rod(length=1.0), 0.0, mass=0.0)
     with pytest.raises(AtwoodError, match="could not be worked with"):
         simulate(scene)
