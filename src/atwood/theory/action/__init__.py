@@ -1,7 +1,7 @@
 """The action of motions and paths, motions between given ends, and the theory of Hamilton and Jacobi."""
 
 from atwood.theory.action.action_angle import ActionAngle, action_angle
-from atwood.theory.action.between import JoiningMotion, boundary_value_motions
+from atwood.theory.action.boundary_values import JoiningMotion, boundary_value_motions
 from atwood.theory.action.integral import Action, Variation, action
 from atwood.theory.action.separation import SeparatedMotion, Separation, separation
 

@@ -1,7 +1,12 @@
 """How neighbouring motions move: tangent flow, Lyapunov exponents, Poincare sections."""
 
-from atwood.theory.flow.phase_portrait import PhasePortrait, RestPoint, phase_portrait
-from atwood.theory.flow.section import PoincareSection, poincare_section
+from atwood.theory.flow.phase_portrait import (
+    PhasePortrait,
+    PoincareSection,
+    RestPoint,
+    phase_portrait,
+    poincare_section,
+)
 from atwood.theory.flow.tangent_flow import LyapunovExponents, TangentFlow, lyapunov_exponents, tangent_flow
 
 __all__ = [

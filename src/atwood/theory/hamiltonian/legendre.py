@@ -7,7 +7,7 @@ only L is differentiated, and nothing but a linear system is solved.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -58,27 +58,27 @@ class LegendreTransform:
 
     def momenta(self, q: Numbers, v: Numbers, t: float | None = None) -> FloatArray:
         """Return ``p = dL/dq'`` at coordinates and velocities."""
-        return self._momenta(t, (q, v), None)
+        return self._at("momenta", q, v, t)
 
     def lagrange_function(self, q: Numbers, v: Numbers, t: float | None = None) -> FloatArray:
         """Return L, J; shape () or (states,)."""
-        return self._value(t, (q, v), None)[..., 0]
+        return self._at("Lagrangian", q, v, t)[..., 0]
 
     def forces(self, q: Numbers, v: Numbers, t: float | None = None) -> FloatArray:
         """Return the generalized forces that L does not give: loads, less the derivatives of the Rayleigh function."""
-        return self._forces(t, (q, v), None)
+        return self._at("other forces", q, v, t)
 
     def energies(self, q: Numbers, v: Numbers, t: float | None = None) -> FloatArray:
         """Return T and V, J; shape (2,) or (states, 2)."""
-        return self._energies(t, (q, v), None)
+        return self._at("energies", q, v, t)
 
     def coordinate_gradient(self, q: Numbers, v: Numbers, t: float | None = None) -> FloatArray:
         """Return ``dL/dq`` at coordinates and velocities."""
-        return self._slopes(t, (q, v), None)
+        return self._at("dL/dq", q, v, t)
 
     def time_derivative(self, q: Numbers, v: Numbers, t: float | None = None) -> FloatArray:
         """Return ``dL/dt`` at coordinates and velocities; shape () or (states,)."""
-        return self._rate(t, (q, v), None)[..., 0]
+        return self._at("dL/dt", q, v, t)[..., 0]
 
     def mass_matrix(self, q: Numbers, v: Numbers = None, t: float | None = None) -> FloatArray:
         """Return ``d2L/dq'2``, shape (n, n), or (states, n, n); velocities where it depends on them."""
@@ -86,10 +86,10 @@ class LegendreTransform:
         coordinates = as_numbers(q, n, "q", name)
         still = np.zeros(n) if v is None else as_numbers(v, n, "v", name)
         if self.has_moving_mass:
-            return self._hessian(t, (coordinates, np.broadcast_to(still, coordinates.shape)), None)
+            return self._at("mass matrix", coordinates, np.broadcast_to(still, coordinates.shape), t)
         shape = (*coordinates.shape[:-1], n, n)
         units = np.broadcast_to(np.eye(n), shape)
-        columns = self._columns(t, (np.broadcast_to(coordinates[..., None, :], shape), units), None)
+        columns = self._at("columns", np.broadcast_to(coordinates[..., None, :], shape), units, t)
         return np.asarray(0.5 * (columns + np.swapaxes(columns, -1, -2)))
 
     def velocities(self, q: Numbers, p: Numbers, t: float | None = None) -> FloatArray:
@@ -140,47 +140,40 @@ class LegendreTransform:
         found = self.lagrangian
         return vjp([found.lagrangian], [found.graph.one], list(self.velocity_symbols))
 
-    def _function(self, name: str, expressions: Callable[[], Sequence[Expression]], shape: tuple[int, ...]) -> Function:
-        found = self.lagrangian
-        inputs = (
-            InputGroup("t", (found.time,)),
-            InputGroup("q", found.coordinates),
-            InputGroup("v", self.velocity_symbols),
-        )
+    @cached_property
+    def _quantities(self) -> Mapping[str, tuple[Callable[[], Sequence[Expression]], tuple[int, ...]]]:
+        """Expressions of quantities of coordinates and velocities, and the shape of each at one state."""
+        found, n = self.lagrangian, self.size
+        return {
+            "momenta": (lambda: self.momentum_expressions, (n,)),
+            "Lagrangian": (lambda: [found.lagrangian], (1,)),
+            "energies": (lambda: [found.kinetic, found.potential], (2,)),
+            "dL/dq": (lambda: vjp([found.lagrangian], [found.graph.one], list(found.coordinates)), (n,)),
+            "dL/dt": (lambda: jvp([found.lagrangian], {found.time: 1.0}), (1,)),
+            "other forces": (lambda: self.force_expressions, (n,)),
+            "columns": (self._mass_times_velocities, (n,)),
+            "mass matrix": (self._mass_entries, (n, n)),
+        }
 
+    @cached_property
+    def _functions(self) -> dict[str, Function]:
+        return {}
+
+    def _at(self, name: str, q: Numbers, v: Numbers, t: float | None) -> FloatArray:
+        """Return one of the quantities in numbers; its function is made when it is first asked for."""
+        if name not in self._functions:
+            expressions, shape = self._quantities[name]
+            self._functions[name] = Function(self.assembly, self._program(name, expressions), shape)
+        return self._functions[name](t, (q, v), None)
+
+    def _program(self, name: str, expressions: Callable[[], Sequence[Expression]]) -> Program:
         def make() -> Program:
+            state = {"t": (self.lagrangian.time,), "q": self.lagrangian.coordinates, "v": self.velocity_symbols}
+            inputs = tuple(InputGroup(letter, symbols) for letter, symbols in state.items())
             outputs = (OutputGroup(name, tuple(expressions())),)
             return Program(f"{self.assembly.flat.name} {name}", inputs, self.assembly.parameters, outputs)
 
-        program = self.assembly.shared.get(_PROGRAM, make, self.assembly.orientation.kind, name)
-        return Function(self.assembly, program, shape)
-
-    @cached_property
-    def _momenta(self) -> Function:
-        return self._function("momenta", lambda: self.momentum_expressions, (self.size,))
-
-    @cached_property
-    def _value(self) -> Function:
-        return self._function("Lagrangian", lambda: [self.lagrangian.lagrangian], (1,))
-
-    @cached_property
-    def _energies(self) -> Function:
-        return self._function("energies", lambda: [self.lagrangian.kinetic, self.lagrangian.potential], (2,))
-
-    @cached_property
-    def _slopes(self) -> Function:
-        found = self.lagrangian
-        return self._function(
-            "dL/dq", lambda: vjp([found.lagrangian], [found.graph.one], list(found.coordinates)), (self.size,)
-        )
-
-    @cached_property
-    def _rate(self) -> Function:
-        return self._function("dL/dt", lambda: jvp([self.lagrangian.lagrangian], {self.lagrangian.time: 1.0}), (1,))
-
-    @cached_property
-    def _forces(self) -> Function:
-        return self._function("other forces", lambda: self.force_expressions, (self.size,))
+        return self.assembly.shared.get(_PROGRAM, make, self.assembly.orientation.kind, name)
 
     @cached_property
     def force_expressions(self) -> tuple[Expression, ...]:
@@ -189,27 +182,20 @@ class LegendreTransform:
         losses = vjp([found.rayleigh], [found.graph.one], list(self.velocity_symbols))
         return tuple(found.forces[k] - loss for k, loss in zip(self.force_order, losses, strict=True))
 
-    @cached_property
-    def _columns(self) -> Function:
-        """The product of the mass matrix with a direction, which stands in the place of the velocities."""
+    def _mass_times_velocities(self) -> list[Expression]:
+        """Return the product of the mass matrix with a direction, which stands in the place of the velocities."""
         graph = self.lagrangian.graph
         back: dict[Expression, Expression | float] = {
             graph.symbol(f"direction:{v.name}"): v for v in self.velocity_symbols
         }
-        return self._function("columns", lambda: substitute(self._inertia, back), (self.size,))
+        return substitute(self._inertia, back)
 
-    @cached_property
-    def _hessian(self) -> Function:
-        n, graph = self.size, self.lagrangian.graph
-
-        def entries() -> list[Expression]:
-            found = jacobian(self.momentum_expressions, list(self.velocity_symbols))
-            values = [graph.zero] * (n * n)
-            for row, column, entry in zip(found.rows, found.columns, found.entries, strict=True):
-                values[row * n + column] = entry
-            return values
-
-        return self._function("mass matrix", entries, (n, n))
+    def _mass_entries(self) -> list[Expression]:
+        found, n = jacobian(self.momentum_expressions, list(self.velocity_symbols)), self.size
+        values = [self.lagrangian.graph.zero] * (n * n)
+        for row, column, entry in zip(found.rows, found.columns, found.entries, strict=True):
+            values[row * n + column] = entry
+        return values
 
     # -- numbers --------------------------------------------------------------------------------------------------
 
