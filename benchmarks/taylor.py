@@ -21,7 +21,7 @@ from timing import at_error, best_of, options, peer, print_table, ratio, save
 
 from atwood import assemble, simulate
 from atwood.forms.accelerations import acceleration_program
-from atwood.integrators.taylor.native import CompiledRecurrences
+from atwood.integrators.taylor.stepper import CompiledRecurrences
 from atwood.simulation.problem.taylor_scene import recurrences
 from atwood_library.scenes import Chain, DoublePendulum, FreeBody
 

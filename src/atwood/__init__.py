@@ -80,7 +80,7 @@ from atwood.model.values.vector import Vector, as_vector, cross, dot, norm
 
 if TYPE_CHECKING:
     from atwood.checking import CheckReport, check
-    from atwood.expr.formulas.formula import Formula, formula
+    from atwood.expr.sympy_bridge import Formula, formula
     from atwood.forms.assembly import Assembly
     from atwood.model.compose.serialization import from_data, load_scene, save_scene, to_data
     from atwood.pipeline import assemble, simulate
@@ -307,7 +307,7 @@ __all__ += [
 
 _ROOMS = {
     "atwood.checking": ("CheckReport", "check"),
-    "atwood.expr.formulas.formula": ("Formula", "formula"),
+    "atwood.expr.sympy_bridge": ("Formula", "formula"),
     "atwood.model.compose.serialization": ("from_data", "load_scene", "save_scene", "to_data"),
     "atwood.pipeline": ("Assembly", "assemble", "simulate"),
     "atwood.plotting": ("animate", "plot", "plot_comparison", "plot_mechanism", "plot_sweep"),

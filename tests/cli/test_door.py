@@ -45,7 +45,7 @@ def test_a_run_that_was_made_before_loads_what_it_needs(tmp_path) -> None:
     own = {name for name in warm if name.split(".")[0] in ("atwood", "atwood_library")}
     assert len(own) <= BUDGET, sorted(own)
     assert not [name for name in warm if name in HEAVY]
-    for generator in ("atwood.reporting", "atwood.theory", "atwood.expr.formulas.sympy_bridge"):
+    for generator in ("atwood.reporting", "atwood.theory", "atwood.expr.sympy_bridge"):
         assert generator not in warm
     assert len(written.split()) - 1 <= 20, f"constructors of classes with few instances: {written}"
 

@@ -9,10 +9,9 @@ from atwood import expr as ex
 from atwood.codegen import compile_ida_callbacks, compile_native
 from atwood.codegen.sundials.layout import SundialsLayout, layout_for, sundials_layout
 from atwood.errors import KernelEvaluationError, UsageError
-from atwood.integrators.compiled_functions import NativeCallbacks
 from atwood.integrators.ida import library as sundials_library, native as ida_native
 from atwood.integrators.ida.callbacks import JACOBIAN, RESIDUAL, WEIGHTS
-from atwood.integrators.protocol import ImplicitProblem, SolverOptions
+from atwood.integrators.protocol import ImplicitProblem, NativeCallbacks, SolverOptions
 from atwood.pipeline import assemble
 from atwood_library.scenes import Chain, DoublePendulum, SimplePendulum
 

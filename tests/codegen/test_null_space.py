@@ -8,8 +8,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from atwood.codegen.sundials.null_space import NullSpaceShape
-from atwood.codegen.sundials.null_space_residuals import compile_null_space_callbacks
+from atwood.codegen.sundials.null_space import NullSpaceShape, compile_null_space_callbacks
 from atwood.errors import KernelEvaluationError, UsageError
 from atwood.forms.residuals import null_space_program
 from atwood.integrators.ida import library as sundials_library

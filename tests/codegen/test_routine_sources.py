@@ -69,7 +69,7 @@ def sources() -> Iterator[tuple[str, tuple[str, ...]]]:
     for path in sorted(SOURCE.rglob("*.py")):
         file = path.relative_to(SOURCE).as_posix()
         text = path.read_text(encoding="utf-8")
-        if "RoutineSource(" not in text or file == "codegen/routines/source.py":
+        if "RoutineSource(" not in text or file == "codegen/llvm/build.py":
             continue
         known: dict[str, Any] = dict(vars(import_module("atwood." + file.removesuffix(".py").replace("/", "."))))
         for part in ast.parse(text).body:
@@ -107,13 +107,13 @@ def test_every_module_that_writes_routines_has_a_source() -> None:
 
 def test_the_language_and_its_printer_belong_to_every_key() -> None:
     listed = {f"codegen/{name}" for name in GENERATORS}
-    for file, name in (("codegen/llvm/routines.py", "print_routines"), ("codegen/routines/source.py", "RoutineSource")):
-        assert files_behind(file, name, set()) - {"codegen/routines/source.py"} <= listed
+    for file, name in (("codegen/llvm/printer.py", "print_routines"), ("codegen/llvm/build.py", "RoutineSource")):
+        assert files_behind(file, name, set()) - {"codegen/llvm/build.py"} <= listed
 
 
 def test_a_source_is_named_by_its_files_and_arguments() -> None:
+    from atwood.codegen.llvm.build import RoutineSource
     from atwood.codegen.llvm.elimination import write_routines
-    from atwood.codegen.routines.source import RoutineSource
 
     module = "codegen.llvm.elimination"
     source = RoutineSource(module)
@@ -121,11 +121,11 @@ def test_a_source_is_named_by_its_files_and_arguments() -> None:
     others = [
         RoutineSource(module, ("lazy_dataclasses.py",)),
         RoutineSource(module, (), (1,)),
-        RoutineSource("codegen.once"),
+        RoutineSource("codegen.cache"),
     ]
     assert len({source.key, *(one.key for one in others)}) == 4
 
 
 def test_the_language_of_llvm_is_written_in_one_room() -> None:
     written = {path.relative_to(SOURCE).as_posix() for path in SOURCE.rglob("*.py") if size(path).llvm}
-    assert written == {f"codegen/llvm/{name}.py" for name in ("module", "routines", "text")}
+    assert written == {f"codegen/llvm/{name}.py" for name in ("module", "printer", "text")}

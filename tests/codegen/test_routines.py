@@ -13,10 +13,9 @@ import numpy as np
 import pytest
 
 from atwood.codegen.llvm.engine import compile_text, load_code
-from atwood.codegen.llvm.routines import print_routines
-from atwood.codegen.routines.elimination import write_elimination
-from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER, Kind, Lanes
-from atwood.codegen.routines.language import Record, Routine, Value
+from atwood.codegen.llvm.linear_systems import write_elimination
+from atwood.codegen.llvm.printer import print_routines
+from atwood.codegen.routines import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER, Kind, Lanes, Record, Routine, Value
 
 C_TYPES = {NUMBER: c_double, INTEGER: c_int64, CODE: c_int, ADDRESS: c_void_p}
 INTRINSICS = (

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 
 from atwood import expr as ex
-from atwood.expr.formulas.sympy_bridge import to_sympy
 from atwood.expr.simplify.collect import collect, cost
+from atwood.expr.sympy_bridge import to_sympy
 
 from . import graphs
 

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 
 from atwood import expr as ex
 from atwood.errors import AtwoodError
-from atwood.expr.formulas.sympy_bridge import from_sympy, to_sympy, to_sympy_shared
+from atwood.expr.sympy_bridge import from_sympy, to_sympy, to_sympy_shared
 
 from . import graphs
 

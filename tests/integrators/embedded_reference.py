@@ -16,18 +16,9 @@ from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError
 from atwood.integrators.embedded.steps import APART, GROWTH, RETREAT, SAFETY, SHRINKAGE
 from atwood.integrators.embedded.tableau import Tableau
-from atwood.integrators.event_location import ROUNDING, State
-from atwood.integrators.explicit_problem import (
-    CALM,
-    STIFF,
-    Counts,
-    ExplicitProblem,
-    Outcome,
-    Stepper,
-    absolute_tolerances,
-    no_interpolation,
-)
-from atwood.integrators.protocol import SolverOptions
+from atwood.integrators.event_location import ROUNDING
+from atwood.integrators.protocol import ExplicitProblem, SolverOptions, State, absolute_tolerances
+from atwood.integrators.stepper import CALM, STIFF, Counts, Outcome, Stepper, no_interpolation
 
 
 def matrix(rows: Sequence[Mapping[int, float]], width: int) -> FloatArray:
@@ -100,7 +91,7 @@ def estimate(h: float, fifth: float, third: float, size: int) -> float:
 
 
 class ReferenceStepper(Stepper):
-    """The state of a run; see `atwood.integrators.explicit_problem.Stepper`.
+    """The state of a run; see `atwood.integrators.protocol.Stepper`.
 
     Parameters
     ----------

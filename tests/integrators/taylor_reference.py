@@ -16,17 +16,9 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.codegen.python.backend import compile_program
 from atwood.errors import KernelEvaluationError
-from atwood.integrators.compiled_functions import StepGuard
-from atwood.integrators.event_location import State
-from atwood.integrators.explicit_problem import (
-    Counts,
-    Outcome,
-    Stepper,
-    absolute_tolerances,
-    no_interpolation,
-)
-from atwood.integrators.protocol import SolverOptions
-from atwood.integrators.taylor.problem import (
+from atwood.integrators.protocol import SolverOptions, State, StepGuard, absolute_tolerances
+from atwood.integrators.stepper import Counts, Outcome, Stepper, no_interpolation
+from atwood.integrators.taylor.stepper import (
     DEFECT,
     FLOOR,
     PARTS,
@@ -49,7 +41,7 @@ def power_of_two(value: float) -> float:
 
 
 class ReferenceStepper(Stepper):
-    """The state of a run; see `~atwood.integrators.explicit_problem.Stepper`.
+    """The state of a run; see `~atwood.integrators.protocol.Stepper`.
 
     Parameters
     ----------

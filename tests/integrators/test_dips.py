@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from atwood import Component, Point, Scalar, Scene, connector, event, parameter, simulate
-from atwood.integrators.dips import Point as Reading, find_dip
+from atwood.integrators.event_location import Point as Reading, find_dip
 from atwood_library import Ground, Pivot, PointMass, RigidBody, Spring, TorsionSpring
 
 from ..helpers.runs import FORMS

@@ -15,11 +15,10 @@ from scipy.special import ellipj, ellipk
 from atwood.errors import KernelEvaluationError, StartError, UsageError
 from atwood.forms.quantities import energy_program
 from atwood.integrators import explicit_session
-from atwood.integrators.embedded.native import CompiledStepper
-from atwood.integrators.explicit_problem import ExplicitProblem
+from atwood.integrators.embedded.stepper import CompiledStepper
 from atwood.integrators.explicit_session import ExplicitSession
 from atwood.integrators.methods.dormand_prince import TABLEAU
-from atwood.integrators.protocol import Budget, SolverOptions, Status
+from atwood.integrators.protocol import Budget, ExplicitProblem, SolverOptions, Status
 from atwood.pipeline import assemble
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.explicit_scene import explicit_problem
@@ -295,7 +294,7 @@ def test_ctrl_c_just_as_compiled_steps_call_python_is_not_lost(sampled: bool) ->
 
     def send(frame: Any, event: str, _: Any) -> None:
         nonlocal sent
-        if event == "call" and frame.f_code.co_name == "call" and frame.f_code.co_filename.endswith("native.py"):
+        if event == "call" and frame.f_code.co_name == "call" and frame.f_code.co_filename.endswith("stepper.py"):
             sent += 1
             if sent == 200:
                 signal.raise_signal(signal.SIGINT)

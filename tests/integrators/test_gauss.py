@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from atwood.integrators.gauss.tableau import ORDERS, tableau
+from atwood.integrators.symplectic.gauss import ORDERS, tableau
 
 
 @pytest.mark.parametrize("order", ORDERS)

@@ -12,8 +12,8 @@ from numpy.testing import assert_allclose
 from atwood.codegen.sundials.fixed_pivots import SLOTS, fixed_pivots_addresses
 from atwood.integrators.ida import library as sundials_library, native as ida_native
 from atwood.integrators.ida.callbacks import Record
-from atwood.integrators.ida.fixed import FixedSolver, table_layout
 from atwood.integrators.ida.library import library
+from atwood.integrators.ida.linear_solvers import FixedSolver, table_layout
 from atwood.integrators.protocol import ChoosePivots, ImplicitProblem, SolverOptions, Status, choose_linear_solver
 from atwood.numerics.body_order import Stage
 from atwood.numerics.fixed_pivots import FixedPivots, fix_pivots

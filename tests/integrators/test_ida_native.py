@@ -18,12 +18,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from atwood.errors import UsageError
-from atwood.integrators.compiled_functions import NativeCallbacks
 from atwood.integrators.ida import library as sundials_library, memory, native as ida_native, sundae as ida_sundae
 from atwood.integrators.ida.callbacks import Record, address, jacobian_function, residual_function, weight_function
 from atwood.integrators.ida.native import NativeSession
 from atwood.integrators.ida.setup import IdaTuning
-from atwood.integrators.protocol import Budget, ImplicitProblem, SolverOptions, Status
+from atwood.integrators.protocol import Budget, ImplicitProblem, NativeCallbacks, SolverOptions, Status
 from atwood_library.scenes import DoublePendulum
 
 from ..helpers.runs import packed, prepare

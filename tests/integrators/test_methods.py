@@ -13,15 +13,14 @@ from scipy.special import ellipj, ellipk
 
 from atwood import simulate
 from atwood.errors import UsageError
-from atwood.integrators.composition.steps import ORDERS as COMPOSITIONS
-from atwood.integrators.embedded.native import CompiledStepper
+from atwood.integrators.embedded.stepper import CompiledStepper
 from atwood.integrators.embedded.tableau import Tableau
-from atwood.integrators.explicit_problem import ExplicitProblem
 from atwood.integrators.explicit_session import ExplicitSession
-from atwood.integrators.gauss.tableau import ORDERS
 from atwood.integrators.methods import METHODS, Method
-from atwood.integrators.protocol import Budget, SolverOptions, Status
-from atwood.integrators.taylor.problem import HIGHEST, LOWEST
+from atwood.integrators.protocol import Budget, ExplicitProblem, SolverOptions, Status
+from atwood.integrators.symplectic.composition import ORDERS as COMPOSITIONS
+from atwood.integrators.symplectic.gauss import ORDERS
+from atwood.integrators.taylor.stepper import HIGHEST, LOWEST
 from atwood_library.scenes import SCENES
 
 from .embedded_reference import ReferenceStepper, matrix

@@ -12,14 +12,14 @@ from scipy.special import ellipj, ellipk
 from atwood import Component, Point, Scalar, Scene, connector, expr as ex, parameter, potential, simulate
 from atwood.errors import StartError, UnsupportedError, UsageError
 from atwood.expr.series.taylor import taylor_programs
-from atwood.integrators.explicit_problem import ExplicitProblem
 from atwood.integrators.explicit_session import ExplicitSession
-from atwood.integrators.protocol import Budget, SolverOptions, Status
-from atwood.integrators.taylor.native import CompiledRecurrences, CompiledStepper
-from atwood.integrators.taylor.problem import (
+from atwood.integrators.protocol import Budget, ExplicitProblem, SolverOptions, Status
+from atwood.integrators.taylor.stepper import (
     FACTOR,
     HIGHEST,
     LOWEST,
+    CompiledRecurrences,
+    CompiledStepper,
     TaylorProblem,
     choose_order,
     logarithm,

@@ -12,11 +12,10 @@ from numpy.testing import assert_allclose
 
 from atwood import Scene, UsageError, assemble, simulate
 from atwood.arrays import FloatArray
-from atwood.integrators.embedded.native import CompiledStepper
-from atwood.integrators.explicit_problem import ExplicitProblem
+from atwood.integrators.embedded.stepper import CompiledStepper
 from atwood.integrators.explicit_session import ExplicitSession
 from atwood.integrators.methods.dormand_prince import TABLEAU
-from atwood.integrators.protocol import SolverOptions
+from atwood.integrators.protocol import ExplicitProblem, SolverOptions
 from atwood.simulation.initialization.start import find_start, own_state
 from atwood.simulation.problem.explicit_scene import constrained_problem
 from atwood.simulation.problem.preparation import make_plan

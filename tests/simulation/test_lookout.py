@@ -9,7 +9,7 @@ import pytest
 
 from atwood import simulate
 from atwood.codegen.python.backend import BoundKernel
-from atwood.codegen.sundials.lookout import slope_lists
+from atwood.codegen.sundials.step_monitor import slope_lists
 from atwood.integrators.ida import library as sundials_library
 from atwood.numerics.matrices import to_array
 from atwood.simulation.singular.branches import Look

@@ -15,11 +15,19 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import StartError, UsageError
-from atwood.integrators.compiled_functions import Lookout
 from atwood.integrators.event_location import ROUNDING, EventLocator, Root
-from atwood.integrators.explicit_problem import ExplicitProblem, Outcome, Stepper
-from atwood.integrators.protocol import Budget, ImplicitProblem, SolverOptions, Statistics, Status, StepResult
+from atwood.integrators.protocol import (
+    Budget,
+    ExplicitProblem,
+    ImplicitProblem,
+    Lookout,
+    SolverOptions,
+    Statistics,
+    Status,
+    StepResult,
+)
 from atwood.integrators.session import Session, copied
+from atwood.integrators.stepper import Outcome, Stepper
 
 FIRST_CHUNK, LARGEST_CHUNK = 4000, 100_000
 """So many steps are taken before limits are looked at: at first, for one unknown, and at most."""

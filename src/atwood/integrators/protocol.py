@@ -3,6 +3,13 @@
 A driver integrates ``F(t, y, y') = 0`` from consistent start values.  This module holds only the words that all
 drivers share: the problem, the options, the limits, and the answer of one advance; a run in progress is a
 `~atwood.integrators.session.Session`.
+
+What a problem brings as compiled functions, and what looks at its motion.
+
+What an explicit method is given, and what takes its steps.
+
+An explicit method integrates ``y' = f(t, y)``.  A *stepper* holds the state and takes steps; everything else, such as
+output times, events and limits, is the session's, which is the same for all steppers.
 """
 
 from __future__ import annotations
@@ -15,14 +22,14 @@ import numpy as np
 
 from atwood.arrays import FloatArray, IndexArray
 from atwood.errors import UsageError
-from atwood.integrators.compiled_functions import NativeCallbacks
 from atwood.lazy_dataclasses import dataclass
 from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
+    from atwood.codegen.sundials.events import EventData
     from atwood.numerics.fixed_pivots import FixedPivots
 
-
+State: TypeAlias = tuple[float, FloatArray, FloatArray]
 Values: TypeAlias = Sequence[float] | FloatArray
 ChoosePivots: TypeAlias = "Callable[[Sequence[FloatArray]], FixedPivots | None]"
 LinearSolver: TypeAlias = Literal["dense", "sparse", "fixed"]
@@ -289,3 +296,235 @@ def choose_linear_solver(problem: ImplicitProblem, options: SolverOptions, has_f
         if pivots is not None and (wanted or 3 * pivots.operations["factorise"] < FIXED_SHARE * problem.size**3):
             return "fixed"
     return "sparse" if problem.size >= SPARSE_SIZE and problem.density < SPARSE_DENSITY else "dense"
+
+
+@dataclass(frozen=True, eq=False)
+class NativeCallbacks:
+    """Addresses of compiled functions with SUNDIALS' own C signatures, for one session.
+
+    Residual and Jacobian return 0, or +1 where a value is not finite, which makes IDA try a smaller step.
+
+    Parameters
+    ----------
+    residual
+        An ``IDAResFn``: ``int (double t, N_Vector y, N_Vector yp, N_Vector out, void *data)``.
+    jacobian
+        An ``IDALsJacFn``: ``int (double t, double cj, N_Vector y, N_Vector yp, N_Vector out, SUNMatrix J,
+        void *data, N_Vector, N_Vector, N_Vector)``.  The matrix comes filled with zeros; a sparse one (by column)
+        has its index arrays zeroed too, so that these are written as well.
+    user_data
+        The last argument of all of them, this session's own; 0 for none.
+    weights
+        An ``IDAEwtFn``: ``int (N_Vector y, N_Vector weights, void *data)``, or 0 for none.
+    set_weights
+        ``set_weights(relative, absolute)``, called once before `weights` is used: it makes it give
+        ``1 / (relative[i] * |y[i]| + absolute[i])``.
+    events
+        An ``IDARootFn``: ``int (double t, N_Vector y, N_Vector yp, double *values, void *data)``; 0 for none.  It
+        writes values that are never zero and returns 0, 1 where an event function is not finite, or -2 where one may
+        have passed zero.  So it tells in which steps something happens; what and when is then found out with the
+        problem's own functions.
+    restart_events
+        ``restart_events(t)``: called before IDA starts at a time.
+    has_noticed
+        Asked where `events` did not return 0: whether that was to say that a value may have passed zero since they
+        were called before, in which case they return 0 when they are called again.
+    undefined_values
+        How often residual and Jacobian had no finite value so far, if somebody counts it.
+    attend
+        ``attend(t, y)``, called where `weights` have made IDA stop between two steps: None if that was not on
+        purpose, else whether the equations are written in another way from now on, at the same solution.
+    last_rate
+        The factor cj of the last Jacobian, with which it is worked out anew when the equations have changed.
+    keep
+        Whatever must live as long as the addresses are used.
+    data_bytes
+        How long what `user_data` leads to is, if it holds nothing but pointers and so may be copied; else 0.
+    """
+
+    residual: int
+    jacobian: int
+    user_data: int = 0
+    weights: int = 0
+    set_weights: Callable[[FloatArray, FloatArray], None] | None = None
+    events: int = 0
+    restart_events: Callable[[float], None] | None = None
+    has_noticed: Callable[[], bool] | None = None
+    undefined_values: Callable[[], int] | None = None
+    attend: Callable[[float, FloatArray], bool | None] | None = None
+    last_rate: Callable[[], float] | None = None
+    keep: object = None
+    data_bytes: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Lookout:
+    """Compiled functions that look at a motion now and then, and say when somebody else should.
+
+    Parameters
+    ----------
+    drive
+        Address of ``int (solve, steps, memory, double t_out, double *reached, y, yp, double *y_at, double *yp_at, long
+        allowed, data)``: sends a solver on to a time from look to look, with the addresses of its functions that go
+        on and that count steps.
+    fill
+        Address of ``int (solve, steps, dky, current, memory, double *reached, y, yp, double *y_at, double *yp_at, long
+        allowed, data, double *times, long wanted, double *table, long *filled, double *end)``: sends a solver on
+        through times in the same way and fills a row of a table with y at each, with the addresses of its functions
+        that read a solution and that tell the end of the last step, which is put into `end`.
+    noticed
+        The flag that `drive` then returns; else it returns the solver's, or -1 after as many steps as were allowed.
+    paused
+        The flag of `fill` where it has taken as many steps as were allowed, and read what lies in the last of them.
+    data
+        Their own data.
+    due, due_at
+        When the next look is to be taken, and the address of that time.
+    look
+        Address of ``int (double t, double *y, double *yp, data)``: takes one look, and returns whether somebody else
+        should.
+    keep
+        Whatever must live as long as the addresses are used.
+    """
+
+    drive: int
+    fill: int
+    noticed: int
+    paused: int
+    data: int
+    due: Callable[[], float]
+    due_at: int = 0
+    look: int = 0
+    keep: object = None
+
+
+@dataclass(frozen=True, eq=False)
+class StepGuard:
+    """What judges a step that a method would keep: whether laws did something within it that slopes may have missed.
+
+    Parameters
+    ----------
+    function
+        Address of ``int (double t0, y0, yp0, double t1, y1, yp1, data)``: times, values and rates at both ends of a
+        step; it returns 0 where the step is good.
+    data
+        Its last argument.
+    passes
+        The same for Python: ``passes(t0, y0, yp0, t1, y1, yp1)``.
+    keep
+        Whatever must live as long as the addresses are used.
+    """
+
+    function: int
+    data: int
+    passes: Callable[[float, FloatArray, FloatArray, float, FloatArray, FloatArray], bool]
+    keep: object = None
+
+
+MET = 1e-8
+"""A step of Newton's method that moves nothing by more of its size leaves misses of the square of that: rounding."""
+
+STEPS = 6
+"""So many of these are tried; at the end of a step that is good enough one or two are needed."""
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledRates:
+    """The address of a compiled right-hand side, for one session.
+
+    Parameters
+    ----------
+    function
+        ``int (double t, const double *y, double *yp, void *data)``, which returns 0, or another number where a value is
+        not finite.
+    data
+        Its last argument.
+    keep
+        Whatever must live as long as the addresses are used.
+    project, project_data
+        The address of ``int (double t, double *y, void *data)``, which takes values onto the constraints and returns
+        0, or another number where it cannot, and its last argument; 0 where there are no constraints.
+    """
+
+    function: int
+    data: int = 0
+    keep: object = None
+    project: int = 0
+    project_data: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class ExplicitProblem:
+    """The equations ``y' = f(t, y)`` of one mode.
+
+    The functions get arrays that are only valid during the call and must not be written to.  A function that has no
+    value at a state raises `~atwood.errors.KernelEvaluationError` (or an arithmetic error), or returns values that
+    are not finite: a smaller step is then tried.
+
+    Parameters
+    ----------
+    size
+        The number of unknowns.
+    rates
+        ``rates(t, y)``: the derivatives.
+    events
+        ``events(t, y, yp)``: one value per event, which happens where its value passes through zero.
+    event_count
+        The number of events.
+    event_directions
+        For each event +1 (rising values only), -1 (falling values only) or 0 (both).  Empty: all 0.
+    event_rough
+        Numbers of the events whose exact time does not matter: they happen at the end of a step.
+    event_signs
+        The sign that each event had before the start, 0 where it is not known, or
+        `~atwood.integrators.protocol.JUST_HAPPENED`.  Empty: all 0.
+    compiled
+        ``compiled()``: a compiled form of `rates`.  Each session asks once, and must not share it with another one.
+    compiled_events
+        The same for `events`, if there is one: bound to values, and to no other session.
+    project
+        ``project(t, y)``: the values nearest to these that meet the constraints, with which steps end; None where there
+        are none.
+    guard
+        What judges steps besides their error; None where there is nothing to be missed.
+    """
+
+    size: int
+    rates: Callable[[float, FloatArray], Values]
+    events: Callable[[float, FloatArray, FloatArray], Values] | None = None
+    event_count: int = 0
+    event_directions: tuple[int, ...] = ()
+    event_rough: tuple[int, ...] = ()
+    event_signs: tuple[int, ...] = ()
+    compiled: Callable[[], CompiledRates] | None = None
+    compiled_events: EventData | None = None
+    project: Callable[[float, FloatArray], Values] | None = None
+    guard: StepGuard | None = None
+
+    def __post_init__(self) -> None:
+        if self.size < 1:
+            raise UsageError("a problem needs at least one unknown")
+        if (self.events is None) != (self.event_count == 0):
+            raise UsageError("give both the event function and the number of events, or neither")
+        if self.event_directions and len(self.event_directions) != self.event_count:
+            raise UsageError(f"{self.event_count} events need as many directions")
+        if not set(self.event_directions) <= {-1, 0, 1}:
+            raise UsageError("an event direction is -1, 0 or +1")
+
+
+LOOSEST = 1e-3
+"""The largest relative tolerance that steps are chosen by: longer steps gain energy unseen, until chains fly apart."""
+
+
+_TINY = float(np.finfo(float).tiny)
+
+
+def absolute_tolerances(options: SolverOptions, size: int) -> FloatArray:
+    """Return the absolute tolerance of each unknown; nothing is divided by zero where it is zero."""
+    if isinstance(options.absolute_tolerances, float):
+        return np.full(size, max(options.absolute_tolerances, _TINY))
+    try:
+        given = np.asarray(options.absolute_tolerances, dtype=np.float64)
+        return np.maximum(given if given.shape == (size,) else np.broadcast_to(given, (size,)), _TINY)
+    except ValueError:
+        raise UsageError(f"give one absolute tolerance, or one for each of the {size} unknowns") from None

@@ -12,9 +12,8 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, UsageError
-from atwood.integrators.compiled_functions import Lookout
-from atwood.integrators.event_location import EventLocator, Root, State
-from atwood.integrators.protocol import Budget, Statistics, Status, StepResult
+from atwood.integrators.event_location import EventLocator, Root
+from atwood.integrators.protocol import Budget, Lookout, State, Statistics, Status, StepResult
 
 _T = TypeVar("_T")
 

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from atwood import Model, Scene, assemble, select, simulate, sin
-from atwood.integrators.embedded.native import CompiledStepper
+from atwood.integrators.embedded.stepper import CompiledStepper
 from atwood.simulation.run.session import KeptSession
 from atwood_library import Force, Ground, PointMass, Rod
 from atwood_library.scenes import CartPole

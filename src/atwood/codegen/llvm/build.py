@@ -1,15 +1,22 @@
-"""From programs to loaded machine code, by way of the cache."""
+"""From programs to loaded machine code, by way of the cache.
+
+What is made once in a process, whichever thread asks first.
+
+Where routines are written: what names their machine code in the cache without printing them.
+"""
 
 from __future__ import annotations
 
 import ctypes
+import functools
 import json
 import threading
 from collections.abc import Callable, Sequence
 from functools import cache
 from hashlib import sha256
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,29 +33,21 @@ from atwood.codegen.llvm.engine import (
     target_description,
 )
 from atwood.codegen.llvm.module import CodeOptions, ModuleText, Part, write_module
-from atwood.codegen.routines.source import RoutineSource
 from atwood.errors import KernelEvaluationError, UnsupportedError
 from atwood.expr.core.operations import ExternalFunction
 from atwood.expr.core.program import Program
 from atwood.lazy_dataclasses import dataclass
 from atwood.stages import stage
 
+if TYPE_CHECKING:
+    from atwood.codegen.routines import Routine
+
 _GENERATOR = 1
 """Counts changes to the generated code that do not show in `GENERATORS`."""
 
 GENERATORS = (
-    "llvm/build.py",
-    "llvm/engine.py",
-    "llvm/layout.py",
-    "llvm/linear_systems.py",
-    "llvm/module.py",
-    "llvm/routines.py",
-    "llvm/text.py",
-    "routines/elimination.py",
-    "routines/kernels.py",
-    "routines/kinds.py",
-    "routines/language.py",
-    "routines/tree.py",
+    *(f"llvm/{name}.py" for name in ("build", "engine", "layout", "linear_systems", "module", "printer", "text")),
+    "routines.py",
 )
 """The files, by their place in the room of the code generators, on which the machine code of a program depends.
 
@@ -167,11 +166,11 @@ def _build(
     written = list(routines.write()) if routines is not None else []
     text = module.text
     if module.eliminates:
-        from atwood.codegen.routines.elimination import write_elimination
+        from atwood.codegen.llvm.linear_systems import write_elimination
 
         written += write_elimination()
     if written:
-        from atwood.codegen.llvm.routines import print_routines
+        from atwood.codegen.llvm.printer import print_routines
 
         text = f"{text}\n{print_routines(written)}"
     code = compile_text(text, options.level, has_variables=bool(written))
@@ -242,3 +241,66 @@ def _guard(function: ExternalFunction, failures: Failures) -> Callable[..., floa
             return float("nan")
 
     return guarded
+
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def once(make: Callable[P, T]) -> Callable[P, T]:
+    """Return a function that makes something at its first call, and returns the same ever after.
+
+    Unlike `functools.cache` it makes it once even if several threads ask at the same time: code of which there are two,
+    one of them forgotten, would be taken out of memory while it runs.
+    """
+    lock, made = threading.RLock(), dict[tuple[object, ...], T]()
+
+    @functools.wraps(make)
+    def found(*given: P.args, **named: P.kwargs) -> T:
+        if given not in made:
+            with lock:
+                if given not in made:
+                    made[given] = make(*given, **named)
+        return made[given]
+
+    return found
+
+
+_PACKAGE = Path(__file__).parents[2]
+
+
+@dataclass(frozen=True)
+class RoutineSource:
+    """A function that writes routines, and the files on which they depend.
+
+    Attributes
+    ----------
+    module
+        The module with the function ``write_routines``, within the package; it is imported only to write them.
+    files
+        The other source files of the package that decide what it writes, without those of the language.
+    arguments
+        What it is called with.
+    """
+
+    module: str
+    files: tuple[str, ...] = ()
+    arguments: tuple[object, ...] = ()
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What the routines depend on."""
+        return (self.module, _hash((self.module.replace(".", "/") + ".py", *self.files)), self.arguments)
+
+    def write(self) -> Sequence[Routine]:
+        """Write the routines."""
+        found: Sequence[Routine] = import_module(f"atwood.{self.module}").write_routines(*self.arguments)
+        return found
+
+
+@cache
+def _hash(files: tuple[str, ...]) -> str:
+    total = sha256()
+    for name in files:
+        total.update((_PACKAGE / name).read_bytes())
+    return total.hexdigest()

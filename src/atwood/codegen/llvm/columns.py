@@ -14,12 +14,9 @@ from numpy.typing import ArrayLike
 
 from atwood.arrays import FloatArray
 from atwood.clock import check_time
-from atwood.codegen.llvm.build import Built, build_code, default_options
+from atwood.codegen.llvm.build import Built, RoutineSource, build_code, default_options
 from atwood.codegen.llvm.module import Part
-from atwood.codegen.routines.kernels import addresses
-from atwood.codegen.routines.kinds import ADDRESS, INTEGER
-from atwood.codegen.routines.language import Routine
-from atwood.codegen.routines.source import RoutineSource
+from atwood.codegen.routines import ADDRESS, INTEGER, Routine, addresses
 from atwood.expr.core.program import Program
 
 _COLUMNS = ctypes.CFUNCTYPE(None, *[c_void_p] * 5, c_int64)

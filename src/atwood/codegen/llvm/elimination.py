@@ -11,12 +11,9 @@ from collections.abc import Callable
 from ctypes import c_int64, c_void_p
 from typing import Any
 
-from atwood.codegen.llvm.build import Built, build_code
+from atwood.codegen.llvm.build import Built, RoutineSource, build_code, once
 from atwood.codegen.llvm.module import CodeOptions
-from atwood.codegen.once import once
-from atwood.codegen.routines.kinds import ADDRESS, INTEGER
-from atwood.codegen.routines.language import Operand, Routine, Value
-from atwood.codegen.routines.source import RoutineSource
+from atwood.codegen.routines import ADDRESS, INTEGER, Operand, Routine, Value
 
 LISTS = ("pivot", "begins", "others", "below", "starts", "first", "second", "changed")
 """The lists of places, in the order in which their addresses are given.

@@ -74,7 +74,7 @@ class ModuleText:
     externals
         The functions in Python that it calls, as ``external.0`` and so on, each with its number of arguments.
     eliminates
-        Whether it calls the routines of `atwood.codegen.routines.elimination`, which are not in it.
+        Whether it calls the routines of `atwood.codegen.llvm.linear_systems`, which are not in it.
     """
 
     text: str

@@ -2,8 +2,8 @@
 
 They tell in which steps something may happen, so that no Python runs in all the others: where a sign has changed, and
 where the tangents at the ends of a step leave room for a value that passes zero and comes back
-(`atwood.integrators.dips`). IDA itself locates no roots: it gives up where a value is zero up to its own rounding of
-time, as beside an extreme.
+(`atwood.integrators.event_location`). IDA itself locates no roots: it gives up where a value is
+zero up to its own rounding of time, as beside an extreme.
 """
 
 from __future__ import annotations
@@ -15,14 +15,11 @@ from ctypes import Array, c_double, c_int, c_void_p
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from atwood.codegen.llvm.build import Built, build_code, default_options
+from atwood.codegen.llvm.build import Built, RoutineSource, build_code, default_options
 from atwood.codegen.llvm.module import Part
-from atwood.codegen.routines.kernels import call_kernel, place_of
-from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, NUMBER
-from atwood.codegen.routines.language import Record, Routine, Value
-from atwood.codegen.routines.source import RoutineSource
-from atwood.codegen.sundials.ida_routines import array_of
+from atwood.codegen.routines import ADDRESS, BOOLEAN, NUMBER, Record, Routine, Value, call_kernel, place_of
 from atwood.codegen.sundials.layout import SundialsLayout, sundials_layout
+from atwood.codegen.sundials.residuals import array_of
 from atwood.codegen.tangents import SECANT, STEEP
 from atwood.errors import UsageError
 from atwood.expr.core.program import Program
@@ -149,7 +146,7 @@ def compile_events(program: Program, for_ida: bool) -> EventCode:
     part = Part("kernel", program)
     layout = sundials_layout() if for_ida else None
     exports = ["events", "look", *(["ida_events"] if for_ida else [])]
-    files = ("codegen/sundials/ida_routines.py", "codegen/tangents.py")
+    files = ("codegen/sundials/residuals.py", "codegen/tangents.py")
     routines = RoutineSource("codegen.sundials.events", files, (groups[1], groups[2], groups[3], layout))
     return EventCode(program, build_code([part], default_options([part]), exports=exports, routines=routines), for_ida)
 

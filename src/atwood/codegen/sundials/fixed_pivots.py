@@ -10,14 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from atwood.codegen.llvm.build import Built, build_code
+from atwood.codegen.llvm.build import Built, RoutineSource, build_code, once
 from atwood.codegen.llvm.module import CodeOptions
-from atwood.codegen.once import once
-from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER, Kind
-from atwood.codegen.routines.language import Operand, Record, Routine, Value
-from atwood.codegen.routines.source import RoutineSource
-from atwood.codegen.sundials.ida_routines import array_of
+from atwood.codegen.routines import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER, Kind, Operand, Record, Routine, Value
 from atwood.codegen.sundials.layout import SundialsLayout, sundials_layout
+from atwood.codegen.sundials.residuals import array_of
 
 SLOTS = (
     *("starts", "middles", "indices", "targets", "target_starts", "rows", "columns"),
@@ -60,7 +57,7 @@ def fixed_pivots_addresses() -> Mapping[str, int]:
 
 @once
 def _code() -> Built:
-    files = ("codegen/sundials/ida_routines.py",)
+    files = ("codegen/sundials/residuals.py",)
     routines = RoutineSource("codegen.sundials.fixed_pivots", files, (sundials_layout(),))
     return build_code([], CodeOptions(level=2), exports=_EXPORTS, routines=routines)
 

@@ -9,21 +9,37 @@ with ``r - G^T lambda`` in the place of r, at given multipliers.  What does depe
 where d are the dependent speeds, i the independent ones and R = r - G^T lambda with lambda held.  So another choice of
 dependent coordinates is another list of numbers, for which nothing is compiled.  Constraints that share no dependent
 speed are solved separately, block by block.
+
+Residual, Jacobian and error weights of a mechanism with loops as IDA calls them, for any choice of coordinates.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 
-from atwood.codegen.routines.elimination import write_elimination
-from atwood.codegen.routines.kernels import call_kernel, place_of
-from atwood.codegen.routines.kinds import ADDRESS, CODE, INTEGER
-from atwood.codegen.routines.language import Operand, Routine, Value, Variable
-from atwood.codegen.routines.source import RoutineSource
-from atwood.codegen.sundials.ida_routines import JACOBIAN, RESIDUAL, array_of, index_kind, write_weights
-from atwood.codegen.sundials.layout import SundialsLayout
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from atwood.codegen.llvm.build import Built, RoutineSource, build_code, default_options
+from atwood.codegen.llvm.linear_systems import write_elimination
+from atwood.codegen.llvm.module import Part
+from atwood.codegen.routines import ADDRESS, CODE, INTEGER, Operand, Routine, Value, Variable, call_kernel, place_of
+from atwood.codegen.sundials.layout import SundialsLayout, sundials_layout
+from atwood.codegen.sundials.residuals import (
+    EXPORTS,
+    JACOBIAN,
+    RESIDUAL,
+    Callbacks,
+    UserData,
+    array_of,
+    check_groups,
+    index_kind,
+    write_weights,
+)
+from atwood.errors import UsageError
+from atwood.expr.core.program import Program
 from atwood.lazy_dataclasses import dataclass
 
 FIELDS = (
@@ -118,7 +134,7 @@ def _places(lengths: dict[str, int]) -> dict[str, int]:
 
 def null_space_source(layout: SundialsLayout, shape: NullSpaceShape, sparse: bool) -> RoutineSource:
     """Return what writes residual, Jacobian and error weights with IDA's signatures."""
-    files = ("codegen/sundials/ida_routines.py",)
+    files = ("codegen/sundials/residuals.py",)
     return RoutineSource("codegen.sundials.null_space", files, (layout, shape, sparse))
 
 
@@ -283,3 +299,75 @@ def _write_pattern(r: Routine, layout: SundialsLayout, matrix: Value, size: int)
         write(starts, column, column * size)
     with r.count(size) as column, r.count(size) as row:
         write(rows, column * size + row, row)
+
+
+def compile_null_space_callbacks(
+    stack: Program,
+    derivatives: Program,
+    jacobian: tuple[ArrayLike, ArrayLike],
+    pattern: tuple[ArrayLike, ArrayLike],
+    shape: NullSpaceShape,
+    sparse: bool = False,
+    *,
+    cache: bool = True,
+    layout: SundialsLayout | None = None,
+) -> NullSpaceCallbacks:
+    """Compile what the reduced form of a mechanism with loops is made of to functions that IDA calls."""
+    jacobian_rows, jacobian_columns, rows, columns = (
+        np.asarray(x, dtype=np.int64).ravel() for x in (*jacobian, *pattern)
+    )
+    check_groups(stack, [1, shape.size, shape.size], shape.stack + len(jacobian_rows))
+    check_groups(derivatives, [1, shape.size, shape.size, 1, shape.rates], len(rows))
+    placed = np.concatenate([np.arange(shape.stack), shape.stack + jacobian_rows * shape.speeds + jacobian_columns])
+    parts = [
+        Part("residual", stack, tuple(placed.tolist())),
+        Part("jacobian", derivatives, tuple((columns * shape.stack + rows).tolist())),
+    ]
+    routines = null_space_source(layout or sundials_layout(), shape, sparse)
+    built = build_code(parts, default_options(parts), exports=EXPORTS, routines=routines, cached=cache)
+    return NullSpaceCallbacks({"residual": stack, "jacobian": derivatives}, shape, built)
+
+
+class NullSpaceData(UserData):
+    """The user's data of one session, with the choice of dependent coordinates; see `UserData`."""
+
+    @property
+    def choice(self) -> NDArray[np.int64]:
+        """Which coordinates are dependent, as lists of numbers; may be changed between two steps."""
+        return self.arrays["choice"]
+
+    @property
+    def rate(self) -> float:
+        """The factor cj of the last Jacobian."""
+        return float(self.arrays["state"][RATE])
+
+    def take_attention(self) -> bool:
+        """Return whether a Jacobian found the choice to be a poor one since this was last asked."""
+        state = self.arrays["state"]
+        found, state[ATTENTION] = bool(state[ATTENTION]), 0.0
+        return found
+
+
+class NullSpaceCallbacks(Callbacks):
+    """The functions of a mechanism with loops, for any choice of dependent coordinates; see `Callbacks`.
+
+    The weights return -1, at which IDA hands over what it has, also where the last Jacobian found the choice to be a
+    poor one.
+    """
+
+    def __init__(self, programs: Mapping[str, Program], shape: NullSpaceShape, built: Built) -> None:
+        super().__init__(programs, shape.size, built)
+        self.shape = shape
+
+    def bind(self, parameter_values: ArrayLike, choice: ArrayLike, sizes: ArrayLike, limit: float) -> NullSpaceData:
+        """Return the user's data for values of the parameters; each run needs its own."""
+        arrays = self._arrays(parameter_values) | {
+            "choice": np.array(choice, dtype=np.int64),
+            "work": np.zeros(self.shape.work["end"]),
+            "sizes": np.array(sizes, dtype=float),
+            "state": np.zeros(3),
+        }
+        arrays["state"][LIMIT] = limit
+        if arrays["choice"].shape != (self.shape.choice["end"],) or arrays["sizes"].shape != (self.shape.speeds,):
+            raise UsageError("the choice or the sizes have another length than the mechanism")
+        return NullSpaceData(FIELDS, arrays)

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 
-from atwood.codegen.routines.kinds import ADDRESS, CODE, NUMBER
-from atwood.codegen.routines.language import Routine, Value
-from atwood.integrators.embedded.memory import LANES, Memory, open_routine
+from atwood.codegen.routines import ADDRESS, CODE, NUMBER, Routine, Value
+from atwood.integrators.embedded.stepper import LANES, Memory, open_routine
 from atwood.integrators.embedded.tableau import Tableau
 
 

@@ -9,21 +9,18 @@ from ctypes import c_void_p
 import numpy as np
 from numpy.typing import ArrayLike
 
-from atwood.codegen.llvm.build import build_code, default_options
+from atwood.codegen.llvm.build import RoutineSource, build_code, default_options
 from atwood.codegen.llvm.module import Part
-from atwood.codegen.routines.kernels import call_kernel, place_of
-from atwood.codegen.routines.kinds import ADDRESS, CODE, NUMBER
-from atwood.codegen.routines.language import Routine
-from atwood.codegen.routines.source import RoutineSource
+from atwood.codegen.routines import ADDRESS, CODE, NUMBER, Routine, call_kernel, place_of
 from atwood.errors import UnsupportedError
 from atwood.expr.core.program import Program
-from atwood.integrators.explicit_problem import MET, STEPS, CompiledRates
+from atwood.integrators.protocol import MET, STEPS, CompiledRates
 from atwood.lazy_dataclasses import dataclass
 
 
 def rates_source(coordinates: int, speeds: int, given: bool, projects: bool = False) -> RoutineSource:
     """Return what writes ``rates``, and ``project`` where there are constraints."""
-    files = ("integrators/explicit_problem.py",)
+    files = ("integrators/protocol.py",)
     return RoutineSource("integrators.embedded.rates", files, (coordinates, speeds, given, projects))
 
 

@@ -10,13 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from math import inf, prod
 
-from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, INTEGER, NUMBER, Lanes
-from atwood.codegen.routines.language import Routine, Value
+from atwood.codegen.routines import ADDRESS, BOOLEAN, INTEGER, NUMBER, Lanes, Routine, Value
 from atwood.integrators.embedded.dense_output import slopes, weighted, write_dense_output
-from atwood.integrators.embedded.memory import LANES, Memory, open_routine
+from atwood.integrators.embedded.stepper import LANES, Memory, open_routine
 from atwood.integrators.embedded.tableau import Tableau
-from atwood.integrators.explicit_problem import CALM, STIFF
-from atwood.integrators.output_times import SAMPLE_ARGUMENTS, write_sample
+from atwood.integrators.stepper import CALM, SAMPLE_ARGUMENTS, STIFF, write_sample
 
 SAFETY = 0.9
 GROWTH, SHRINKAGE = 6.0, 3.0
@@ -367,7 +365,7 @@ def write_routines(pair: Tableau) -> list[Routine]:
     """Return the routines of a pair.
 
     They take a pointer to the pointers of a session; numbers and counts are behind two of these
-    (`atwood.integrators.embedded.memory`).
+    (`atwood.integrators.embedded.stepper`).
     """
     ends = (_begin, _run, _sample)
     inner = (_evaluate, _attempt, _error, _stability, _held, _guarded, _look, _watched)

@@ -10,17 +10,18 @@ import ctypes
 from collections.abc import Callable, Iterable
 from ctypes import CFUNCTYPE, c_double, c_int, c_int32, c_int64, c_void_p
 from math import inf
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError
-from atwood.integrators.event_location import State
-from atwood.integrators.ida.library import SundialsLibrary
-from atwood.integrators.protocol import ImplicitProblem, LinearSolver
+from atwood.integrators.protocol import ImplicitProblem, LinearSolver, State
 from atwood.lazy_dataclasses import dataclass
+
+if TYPE_CHECKING:
+    from atwood.integrators.ida.library import SundialsLibrary
 
 NO_VALUE = (KernelEvaluationError, ArithmeticError)
 """What a function raises where it has no value."""

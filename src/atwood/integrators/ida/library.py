@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from atwood.errors import AtwoodError
-from atwood.integrators.ida.sparse import BY_COLUMNS, OneAtATime, SparseSolver
+from atwood.integrators.ida.linear_solvers import BY_COLUMNS, OneAtATime, SparseSolver, table_layout
 
 OLDEST = 7
 """The first major version with the calls that are used here."""
@@ -185,9 +185,7 @@ class SundialsLibrary:
 
     @cached_property
     def has_fixed_solvers(self) -> bool:
-        """Whether linear solvers of our own can be made: see `atwood.integrators.ida.fixed`."""
-        from atwood.integrators.ida.fixed import table_layout
-
+        """Whether linear solvers of our own can be made: see `atwood.integrators.ida.linear_solvers`."""
         try:
             table_layout(self)
         except LookupError:

@@ -8,22 +8,17 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from ctypes import c_double, c_int, c_long, c_void_p
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
-from atwood.integrators.compiled_functions import Lookout
 from atwood.integrators.ida.callbacks import JACOBIAN, Record
 from atwood.integrators.ida.library import SundialsLibrary
-from atwood.integrators.ida.sparse import SparseSolver
-from atwood.integrators.protocol import ChoosePivots
+from atwood.integrators.ida.linear_solvers import FixedSolver, SparseSolver
+from atwood.integrators.protocol import ChoosePivots, Lookout
 from atwood.lazy_dataclasses import dataclass
-
-if TYPE_CHECKING:
-    from atwood.integrators.ida.fixed import FixedSolver
-
 
 TO_TIME, ONE_STEP = 1, 2
 """What `IdaMemory.solve` does: go on until a time is reached or passed, or take one step."""
@@ -204,8 +199,6 @@ class IdaMemory:
         """Make the matrix and the linear solver; a record takes up what goes wrong in Python there."""
         library, parts, n = self.library, self._parts, self.size
         if pivots is not None:
-            from atwood.integrators.ida.fixed import FixedSolver
-
             parts.fixed = fixed = FixedSolver(library, pivots, parts.context, record)
             matrix, solver = fixed.matrix, fixed.solver
         elif is_sparse:

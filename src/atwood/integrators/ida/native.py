@@ -20,19 +20,20 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, UsageError
-from atwood.integrators.compiled_functions import Lookout
-from atwood.integrators.event_location import EventLocator, Root, State
+from atwood.integrators.event_location import EventLocator, Root
 from atwood.integrators.ida.callbacks import Record, explain
 from atwood.integrators.ida.library import library
 from atwood.integrators.ida.memory import ONE_STEP, ROOT_RETURN, STOPPED_BY_WEIGHTS, TO_TIME, TOO_MUCH_WORK, Counts
-from atwood.integrators.ida.pace import FIRST_CHUNK, Pace, first_chunk
 from atwood.integrators.ida.setup import IdaTuning, prepare
 from atwood.integrators.ida.states import checked_state, is_finite
 from atwood.integrators.ida.sundae import REASONS, SHORTER, TOO_LONG
+from atwood.integrators.ida.watchdog import FIRST_CHUNK, Pace, first_chunk
 from atwood.integrators.protocol import (
     Budget,
     ImplicitProblem,
+    Lookout,
     SolverOptions,
+    State,
     Statistics,
     Status,
     StepResult,

@@ -6,12 +6,10 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
-from atwood.integrators.compiled_functions import NativeCallbacks
-from atwood.integrators.event_location import State
 from atwood.integrators.ida.callbacks import Record, address, jacobian_function, residual_function, weight_function
 from atwood.integrators.ida.library import library
 from atwood.integrators.ida.memory import IdaMemory
-from atwood.integrators.protocol import ImplicitProblem, LinearSolver, SolverOptions
+from atwood.integrators.protocol import ImplicitProblem, LinearSolver, NativeCallbacks, SolverOptions, State
 from atwood.lazy_dataclasses import dataclass
 
 LOOSE_NEWTON, TIGHT_NEWTON, FIXED_NEWTON = 0.33, 0.01, 0.1

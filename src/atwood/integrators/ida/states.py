@@ -8,7 +8,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import StartError, UsageError
-from atwood.integrators.event_location import State
+from atwood.integrators.protocol import State
 
 _FEW = 64
 """So many numbers are added up before NumPy has begun."""

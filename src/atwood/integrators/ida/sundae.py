@@ -25,13 +25,14 @@ import numpy as np
 
 from atwood.arrays import FloatArray, IndexArray
 from atwood.errors import KernelEvaluationError, UsageError
-from atwood.integrators.event_location import ROUNDING, EventLocator, Root, State
+from atwood.integrators.event_location import ROUNDING, EventLocator, Root
 from atwood.integrators.ida.library import without_solver_messages
 from atwood.integrators.ida.states import checked_state
 from atwood.integrators.protocol import (
     Budget,
     ImplicitProblem,
     SolverOptions,
+    State,
     Statistics,
     Status,
     StepResult,

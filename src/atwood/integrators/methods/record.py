@@ -7,17 +7,16 @@ from math import inf
 from typing import TYPE_CHECKING, Any, Literal
 
 from atwood.arrays import FloatArray
-from atwood.integrators.explicit_problem import LOOSEST, ExplicitProblem
-from atwood.integrators.protocol import Budget, ImplicitProblem, SolverOptions
+from atwood.integrators.protocol import LOOSEST, Budget, ExplicitProblem, ImplicitProblem, SolverOptions
 from atwood.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
+    from atwood.integrators.batch import BatchPlaces
     from atwood.integrators.embedded.tableau import Tableau
-    from atwood.integrators.ensemble.batch import BatchPlaces
     from atwood.integrators.explicit_session import ExplicitSession, Leave
-    from atwood.integrators.gauss.hamiltonian import Hamiltonian
     from atwood.integrators.session import Session
-    from atwood.integrators.taylor.problem import TaylorProblem
+    from atwood.integrators.symplectic.stepper import Hamiltonian
+    from atwood.integrators.taylor.stepper import TaylorProblem
 
 
 LEAST = 1e-15
@@ -153,7 +152,7 @@ class Method:
 
 def open_pair(task: Task, pair: Tableau) -> ExplicitSession:
     """Open a session of an embedded pair."""
-    from atwood.integrators.embedded.native import CompiledStepper
+    from atwood.integrators.embedded.stepper import CompiledStepper
     from atwood.integrators.explicit_session import ExplicitSession
 
     stepper = CompiledStepper(task.problem, task.settings, pair)
@@ -166,7 +165,7 @@ def explicit_pair(key: str, title: str, citation: str, pair: Tableau, **more: An
     """Return the method of an embedded pair; see `Method` for what else is said of it."""
 
     def places(task: Task) -> BatchPlaces:
-        from atwood.integrators.embedded.native import CompiledStepper
+        from atwood.integrators.embedded.stepper import CompiledStepper
 
         return CompiledStepper(task.problem, task.settings, pair).batch_places()
 

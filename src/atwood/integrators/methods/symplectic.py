@@ -10,7 +10,7 @@ from atwood.integrators.methods.record import Method, Task
 
 if TYPE_CHECKING:
     from atwood.integrators.explicit_session import ExplicitSession
-    from atwood.integrators.gauss.hamiltonian import CompiledMethod, Hamiltonian
+    from atwood.integrators.symplectic.stepper import CompiledMethod, Hamiltonian
 
 
 _ORDER = 8
@@ -18,13 +18,13 @@ _ORDER = 8
 
 
 def _gauss(given: Hamiltonian, order: int) -> CompiledMethod:
-    from atwood.integrators.gauss.native import CompiledGauss
+    from atwood.integrators.symplectic.stepper import CompiledGauss
 
     return CompiledGauss(given.equations, given.speeds, order)
 
 
 def _composition(given: Hamiltonian, order: int) -> CompiledMethod:
-    from atwood.integrators.composition.steps import CompiledComposition
+    from atwood.integrators.symplectic.composition import CompiledComposition
 
     if order not in COMPOSITION.orders:
         raise UsageError(
@@ -44,7 +44,7 @@ def _composition(given: Hamiltonian, order: int) -> CompiledMethod:
 
 def _open(task: Task, is_split: bool) -> ExplicitSession:
     from atwood.integrators.explicit_session import ExplicitSession
-    from atwood.integrators.gauss.native import GaussStepper
+    from atwood.integrators.symplectic.stepper import GaussStepper
 
     assert task.hamiltonian is not None
     given, problem = task.hamiltonian(), task.problem

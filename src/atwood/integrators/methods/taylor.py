@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 from atwood.integrators.methods.record import Method, Task
 
 if TYPE_CHECKING:
-    from atwood.integrators.ensemble.batch import BatchPlaces
+    from atwood.integrators.batch import BatchPlaces
     from atwood.integrators.explicit_session import ExplicitSession
-    from atwood.integrators.taylor.native import CompiledStepper
+    from atwood.integrators.taylor.stepper import CompiledStepper
 
 
 def _stepper(task: Task) -> CompiledStepper:
-    from atwood.integrators.taylor.native import CompiledStepper
+    from atwood.integrators.taylor.stepper import CompiledStepper
 
     assert task.series is not None
     return CompiledStepper(task.series(), task.settings, guard=task.problem.guard)

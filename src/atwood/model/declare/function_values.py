@@ -224,7 +224,7 @@ def is_sympy(value: Any) -> bool:
 
 
 def _from_sympy(value: Any, symbols: Mapping[str, Expression], where: str) -> Expression:
-    from atwood.expr.formulas.sympy_bridge import from_sympy
+    from atwood.expr.sympy_bridge import from_sympy
 
     for one in value.free_symbols:
         if one.name not in symbols:

@@ -21,8 +21,7 @@ from atwood.forms.caches import Key
 from atwood.forms.constrained import ConstrainedProgram, constrained_program
 from atwood.forms.quantities import to_maximal
 from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
-from atwood.integrators.explicit_problem import MET, STEPS, CompiledRates, ExplicitProblem
-from atwood.integrators.protocol import Values
+from atwood.integrators.protocol import MET, STEPS, CompiledRates, ExplicitProblem, Values
 from atwood.simulation.problem.problem import Plan
 from atwood.topology.graph import connected_groups
 

@@ -14,9 +14,9 @@ from atwood.expr import Program
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.canonical import CanonicalPrograms, canonical_programs, closed_canonical_programs, separable_programs
-from atwood.integrators.explicit_problem import ExplicitProblem
-from atwood.integrators.gauss.hamiltonian import CompiledMethod, Hamiltonian
 from atwood.integrators.methods import IDA, advise
+from atwood.integrators.protocol import ExplicitProblem
+from atwood.integrators.symplectic.stepper import CompiledMethod, Hamiltonian
 from atwood.simulation.problem.closed_loops import Solved
 
 _COMPILED: Key[CompiledMethod] = Key("compiled symplectic method")

@@ -10,12 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
-from atwood.codegen.sundials.null_space import NullSpaceShape
-from atwood.codegen.sundials.null_space_residuals import NullSpaceCallbacks, NullSpaceData, compile_null_space_callbacks
+from atwood.codegen.sundials.null_space import (
+    NullSpaceCallbacks,
+    NullSpaceData,
+    NullSpaceShape,
+    compile_null_space_callbacks,
+)
 from atwood.forms.program import FormProgram
 from atwood.forms.residuals import NullSpaceProgram
-from atwood.integrators.compiled_functions import NativeCallbacks
-from atwood.integrators.protocol import LinearSolver
+from atwood.integrators.protocol import LinearSolver, NativeCallbacks
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.numerics.body_order import elimination_stages

@@ -17,9 +17,8 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.program import FormProgram
 from atwood.forms.residuals import NullSpaceProgram, keep_constraints, null_space_program
-from atwood.integrators.compiled_functions import NativeCallbacks
 from atwood.integrators.methods import Method
-from atwood.integrators.protocol import ImplicitProblem, LinearSolver
+from atwood.integrators.protocol import ImplicitProblem, LinearSolver, NativeCallbacks
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.numerics.matrices import to_array
 from atwood.simulation.dynamics.balance import Balance, balance_of, columns_of
@@ -35,7 +34,7 @@ from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
     from atwood.codegen import IdaCallbacks
-    from atwood.codegen.sundials.null_space_residuals import NullSpaceCallbacks
+    from atwood.codegen.sundials.null_space import NullSpaceCallbacks
     from atwood.numerics.fixed_pivots import FixedPivots
     from atwood.simulation.problem.implicit_scene import CompiledNullSpace
 

@@ -15,7 +15,7 @@ from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.program import state_groups
-from atwood.integrators.compiled_functions import StepGuard
+from atwood.integrators.protocol import StepGuard
 from atwood.simulation.problem.curved_laws import find_curved, find_external, is_needed, watched_program
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def _by_samples(
     other: StepGuard | None,
 ) -> StepGuard:
     """Return what looks at functions in Python now and then, and say so."""
-    from atwood.integrators.sampled_steps import GRID, SAMPLES, SampledSteps  # few laws are in Python
+    from atwood.integrators.step_guard import GRID, SAMPLES, SampledSteps  # few laws are in Python
 
     inputs, parameters, values = state_groups(assembly.own_equations), assembly.parameters, assembly.parameter_values
     if closed is not None:
@@ -105,11 +105,11 @@ def _by_bounds(
         reactions = equations.read.values()
         return watched_program(assembly.flat.name, curved, groups, parameters, angles, known, reactions)
 
-    from atwood.codegen.llvm.step_guard import GuardCode, compile_guard
+    from atwood.integrators.step_guard import GuardCode, compile_guard
 
     shared = assembly.shared
     with shared.lock:
         program = shared.get(_PROGRAM, make, assembly.form, form, is_estimated)
     code = shared.get(_CODE, lambda: compile_guard(program), program)
     assert isinstance(code, GuardCode)
-    return StepGuard(*code.bind(values, reach, _SHORTEST * abs(span[1] - span[0])))
+    return code.bind(values, reach, _SHORTEST * abs(span[1] - span[0]))

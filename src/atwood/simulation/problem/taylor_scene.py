@@ -17,10 +17,10 @@ from atwood.forms.accelerations import AccelerationProgram, accelerations_of
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.integrators.methods import EXPLICIT, IDA, advise
-from atwood.integrators.taylor.problem import REACH, TaylorProblem
+from atwood.integrators.taylor.stepper import REACH, TaylorProblem
 
 if TYPE_CHECKING:
-    from atwood.integrators.taylor.native import CompiledRecurrences
+    from atwood.integrators.taylor.stepper import CompiledRecurrences
 
 
 _BRANCHES: Key[bool] = Key("whether a branch could be without a value")
@@ -108,7 +108,7 @@ def _compiled(
 
     @cache
     def bound() -> tuple[CompiledRecurrences, FloatArray]:
-        from atwood.integrators.taylor.native import CompiledRecurrences
+        from atwood.integrators.taylor.stepper import CompiledRecurrences
 
         code = assembly.shared.get(_COMPILED, lambda: CompiledRecurrences(programs), programs)
         return code, code.bind(values)

@@ -15,10 +15,9 @@ from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, substitute
 from atwood.forms.caches import Key
-from atwood.integrators.explicit_problem import LOOSEST, ExplicitProblem
 from atwood.integrators.explicit_session import Leave
 from atwood.integrators.methods import Method, Task
-from atwood.integrators.protocol import Budget, SolverOptions, Statistics, Status, StepResult
+from atwood.integrators.protocol import LOOSEST, Budget, ExplicitProblem, SolverOptions, Statistics, Status, StepResult
 from atwood.integrators.session import Session
 from atwood.lazy_dataclasses import replace
 from atwood.simulation.problem.closed_loops import Solved, levels, on_branch, solve_at

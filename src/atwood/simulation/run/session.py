@@ -10,11 +10,18 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
-from atwood.integrators.compiled_functions import GuardedResidual, NativeCallbacks, StepGuard
-from atwood.integrators.explicit_problem import ExplicitProblem
 from atwood.integrators.explicit_session import ExplicitSession, Leave
+from atwood.integrators.ida.guarded_residual import GuardedResidual
 from atwood.integrators.methods import EXPLICIT, IDA, LEAST, Method, Task, advise
-from atwood.integrators.protocol import Budget, ImplicitProblem, LinearSolver, SolverOptions
+from atwood.integrators.protocol import (
+    Budget,
+    ExplicitProblem,
+    ImplicitProblem,
+    LinearSolver,
+    NativeCallbacks,
+    SolverOptions,
+    StepGuard,
+)
 from atwood.integrators.session import Session
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.simulation.dynamics.orientation_coordinates import longest_step
@@ -28,8 +35,8 @@ from atwood.simulation.run.choice import solved_loops
 if TYPE_CHECKING:
     from atwood.forms.loops.closed_form import ClosedForm
     from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
-    from atwood.integrators.gauss.hamiltonian import Hamiltonian
-    from atwood.integrators.taylor.problem import TaylorProblem
+    from atwood.integrators.symplectic.stepper import Hamiltonian
+    from atwood.integrators.taylor.stepper import TaylorProblem
     from atwood.simulation.problem.closed_loops import Solved
 
 
@@ -141,7 +148,7 @@ def _guarded(problem: ImplicitProblem, request: SolverRequest, method: Method) -
     begins: list[Callable[[float, FloatArray, FloatArray], None]] = [residual.begin]
 
     def native(linear_solver: LinearSolver) -> NativeCallbacks:
-        from atwood.codegen.sundials.guarded_residual import guarded_residual
+        from atwood.integrators.ida.guarded_residual import guarded_residual
 
         assert make is not None
         made = make(linear_solver)

@@ -13,7 +13,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, SolveError
 from atwood.forms.caches import Key
-from atwood.integrators.compiled_functions import Lookout
+from atwood.integrators.protocol import Lookout
 from atwood.lazy_dataclasses import dataclass
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.problem.projection import project_safely, project_states
@@ -31,7 +31,7 @@ from atwood.simulation.singular.crossing import (
 )
 
 if TYPE_CHECKING:
-    from atwood.codegen.sundials.lookout import LookoutCode, LookoutData
+    from atwood.codegen.sundials.step_monitor import LookoutCode, LookoutData
 
 _LOOKOUT: Key[LookoutCode] = Key("machine code of the singularity monitor")
 
@@ -96,7 +96,7 @@ def compiled_looks(plan: Plan, whole: float, size: int) -> LookoutData | None:
     held, assembly = plan.balance.program, plan.assembly
     if plan.not_compilable or held.constraints > _LARGEST:
         return None
-    from atwood.codegen.sundials.lookout import Pace, compile_lookout
+    from atwood.codegen.sundials.step_monitor import Pace, compile_lookout
 
     places = held.jacobian_rows, held.jacobian_columns
     code = assembly.shared.get(
@@ -111,7 +111,7 @@ def compiled_looks(plan: Plan, whole: float, size: int) -> LookoutData | None:
 
 def as_lookout(data: LookoutData) -> Lookout:
     """Return what a session is given to look with."""
-    from atwood.codegen.sundials.lookout_routines import NOTICED, PAUSED
+    from atwood.codegen.sundials.step_monitor import NOTICED, PAUSED
 
     code = data.code
     return Lookout(code.drive, code.fill, NOTICED, PAUSED, data.address, data.due, data.due_at, code.look_address, data)

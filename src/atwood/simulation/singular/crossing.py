@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError
-from atwood.integrators.event_location import EventLocator, Root, State
+from atwood.integrators.event_location import EventLocator, Root
+from atwood.integrators.protocol import State
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.numerics.matrices import scaled, to_array

@@ -13,8 +13,7 @@ import time
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.integrators.compiled_functions import Lookout
-from atwood.integrators.protocol import Status, StepResult
+from atwood.integrators.protocol import Lookout, Status, StepResult
 from atwood.simulation.problem.problem import Plan
 from atwood.simulation.singular.branches import Look, WaysOver, as_lookout, compiled_looks, going_on, stride_from
 from atwood.simulation.singular.crossing import SingularCrossing, zero_ahead

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.forms.sides import has_sides
-from atwood.integrators.ensemble.batch import Batch, BatchPlaces
+from atwood.integrators.batch import Batch, BatchPlaces
 from atwood.integrators.methods import AUTO, METHODS
 from atwood.lazy_dataclasses import dataclass
 from atwood.simulation.events.modes import find_event_functions

@@ -18,11 +18,10 @@ from atwood.codegen.sundials.events import EventData
 from atwood.errors import AtwoodError
 from atwood.forms.accelerations import AccelerationProgram, accelerations_of
 from atwood.forms.assembly import Assembly
+from atwood.integrators.batch import BatchPlaces
 from atwood.integrators.embedded.rates import OwnRates
-from atwood.integrators.ensemble.batch import BatchPlaces
-from atwood.integrators.explicit_problem import LOOSEST
 from atwood.integrators.methods import AUTO, Method, Task
-from atwood.integrators.protocol import SolverOptions
+from atwood.integrators.protocol import LOOSEST, SolverOptions
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.outputs.event_functions import EventFunction
 from atwood.simulation.dynamics.balance import masses_at

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError, UsageError
 from atwood.forms.assembly import Assembly
-from atwood.integrators.gauss.tableau import tableau
+from atwood.integrators.symplectic.gauss import tableau
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import assemble, simulate

@@ -8,8 +8,8 @@ from typing import Any, TypeAlias
 from atwood.arguments import Kind, Refused, each, instance, optional
 from atwood.errors import AtwoodError, UsageError
 from atwood.expr import Expression, Graph, sqrt
-from atwood.expr.formulas.sympy_bridge import from_sympy
 from atwood.expr.simplify.polynomial import TooLargeError
+from atwood.expr.sympy_bridge import from_sympy
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import mpmath, sympy
 from atwood.theory.formulas.book import Book

@@ -10,7 +10,7 @@ import numpy as np
 from atwood.arguments import BY_PATH, NAME, TEXT, Kind, Refused, check_fields, show
 from atwood.errors import UsageError, suggestion
 from atwood.expr import Expression
-from atwood.expr.formulas.sympy_bridge import from_sympy
+from atwood.expr.sympy_bridge import from_sympy
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
 from atwood.mechanics.outputs.observables import add_up

@@ -1,15 +1,18 @@
-"""Routines that all methods of fixed steps share: the loop over steps, and what lies between two of them."""
+"""Routines that all methods of fixed steps share: the loop over steps, and what lies between two of them.
+
+Memory of a session of fixed steps: what routines and Python agree on.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from itertools import accumulate
 
-from atwood.codegen.routines.kinds import ADDRESS, INTEGER, NUMBER
-from atwood.codegen.routines.language import Operand, Routine, Value
-from atwood.integrators.gauss.layout import Layout, Memory, open_routine
-from atwood.integrators.output_times import SAMPLE_ARGUMENTS, write_sample
+from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Kind, Operand, Record, Routine, Value
+from atwood.integrators.stepper import SAMPLE_ARGUMENTS, write_sample
+from atwood.lazy_dataclasses import dataclass
 
-FILES = ("integrators/gauss/fixed_steps.py", "integrators/gauss/layout.py", "integrators/output_times.py")
+FILES = ("integrators/symplectic/fixed_steps.py", "integrators/stepper.py")
 """On these the routines here depend."""
 
 
@@ -120,3 +123,82 @@ def sample(layout: Layout) -> Routine:
     r, m, _ = open_routine(layout, "sample", SAMPLE_ARGUMENTS, exported=True)
     width: Operand = r.value(layout.width, INTEGER)
     return write_sample(r, m.numbers, m.counts, width)
+
+
+POINTERS = ("derived", "scratch", "rates", "rates_data", "derived_2", "guard", "guard_data")
+NUMBERS = ("t", "t_old", "stop", "step", "origin")
+COUNTS = ("limit", "steps", "failures", "evaluations", "undefined", "filled", "since")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where a session keeps its numbers, in one array of doubles.
+
+    Attributes
+    ----------
+    coordinates, speeds, stages
+        Their numbers.
+    has_speeds
+        Whether the equations give speeds besides the rates of the coordinates.
+    takes_speeds
+        Whether they take an approximation to them.
+    """
+
+    coordinates: int
+    speeds: int
+    stages: int
+    has_speeds: bool
+    takes_speeds: bool
+
+    @property
+    def size(self) -> int:
+        """The number of coordinates and momenta."""
+        return 2 * self.coordinates
+
+    @property
+    def width(self) -> int:
+        """The number of coordinates and speeds."""
+        return self.coordinates + self.speeds
+
+    @property
+    def places(self) -> dict[str, int]:
+        """Where each group begins; ``end`` is the length of the whole."""
+        n, m, s = self.size, max(self.speeds, 1), self.stages
+        sizes = {"pointers": len(POINTERS), "numbers": len(NUMBERS), "counts": len(COUNTS)}
+        sizes |= {"y": n, "y_old": n, "rest": n, "per_size": n}
+        sizes |= {"ends": 4 * self.width, "around": 2 * self.width}
+        work = {"L": s * n, "G": s * n, "Y": n, "F": n, "V": m, "U": s * m, "scale": n}
+        for name in ("main", "aside"):
+            sizes |= {f"{name}.{key}": size for key, size in work.items()}
+        starts = [0, *accumulate(sizes.values())]
+        return dict(zip((*sizes, "end"), starts, strict=True))
+
+    def within(self, key: str) -> int:
+        """Return where a group of a work area begins in it."""
+        places = self.places
+        return places[f"main.{key}"] - places["main.L"]
+
+
+class Memory:
+    """The memory of a session within a routine."""
+
+    def __init__(self, mem: Value, layout: Layout) -> None:
+        self.session, self._places = mem, layout.places
+        self.pointers = Record(mem.at(self._places["pointers"]), dict.fromkeys(POINTERS, ADDRESS))
+        self.numbers = Record(mem.at(self._places["numbers"]), dict.fromkeys(NUMBERS, NUMBER))
+        self.counts = Record(mem.at(self._places["counts"]), dict.fromkeys(COUNTS, INTEGER))
+
+    def at(self, group: str) -> Value:
+        """Return where a group of numbers begins."""
+        return self.session.at(self._places[group])
+
+
+def open_routine(
+    layout: Layout,
+    name: str,
+    more: Mapping[str, Kind] | None = None,
+    exported: bool = False,
+) -> tuple[Routine, Memory, list[Value]]:
+    """Return a new routine of a session, its memory, and its further arguments."""
+    routine = Routine(name, {"mem": ADDRESS, **(more or {})}, exported=exported)
+    return routine, Memory(routine.arguments[0], layout), routine.arguments[1:]

@@ -2,12 +2,14 @@
 
 The code of the steps is the same for all problems of a pair and comes from the cache after the first time.  What a
 problem adds is the compiled right-hand side (`atwood.integrators.embedded.rates`).
+
+Memory of a session of an embedded pair: what routines and Python agree on.
 """
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from ctypes import c_double, c_int, c_void_p
 from functools import cache
 from itertools import accumulate
@@ -18,23 +20,91 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.codegen.once import once
-from atwood.codegen.routines.source import RoutineSource
+from atwood.codegen.llvm.build import RoutineSource, once
+from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Kind, Lanes, Record, Routine, Value
 from atwood.errors import KernelEvaluationError
-from atwood.integrators.compiled_functions import Lookout
-from atwood.integrators.embedded.memory import COUNTS, LANES, NUMBERS, POINTERS
 from atwood.integrators.embedded.tableau import Tableau
-from atwood.integrators.explicit_problem import (
+from atwood.integrators.protocol import (
     CompiledRates,
     ExplicitProblem,
+    Lookout,
+    SolverOptions,
     absolute_tolerances,
 )
-from atwood.integrators.native_stepper import COUNTED, NativeStepper, Routines, routines_of
-from atwood.integrators.protocol import SolverOptions
+from atwood.integrators.stepper import COUNTED, NativeStepper, Routines, routines_of
 
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventData
-    from atwood.integrators.ensemble.batch import BatchPlaces
+    from atwood.integrators.batch import BatchPlaces
+
+LANES = 4
+"""How many unknowns a loop works on at a time; rows are padded to a multiple of it with finite numbers."""
+
+NUMBERS = ("t", "t_old", "h", "next", "stop", "relative", "longest", "horizon", "first", "looked", "likeness", "tried")
+COUNTS = (
+    "size",
+    "padded",
+    "limit",
+    "steps",
+    "failures",
+    "evaluations",
+    "undefined",
+    "stiff",
+    "is_dense",
+    "filled",
+    "edgy",
+    "calm",
+    "event_count",
+    "heeds",
+    "seen",
+    "looks",
+)
+POINTERS = (
+    "function",
+    "data",
+    "numbers",
+    "counts",
+    "arrays",
+    "events",
+    "events_data",
+    "values",
+    "signs",
+    "project",
+    "project_data",
+    "watch",
+    "watch_data",
+    "due",
+    "guard",
+    "guard_data",
+)
+
+
+class Memory:
+    """The memory of a session within a routine."""
+
+    def __init__(self, session: Value, pair: Tableau) -> None:
+        self.session, self.pair = session, pair
+        self.at = Record(session, dict.fromkeys(POINTERS, ADDRESS))
+        self.numbers = Record(self.at.numbers, dict.fromkeys(NUMBERS, NUMBER))
+        self.counts = Record(self.at.counts, dict.fromkeys(COUNTS, INTEGER))
+        self.arrays = self.at.arrays
+        self.size, self.padded = self.counts.size, self.counts.padded
+
+    def row(self, row: int | str) -> Value:
+        """Return the address of a row of the table of arrays."""
+        return self.arrays.at(self.padded * (self.pair.rows[row] if isinstance(row, str) else row))
+
+    def lanes(self, row: Value, j: Value) -> Value:
+        """Return the lanes of a row from an unknown on."""
+        return row.read(j, Lanes(LANES))
+
+
+def open_routine(
+    pair: Tableau, name: str, more: Mapping[str, Kind] | None = None, result: Kind = CODE, exported: bool = False
+) -> tuple[Routine, Memory, list[Value]]:
+    """Return a new routine of a session, its memory, and its further arguments."""
+    routine = Routine(name, {"session": ADDRESS, **(more or {})}, result, exported)
+    return routine, Memory(routine.arguments[0], pair), routine.arguments[1:]
 
 
 _RATES = ctypes.CFUNCTYPE(c_int, c_double, c_void_p, c_void_p, c_void_p)
@@ -218,9 +288,9 @@ _PROJECT, _WATCH, _GUARD = map(POINTERS.index, ("project", "watch", "guard"))
 
 
 _FILES = (
-    *(f"integrators/embedded/{name}.py" for name in ("dense_output", "memory", "tableau")),
-    "integrators/explicit_problem.py",
-    "integrators/output_times.py",
+    *(f"integrators/embedded/{name}.py" for name in ("dense_output", "stepper", "tableau")),
+    "integrators/protocol.py",
+    "integrators/stepper.py",
 )
 
 

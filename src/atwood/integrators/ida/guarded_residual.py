@@ -9,20 +9,19 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from ctypes import Array, c_void_p
+from typing import Any
 
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.codegen.llvm.build import Built, build_code
+from atwood.codegen.llvm.build import Built, RoutineSource, build_code, once
 from atwood.codegen.llvm.module import CodeOptions
-from atwood.codegen.once import once
-from atwood.codegen.routines.kinds import ADDRESS, INTEGER
-from atwood.codegen.routines.language import Record, Routine
-from atwood.codegen.routines.source import RoutineSource
+from atwood.codegen.routines import ADDRESS, INTEGER, Record, Routine
 from atwood.codegen.sundials.events import EVENTS_PLACE
-from atwood.codegen.sundials.ida_routines import RESIDUAL, array_of
 from atwood.codegen.sundials.layout import SundialsLayout, sundials_layout
-from atwood.errors import UsageError
+from atwood.codegen.sundials.residuals import RESIDUAL, array_of
+from atwood.errors import KernelEvaluationError, UsageError
+from atwood.integrators.protocol import StepGuard
 
 _PLACE = EVENTS_PLACE - 1
 """Which of the pointers of IDA's user data leads to what is remembered here."""
@@ -33,8 +32,8 @@ _FIELDS = dict.fromkeys(("guard", "guard_data", "residual", "kept", "tried", "ve
 @once
 def _code() -> Built:
     """Return the code of the residual."""
-    files = ("codegen/sundials/events.py", "codegen/sundials/ida_routines.py")
-    routines = RoutineSource("codegen.sundials.guarded_residual", files, (sundials_layout(),))
+    files = ("codegen/sundials/events.py", "codegen/sundials/residuals.py")
+    routines = RoutineSource("integrators.ida.guarded_residual", files, (sundials_layout(),))
     return build_code([], CodeOptions(level=2), exports=["guarded"], routines=routines)
 
 
@@ -79,3 +78,41 @@ def guarded_residual(
         states[:] = [t, *y[:size], *yp[:size]]
 
     return _code().code.addresses["guarded"], block, begin, (states, verdict, own)
+
+
+class GuardedResidual:
+    """A residual in Python that judges each step before it is worked out.
+
+    It has no value where a step may have passed over something, which makes IDA try a smaller one. Time goes on only
+    from a step that was kept.
+
+    Parameters
+    ----------
+    residual
+        The residual itself.
+    guard
+        What judges.
+    size
+        How many of the unknowns, the first ones, are looked at.
+    """
+
+    def __init__(self, residual: Callable[..., Any], guard: StepGuard, size: int) -> None:
+        self._residual, self._guard, self._size = residual, guard, size
+        self._kept = self._tried = (0.0, np.zeros(size), np.zeros(size))
+        self._passes = True
+
+    def begin(self, t: float, y: FloatArray, yp: FloatArray) -> None:
+        """Hear of a start."""
+        self._kept = self._tried = (t, y[: self._size].copy(), yp[: self._size].copy())
+
+    def __call__(self, t: float, y: FloatArray, yp: FloatArray) -> Any:
+        """Return the values of the residual."""
+        if t > self._tried[0]:
+            self._kept = self._tried
+        here = (t, y[: self._size].copy(), yp[: self._size].copy())
+        if t != self._tried[0]:
+            self._passes = self._guard.passes(*self._kept, *here)
+        self._tried = here if self._passes else (t, *self._tried[1:])
+        if not self._passes:
+            raise KernelEvaluationError(f"a law may change too fast within a step to t = {t:.9g}")
+        return self._residual(t, y, yp)

@@ -1,4 +1,7 @@
-"""The methods of Gauss as machine code: no Python runs between outputs."""
+"""The methods of Gauss as machine code: no Python runs between outputs.
+
+Hamilton's equations of a scene, as methods of equal steps are given them.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import ctypes
 import warnings
 from collections.abc import Callable
 from ctypes import c_double, c_int, c_int64, c_void_p
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -14,13 +18,14 @@ from atwood.codegen.llvm.build import Built, build_code, default_options
 from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.errors import KernelEvaluationError, SolveError
 from atwood.expr import Program
-from atwood.integrators.compiled_functions import StepGuard
-from atwood.integrators.event_location import State
-from atwood.integrators.explicit_problem import CompiledRates, Counts, Outcome, Stepper
-from atwood.integrators.gauss.hamiltonian import CompiledMethod
-from atwood.integrators.gauss.layout import COUNTS, NUMBERS, POINTERS, Layout
-from atwood.integrators.gauss.steps import FUNCTIONS, gauss_source
-from atwood.integrators.protocol import SolverOptions
+from atwood.integrators.protocol import CompiledRates, SolverOptions, State, StepGuard
+from atwood.integrators.stepper import Counts, Outcome, Stepper
+from atwood.integrators.symplectic.fixed_steps import COUNTS, NUMBERS, POINTERS, Layout
+from atwood.integrators.symplectic.gauss import FUNCTIONS, gauss_source
+from atwood.lazy_dataclasses import dataclass
+
+if TYPE_CHECKING:
+    from atwood.integrators.symplectic.fixed_steps import Layout
 
 _UNLIMITED = 2**62
 _CALM, _SHORTEST = 8, 1e-12
@@ -55,7 +60,7 @@ class CompiledGauss:
     speeds
         How many speeds there are.
     order
-        Of the method, one of `atwood.integrators.gauss.tableau.ORDERS`.
+        Of the method, one of `atwood.integrators.symplectic.gauss.ORDERS`.
     """
 
     def __init__(self, equations: Program, speeds: int, order: int) -> None:
@@ -307,3 +312,53 @@ _LIMIT, _STEPS, _FILLED = map(COUNTS.index, ("limit", "steps", "filled"))
 _FAILURES = COUNTS.index("failures")
 _COUNTED = tuple(map(COUNTS.index, ("steps", "failures", "evaluations", "undefined")))
 assert POINTERS[:2] == ("derived", "scratch")
+
+
+class CompiledMethod(Protocol):
+    """A method with fixed steps, for any parameter values and any step."""
+
+    order: int
+    layout: Layout
+    functions: dict[str, Callable[..., int]]
+
+    def memory(self, parameter_values: FloatArray) -> tuple[FloatArray, tuple[object, ...]]:
+        """Return the array of a session, and what it leads to."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Hamiltonian:
+    """Hamilton's equations, with what a run with equal steps was asked for.
+
+    Attributes
+    ----------
+    name
+        Of the scene.
+    equations
+        Program of (t, q, p), or of (t, q, p, u), with q' and p', and with the speeds where these are not q'.
+    separated
+        Returns the programs of the forces (t, q) and of the velocities p where H is T(p) + V(q, t); else None.
+    speeds
+        How many speeds there are.
+    values
+        Values of the parameters.
+    momenta
+        ``momenta(t, q, u)``: what p is there.
+    sizes
+        How large coordinates and momenta are in the scene.
+    order, step
+        What was asked for; None where that is to be chosen.
+    compiled
+        ``compiled(make, *key)``: a method as machine code, made at most once for all scenes of one structure.
+    """
+
+    name: str
+    equations: Program
+    separated: Callable[[], tuple[Program, Program] | None]
+    speeds: int
+    values: FloatArray
+    momenta: Callable[[float, FloatArray, FloatArray], FloatArray]
+    sizes: FloatArray
+    order: int | None
+    step: float | None
+    compiled: Callable[..., Any]

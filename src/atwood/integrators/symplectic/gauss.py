@@ -4,20 +4,38 @@ Stages are found by fixed-point iteration, each with those before it that are kn
 the last step gives; it ends where changes are rounding, since what is left of the iteration's error would not be
 symplectic. Increments are added with compensation (Hairer, Lubich and Wanner, Geometric Numerical Integration, sections
 VIII.5 and VIII.6).
+
+Coefficients of the methods of Gauss, correctly rounded.
+
+Collocation at the zeros of the shifted Legendre polynomial of degree s has the order 2s, is symmetric and symplectic
+(Hairer, Lubich and Wanner, Geometric Numerical Integration, sections II.1.3 and VI.4.1). It is symplectic since
+``b_i a_ij + b_j a_ji = b_i b_j``; with ``m_ij = a_ij/b_j`` that is ``m_ij + m_ji = 1``, which holds exactly for
+floating-point numbers too where ``m_ij`` is taken as one less ``m_ji`` (Antonana, Makazaga and Murua, Numerical
+Algorithms 76, 2017).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from decimal import Decimal, localcontext
+from functools import cache
 from math import inf
+from typing import NamedTuple
 
-from atwood.codegen.routines.kernels import call_kernel, place_of
-from atwood.codegen.routines.kinds import ADDRESS, CODE, INTEGER, NUMBER
-from atwood.codegen.routines.language import Routine, Value
-from atwood.codegen.routines.source import RoutineSource
-from atwood.integrators.gauss.fixed_steps import FILES, copy_numbers, interpolate, judge, run, sample, unless_found
-from atwood.integrators.gauss.layout import Layout, Memory, open_routine
-from atwood.integrators.gauss.tableau import Tableau, tableau
+from atwood.codegen.llvm.build import RoutineSource
+from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Routine, Value, call_kernel, place_of
+from atwood.integrators.symplectic.fixed_steps import (
+    FILES,
+    Layout,
+    Memory,
+    copy_numbers,
+    interpolate,
+    judge,
+    open_routine,
+    run,
+    sample,
+    unless_found,
+)
 
 FUNCTIONS = ("run", "interpolate", "sample", "begin", "trial", "speeds")
 
@@ -34,9 +52,9 @@ _STEP = {"w": ADDRESS, "y": ADDRESS, "t": NUMBER, "h": NUMBER}
 def gauss_source(layout: Layout, order: int) -> RoutineSource:
     """Return what writes the routines of a method, for a module with the equations as ``kernel``.
 
-    They take a session's array, which `atwood.integrators.gauss.layout` lays out.
+    They take a session's array, which `atwood.integrators.symplectic.fixed_steps` lays out.
     """
-    return RoutineSource("integrators.gauss.steps", ("integrators/gauss/tableau.py", *FILES), (layout, order))
+    return RoutineSource("integrators.symplectic.gauss", FILES, (layout, order))
 
 
 def write_routines(layout: Layout, order: int) -> list[Routine]:
@@ -224,3 +242,97 @@ def _trial(layout: Layout) -> Routine:
         target[i] = source[i] + total
     r.give(0)
     return r
+
+
+ORDERS = (2, 4, 6, 8, 10, 12)
+"""The orders there are."""
+
+_DIGITS = 60
+
+
+class Tableau(NamedTuple):
+    """A method of s stages: with ``L_j = h b_j f(Y_j)``, ``Y_i = y + sum m_ij L_j`` and the step is ``sum L_j``.
+
+    Attributes
+    ----------
+    nodes
+        c.
+    weights
+        b.
+    shares
+        m, by rows.
+    ahead
+        What the polynomial through the L of one step gives for those of the next, by rows.
+    """
+
+    nodes: tuple[float, ...]
+    weights: tuple[float, ...]
+    shares: tuple[tuple[float, ...], ...]
+    ahead: tuple[tuple[float, ...], ...]
+
+
+@cache
+def tableau(order: int) -> Tableau:
+    """Return the method of an order, one of `ORDERS`."""
+    s = order // 2
+    with localcontext() as context:
+        context.prec = _DIGITS
+        nodes = _zeros(s)
+        basis = [_lagrange(nodes, j) for j in range(s)]
+        weights = [_integral(one, Decimal(1)) for one in basis]
+        exact = [[_integral(basis[j], c) / weights[j] for j in range(s)] for c in nodes]
+        shares = [[0.5] * s for _ in range(s)]
+        for i in range(s):
+            for j in range(i):
+                # The larger of the two is rounded, so that the other is one less it without rounding.
+                above = float(exact[i][j])
+                shares[i][j], shares[j][i] = above, 1.0 - above
+        ahead = tuple(
+            tuple(float(weights[i] / weights[j] * _value(basis[j], 1 + nodes[i])) for j in range(s)) for i in range(s)
+        )
+        return Tableau(tuple(map(float, nodes)), tuple(map(float, weights)), tuple(map(tuple, shares)), ahead)
+
+
+Polynomial = list[Decimal]
+"""Coefficients, lowest power first."""
+
+
+def _zeros(s: int) -> list[Decimal]:
+    """Return the zeros of the shifted Legendre polynomial, ``(d/dx)^s x^s (x - 1)^s``, by Newton's method."""
+    row: Polynomial = [Decimal(1)]
+    for k in range(s):  # the coefficients of the polynomial P_s(1 - 2x) = sum (-s)_k (s+1)_k/(k!)^2 x^k
+        row.append(row[-1] * (k - s) * (s + 1 + k) / ((k + 1) ** 2))
+    slope = [k * value for k, value in enumerate(row)][1:]
+    found: list[Decimal] = []
+    for _ in range(s):
+        x = Decimal(0)  # below all zeros that are left, from where the iteration rises without passing one
+        for _ in range(500):
+            value, rate = _value(row, x), _value(slope, x)
+            rate -= value * sum((1 / (x - known) for known in found), Decimal(0))
+            step = value / rate
+            x -= step
+            if abs(step) < Decimal(10) ** (10 - _DIGITS):
+                break
+        found.append(x)
+    return sorted(found)
+
+
+def _value(row: Polynomial, x: Decimal) -> Decimal:
+    total = Decimal(0)
+    for coefficient in reversed(row):
+        total = total * x + coefficient
+    return total
+
+
+def _integral(row: Polynomial, x: Decimal) -> Decimal:
+    return _value([Decimal(0), *(value / (k + 1) for k, value in enumerate(row))], x)
+
+
+def _lagrange(nodes: list[Decimal], j: int) -> Polynomial:
+    """Return the polynomial that is one at a node and zero at the others."""
+    row: Polynomial = [Decimal(1)]
+    for i, node in enumerate(nodes):
+        if i != j:
+            shifted = [Decimal(0), *row]
+            row = [(a - node * b) / (nodes[j] - node) for a, b in zip(shifted, [*row, Decimal(0)], strict=True)]
+    return row

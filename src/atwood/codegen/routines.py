@@ -1,18 +1,121 @@
-"""A small imperative language: typed values, variables, arrays, records, loops, branches and calls.
+"""Kinds of values of a routine: numbers, integers, conditions, lanes of numbers and addresses.
+
+What a routine becomes: a tree of instructions with structured control flow, which printers read.
+
+A small imperative language: typed values, variables, arrays, records, loops, branches and calls.
 
 A routine is written with Python's operators on values, and becomes a tree of instructions that says nothing of the
 target.  Each operation is an instruction of its own, in the order of writing: a value that was read from memory stays
 what it was.  Control flow is structured: printers for other languages need no jumps.
+
+Calls of a program's functions from a routine (`atwood.codegen.llvm.module` says what these take).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NamedTuple, TypeAlias
 
-from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER, Kind, Lanes
-from atwood.codegen.routines.tree import Block, Branch, Call, Instruction, Jump, Loop
+from atwood.lazy_dataclasses import dataclass
+
+
+class Scalar(NamedTuple):
+    """A kind of one value.
+
+    Attributes
+    ----------
+    name
+        Its name in messages.
+    is_float
+        Whether its arithmetic is that of floating-point numbers.
+    """
+
+    name: str
+    is_float: bool = False
+
+
+@dataclass(frozen=True)
+class Lanes:
+    """Several neighbouring numbers, or conditions on them, on which an operation works at once.
+
+    Attributes
+    ----------
+    count
+        Their number.
+    is_float
+        False for conditions, one for each lane.
+    """
+
+    count: int
+    is_float: bool = True
+
+    @property
+    def name(self) -> str:
+        """What messages call them."""
+        return f"{self.count} lanes of {'numbers' if self.is_float else 'conditions'}"
+
+
+Kind: TypeAlias = Scalar | Lanes
+
+NUMBER = Scalar("number", is_float=True)
+"""A double."""
+
+INTEGER = Scalar("integer")
+"""An integer of 64 bits, with sign."""
+
+CODE = Scalar("code")
+"""An integer of 32 bits: what a function returns, zero where all went well, or an element of a list of such."""
+
+BOOLEAN = Scalar("condition")
+"""True or false."""
+
+ADDRESS = Scalar("address")
+"""Where numbers, integers or addresses of 8 bytes each lie, or a function."""
+
+
+class Instruction(NamedTuple):
+    """An operation on values; `result` is None where it has none."""
+
+    operation: str
+    result: Value | None
+    arguments: tuple[Any, ...]
+
+
+class Call(NamedTuple):
+    """A call of a routine by its name, or of a function by its address."""
+
+    result: Value | None
+    function: str | Value
+    arguments: tuple[Value, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """What is done where a condition holds, and what otherwise."""
+
+    condition: Value
+    then: Block
+    otherwise: Block
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """What is done again and again until a jump leaves it."""
+
+    number: int
+    body: Block
+
+
+@dataclass(frozen=True, eq=False)
+class Jump:
+    """To the end of a loop, or to its next turn."""
+
+    loop: Loop
+    leaves: bool
+
+
+Block = list["Instruction | Call | Branch | Loop | Jump"]
 
 
 class Value:
@@ -394,3 +497,25 @@ class Routine:
         self._blocks.append(block)
         yield
         self._blocks.pop()
+
+
+def addresses(r: Routine, places: Sequence[Value]) -> Value:
+    """Return an array of this call's own that holds addresses."""
+    table = r.array(len(places))
+    for k, place in enumerate(places):
+        table.write(k, place, ADDRESS)
+    return table
+
+
+def place_of(r: Routine, number: Value) -> Value:
+    """Return an array of this call's own that holds a number."""
+    place = r.array(1)
+    place[0] = number
+    return place
+
+
+def call_kernel(
+    r: Routine, name: str, inputs: Sequence[Value], derived: Value, scratch: Value, outputs: Sequence[Value]
+) -> Value:
+    """Call a program; return 0, or 1 where a result is not finite."""
+    return r.call(name, addresses(r, inputs), derived, scratch, addresses(r, outputs))

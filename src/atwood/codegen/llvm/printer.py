@@ -9,9 +9,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from atwood.codegen.llvm.text import literal
-from atwood.codegen.routines.kinds import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER, Kind, Lanes
-from atwood.codegen.routines.language import Routine, Value
-from atwood.codegen.routines.tree import Block, Branch, Call, Instruction, Jump, Loop
+from atwood.codegen.routines import (
+    ADDRESS,
+    BOOLEAN,
+    CODE,
+    INTEGER,
+    NUMBER,
+    Block,
+    Branch,
+    Call,
+    Instruction,
+    Jump,
+    Kind,
+    Lanes,
+    Loop,
+    Routine,
+    Value,
+)
 
 _TYPES: dict[Kind, str] = {NUMBER: "double", INTEGER: "i64", CODE: "i32", BOOLEAN: "i1", ADDRESS: "ptr"}
 _CONVERTED: dict[Kind, str] = {CODE: "sext", INTEGER: "trunc"}

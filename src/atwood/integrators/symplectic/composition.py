@@ -13,26 +13,33 @@ from typing import Final
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.codegen.llvm.build import build_code, default_options
+from atwood.codegen.llvm.build import RoutineSource, build_code, default_options
 from atwood.codegen.llvm.module import CodeOptions, Part
-from atwood.codegen.routines.kernels import call_kernel, place_of
-from atwood.codegen.routines.kinds import ADDRESS, NUMBER
-from atwood.codegen.routines.language import Routine, Value
-from atwood.codegen.routines.source import RoutineSource
+from atwood.codegen.routines import ADDRESS, NUMBER, Routine, Value, call_kernel, place_of
 from atwood.expr import Program
-from atwood.integrators.gauss.fixed_steps import FILES, copy_numbers, interpolate, judge, run, sample, unless_found
-from atwood.integrators.gauss.layout import POINTERS, Layout, Memory, open_routine
-from atwood.integrators.gauss.native import bind_functions
-from atwood.integrators.gauss.steps import FUNCTIONS
+from atwood.integrators.symplectic.fixed_steps import (
+    FILES,
+    POINTERS,
+    Layout,
+    Memory,
+    copy_numbers,
+    interpolate,
+    judge,
+    open_routine,
+    run,
+    sample,
+    unless_found,
+)
+from atwood.integrators.symplectic.gauss import FUNCTIONS
+from atwood.integrators.symplectic.stepper import bind_functions
 
 
 def composition_source(layout: Layout, order: int) -> RoutineSource:
     """Return what writes the routines, for a module with forces as ``kernel`` and velocities as ``flow``.
 
-    They are those of `atwood.integrators.gauss.steps`, on the same memory.
+    They are those of `atwood.integrators.symplectic.gauss`, on the same memory.
     """
-    files = ("integrators/composition/steps.py", *FILES)
-    return RoutineSource("integrators.composition.steps", files, (layout, order))
+    return RoutineSource("integrators.symplectic.composition", FILES, (layout, order))
 
 
 def write_routines(layout: Layout, order: int) -> list[Routine]:
@@ -173,7 +180,7 @@ class CompiledComposition:
     velocities
         Program of p with q'.
     order
-        Of the method, one of `atwood.integrators.composition.steps.ORDERS`.
+        Of the method, one of `atwood.integrators.symplectic.composition.ORDERS`.
     """
 
     def __init__(self, forces: Program, velocities: Program, order: int) -> None:

@@ -1,1 +1,0 @@
-"""Routines with loops and branches, written once and printed for each target."""

@@ -1,1 +1,0 @@
-"""Formulas for people: to and from sympy."""

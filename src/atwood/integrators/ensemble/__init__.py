@@ -1,1 +1,0 @@
-"""Many runs of one smooth problem in one compiled call."""

@@ -1,0 +1,389 @@
+"""The Taylor-series method: what it is given, its order, and how its steps are chosen.
+
+A. Jorba and M. Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods,
+Experimental Mathematics 14 (2005) 99-117: the order from the tolerance and the step from the last coefficients are in
+section 3.  Three things differ:
+
+- Sizes are those of each unknown, as its tolerances say, where they take the largest of all.
+- Their two last coefficients are not enough: a mechanism that is released at rest where its forces are odd has series
+  in which only every fourth coefficient is there, and both can be zero.  So four are looked at.
+- At the end of a step, the rates are compared with the derivative of the polynomial.  That costs nothing, since the
+  next step begins with these rates, and it shows what no coefficient can: a law that changes within a step.
+
+Memory of a session of Taylor series: what routines, recurrences and Python agree on.
+
+The coefficients that are convolved lie in blocks of `LANES` values, each block with one row for each order, so that
+the convolutions of a block are worked out together and read memory in order: nothing has to be gathered, and no lane
+waits for another.
+
+The Taylor-series method as machine code: no Python runs between outputs.
+
+The code of the steps is the same for all systems and comes from the cache after the first time.  What a system adds is
+its recurrences, as two compiled programs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from itertools import accumulate
+from math import ceil, exp, frexp, inf, log, log2
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from atwood.arrays import FloatArray
+from atwood.codegen.llvm.build import RoutineSource, build_code, default_options, once
+from atwood.codegen.llvm.module import Part
+from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Kind, Lanes, Operand, Record, Routine, Value
+from atwood.expr.series.taylor import TaylorPrograms
+from atwood.integrators.protocol import SolverOptions, StepGuard, absolute_tolerances
+from atwood.integrators.stepper import NativeStepper, Routines, routines_of
+from atwood.lazy_dataclasses import dataclass, replace
+
+if TYPE_CHECKING:
+    from atwood.expr.series.taylor import TaylorPrograms
+    from atwood.integrators.batch import BatchPlaces
+
+LOWEST, HIGHEST = 5, 28
+"""The orders that are used."""
+
+FACTOR = 0.65
+"""Orders for each factor e of the tolerance; a step is then e^(-1/FACTOR) of the radius of convergence.
+
+A half is best if an order costs as much as its number of terms; here convolutions are cheap beside what every order
+costs, and 0.6 to 0.7 takes the least time for an error (chains of 2, 10 and 40 links, errors from 1e-3 to 1e-12).
+"""
+
+WATCHED = 4
+"""The radius of convergence is estimated from so many last coefficients."""
+
+DEFECT = 30.0
+"""How far the rates at the end of a step may be from the polynomial's, in units of the tolerance."""
+
+FLOOR = 1e-12
+"""The least such difference that is looked at, relative to the sizes: below it is rounding."""
+
+RETREAT = 0.5
+"""The share of a step that is tried next where the rates do not fit or have no value."""
+
+
+RETRIES, SMALLER = 4, 1e-6
+"""How often coefficients that are not finite are tried again, with a unit of time that is so many times smaller."""
+
+
+PARTS = 2
+"""What judges a step is asked about so many parts of it: longer ones bend more than the cubics between their ends."""
+
+
+REACH = 0.5
+"""Where events are looked for, no step changes an unknown by more than so many times its size."""
+
+
+@dataclass(frozen=True, eq=False)
+class TaylorProblem:
+    """The recurrences of one mode, with parameter values.
+
+    Parameters
+    ----------
+    programs
+        The recurrences, of which `atwood.integrators.taylor.stepper.LANES` convolutions are worked out at a time.
+    parameters
+        The values of the parameters of the program of order zero.
+    compiled
+        ``compiled()``: the recurrences as machine code, and what depends on their parameters alone.
+    stop_time
+        No step goes beyond this time: what acts may change there.
+    reach
+        No step changes an unknown by more than so many times its size: where events are looked for, a step must not be
+        so long that one comes and goes within it.
+    """
+
+    programs: TaylorPrograms
+    parameters: FloatArray
+    compiled: Callable[[], tuple[CompiledRecurrences, FloatArray]]
+    stop_time: float = inf
+    reach: float = inf
+
+
+def choose_order(options: SolverOptions) -> int:
+    """Return the order that suits a tolerance: Jorba and Zou, section 3.1, where the factor is 1/2."""
+    found = ceil(1.0 - FACTOR * log(options.relative_tolerance))
+    return min(max(found, LOWEST), HIGHEST)
+
+
+def share_of_radius(order: int, tolerance: float) -> float:
+    """Return the step as a share of the radius of convergence: where terms of order p - 1 are as small as allowed.
+
+    The last factor is that of Jorba and Zou, section 3.2.
+    """
+    return exp((log(tolerance) - 0.7) / (order - 1))
+
+
+def logarithm(value: float) -> float:
+    """Return the logarithm to base 2, good enough for a step: linear between powers of two, and finite at zero."""
+    if value < 2.0**-1022:
+        return -1023.0
+    mantissa, exponent = frexp(value)
+    return 2.0 * mantissa + (exponent - 2)
+
+
+WIDTH = 4
+"""How many unknowns a loop works on at a time; rows are padded to a multiple of it with finite numbers."""
+
+LANES = 8
+"""How many convolutions are worked out at a time."""
+
+STRIDE = LANES * (HIGHEST + 1)
+"""How far one block is from the next: an odd number of rows, so that the rows of one order do not share cache sets."""
+
+_NAMES = (
+    *("y", "y_low", "new", "new_low", "rates", "new_rates", "slope", "floors", "sizes"),
+    *("trial", "trial_rates", "kept", "kept_rates"),
+)
+ROWS = {"x": 0, **{name: HIGHEST + 1 + i for i, name in enumerate(_NAMES)}, "all": HIGHEST + 1 + len(_NAMES)}
+"""The rows of the table of arrays: the coefficients of the unknowns from order zero on, and what steps need."""
+
+NUMBERS = (
+    *("order_number", "order_inverse", "order_step", "order_tick"),  # what the program of an order is told
+    *("t", "t_old", "t_new", "time"),
+    *("unit", "last", "first", "stop", "stop_time", "share", "allowed", "longest", "horizon", "reach"),
+)
+COUNTS = (
+    *("size", "padded", "order", "pair_blocks", "square_blocks", "limit"),
+    *("steps", "failures", "evaluations", "undefined", "stiff", "filled"),
+)
+POINTERS = (
+    *("start", "prologue", "recurrence"),  # functions
+    *("start_derived", "derived", "scratch", "known"),
+    *("new_in", "new_out", "trial_in", "trial_out", "order_in", "order_out"),  # tables of pointers
+    *("arrays", "table", "pair_sums", "square_sums", "numbers", "counts"),
+    *("guard", "guard_data"),
+)
+
+
+def positions(pairs: int, squares: int, size: int) -> tuple[int, ...]:
+    """Return where the results of the program of an order go, from the row of that order in the first block.
+
+    The blocks of left and right factors take turns, and those of squares follow; the coefficients of the unknowns have
+    an array of their own.
+    """
+    left = [2 * (i // LANES) * STRIDE + i % LANES for i in range(pairs)]
+    first = 2 * (-(-pairs // LANES))
+    last = [(first + i // LANES) * STRIDE + i % LANES for i in range(squares)]
+    return (*left, *(at + STRIDE for at in left), *last, *range(size))
+
+
+class Memory:
+    """The memory of a session within a routine."""
+
+    def __init__(self, session: Value) -> None:
+        self.session = session
+        self.at = Record(session, dict.fromkeys(POINTERS, ADDRESS))
+        self.numbers = Record(self.at.numbers, dict.fromkeys(NUMBERS, NUMBER))
+        self.counts = Record(self.at.counts, dict.fromkeys(COUNTS, INTEGER))
+        self.arrays, self.size, self.padded = self.at.arrays, self.counts.size, self.counts.padded
+
+    def row(self, row: Operand | str) -> Value:
+        """Return the address of a row of the table of arrays, by its name or number."""
+        return self.arrays.at(self.padded * (ROWS[row] if isinstance(row, str) else row))
+
+    def lanes(self, row: Value, j: Value) -> Value:
+        """Return the lanes of a row from an unknown on."""
+        return row.read(j, Lanes(WIDTH))
+
+
+def open_routine(
+    name: str, more: Mapping[str, Kind] | None = None, result: Kind | None = CODE, exported: bool = False
+) -> tuple[Routine, Memory, list[Value]]:
+    """Return a new routine of a session, its memory, and its further arguments."""
+    routine = Routine(name, {"session": ADDRESS, **(more or {})}, result, exported)
+    return routine, Memory(routine.arguments[0]), routine.arguments[1:]
+
+
+_PACKED = (0, 1, 2)
+"""The groups of results of the program of an order whose rows lie in blocks: left, right and squares."""
+
+_LINE = 8
+"""Numbers in one line of the processor's cache: every array begins with one."""
+
+
+class CompiledRecurrences:
+    """The recurrences of a system as machine code, for any parameter values.
+
+    Parameters
+    ----------
+    programs
+        The recurrences, made for `~atwood.integrators.taylor.stepper.LANES`.
+    """
+
+    def __init__(self, programs: TaylorPrograms) -> None:
+        self.programs = programs
+        self.size = len(programs.start.inputs[1].symbols)
+        order = Part("order", programs.order, positions(programs.pairs, programs.squares, self.size), LANES, _PACKED)
+        parts = [Part("start", programs.start), order]
+        self.built = build_code(parts, replace(default_options(parts), contract=True))
+        self.addresses = self.built.code.addresses
+        self.layout = _Layout(self)
+
+    def bind(self, parameter_values: ArrayLike) -> FloatArray:
+        """Return what depends on parameters alone."""
+        return self.built.derive("start", self.programs.start, parameter_values)[0]
+
+
+class _Layout:
+    """Where each array of a session stands, from the beginning of its memory.
+
+    Parameters
+    ----------
+    recurrences
+        What a session is of.
+
+    Attributes
+    ----------
+    places, size, padded
+        In numbers of 8 bytes: where arrays begin, how many there are in all, and in a row of unknowns.
+    tables
+        What the tables of pointers hold, in bytes from the beginning.
+    pointers, is_own
+        The pointers of a session, and which of them are such distances; addresses of functions are not.
+    """
+
+    def __init__(self, recurrences: CompiledRecurrences) -> None:
+        programs, n = recurrences.programs, recurrences.size
+        self.padded = -(-n // WIDTH) * WIDTH
+        known = len(programs.order.parameters)
+        pairs, squares = -(-programs.pairs // LANES), -(-programs.squares // LANES)
+        lengths = {
+            "pointers": len(POINTERS),
+            "numbers": len(NUMBERS),
+            "counts": len(COUNTS),
+            "tables": 16,
+            "values": 2 * n,
+            "known": known,
+            "spare": known,
+            "derived": len(programs.order.prologue),
+            "scratch": recurrences.built.scratch,
+            "arrays": ROWS["all"] * self.padded,
+            "pair_sums": pairs * LANES,
+            "square_sums": squares * LANES,
+            "table": (2 * pairs + squares) * STRIDE,
+        }
+        ends = [0, *accumulate(-(-length // _LINE) * _LINE for length in lengths.values())]
+        self.places, self.size = dict(zip(lengths, ends, strict=False)), ends[-1]
+        far = {name: 8 * at for name, at in self.places.items()}
+
+        def row(name: str) -> int:
+            return far["arrays"] + 8 * self.padded * ROWS[name]
+
+        def number(name: str) -> int:
+            return far["numbers"] + 8 * NUMBERS.index(name)
+
+        pairs_of_tables = (
+            *(number("t_new"), row("new"), row("new_rates"), far["known"]),
+            *(number("time"), row("trial"), row("trial_rates"), far["spare"]),
+            *(far["pair_sums"], far["square_sums"], far["numbers"]),
+        )
+        self.tables = np.array(pairs_of_tables, dtype=np.int64)
+        names = ("new_in", "new_out", "trial_in", "trial_out", "order_in", "order_out")
+        far |= {name: far["tables"] + 8 * at for name, at in zip(names, (0, 2, 4, 6, 8, 12), strict=True)}
+        code = recurrences.addresses
+        given = {"start": code["start"], "prologue": code["order_prologue"], "recurrence": code["order"]}
+        given |= dict.fromkeys(("start_derived", "guard", "guard_data"), 0)  # of each session
+        self.pointers = np.array([{**far, **given}[name] for name in POINTERS], dtype=np.int64)
+        self.is_own = np.array([name not in given for name in POINTERS], dtype=np.int64)
+
+
+class CompiledStepper(NativeStepper):
+    """The state of a run with Taylor series.
+
+    Parameters
+    ----------
+    problem
+        The recurrences.
+    options
+        The accuracy.
+    order
+        The order of the method; None takes the one that suits the tolerance.
+    guard
+        What judges steps besides their error.
+    """
+
+    _number = MappingProxyType({name: place for place, name in enumerate(NUMBERS)})
+    _count = MappingProxyType({name: place for place, name in enumerate(COUNTS)})
+
+    def __init__(
+        self,
+        problem: TaylorProblem,
+        options: SolverOptions,
+        order: int | None = None,
+        guard: StepGuard | None = None,
+    ) -> None:
+        recurrences, derived = problem.compiled()
+        self._size, self._options = recurrences.size, options
+        self._keep = recurrences, derived
+        chosen = choose_order(options) if order is None else order
+        self._lay_out(recurrences, derived, guard)
+        n = self._size
+        self._arrays[ROWS["floors"]] = 1.0
+        self._arrays[ROWS["floors"], :n] = absolute_tolerances(options, n) / options.relative_tolerance
+        programs = recurrences.programs
+        pairs, squares = -(-programs.pairs // LANES), -(-programs.squares // LANES)
+        self._counts[: COUNTS.index("limit")] = n, self._arrays.shape[1], chosen, pairs, squares
+        share = log2(share_of_radius(chosen, options.relative_tolerance))
+        allowed = DEFECT * options.relative_tolerance + FLOOR
+        limits = allowed, options.max_step or inf, options.horizon, problem.reach
+        self._numbers[_FIRST:] = options.first_step or 0.0, 0.0, problem.stop_time, share, *limits
+        self._routines = _routines()
+
+    def _lay_out(self, recurrences: CompiledRecurrences, derived: FloatArray, guard: StepGuard | None) -> None:
+        """Find a place for everything, in one piece of memory that begins with a cache line."""
+        layout, n = recurrences.layout, self._size
+        memory = np.zeros(layout.size + _LINE)
+        begins: int = memory.ctypes.data
+        skipped = -(begins // 8) % _LINE
+        memory, base = memory[skipped:], begins + 8 * skipped
+        at = layout.places
+        whole = memory.view(np.int64)
+        self._numbers = memory[at["numbers"] : at["numbers"] + len(NUMBERS)]
+        self._counts = whole[at["counts"] : at["counts"] + len(COUNTS)]
+        self._arrays = memory[at["arrays"] : at["arrays"] + ROWS["all"] * layout.padded].reshape(-1, layout.padded)
+        self._ends = self._arrays[ROWS["y"], :n], self._arrays[ROWS["rates"], :n]
+        self._values = memory[at["values"] : at["values"] + 2 * n].reshape(2, n)
+        whole[at["tables"] : at["tables"] + len(layout.tables)] = layout.tables + base
+        pointers = whole[at["pointers"] : at["pointers"] + len(POINTERS)]
+        pointers[:] = layout.pointers + base * layout.is_own
+        pointers[POINTERS.index("start_derived")] = derived.ctypes.data
+        if guard is not None:
+            self._guard = guard
+            pointers[POINTERS.index("guard") :] = guard.function, guard.data
+        self._session = base + 8 * at["pointers"]
+        self._parameters = recurrences.addresses["start_prologue"], derived.ctypes.data, base + 8 * at["scratch"]
+        self._outputs = base + 8 * at["values"], base + 8 * (at["values"] + n)
+
+    def batch_places(self) -> BatchPlaces:
+        """Return the addresses with which many runs can be made in one call.
+
+        What this session knows of parameters is written over by a run that has others.
+        """
+        factor = 1.0 / self._options.relative_tolerance
+        return self._places(self._arrays[ROWS["floors"]], factor, self._parameters)
+
+
+_FIRST = NUMBERS.index("first")
+
+
+_ROUTINES = RoutineSource(
+    "integrators.taylor.steps",
+    (
+        "integrators/stepper.py",
+        "integrators/taylor/stepper.py",
+    ),
+)
+
+
+@once
+def _routines() -> Routines:
+    """Return the routines of the method."""
+    return routines_of(_ROUTINES)
