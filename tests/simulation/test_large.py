@@ -174,7 +174,7 @@ def test_many_states_at_once() -> None:
     entries, right = random.standard_normal((len(rows), states)), random.standard_normal((m, states))
     held = Pattern(rows, columns, (m, n))
     kept = [i for i in range(m) if i % 7]
-    found = Normal(held, kept).least_norm(entries, right[kept])
+    found = Normal(held, kept).factorised(entries)(right[kept])
     at = Pattern(np.array([*range(n), 0, 1]), np.array([*range(n), 1, 0]), (n, n))
     masses = np.concatenate([random.uniform(1.0, 2.0, (n, states)), np.full((2, states), 0.25)])
     bias = random.standard_normal((n, states))

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _SHARE = 1e-10
 """What is added to the normal equations, relative to their largest diagonal entry."""
 
-_PASSES = 12
+_PASSES, _ITERATIONS = 12, 40
 _BLOCK = 256
 
 
@@ -90,7 +90,7 @@ def rows_are_independent(matrix: Any, tolerance: float) -> bool:
     return value > max(100.0 * tolerance**2, 1e-12)
 
 
-def smallest_direction(square: Any, iterations: int = 40) -> tuple[float, FloatArray]:
+def smallest_direction(square: Any) -> tuple[float, FloatArray]:
     """Return the smallest eigenvalue of a symmetric matrix without negative ones, relative to its size, and its vector.
 
     By inverse iteration, which comes from above.
@@ -101,7 +101,7 @@ def smallest_direction(square: Any, iterations: int = 40) -> tuple[float, FloatA
     vector = np.cos(np.arange(n) * np.sqrt(2.0)) + 0.01  # no symmetry singles it out
     vector /= np.linalg.norm(vector)
     value = np.inf
-    for _ in range(iterations):
+    for _ in range(_ITERATIONS):
         vector = solver.solve(vector)
         length = float(np.linalg.norm(vector))
         if not np.isfinite(length) or length == 0.0:

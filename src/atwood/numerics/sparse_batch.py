@@ -202,12 +202,8 @@ class Normal:
         square[:n] += _SHARE * np.max(square[:n], axis=0, initial=0.0)
         return self.elimination.factorise(square)
 
-    def least_norm(self, entries: FloatArray, right: FloatArray) -> FloatArray:
-        """Return the shortest solution for each state, shape (columns, states)."""
-        return self.factorised(entries)(right)
-
     def factorised(self, entries: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """Return what gives the shortest solutions for one right-hand side after another; see `least_norm`."""
+        """Return what gives the shortest solutions, shape (columns, states), for one right-hand side after another."""
         entries = entries[self._which]
         factors = self._factorise(entries)
 

@@ -207,18 +207,23 @@ def solve_balance(now: BalanceValues, kept: NDArray[np.intp] | None, t: float) -
     n = len(now.bias)
     jacobian = now.jacobian if kept is None else now.jacobian[kept]
     gamma = now.gamma if kept is None else now.gamma[kept]
-    m = len(gamma)
     if not is_full(now.mass):
         solved = solve_bordered(now.mass, jacobian, now.bias, gamma)
         if solved is None:
             raise _undetermined(t)
         return solved
-    matrix = np.zeros((n + m, n + m))
-    matrix[:n, :n] = now.mass
-    matrix[:n, n:] = -jacobian.T
-    matrix[n:, :n] = jacobian
-    solution = solve_determined(matrix, np.concatenate([-now.bias, -gamma]), t)
+    solution = solve_determined(bordered(now.mass, jacobian), np.concatenate([-now.bias, -gamma]), t)
     return solution[:n], solution[n:]
+
+
+def bordered(mass: FloatArray, jacobian: FloatArray) -> FloatArray:
+    """Return the matrix of balances of forces, for accelerations and then multipliers, of one state or of many."""
+    n, m = mass.shape[-1], jacobian.shape[-2]
+    matrix = np.zeros((*mass.shape[:-2], n + m, n + m))
+    matrix[..., :n, :n] = mass
+    matrix[..., :n, n:] = -np.swapaxes(jacobian, -1, -2)
+    matrix[..., n:, :n] = jacobian
+    return matrix
 
 
 def solve_determined(matrix: FloatArray, right: FloatArray, t: float) -> FloatArray:

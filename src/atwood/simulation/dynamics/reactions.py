@@ -24,7 +24,7 @@ from atwood.forms.quantities import internal_reactions_of, to_maximal
 from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.matrices import is_best_full, least_size, or_one, solve_even, to_array
 from atwood.numerics.rank import decompose
-from atwood.simulation.dynamics.balance import Balance, balance_of, masses_at
+from atwood.simulation.dynamics.balance import Balance, balance_of, bordered, masses_at
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.redundancy import RankFinding, find_rank, kept_along
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales, multiplier_sizes, scene_length
@@ -181,13 +181,9 @@ def _solved_full(
             full_mass[:, program.mass_rows, program.mass_columns] = mass[:, part].T
         full_jacobian = np.zeros((count, m, n))
         full_jacobian[:, program.jacobian_rows, program.jacobian_columns] = jacobian[:, part].T
-        matrix = np.zeros((count, size, size))
-        matrix[:, :n, :n] = full_mass
-        matrix[:, :n, n:] = -np.swapaxes(full_jacobian[:, kept], 1, 2)
-        matrix[:, n:, :n] = full_jacobian[:, kept]
         right = -np.concatenate([bias[:, part].T, gamma[kept][:, part].T], axis=1)
         try:
-            solved = solve_even(matrix, right)
+            solved = solve_even(bordered(full_mass, full_jacobian[:, kept]), right)
         except np.linalg.LinAlgError:
             raise SolveError(
                 "the forces do not determine the accelerations somewhere along the run",

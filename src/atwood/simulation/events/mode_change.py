@@ -18,7 +18,7 @@ from atwood.mechanics.outputs.event_functions import UPDATE, EventFunction, list
 from atwood.numerics.matrices import is_full, least_norm, scaled, to_array
 from atwood.numerics.newton import Missing, newton
 from atwood.numerics.sparse import solve_bordered
-from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_of
+from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_of, bordered
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of, reference_coordinates
 from atwood.simulation.dynamics.orientation_coordinates import (
     Reassemble,
@@ -182,10 +182,10 @@ def _solve_impact(
         solved = solve_bordered(now.mass, now.jacobian, -(now.mass @ u), now.explicit_rate)
         if solved is not None:
             return solved[0], solved[1] * rows
-    m, n = len(now.gamma), len(u)
+    n = len(u)
     mass, slope = sizes[:, None] * to_array(now.mass) * sizes, to_array(scaled(now.jacobian, sizes, rows))
     mass = mass / (np.max(np.abs(mass), initial=0.0) or 1.0)
-    matrix = np.block([[mass, -slope.T], [slope, np.zeros((m, m))]])
+    matrix = bordered(mass, slope)
     right = np.concatenate([mass @ (u / sizes), -now.explicit_rate / rows])
     found = least_norm(matrix, right, errors=_LIGHT)
     return found[:n] * sizes, found[n:]

@@ -67,12 +67,23 @@ def explain_positions(failed: Failed) -> StartError:
     held = _missed_most(failed)
     if not any(one.value is not None for one in failed.equations.constraints):
         return contradiction(fixed, own, _freedom(failed), _as_near_as_it_gets(failed), held)
-    system = System(failed.assembly, failed.equations, [], True)
-    units = units_of_rows(failed.assembly, failed.equations, system, failed.length)
-    best = closest_of_all(system, units, failed.scales, failed.time, failed.nearest)
+    system, _, best = _misses_least(failed, [])
     if best is not None and best.size > tolerances.CLOSED:
         return _open_loop(failed, system, best)
     return contradiction(fixed, own, _freedom(failed), _what_stays_open(failed), held)
+
+
+def _misses_least(
+    failed: Failed, fixed: Sequence[Target], share: float = 1.0
+) -> tuple[System, FloatArray, Nearest | None]:
+    """Return the constraints with fixed values, what counts as one in each, and the place that misses least.
+
+    What is fixed counts as missed by one where it is by a share of its unit: with a small one it all but holds.
+    """
+    system = System(failed.assembly, failed.equations, fixed, True)
+    units = units_of_rows(failed.assembly, failed.equations, system, failed.length)
+    units[system.constraints :] *= share
+    return system, units, closest_of_all(system, units, failed.scales, failed.time, failed.nearest)
 
 
 def _missed_most(failed: Failed) -> str:
@@ -85,9 +96,7 @@ def _missed_most(failed: Failed) -> str:
 def _as_near_as_it_gets(failed: Failed) -> str:
     """Return, in words, the values of all that is fixed where they are met best."""
     fixed = failed.level.fixed
-    system = System(failed.assembly, failed.equations, fixed, True)
-    units = units_of_rows(failed.assembly, failed.equations, system, failed.length)
-    best = closest_of_all(system, units, failed.scales, failed.time, failed.nearest)
+    _, units, best = _misses_least(failed, fixed)
     if best is None:
         return ""
     off = [
@@ -104,10 +113,7 @@ def _what_stays_open(failed: Failed) -> str:
     fixed = failed.level.fixed
     if not fixed:
         return ""
-    system = System(failed.assembly, failed.equations, fixed, True)
-    units = units_of_rows(failed.assembly, failed.equations, system, failed.length)
-    units[system.constraints :] *= _HELD  # what is fixed holds all but exactly
-    best = closest_of_all(system, units, failed.scales, failed.time, failed.nearest)
+    system, units, best = _misses_least(failed, fixed, _HELD)
     if best is None:
         return ""
     if np.any(np.abs(best.residual[system.constraints :]) > 1e-6 / _HELD * units[system.constraints :]):
