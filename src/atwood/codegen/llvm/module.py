@@ -285,13 +285,12 @@ def _write_prologue(name: str) -> str:
 
 def _declarations(needs: Needs, sincos: str) -> list[str]:
     """Return the declarations of what the module calls."""
-    arguments = dict(LIBRARY_FUNCTIONS.values())
     lines = ["declare double @llvm.sqrt.f64(double)", "declare double @llvm.fabs.f64(double)"]
     for name in sorted(needs.library):
         if name == sincos:
             lines.append(f"declare void @{name}(double, ptr, ptr) #0")
         else:
-            lines.append(f"declare double @{name}({', '.join(['double'] * arguments[name])}) #0")
+            lines.append(f"declare double @{name}({', '.join(['double'] * LIBRARY_FUNCTIONS[name])}) #0")
     for position, (_, count) in enumerate(needs.externals):
         lines.append(f"declare double @external.{position}({', '.join(['double'] * count)}) #0")
     return [*lines, "attributes #0 = { nounwind }", "!0 = !{}"]

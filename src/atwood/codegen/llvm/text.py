@@ -16,23 +16,10 @@ from atwood.expr.core.graph import Expression
 from atwood.expr.core.operations import ExternalFunction
 from atwood.lazy_dataclasses import dataclass
 
-LIBRARY_FUNCTIONS: Mapping[str, tuple[str, int]] = {
-    "sin": ("sin", 1),
-    "cos": ("cos", 1),
-    "tan": ("tan", 1),
-    "asin": ("asin", 1),
-    "acos": ("acos", 1),
-    "atan": ("atan", 1),
-    "exp": ("exp", 1),
-    "log": ("log", 1),
-    "sinh": ("sinh", 1),
-    "cosh": ("cosh", 1),
-    "tanh": ("tanh", 1),
-    "floor": ("floor", 1),
-    "atan2": ("atan2", 2),
-    "pow": ("pow", 2),
-}
-"""Operations that the C library computes: its name for them, and the number of arguments."""
+LIBRARY_FUNCTIONS: Mapping[str, int] = dict.fromkeys(
+    ("sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh", "floor"), 1
+) | {"atan2": 2, "pow": 2}
+"""Operations that the C library computes, where they have the same names, with the number of arguments."""
 
 _INTRINSICS = {"sqrt": "@llvm.sqrt.f64", "absolute": "@llvm.fabs.f64"}
 _ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
@@ -216,7 +203,7 @@ class Writer:
         return self.put(f"{_LOGICAL[operation]} i1 {conditions[0]}, {conditions[1]}")
 
     def _call_library(self, node: Expression) -> str:
-        name = LIBRARY_FUNCTIONS[node.operation][0]
+        name = node.operation
         self.needs.library.add(name)
         arguments = ", ".join(f"double {self.value(argument)}" for argument in node.arguments)
         return self.put(f"call double @{name}({arguments})")
