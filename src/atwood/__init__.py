@@ -59,8 +59,8 @@ from atwood.model.compose.connection_rules import connect
 from atwood.model.compose.scene import Scene
 from atwood.model.declare.component import Component
 from atwood.model.declare.connectors import Connector, Frame, Groove, Point, Shaft, Slide, connector
-from atwood.model.declare.contributions import BodyInertia, CoordinateLoad, Load, Placement, PointInertia
 from atwood.model.declare.field_functions import Number, Triple, discrete_state, parameter, signal, state
+from atwood.model.declare.law_results import BodyInertia, CoordinateLoad, Load, Placement, PointInertia
 from atwood.model.declare.laws import (
     constraint,
     derivative,
@@ -76,7 +76,7 @@ from atwood.model.declare.laws import (
 )
 from atwood.model.values.outline import Outline
 from atwood.model.values.rotation import FREE, Rotation, normals, turn
-from atwood.model.values.vector import Vector, as_vector, cross, dot, norm
+from atwood.model.values.space import Vector, as_vector, cross, dot, norm
 
 if TYPE_CHECKING:
     from atwood.checking import CheckReport, check

@@ -17,8 +17,8 @@ from atwood.consistency.trials import Body
 from atwood.expr import Graph, evaluate
 from atwood.model.declare.component import Binding, bind
 from atwood.model.declare.connectors import Frame, Motion
-from atwood.model.declare.contributions import BodyInertia, Load, Placement, PointInertia
-from atwood.model.declare.law import scalars
+from atwood.model.declare.law_results import BodyInertia, Load, Placement, PointInertia
+from atwood.model.declare.laws import scalars
 from atwood.model.values.space import FIXED_AXES, make_space, planar_axes
 from atwood.model.values.units import parse_si_unit
 

@@ -9,12 +9,11 @@ from atwood.consistency.trials import Pose, Trial
 from atwood.model.compose.scene import Scene
 from atwood.model.declare.component import Component
 from atwood.model.declare.connectors import Frame, Groove, JointCoordinate, Point, Shaft, Slide, connector
-from atwood.model.declare.contributions import BodyInertia, Placement, PointInertia
 from atwood.model.declare.field_functions import parameter
-from atwood.model.declare.law import Law
-from atwood.model.declare.laws import constraint, inertia, joint, observable
+from atwood.model.declare.law_results import BodyInertia, Placement, PointInertia
+from atwood.model.declare.laws import Law, constraint, inertia, joint, observable
 from atwood.model.values.rotation import normals, turn
-from atwood.model.values.vector import Vector, as_vector, dot
+from atwood.model.values.space import Vector, as_vector, dot
 
 
 class Ball(Component):

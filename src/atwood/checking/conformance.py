@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Iterable, Iterator
 from typing import Any, get_args
@@ -10,8 +11,7 @@ import numpy as np
 
 from atwood.arguments import ANYTHING, FLAG, show, takes
 from atwood.checking.bench import on_bench
-from atwood.checking.expressions import wrong_on_expressions, wrong_updates
-from atwood.checking.forces import wrong_forces
+from atwood.checking.forces import in_motion, wrong_forces, wrong_on_expressions
 from atwood.checking.samples import CheckReport, Finding, as_part, in_space, samples_of
 from atwood.checking.units import wrong_units
 from atwood.consistency.check import contradictions, wrong_names
@@ -21,7 +21,7 @@ from atwood.lazy_dataclasses import replace
 from atwood.model.compose.composite import Model
 from atwood.model.declare.component import Component
 from atwood.model.declare.connectors import Frame, Shaft
-from atwood.model.declare.law import Kind
+from atwood.model.declare.laws import Kind
 from atwood.model.local.flatten import Part
 from atwood.model.values.outline import Outline
 from atwood.model.values.space import Space, make_space
@@ -254,3 +254,41 @@ def _compared(one: Result, other: Result, space: str, length: float) -> Iterator
 def _is_rigid(trial: Trial) -> bool:
     """Return whether a component is a rigid joint, which may hold all there is."""
     return any(law.options.rigid for law in trial.component.laws("joint") if law.holds_in(trial.space.name))
+
+
+def wrong_updates(trial: Trial, mode: str) -> Iterator[Finding | None]:
+    """Yield, for each update law, what is wrong with what it returns, or None."""
+    for law in trial.component.laws("update"):
+        if law.holds_in(trial.space.name) and law.acts_in(mode):
+            specs = trial.component.state_specs()
+            count = sum(len(specs[name].names(trial.part.values)) for name in law.options.sets)
+            text = _wrong(trial, law.name, count)
+            yield Finding("failure", "updates", law.name, trial.space.name, text) if text else None
+
+
+def _wrong(trial: Trial, name: str, count: int) -> str:
+    """Return what is wrong, in words, or nothing."""
+    try:
+        given = getattr(in_motion(trial), name)()
+    except Exception as error:  # whatever a law of somebody's own can raise
+        return f"it raises {type(error).__name__}: {error}"
+    values = list(_flat(given))
+    if len(values) != count:
+        return f"it returns {len(values)} values where it sets {count}"
+    for value in values:
+        try:
+            if math.isfinite(float(value)):
+                continue
+        except (TypeError, ValueError):
+            return f"it returns {value!r} where a number is wanted"
+        return f"it returns {float(value)!r}, which no state can be"
+    return ""
+
+
+def _flat(given: Any) -> Iterator[Any]:
+    """Yield the values in what an update returned."""
+    if isinstance(given, Iterable) and not isinstance(given, str):
+        for one in given:
+            yield from _flat(one)
+    else:
+        yield given

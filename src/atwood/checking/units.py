@@ -16,12 +16,12 @@ from atwood.consistency.trials import Body, Trial
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.declare.component import Binding, Component, bind
 from atwood.model.declare.connectors import JointCoordinate, Motion, Slide
-from atwood.model.declare.contributions import BodyInertia, CoordinateLoad, Load, Placement, PointInertia
 from atwood.model.declare.function_values import Function
-from atwood.model.declare.law import Law, scalars
+from atwood.model.declare.law_results import BodyInertia, CoordinateLoad, Load, Placement, PointInertia
+from atwood.model.declare.laws import Law, scalars
 from atwood.model.values.rotation import Rotation
+from atwood.model.values.space import Vector
 from atwood.model.values.units import Exponents, parse_unit
-from atwood.model.values.vector import Vector
 
 NOTHING: Exponents = (0, 0, 0, 0)
 LENGTH: Exponents = (0, 1, 0, 0)

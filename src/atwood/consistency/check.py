@@ -13,7 +13,7 @@ from atwood.consistency.joints import Unknown, wrong_joint, wrong_rates
 from atwood.consistency.trials import Trial, contradiction_at, make_trial
 from atwood.errors import DeclarationError, suggestion
 from atwood.model.declare.component import Component
-from atwood.model.declare.law import Law
+from atwood.model.declare.laws import Law
 from atwood.model.local.flatten import Part
 from atwood.model.values.space import Space
 

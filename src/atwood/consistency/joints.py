@@ -21,7 +21,7 @@ from atwood.consistency.trials import (
 from atwood.errors import DeclarationError
 from atwood.expr import Scalar
 from atwood.model.declare.connectors import Motion
-from atwood.model.declare.law import Law, scalars
+from atwood.model.declare.laws import Law, scalars
 from atwood.model.values.rotation import FREE
 from atwood.numerics.rank import rank
 

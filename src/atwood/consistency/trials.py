@@ -17,13 +17,11 @@ from atwood.errors import DeclarationError
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.declare.component import Binding, Component, bind
 from atwood.model.declare.connectors import Frame, JointCoordinate, Motion
-from atwood.model.declare.contributions import Placement
-from atwood.model.declare.law import Law
+from atwood.model.declare.law_results import Placement, call_law
+from atwood.model.declare.laws import Law
 from atwood.model.local.flatten import Part
-from atwood.model.returned import call_law
 from atwood.model.values.rotation import FREE, IDENTITY, Axes, Rotation, as_rotation, transposed
-from atwood.model.values.space import FIXED_AXES, Space, planar_axes
-from atwood.model.values.vector import ZERO, Vector, dot, norm
+from atwood.model.values.space import FIXED_AXES, ZERO, Space, Vector, dot, norm, planar_axes
 
 STEP = 1e-3
 """Step of the differences in time, s: velocities are some lengths of the component, or radians, a second."""

@@ -28,12 +28,11 @@ from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.build import build_equations
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Mechanism, discrete_states_of
-from atwood.mechanics.outputs.observables import Observable, Reaction, list_reactions
-from atwood.mechanics.outputs.reading import observe
+from atwood.mechanics.outputs.observables import Observable, observe
+from atwood.mechanics.outputs.reactions import Reaction, list_reactions
 from atwood.mechanics.read import LineSigns
 from atwood.model.local.flatten import FlatScene, flatten
-from atwood.model.local.parts import DiscreteState
-from atwood.model.local.states import declared_starts
+from atwood.model.local.parts import DiscreteState, declared_starts
 from atwood.topology.orientation_coordinates import Orientation
 from atwood.topology.spanning_forest import grow_spanning_forest
 

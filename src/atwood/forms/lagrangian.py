@@ -23,8 +23,8 @@ from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Constraint, Equations, balance_rows, inertia_forces
 from atwood.mechanics.dynamics.forces import Forces, in_joint_coordinates, local_map, part_forces
 from atwood.mechanics.kinematics.orientation import euler_spin
-from atwood.mechanics.outputs.observables import Observable, add_up, part_energies
-from atwood.mechanics.outputs.reading import MOMENTUM
+from atwood.mechanics.outputs.observables import MOMENTUM, Observable
+from atwood.mechanics.outputs.totals import add_up, part_energies
 from atwood.model.local.parts import LocalPart
 from atwood.topology.spanning_forest import Coordinate
 

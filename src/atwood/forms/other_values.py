@@ -20,13 +20,13 @@ from atwood.mechanics.constraints.values import holds_velocities
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Decision, Mechanism, check_closures, started_at
 from atwood.mechanics.kinematics.orientation import body_offsets
+from atwood.mechanics.read import find_line_signs
 from atwood.model.compose.composite import Model
 from atwood.model.compose.scene import Scene
 from atwood.model.local.bound import variation_names
 from atwood.model.local.flatten import FlatScene, Part
 from atwood.model.local.parts import LocalPart
-from atwood.model.values.vector import Vector
-from atwood.topology.line_signs import find_line_signs
+from atwood.model.values.space import Vector
 
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly

@@ -11,8 +11,9 @@ from atwood.forms.caches import Key
 from atwood.forms.program import state_groups
 from atwood.mechanics.constraints.read_multipliers import with_known
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.mechanics.outputs.internal_reactions import InternalReactions, internal_reaction_program
-from atwood.mechanics.outputs.observables import Observable, energies
+from atwood.mechanics.outputs.observables import Observable
+from atwood.mechanics.outputs.reactions import InternalReactions, internal_reaction_program
+from atwood.mechanics.outputs.totals import energies
 
 if TYPE_CHECKING:
     from atwood.forms.assembly import Assembly

@@ -7,13 +7,18 @@ from collections.abc import Collection, Mapping, Sequence
 from atwood.errors import DeclarationError
 from atwood.expr import Expression, Graph, depends_on, live, substitute
 from atwood.lazy_dataclasses import replace
-from atwood.mechanics.constraints.elimination import SOLVED, check_held, drop_closed, eliminate_linear
-from atwood.mechanics.constraints.idle_spin import IDLE_SPIN
+from atwood.mechanics.constraints.elimination import (
+    SOLVED,
+    check_held,
+    drop_closed,
+    eliminate_linear,
+    without_whole_turns,
+)
 from atwood.mechanics.constraints.knots import balance_knots, linear_knots
+from atwood.mechanics.constraints.massless_spins import IDLE_SPIN
 from atwood.mechanics.constraints.read_multipliers import known_multipliers, with_known
 from atwood.mechanics.constraints.rolling import Taken, integrated, take_up, without_idle_spins
 from atwood.mechanics.constraints.values import Values, constraint_values, find_constraints, levels, velocity_levels
-from atwood.mechanics.constraints.whole_turns import without_whole_turns
 from atwood.mechanics.dynamics.augmented import difference
 from atwood.mechanics.dynamics.equations import Equations, force_rows, motion_rows, put_in_place
 from atwood.mechanics.dynamics.forces import Site, in_joint_coordinates, local_map
@@ -28,7 +33,7 @@ from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.mechanics.kinematics.positions import BodyShape, Kinematics, shapes
 from atwood.model.declare.component import bind
 from atwood.model.local.parts import LocalConstraint, LocalState, multiplier_symbol
-from atwood.model.values.vector import Vector
+from atwood.model.values.space import Vector
 from atwood.topology.spanning_forest import Coordinate, SpanningForest
 
 

@@ -1,4 +1,7 @@
-"""From a scene taken apart into leaves to its mechanism: the laws of all parts, and the joints and bodies they make."""
+"""From a scene taken apart into leaves to its mechanism: the laws of all parts, and the joints and bodies they make.
+
+On a line, lengths are signed once and for all by which of their ends starts further along.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,11 @@ from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
 from atwood.consistency.check import check_laws, check_names
-from atwood.expr import Expression, Graph
+from atwood.expr import Expression, Graph, evaluate
 from atwood.expr.core.relations import TimeRelations
 from atwood.lazy_dataclasses import replace
-from atwood.mechanics.constraints.idle_spin import hold_idle_spins
-from atwood.mechanics.dynamics.carried_inertia import inertia_asked_for
-from atwood.mechanics.dynamics.inertia import check_tensors
+from atwood.mechanics.constraints.massless_spins import hold_idle_spins
+from atwood.mechanics.dynamics.inertia import check_tensors, inertia_asked_for
 from atwood.mechanics.kinematics.mechanism import (
     Connector,
     Mechanism,
@@ -22,15 +24,14 @@ from atwood.mechanics.kinematics.mechanism import (
     origin_at,
 )
 from atwood.mechanics.kinematics.orientation import body_offsets
-from atwood.model.declare.contributions import Carried
+from atwood.model.declare.law_results import Carried
 from atwood.model.local.bound import ParameterTable
 from atwood.model.local.flatten import FlatScene
 from atwood.model.local.laws import localize
 from atwood.model.local.parts import LocalPart
-from atwood.model.values.space import Space, make_space
+from atwood.model.values.space import Space, Vector, dot, make_space
 from atwood.topology.bodies import Bodies, find_bodies
 from atwood.topology.graph import MechanismGraph, build_graph
-from atwood.topology.line_signs import find_line_signs
 
 LineSigns = Mapping[tuple[str, str, str], float]
 """On a line, the sign of each length: of (part, one connector, the other)."""
@@ -116,3 +117,64 @@ def _find_line_signs(flat: FlatScene, ground: _Ground, found: _Reading) -> LineS
     locals_, network, bodies = found
     offsets = {body.index: body_offsets(body, ground.space)[0] for body in bodies.bodies}
     return find_line_signs(flat, network, bodies, locals_, offsets, ground.table.values, ground.space)
+
+
+def find_line_signs(
+    flat: FlatScene,
+    mechanism: MechanismGraph,
+    bodies: Bodies,
+    locals_: Mapping[str, LocalPart],
+    offsets: Mapping[int, Mapping[int, Vector]],
+    parameters: Mapping[Expression, float],
+    space: Space,
+) -> dict[tuple[str, str, str], float]:
+    """Return, for pairs of connectors of each part, the sign of the second's start position minus the first's."""
+    assert space.line is not None
+    places = {node: _number(offset, space.line, parameters) for node, offset in offsets[0].items()}
+    for path, value in {**flat.guess, **flat.start}.items():
+        _note(path, value, mechanism, bodies, locals_, offsets, parameters, space.line, places)
+    found: dict[tuple[str, str, str], float] = {}
+    for path, local in locals_.items():
+        names = list(local.connectors)
+        for a in names:
+            for b in names:
+                p, q = (places.get(mechanism.node_of[(path, name)]) for name in (a, b))
+                if p is not None and q is not None and p != q:
+                    found[path, a, b] = 1.0 if q > p else -1.0
+    return found
+
+
+def _number(vector: Vector, line: Vector, parameters: Mapping[Expression, float]) -> float:
+    along = dot(vector, line)
+    return evaluate([along], parameters)[0] if isinstance(along, Expression) else float(along)
+
+
+def _note(
+    path: str,
+    value: float,
+    mechanism: MechanismGraph,
+    bodies: Bodies,
+    locals_: Mapping[str, LocalPart],
+    offsets: Mapping[int, Mapping[int, Vector]],
+    parameters: Mapping[Expression, float],
+    line: Vector,
+    places: dict[int, float],
+) -> None:
+    """Take up a start value that says where the first connector of a part is, and with it the rest of its body."""
+    for quantity, component in (("position.x", line.x), ("position.y", line.y), ("position.z", line.z)):
+        owner, matched, _ = path.rpartition(f".{quantity}")
+        if matched and owner in locals_ and component != 0.0:
+            place = value / component
+            break
+    else:
+        owner, matched, _ = path.rpartition(".displacement")
+        if not matched or owner not in locals_:
+            return
+        place = value
+    local = locals_[owner]
+    if not local.connectors:
+        return
+    node = mechanism.node_of[(owner, next(iter(local.connectors)))]
+    body = bodies.body_of[node]
+    for other, offset in offsets[body].items():
+        places.setdefault(other, place + _number(offset - offsets[body][node], line, parameters))

@@ -11,7 +11,7 @@ from atwood.arguments import optional, takes
 from atwood.display import data_of, fitted, plain
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
-from atwood.mechanics.constraints.idle_spin import IDLE_SPIN
+from atwood.mechanics.constraints.massless_spins import IDLE_SPIN
 from atwood.mechanics.constraints.pfaffian import integrable_together
 from atwood.model.compose.composite import Model
 from atwood.numerics.matrices import scaled, to_array

@@ -19,7 +19,7 @@ from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.kinematics.mechanism import world_position
 from atwood.mechanics.kinematics.orientation import node_axes, spin_in_world
 from atwood.model.local.flatten import FlatScene
-from atwood.model.values.vector import Vector
+from atwood.model.values.space import Vector
 from atwood.numerics.matrices import scaled
 from atwood.numerics.rank import independent_rows
 from atwood.pipeline import assemble_flat

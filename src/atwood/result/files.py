@@ -31,7 +31,7 @@ from atwood.errors import UsageError
 from atwood.files import check_directory, read_checked, write_atomically
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
-from atwood.model.declare.quantities import PATHS, Quantity
+from atwood.model.declare.connectors import PATHS, Quantity
 from atwood.result.about import describe_all
 from atwood.result.formats.companion import read_with_companion, write_with_companion
 from atwood.result.formats.dataset import Dataset, json_text

@@ -18,7 +18,7 @@ from atwood.errors import ResultError
 from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import find_observables
 from atwood.integrators.protocol import Statistics
-from atwood.model.declare.quantities import PATHS, Quantity
+from atwood.model.declare.connectors import PATHS, Quantity
 from atwood.result.energy import ConservedLedger, EnergyLedger, account
 from atwood.result.segment_quantities import SegmentQuantities
 from atwood.result.trajectories import Trajectories

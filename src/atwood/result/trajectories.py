@@ -11,7 +11,7 @@ from atwood.arguments import check, takes, whole
 from atwood.arrays import FloatArray
 from atwood.display import count_of, fitted, listed
 from atwood.errors import MissingGroupError, MissingQuantityError, ResultError, suggestion, suggestion_in_parts
-from atwood.model.declare.quantities import PATH, PATHS, Quantity
+from atwood.model.declare.connectors import PATH, PATHS, Quantity
 from atwood.table import Shown, Table, facts, table
 
 if TYPE_CHECKING:

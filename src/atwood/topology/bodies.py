@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from atwood.expr import Expression, Scalar, depends_on, is_zero
 from atwood.lazy_dataclasses import dataclass
-from atwood.model.declare.law import Kind
+from atwood.model.declare.laws import Kind
 from atwood.model.local.parts import LocalConstraint, LocalPart
 from atwood.topology.graph import WORLD, Joint, MechanismGraph
 

@@ -9,7 +9,7 @@ from tests.helpers.runs import difference_quotient, moved, prepare
 from atwood import Component, ExternalFunction, Point, Scene, UsageError, connector, dynamics, external, force, select
 from atwood.errors import KernelEvaluationError
 from atwood.forms.quantities import observer
-from atwood.model.declare.contributions import Load
+from atwood.model.declare.law_results import Load
 from atwood.theory.dynamics.dynamics import Dynamics
 from atwood_library import Drag, Force, Ground, PointMass, Rod
 from atwood_library.scenes import SCENES

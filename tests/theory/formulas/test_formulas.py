@@ -32,7 +32,7 @@ from atwood import (
     tanh,
 )
 from atwood.expr import evaluate
-from atwood.model.declare.contributions import Load
+from atwood.model.declare.law_results import Load
 from atwood.theory.equations.equations import EquationsOfMotion
 from atwood.theory.formulas.printers import code
 from atwood_library import PointMass

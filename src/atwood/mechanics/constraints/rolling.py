@@ -17,7 +17,7 @@ import numpy as np
 from atwood.expr import Expression, depends_on, evaluate, jacobian, jvp, substitute, vjp
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.constraints.elimination import SOLVED, eliminate_linear
-from atwood.mechanics.constraints.idle_spin import IDLE_SPIN, idle_speeds
+from atwood.mechanics.constraints.massless_spins import IDLE_SPIN, idle_speeds
 from atwood.mechanics.constraints.pfaffian import (
     NEEDED,
     Form,

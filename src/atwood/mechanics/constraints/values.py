@@ -24,7 +24,7 @@ from atwood.mechanics.kinematics.motion import Movement
 from atwood.mechanics.kinematics.orientation import spin_in_world
 from atwood.mechanics.kinematics.positions import Kinematics, Placements
 from atwood.model.local.parts import LocalConstraint, LocalPart
-from atwood.model.values.vector import Vector, cross
+from atwood.model.values.space import Vector, cross
 from atwood.topology.spanning_forest import SpanningForest
 
 Values = list[tuple[str, LocalConstraint, Expression]]

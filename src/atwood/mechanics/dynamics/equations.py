@@ -16,9 +16,9 @@ from atwood.mechanics.dynamics.inertia import Masses, tensor_of, turned_tensor
 from atwood.mechanics.kinematics.mechanism import Constant, Decision
 from atwood.mechanics.kinematics.orientation import inertial_torque, torque_components
 from atwood.mechanics.kinematics.positions import BodyShape, Kinematics, body_point_of
-from atwood.model.declare.contributions import BodyInertia
+from atwood.model.declare.law_results import BodyInertia
 from atwood.model.local.parts import LocalConstraint, LocalPart, LocalState
-from atwood.model.values.vector import cross
+from atwood.model.values.space import cross
 from atwood.topology.orientation_coordinates import OrientationCoordinates
 from atwood.topology.spanning_forest import Coordinate, SpanningForest
 

@@ -15,8 +15,7 @@ from atwood.mechanics.kinematics.orientation import NodeTurn, node_axes, spin_in
 from atwood.mechanics.kinematics.positions import Kinematics, Placements
 from atwood.model.local.parts import LocalConstraint, LocalPart
 from atwood.model.values.rotation import Axes, from_axes
-from atwood.model.values.space import Space
-from atwood.model.values.vector import Vector, cross, dot
+from atwood.model.values.space import Space, Vector, cross, dot
 from atwood.topology.bodies import Bodies
 from atwood.topology.graph import MechanismGraph
 

@@ -15,11 +15,9 @@ from atwood.expr.core.relations import TimeRelations, values_just_after
 from atwood.lazy_dataclasses import dataclass, names_of, replace
 from atwood.mechanics.kinematics.orientation import NodeTurn, body_offsets, plain, rotate
 from atwood.model.local.bound import ParameterTable
-from atwood.model.local.parts import DiscreteState, LocalPart
-from atwood.model.local.states import declared_starts
+from atwood.model.local.parts import DiscreteState, LocalPart, declared_starts
 from atwood.model.values.rotation import as_rotation, compose
-from atwood.model.values.space import Space
-from atwood.model.values.vector import Vector, as_vector
+from atwood.model.values.space import Space, Vector, as_vector
 from atwood.tolerances import tolerances
 from atwood.topology.bodies import Bodies
 from atwood.topology.graph import WORLD, Joint, MechanismGraph

@@ -11,8 +11,7 @@ from typing import Any, TypeAlias
 
 from atwood.expr import Expression, Scalar, cos, sin
 from atwood.model.values.rotation import IDENTITY, Axes, Rotation, Turn, as_rotation, compose, from_axes, to_axes
-from atwood.model.values.space import Space, planar_axes
-from atwood.model.values.vector import Vector, cross
+from atwood.model.values.space import Space, Vector, cross, planar_axes
 from atwood.topology.bodies import Body, RigidStep
 from atwood.topology.orientation_coordinates import OrientationCoordinates
 

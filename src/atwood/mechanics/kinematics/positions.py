@@ -17,8 +17,7 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.kinematics.orientation import NodeTurn, node_axes, rotate
 from atwood.model.local.parts import LocalJoint, LocalPart
 from atwood.model.values.rotation import Axes, from_axes
-from atwood.model.values.space import Space
-from atwood.model.values.vector import Vector, cross
+from atwood.model.values.space import Space, Vector, cross
 from atwood.topology.bodies import Bodies, Body
 from atwood.topology.graph import WORLD, Joint, MechanismGraph
 from atwood.topology.spanning_forest import Attachment, SpanningForest

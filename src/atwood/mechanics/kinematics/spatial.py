@@ -42,7 +42,7 @@ from atwood.model.values.rotation import (
     to_axes,
     transposed,
 )
-from atwood.model.values.vector import Vector, cross
+from atwood.model.values.space import Vector, cross
 from atwood.topology.bodies import Bodies, Body
 from atwood.topology.graph import Joint
 from atwood.topology.spanning_forest import Attachment, SpanningForest

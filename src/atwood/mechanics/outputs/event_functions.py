@@ -10,11 +10,11 @@ from atwood.expr import Expression, Graph
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Mechanism
-from atwood.mechanics.outputs.observables import Reaction
-from atwood.mechanics.outputs.reading import Reader
+from atwood.mechanics.outputs.observables import Reader
+from atwood.mechanics.outputs.reactions import Reaction
 from atwood.model.declare.component import bind
-from atwood.model.declare.law import Law
-from atwood.model.returned import call_law, finite_scalar
+from atwood.model.declare.law_results import call_law, finite_scalar
+from atwood.model.declare.laws import Law
 
 UPDATE = "update"
 """Target of an event that changes states of its part, and no mode."""

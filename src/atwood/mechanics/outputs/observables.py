@@ -1,27 +1,41 @@
-"""What can be read of a scene: every quantity of every component, by its path, as an expression of the state."""
+"""Quantities of components by path, as expressions of the state, made when somebody asks for them.
+
+A large scene has ten thousands of quantities, of which a run needs a few.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 from typing import Any
 
-from atwood.expr import Expression, Scalar, jvp, live, substitute, vjp
+from atwood.display import count_of
+from atwood.errors import AtwoodError, MissingNameError
+from atwood.expr import Expression, Scalar, is_zero, jvp, live, substitute
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.build import resolve_signals
-from atwood.mechanics.dynamics.carried_inertia import CarriedInertia
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.mechanics.dynamics.forces import in_joint_coordinates, local_map, rate_symbol
-from atwood.mechanics.dynamics.inertia import tensor_of, turned_tensor
+from atwood.mechanics.dynamics.forces import in_joint_coordinates, local_map
+from atwood.mechanics.dynamics.inertia import CarriedInertia
 from atwood.mechanics.kinematics.mechanism import Mechanism, world_position
-from atwood.mechanics.kinematics.orientation import NodeTurn, node_axes, spin_in_world
-from atwood.mechanics.kinematics.positions import body_point_of
-from atwood.model.declare.component import Binding
+from atwood.mechanics.kinematics.orientation import node_axes, spin_in_world
+from atwood.mechanics.outputs.reactions import Reaction
+from atwood.mechanics.outputs.totals import (
+    Totals,
+    add_totals,
+    add_up,
+    energy_rate,
+    of_mass,
+    part_energies,
+    part_totals,
+)
+from atwood.model.declare.component import Binding, bind
 from atwood.model.declare.connectors import Frame, JointCoordinate, Motion
-from atwood.model.declare.contributions import BodyInertia
+from atwood.model.declare.law_results import call_law, law_value, not_evaluated, one_scalar
 from atwood.model.local.parts import LocalPart
-from atwood.model.values.rotation import from_axes, to_axes
-from atwood.model.values.space import FIXED_AXES
-from atwood.model.values.vector import Vector, dot
+from atwood.model.values.rotation import to_axes
+from atwood.model.values.space import FIXED_AXES, ZERO, Vector
 
 
 @dataclass(frozen=True)
@@ -53,72 +67,6 @@ class Observable:
     value: Expression
     rate: str = ""
     sharing: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Reaction:
-    """A reaction that a component reports.
-
-    Attributes
-    ----------
-    path
-        Its dotted path.
-    unit, doc
-        Unit and meaning.
-    symbol
-        What stands for it in the expressions of observables.
-    key
-        The constraint it belongs to, as (part, law, number); for a rigid joint, (part, law, -1).
-    sign
-        It is `sign` times the multiplier of that constraint.
-    axis
-        For a rigid joint: 0, 1, 2 for a force component, 3 for the torque in a plane, 3, 4, 5 for its components in
-        space; -1 otherwise.
-    """
-
-    path: str
-    unit: str
-    doc: str
-    symbol: Expression
-    key: tuple[str, str, int]
-    sign: float
-    axis: int = -1
-
-
-def list_reactions(mechanism: Mechanism) -> tuple[Reaction, ...]:
-    """Return every reaction that the components report, in the order of declaration."""
-    graph, found = mechanism.table.graph, []
-    reported = {f".{'xyz'[i]}" for i in mechanism.space.reported_axes}
-    for path, local in mechanism.locals_.items():
-        for law in local.part.component.laws("constraint"):
-            if not law.holds_in(mechanism.space.name):
-                continue
-            options = law.options
-            names = options.reactions
-            present = [c for c in local.constraints if c.law.name == law.name]
-            if len(names) == 1 and len(present) == 3:
-                names = tuple(f"{names[0]}.{axis}" for axis in "xyz")
-            for index, name in enumerate(names):
-                if any(name.endswith(f".{axis}") for axis in "xyz") and name[-2:] not in reported:
-                    continue
-                full = f"{path}.{name}"
-                symbol = graph.symbol(f"reaction:{full}")
-                found.append(Reaction(full, options.unit, options.doc, symbol, (path, law.name, index), options.sign))
-        for joint in local.joints:
-            options = joint.law.options
-            if not (options.rigid and options.reaction_doc):
-                continue
-            for axis in mechanism.space.reported_axes:
-                full, doc = f"{path}.force.{'xyz'[axis]}", f"Force {options.reaction_doc}, in world axes."
-                symbol = graph.symbol(f"reaction:{full}")
-                found.append(Reaction(full, "N", doc, symbol, (path, joint.law.name, -1), 1.0, axis))
-            about = "counter-clockwise" if mechanism.space.is_planar else "in world axes"
-            for number, axis_name in enumerate(mechanism.space.turn_names):
-                full, doc = f"{path}.torque{axis_name}", f"Torque {options.reaction_doc}, {about}."
-                symbol = graph.symbol(f"reaction:{full}")
-                key = (path, joint.law.name, -1)
-                found.append(Reaction(full, "N*m", doc, symbol, key, 1.0, 3 + number))
-    return tuple(found)
 
 
 def take(
@@ -233,67 +181,260 @@ def _turned(mechanism: Mechanism, equations: Equations, motion: Motion, node: in
     )
 
 
-def part_energies(
-    mechanism: Mechanism, equations: Equations, path: str, signals: Mapping[Expression, Expression]
-) -> tuple[Expression, Expression]:
-    """Return kinetic and potential energy of one part, its weight included."""
-    graph, local, kinematics = mechanism.table.graph, mechanism.locals_[path], equations.kinematics
-    site, space = equations.site, mechanism.space
-    mapping = {**local_map(site, local, kinematics), **signals}
-    kinetic: Scalar = graph.constant(0.0)
-    potential: Scalar = graph.constant(0.0)
-    pull = space.components(mechanism.gravity)
-    for one in local.point_inertias:
-        nodes = [site.node(path, p.name) for p in one.points]
-        places = [world_position(mechanism, kinematics.placements, node) for node in nodes]
-        for i, a in enumerate(nodes):
-            for j, b in enumerate(nodes):
-                for k, g in enumerate(pull):
-                    va, vb = kinematics.velocities[a][k], kinematics.velocities[b][k]
-                    kinetic = kinetic + 0.5 * (one.masses[i][j] * (va * vb))
-                    potential = potential - one.masses[i][j] * (g * places[i][k])
-    for body in local.body_inertias:
-        node = site.node(path, body.frame.name)
-        index = site.bodies.body_of[node]
-        turn = site.node_turns[node]
-        arm = body_point_of(kinematics, index, turn, body.center_of_mass, space)
-        place = world_position(mechanism, kinematics.placements, node)
-        for k, g in enumerate(pull):
-            v = kinematics.velocities[node][k] + arm.velocity[k]
-            kinetic = kinetic + 0.5 * (body.mass * (v * v))
-            potential = potential - body.mass * (g * (place[k] + arm.position[k]))
-        kinetic = kinetic + _energy_of_turning(path, body, turn, kinematics.angular_velocities.get(index, ()))
-    for value in in_joint_coordinates(local, kinematics, local.potentials)[0]:
-        potential = potential + substitute([value], mapping)[0]
-    functions, hung = in_joint_coordinates(local, kinematics, local.lagrangians)
-    for value in functions:
-        rates = [*local.velocities, *(rate_symbol(symbol) for symbol in hung)]
-        momenta = vjp([value], [graph.constant(1.0)], rates)
-        still = substitute([value], dict.fromkeys(rates, graph.zero))[0]
-        energy = sum((p * v for p, v in zip(momenta, rates, strict=True)), still - value)
-        kinetic = kinetic + substitute([energy], mapping)[0]
-        potential = potential - substitute([still], mapping)[0]
-    return graph.convert(kinetic), graph.convert(potential)
+MOMENTUM = "p:"
+"""What the path of a momentum begins with, before that of its coordinate."""
 
 
-def _energy_of_turning(path: str, body: BodyInertia, turn: NodeTurn, spin: Sequence[Expression]) -> Scalar:
-    """Return ``1/2 omega . J omega`` (Goldstein, section 5.3)."""
-    if len(spin) == 3:
-        omega = Vector(*spin)
-        return 0.5 * dot(omega, from_axes(turned_tensor(tensor_of(path, body), turn), omega))
-    return 0.5 * (body.moment * (spin[0] * spin[0])) if spin else 0.0
+def observe(
+    mechanism: Mechanism,
+    equations: Equations,
+    reactions: Sequence[Reaction],
+    lock: AbstractContextManager[Any] | None = None,
+    momenta: Callable[[], Mapping[str, Observable]] | None = None,
+) -> Mapping[str, Observable]:
+    """Return every observable of every component, by path."""
+    return Observables(mechanism, equations, reactions, lock or nullcontext(), momenta)
 
 
-def energies(mechanism: Mechanism, equations: Equations) -> tuple[Expression, Expression]:
-    """Return kinetic and potential energy of the scene."""
-    signals = resolve_signals(mechanism, equations.site, equations.kinematics, equations.read)
-    parts = [part_energies(mechanism, equations, path, signals) for path in mechanism.locals_]
-    return add_up([k for k, _ in parts]), add_up([v for _, v in parts])
+class Observables(Mapping[str, Observable]):
+    """Every observable of a scene by path; those of a component are made when one of them is first asked for.
+
+    Parameters
+    ----------
+    mechanism, equations, reactions, lock, momenta
+        See `observe`.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        equations: Equations,
+        reactions: Sequence[Reaction],
+        lock: AbstractContextManager[Any],
+        momenta: Callable[[], Mapping[str, Observable]] | None = None,
+    ) -> None:
+        self._mechanism, self._lock, self._momenta = mechanism, lock, momenta
+        self._reader = Reader(mechanism, equations, reactions)
+        self._reactions = {one.path: one for one in reactions}
+        self._made: dict[str, dict[str, Observable]] = {}
+        self._wholes: dict[str, Mapping[str, Observable]] = {}
+        self._all: dict[str, Observable] | None = None
+
+    def __repr__(self) -> str:
+        # To count them would make them all.
+        return f"<Observables of {count_of(len(self._mechanism.locals_), 'part')}, by path>"
+
+    def __getitem__(self, path: str) -> Observable:
+        if self._all is not None and path in self._all:
+            return self._all[path]
+        one = self._reactions.get(path)
+        if one is not None:
+            return Observable(one.path, one.unit, one.doc, False, one.symbol)
+        if path.startswith(MOMENTUM) and self._momenta is not None:
+            return self._momenta()[path]
+        part = path.rpartition(".")[0]
+        while part:
+            if part in self._mechanism.locals_:
+                return self._of(part)[path]
+            part = part.rpartition(".")[0]
+        return self._whole(path)[path]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._everything())
+
+    def __len__(self) -> int:
+        return len(self._everything())
+
+    def _whole(self, path: str) -> Mapping[str, Observable]:
+        """Return the quantities of the model, or the scene, that a path may be one of; they are not listed."""
+        *steps, last = path.split(".")
+        model = steps if last not in ("x", "y", "z") else steps[:-1]
+        prefix = ".".join((*model, "")) if model else ""
+        if not any(one.startswith(prefix) for one in self._mechanism.locals_):
+            return {}
+        if prefix not in self._wholes:
+            with self._lock:
+                self._wholes[prefix] = observe_totals(self._mechanism, prefix, self._reader.inside(prefix))
+        return self._wholes[prefix]
+
+    def _everything(self) -> dict[str, Observable]:
+        if self._all is None:
+            found = {path: one for part in self._mechanism.locals_ for path, one in self._of(part).items()}
+            found.update({path: self[path] for path in self._reactions})
+            self._all = found
+        return self._all
+
+    def _of(self, part: str) -> dict[str, Observable]:
+        if part not in self._made:
+            with self._lock:
+                self._made[part] = _observe_part(self._mechanism, self._reader, part)
+        return self._made[part]
 
 
-def add_up(values: Sequence[Expression]) -> Expression:
-    """Return a sum."""
-    total = values[0]
-    for value in values[1:]:
-        total = total + value
-    return total
+def _observe_part(mechanism: Mechanism, reader: Reader, path: str) -> dict[str, Observable]:
+    """Return every observable of one component, without its reactions."""
+    found: dict[str, Observable] = {}
+    local = mechanism.locals_[path]
+    bound = bind(local.part.component, reader.binding(local, with_energies=True))
+    for law in local.part.component.laws("observable"):
+        if not law.holds_in(mechanism.space.name):
+            continue
+        try:
+            value = law_value(bound, law.name)
+        except MissingNameError as error:  # a name that is misspelt
+            raise not_evaluated(path, law, error) from error
+        except (AtwoodError, ArithmeticError):
+            continue  # it asks for an orientation that nothing determines, or for what never leaves a pole
+        except Exception as error:  # whatever a law of somebody's own can raise
+            raise not_evaluated(path, law, error) from error
+        if isinstance(value, tuple) and law.name in local.part.component.state_specs():
+            for i, one in enumerate(value):
+                take(mechanism, found, f"{path}.{law.name}[{i}]", one, law.options.unit, law.options.doc, False)
+            continue
+        if not isinstance(value, Vector):
+            value = call_law(path, law, partial(one_scalar, mechanism.table.graph, value))
+        options = law.options
+        rate = f"{path}.{options.rate}" if options.rate else ""
+        take(mechanism, found, f"{path}.{law.name}", value, options.unit, options.doc, options.periodic, rate)
+    has_inertia = any(local.part.component.laws(kind) for kind in ("inertia", "lagrangian"))
+    if has_inertia or local.potentials:
+        kinetic, potential = reader.energies(path)
+        if has_inertia:
+            take(mechanism, found, f"{path}.kinetic_energy", kinetic, "J", "Kinetic energy.", False)
+        take(mechanism, found, f"{path}.potential_energy", potential, "J", "Potential energy.", False)
+    # A rate that has no value tells no turns.
+    found = {name: one if one.rate in found else replace(one, rate="") for name, one in found.items()}
+    sharing: dict[str, list[str]] = {}
+    for law in local.part.component.laws("observable"):
+        if law.options.pole and f"{path}.{law.name}" in found:
+            sharing.setdefault(f"{path}.{law.options.pole}", []).append(f"{path}.{law.name}")
+    for pole, angles in sharing.items():
+        if pole in found and len(angles) == 2:
+            shared = (*angles, pole)  # also where it is a sum of coordinates by itself, as it is at a pole for ever
+            found.update({angle: replace(found[angle], periodic=True, sharing=shared) for angle in angles})
+    return found
+
+
+class Reader:
+    """What the laws of parts read when they may read everything.
+
+    Parameters
+    ----------
+    mechanism, equations, reactions
+        See `observe`.
+    """
+
+    def __init__(self, mechanism: Mechanism, equations: Equations, reactions: Sequence[Reaction]) -> None:
+        self._mechanism, self._equations = mechanism, equations
+        self._signals = resolve_signals(mechanism, equations.site, equations.kinematics, equations.read)
+        self._energies: dict[str, tuple[Expression, Expression]] = {}
+        self._around: dict[str, _Around] = {}
+        self._totals: dict[str, Totals] = {}
+        self._reactions: dict[str, dict[str, Expression]] = {}
+        for one in reactions:
+            self._reactions.setdefault(one.key[0], {})[one.path[len(one.key[0]) + 1 :]] = one.symbol
+        self._known: dict[str, dict[str, Expression]] = {}
+        for symbol, value in equations.kinematics.placements.joint_coordinates.items():
+            part, _, name = symbol.name.rpartition(".")
+            self._known.setdefault(part, {})[name] = value
+
+    def energies(self, path: str) -> tuple[Expression, Expression]:
+        """Return kinetic and potential energy of one part."""
+        if path not in self._energies:
+            self._energies[path] = part_energies(self._mechanism, self._equations, path, self._signals)
+        return self._energies[path]
+
+    def totals(self, path: str) -> Totals:
+        """Return mass, momentum and inertia of one part."""
+        if path not in self._totals:
+            self._totals[path] = part_totals(self._mechanism, self._equations, path)
+        return self._totals[path]
+
+    def rate_of(self, energy: Expression) -> Expression:
+        """Return how fast an energy changes along the motion."""
+        return energy_rate(self._equations, energy)
+
+    def binding(self, local: LocalPart, with_energies: bool = False) -> Binding:
+        """Return what the laws of a part read."""
+        path = local.part.path
+        known, zero = self._known.get(path, {}), self._mechanism.table.graph.zero
+        across = {name: zero for name, value in local.binding.reactions.items() if is_zero(value)}  # of a plane
+        own = {**across, **self._reactions.get(path, {})}
+        energies: Mapping[str, Any] = self._around_part(local) if with_energies else {}
+        return make_binding(self._mechanism, self._equations, local, own, known, energies, self._signals)
+
+    def _around_part(self, local: LocalPart) -> Mapping[str, Any]:
+        owner = local.part.component._parent
+        return self.inside(f"{owner.path}." if owner is not None and owner.path else "")
+
+    def inside(self, prefix: str) -> Mapping[str, Any]:
+        """Return energies and totals of all parts whose paths begin alike; of the scene, with no beginning."""
+        if prefix not in self._around:
+            self._around[prefix] = _Around(self, [p for p in self._mechanism.locals_ if p.startswith(prefix)])
+        return self._around[prefix]
+
+
+class _Around(Mapping[str, Any]):
+    """Energies and totals of some parts together, added up when they are asked for."""
+
+    def __init__(self, reader: Reader, parts: Sequence[str]) -> None:
+        self._reader, self._parts = reader, parts
+        self._made: dict[str, Any] = {}
+
+    def __getitem__(self, kind: str) -> Any:
+        if kind not in self._made:
+            if kind in _ENERGIES:
+                number = _ENERGIES.index(kind)
+                self._made[kind] = add_up([self._reader.energies(path)[number] for path in self._parts])
+            elif kind == "power":
+                self._made[kind] = self._reader.rate_of(self["kinetic"] + self["potential"])
+            elif kind in _TOTALS:
+                whole = add_totals([self._reader.totals(path) for path in self._parts])
+                self._made.update({name: getattr(whole, name) for name in _TOTALS})
+            else:
+                raise KeyError(kind)
+        return self._made[kind]
+
+    def __contains__(self, kind: object) -> bool:
+        return kind in (*_ENERGIES, "power", *_TOTALS)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter((*_ENERGIES, "power", *_TOTALS))
+
+    def __len__(self) -> int:
+        return len(_ENERGIES) + 1 + len(_TOTALS)
+
+
+_ENERGIES = ("kinetic", "potential")
+_TOTALS = ("mass", "first_moment", "momentum", "angular_momentum", "moments", "products")
+
+
+def observe_totals(mechanism: Mechanism, prefix: str, around: Mapping[str, object]) -> dict[str, Observable]:
+    """Return the quantities of a model as a whole, by path."""
+    found: dict[str, Observable] = {}
+    for name, value, unit, doc in _quantities(mechanism.space.name, around):
+        take(mechanism, found, f"{prefix}{name}", value, unit, doc, False)
+    return found
+
+
+def _quantities(space: str, around: Mapping[str, object]) -> Iterator[tuple[str, Scalar, str, str]]:
+    read: Mapping[str, Scalar] = around
+    mass, first = read["mass"], read["first_moment"]
+    yield "mass", mass, "kg", "Mass of all parts."
+    yield "center_of_mass", first / mass, "m", "Centre of mass in world axes."
+    yield "momentum", read["momentum"], "kg*m/s", "Momentum in world axes."
+    yield "kinetic_energy", read["kinetic"], "J", "Kinetic energy of all parts."
+    yield "potential_energy", read["potential"], "J", "Potential energy of all parts."
+    yield "total_energy", read["kinetic"] + read["potential"], "J", "Kinetic and potential energy of all parts."
+    yield "power", read["power"], "W", "Rate of the kinetic and potential energy of all parts."
+    # about the centre of mass, by the parallel-axis theorem
+    own = of_mass(-1.0 / mass, first, first, ZERO)
+    moments = read["moments"] + own.moments
+    if space == "space":
+        yield "angular_momentum", read["angular_momentum"], "kg*m^2/s", "Angular momentum about the world's origin."
+        yield "moments", moments, "kg*m^2", "Entries Jxx, Jyy, Jzz about the centre of mass, in world axes."
+        yield "products", read["products"] + own.products, "kg*m^2", "Entries Jxy, Jxz, Jyz, likewise."
+    elif space == "plane":
+        turning = read["angular_momentum"].y * -1.0
+        yield "angular_momentum", turning, "kg*m^2/s", "Angular momentum about the origin, counter-clockwise."
+        yield "moment", moments.y, "kg*m^2", "Moment of inertia about the centre of mass."

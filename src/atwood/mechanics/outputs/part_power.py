@@ -19,8 +19,8 @@ from atwood.mechanics.dynamics.forces import Forces, in_joint_coordinates, local
 from atwood.mechanics.dynamics.inertia import tensor_of, turned_tensor
 from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.mechanics.kinematics.positions import body_point_of
-from atwood.mechanics.outputs.internal_reactions import add_inertia, add_reactions, multipliers_by_part
-from atwood.mechanics.outputs.observables import part_energies
+from atwood.mechanics.outputs.reactions import add_inertia, add_reactions, multipliers_by_part
+from atwood.mechanics.outputs.totals import part_energies
 from atwood.model.local.moving_mass import inertial_energy
 from atwood.model.local.parts import LocalPart
 

@@ -1,20 +1,22 @@
-"""Totals: mass, momentum, angular momentum and inertia of several parts together, about the world's origin."""
+"""Energies, momenta and inertia of a part, and of several parts together, about the world's origin."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
-from atwood.expr import Expression, Scalar, jvp
+from atwood.expr import Expression, Scalar, jvp, substitute, vjp
 from atwood.lazy_dataclasses import dataclass
+from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
+from atwood.mechanics.dynamics.forces import in_joint_coordinates, local_map, rate_symbol
 from atwood.mechanics.dynamics.inertia import tensor_of, turned_tensor
 from atwood.mechanics.kinematics.mechanism import Mechanism, world_position
+from atwood.mechanics.kinematics.orientation import NodeTurn
 from atwood.mechanics.kinematics.positions import body_point_of
-from atwood.mechanics.outputs.observables import Observable, take
-from atwood.model.declare.contributions import BodyInertia
+from atwood.model.declare.law_results import BodyInertia
 from atwood.model.local.parts import LocalPart
 from atwood.model.values.rotation import Axes, from_axes
-from atwood.model.values.vector import ZERO, Vector, cross, dot
+from atwood.model.values.space import ZERO, Vector, cross, dot
 
 
 @dataclass(frozen=True)
@@ -63,13 +65,13 @@ def part_totals(mechanism: Mechanism, equations: Equations, path: str) -> Totals
         moving = [space.vector(kinematics.velocities[node]) for node in nodes]
         for i, r in enumerate(places):
             for j, (s, v) in enumerate(zip(places, moving, strict=True)):
-                total += _of_mass(one.masses[i][j], r, s, v)
+                total += of_mass(one.masses[i][j], r, s, v)
     for body in local.body_inertias:
         total += _of_body(mechanism, equations, local, body)
     return total
 
 
-def _of_mass(mass: Scalar, r: Vector, s: Vector, velocity: Vector) -> Totals:
+def of_mass(mass: Scalar, r: Vector, s: Vector, velocity: Vector) -> Totals:
     """Return what a mass has at r that moves with a velocity, and has its second arm at s."""
     momentum = velocity * mass
     square = dot(r, s)
@@ -85,7 +87,7 @@ def _of_body(mechanism: Mechanism, equations: Equations, local: LocalPart, body:
     index, turn = equations.site.bodies.body_of[node], equations.site.node_turns[node]
     arm = body_point_of(kinematics, index, turn, body.center_of_mass, space)
     place = space.vector(world_position(mechanism, kinematics.placements, node)) + space.vector(arm.position)
-    whole = _of_mass(body.mass, place, place, space.vector(kinematics.velocities[node]) + space.vector(arm.velocity))
+    whole = of_mass(body.mass, place, place, space.vector(kinematics.velocities[node]) + space.vector(arm.velocity))
     spin = kinematics.angular_velocities.get(index, ())
     if space.is_spatial:
         tensor = turned_tensor(tensor_of(local.part.path, body), turn)
@@ -120,40 +122,75 @@ def energy_rate(equations: Equations, energy: Expression) -> Expression:
     return jvp([energy], moving)[0]
 
 
-def observe_totals(mechanism: Mechanism, prefix: str, around: Mapping[str, object]) -> dict[str, Observable]:
-    """Return the quantities of a model as a whole, by path."""
-    found: dict[str, Observable] = {}
-    for name, value, unit, doc in _quantities(mechanism.space.name, around):
-        take(mechanism, found, f"{prefix}{name}", value, unit, doc, False)
-    return found
-
-
-def _quantities(space: str, around: Mapping[str, object]) -> Iterator[tuple[str, Scalar, str, str]]:
-    read: Mapping[str, Scalar] = around
-    mass, first = read["mass"], read["first_moment"]
-    yield "mass", mass, "kg", "Mass of all parts."
-    yield "center_of_mass", first / mass, "m", "Centre of mass in world axes."
-    yield "momentum", read["momentum"], "kg*m/s", "Momentum in world axes."
-    yield "kinetic_energy", read["kinetic"], "J", "Kinetic energy of all parts."
-    yield "potential_energy", read["potential"], "J", "Potential energy of all parts."
-    yield "total_energy", read["kinetic"] + read["potential"], "J", "Kinetic and potential energy of all parts."
-    yield "power", read["power"], "W", "Rate of the kinetic and potential energy of all parts."
-    # about the centre of mass, by the parallel-axis theorem
-    own = _of_mass(-1.0 / mass, first, first, ZERO)
-    moments = read["moments"] + own.moments
-    if space == "space":
-        yield "angular_momentum", read["angular_momentum"], "kg*m^2/s", "Angular momentum about the world's origin."
-        yield "moments", moments, "kg*m^2", "Entries Jxx, Jyy, Jzz about the centre of mass, in world axes."
-        yield "products", read["products"] + own.products, "kg*m^2", "Entries Jxy, Jxz, Jyz, likewise."
-    elif space == "plane":
-        turning = read["angular_momentum"].y * -1.0
-        yield "angular_momentum", turning, "kg*m^2/s", "Angular momentum about the origin, counter-clockwise."
-        yield "moment", moments.y, "kg*m^2", "Moment of inertia about the centre of mass."
-
-
 def add_totals(parts: Sequence[Totals]) -> Totals:
     """Return what several parts have together."""
     total = Totals()
     for part in parts:
         total += part
+    return total
+
+
+def part_energies(
+    mechanism: Mechanism, equations: Equations, path: str, signals: Mapping[Expression, Expression]
+) -> tuple[Expression, Expression]:
+    """Return kinetic and potential energy of one part, its weight included."""
+    graph, local, kinematics = mechanism.table.graph, mechanism.locals_[path], equations.kinematics
+    site, space = equations.site, mechanism.space
+    mapping = {**local_map(site, local, kinematics), **signals}
+    kinetic: Scalar = graph.constant(0.0)
+    potential: Scalar = graph.constant(0.0)
+    pull = space.components(mechanism.gravity)
+    for one in local.point_inertias:
+        nodes = [site.node(path, p.name) for p in one.points]
+        places = [world_position(mechanism, kinematics.placements, node) for node in nodes]
+        for i, a in enumerate(nodes):
+            for j, b in enumerate(nodes):
+                for k, g in enumerate(pull):
+                    va, vb = kinematics.velocities[a][k], kinematics.velocities[b][k]
+                    kinetic = kinetic + 0.5 * (one.masses[i][j] * (va * vb))
+                    potential = potential - one.masses[i][j] * (g * places[i][k])
+    for body in local.body_inertias:
+        node = site.node(path, body.frame.name)
+        index = site.bodies.body_of[node]
+        turn = site.node_turns[node]
+        arm = body_point_of(kinematics, index, turn, body.center_of_mass, space)
+        place = world_position(mechanism, kinematics.placements, node)
+        for k, g in enumerate(pull):
+            v = kinematics.velocities[node][k] + arm.velocity[k]
+            kinetic = kinetic + 0.5 * (body.mass * (v * v))
+            potential = potential - body.mass * (g * (place[k] + arm.position[k]))
+        kinetic = kinetic + _energy_of_turning(path, body, turn, kinematics.angular_velocities.get(index, ()))
+    for value in in_joint_coordinates(local, kinematics, local.potentials)[0]:
+        potential = potential + substitute([value], mapping)[0]
+    functions, hung = in_joint_coordinates(local, kinematics, local.lagrangians)
+    for value in functions:
+        rates = [*local.velocities, *(rate_symbol(symbol) for symbol in hung)]
+        momenta = vjp([value], [graph.constant(1.0)], rates)
+        still = substitute([value], dict.fromkeys(rates, graph.zero))[0]
+        energy = sum((p * v for p, v in zip(momenta, rates, strict=True)), still - value)
+        kinetic = kinetic + substitute([energy], mapping)[0]
+        potential = potential - substitute([still], mapping)[0]
+    return graph.convert(kinetic), graph.convert(potential)
+
+
+def _energy_of_turning(path: str, body: BodyInertia, turn: NodeTurn, spin: Sequence[Expression]) -> Scalar:
+    """Return ``1/2 omega . J omega`` (Goldstein, section 5.3)."""
+    if len(spin) == 3:
+        omega = Vector(*spin)
+        return 0.5 * dot(omega, from_axes(turned_tensor(tensor_of(path, body), turn), omega))
+    return 0.5 * (body.moment * (spin[0] * spin[0])) if spin else 0.0
+
+
+def energies(mechanism: Mechanism, equations: Equations) -> tuple[Expression, Expression]:
+    """Return kinetic and potential energy of the scene."""
+    signals = resolve_signals(mechanism, equations.site, equations.kinematics, equations.read)
+    parts = [part_energies(mechanism, equations, path, signals) for path in mechanism.locals_]
+    return add_up([k for k, _ in parts]), add_up([v for _, v in parts])
+
+
+def add_up(values: Sequence[Expression]) -> Expression:
+    """Return a sum."""
+    total = values[0]
+    for value in values[1:]:
+        total = total + value
     return total

@@ -11,7 +11,7 @@ from atwood.display import field_text, fitted
 from atwood.errors import DeclarationError, MissingNameError, ParameterError, UsageError, suggestion
 from atwood.expr import Scalar
 from atwood.lazy_dataclasses import dataclass
-from atwood.model.declare.connectors import Connector, ConnectorSpec, InputRef, Motion, OutputRef, connector
+from atwood.model.declare.connectors import Connector, ConnectorSpec, InputRef, Motion, OutputRef, Quantity, connector
 from atwood.model.declare.declaring import (
     ComponentType,
     collect_declarations,
@@ -24,11 +24,10 @@ from atwood.model.declare.declaring import (
 )
 from atwood.model.declare.field_functions import StateSpec, discrete_state, state
 from atwood.model.declare.fields import MISSING, Field, ParameterSpec, SignalSpec
-from atwood.model.declare.law import Kind, Law
+from atwood.model.declare.laws import Kind, Law
 from atwood.model.declare.parameter_expressions import ParameterExpression
-from atwood.model.declare.quantities import Quantity
 from atwood.model.values.outline import Outline
-from atwood.model.values.vector import Vector, dot, norm
+from atwood.model.values.space import Vector, dot, norm
 from atwood.table import table
 
 

@@ -1,4 +1,4 @@
-"""Connectors: where parts meet.
+"""What a component is known by from outside: connectors, where parts meet, and its quantities, by name.
 
 Connecting makes the across quantities (position, orientation) equal and the through quantities (force, torque) sum
 to zero.  Through quantities are positive *into* the component.
@@ -7,17 +7,23 @@ to zero.  Through quantities are positive *into* the component.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypeVar
 
-from atwood.arguments import ANYTHING, BY_PATH, DOC, NAME, TEXT, Kind, Refused, optional, takes
+from atwood.arguments import ANYTHING, BY_PATH, DOC, NAME, TEXT, Kind, Refused, each, optional, takes
 from atwood.errors import DeclarationError, UsageError
 from atwood.expr import Scalar
 from atwood.lazy_dataclasses import dataclass
-from atwood.model.values.vector import Vector, dot
+from atwood.model.values.space import Vector, dot
 
 if TYPE_CHECKING:
+    import typing_extensions
+
     from atwood.model.declare.component import Component
-    from atwood.model.declare.contributions import Carried
+    from atwood.model.declare.law_results import Carried
+
+    Reading = typing_extensions.TypeVar("Reading", default=Any)
+else:
+    Reading = TypeVar("Reading")
 
 
 @dataclass(frozen=True)
@@ -58,7 +64,69 @@ class Motion:
     body: Carried | None = None
 
 
-class Connector:
+class _Named:
+    """Something of a component that has a name there, and so a path in its scene."""
+
+    __slots__ = ("component", "name")
+
+    def __init__(self, component: Component, name: str) -> None:
+        self.component, self.name = component, name
+
+    @property
+    def path(self) -> str:
+        """Its dotted path."""
+        prefix = self.component.path
+        return f"{prefix}.{self.name}" if prefix else self.name
+
+
+class Quantity(_Named, Generic[Reading]):
+    """A quantity of a component: a name to read it by, ``result[scene["bob2"].position.x]``.
+
+    Parameters
+    ----------
+    component
+        The component.
+    name
+        Name of the quantity there, such as ``position`` or ``position.x``.
+    unit, doc
+        Unit and meaning.
+    """
+
+    __slots__ = ("doc", "unit")
+
+    def __init__(self, component: Component, name: str, unit: str, doc: str) -> None:
+        super().__init__(component, name)
+        self.unit, self.doc = unit, doc
+
+    def __str__(self) -> str:
+        return self.path
+
+    def __repr__(self) -> str:
+        return f"<{self.path} [{self.unit}]: {self.doc}>"
+
+    def __call__(self, *_: Any) -> Reading:
+        """Refuse: outside a law a quantity has a name and no value."""
+        raise UsageError(
+            "it has a value only inside a law", where=self.path, advice=f"After a run, read result[{self.path!r}]."
+        )
+
+    @property
+    def x(self) -> Quantity:
+        """The component along x of a vector."""
+        return Quantity(self.component, f"{self.name}.x", self.unit, self.doc)
+
+    @property
+    def y(self) -> Quantity:
+        """The component along y of a vector."""
+        return Quantity(self.component, f"{self.name}.y", self.unit, self.doc)
+
+    @property
+    def z(self) -> Quantity:
+        """The component along z of a vector."""
+        return Quantity(self.component, f"{self.name}.z", self.unit, self.doc)
+
+
+class Connector(_Named):
     """Base of all connectors.
 
     Parameters
@@ -78,21 +146,14 @@ class Connector:
     family: ClassVar[str] = ""
     """Connectors of one family can meet."""
 
-    __slots__ = ("component", "motion", "name")
+    __slots__ = ("motion",)
 
     def __init__(self, component: Component, name: str, motion: Motion | None = None) -> None:
-        self.component = component
-        self.name = name
+        super().__init__(component, name)
         self.motion = motion
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.path}>"
-
-    @property
-    def path(self) -> str:
-        """The dotted path of the connector."""
-        prefix = self.component.path
-        return f"{prefix}.{self.name}" if prefix else self.name
 
     def _read(self, quantity: str) -> Any:
         if self.motion is None:
@@ -359,3 +420,15 @@ class OutputRef:
 
     component: Component
     name: str
+
+
+def _path(value: Any) -> str:
+    if not isinstance(value, (str, Quantity)) or not str(value).strip():
+        raise Refused
+    return str(value)
+
+
+PATH = Kind("the path of a quantity, such as 'rod.angle'", _path, "PATH")
+
+
+PATHS = optional(each(PATH, "the paths of quantities, such as ['rod.angle']"))

@@ -16,7 +16,7 @@ from atwood.errors import DeclarationError, MissingNameError, ParameterError, ne
 from atwood.model.declare.connectors import ConnectorSpec
 from atwood.model.declare.field_functions import StateSpec
 from atwood.model.declare.fields import MISSING, Field, ParameterSpec, SignalSpec
-from atwood.model.declare.law import Law, ObservableOptions
+from atwood.model.declare.laws import Law, ObservableOptions
 
 _WORDS = {
     "spaces": each(one_of(("line", "plane", "space")), "a tuple of 'line', 'plane' and 'space'", 1, single=False),

@@ -21,9 +21,9 @@ from atwood.arguments import (
     whole,
 )
 from atwood.errors import DeclarationError, ParameterError
+from atwood.model.declare.connectors import Quantity
 from atwood.model.declare.fields import MISSING, Field, FieldReference, ParameterSpec, SignalSpec
 from atwood.model.declare.parameter_expressions import ParameterExpression
-from atwood.model.declare.quantities import Quantity
 
 if TYPE_CHECKING:
     from atwood.model.declare.component import Component

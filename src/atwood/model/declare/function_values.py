@@ -20,8 +20,8 @@ from atwood.expr.core.derivatives import jvp
 from atwood.expr.core.functions import Scalar, graph_of
 from atwood.expr.core.graph import Expression, Graph
 from atwood.model.declare.time_functions import StoredFunction, read_text, steps_of, unknown_name
+from atwood.model.values.space import Vector
 from atwood.model.values.units import Unit
-from atwood.model.values.vector import Vector
 
 
 class Function:

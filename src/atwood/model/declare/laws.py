@@ -7,8 +7,9 @@ functions, and never sees the graph or the solver. Newton's equations are put to
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
-from typing import Any, TypeVar, overload
+import keyword
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any, Generic, Literal, Self, TypeVar, overload
 
 from atwood.arguments import (
     CALLBACK,
@@ -16,6 +17,8 @@ from atwood.arguments import (
     FLAG,
     NAME,
     TEXT,
+    Kind as ArgumentKind,
+    Refused,
     check,
     each,
     either,
@@ -26,27 +29,153 @@ from atwood.arguments import (
     whole,
 )
 from atwood.errors import DeclarationError
-from atwood.model.declare.law import (
-    REACTION,
-    ActingOptions,
-    ConstraintOptions,
-    DerivativeOptions,
-    EventOptions,
-    JointOptions,
-    Kind,
-    Law,
-    ObservableOptions,
-    UpdateOptions,
-    mark,
-)
-from atwood.model.declare.quantities import ObservableLaw
+from atwood.lazy_dataclasses import dataclass
+from atwood.model.declare.connectors import Quantity, Reading
 from atwood.model.values.units import parse_si_unit
 
-_F = TypeVar("_F", bound=Callable[..., Any])
-_R = TypeVar("_R")
+if TYPE_CHECKING:
+    from atwood.model.declare.component import Component
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 
-def _acting(kind: Kind, function: _F | None, modes: Sequence[str]) -> _F | Callable[[_F], _F]:
+Kind = Literal[
+    "potential",
+    "dissipation",
+    "force",
+    "inertia",
+    "lagrangian",
+    "constraint",
+    "joint",
+    "observable",
+    "event",
+    "derivative",
+    "update",
+]
+
+
+@dataclass(frozen=True)
+class Law:
+    """A marked method of a component; `options` is one of the `...Options` below, or None."""
+
+    kind: Kind
+    name: str
+    options: Any = None
+
+    def holds_in(self, space: str) -> bool:
+        """Return whether the law has a meaning in a space."""
+        return self.options is None or space in getattr(self.options, "spaces", (space,))
+
+    def acts_in(self, mode: str) -> bool:
+        """Return whether the law acts while its component is in a mode."""
+        modes = getattr(self.options, "modes", ())
+        return not modes or mode in modes
+
+
+@dataclass(frozen=True)
+class ActingOptions:
+    """In which modes a potential, a Rayleigh function or loads act; in all when empty."""
+
+    modes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ConstraintOptions:
+    """See `constraint`."""
+
+    reactions: tuple[str, ...]
+    unit: str
+    sign: float
+    doc: str
+    modes: tuple[str, ...]
+    spaces: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class JointOptions:
+    """See `joint`."""
+
+    a: str
+    b: str
+    coordinates: tuple[str, ...]
+    solves: tuple[str, ...]
+    spaces: tuple[str, ...]
+    rigid: bool
+    reaction_doc: str
+    modes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ObservableOptions:
+    """See `observable`."""
+
+    unit: str
+    doc: str
+    periodic: bool
+    rate: str
+    spaces: tuple[str, ...]
+    pole: str = ""
+
+
+@dataclass(frozen=True)
+class EventOptions:
+    """See `event`."""
+
+    modes: tuple[str, ...]
+    direction: int
+    target: str
+    message: str
+    unit: str
+    impact: bool
+    spaces: tuple[str, ...] = ("line", "plane", "space")
+
+
+@dataclass(frozen=True)
+class DerivativeOptions:
+    """See `derivative`."""
+
+    states: tuple[str, ...]
+    modes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class UpdateOptions:
+    """See `update`."""
+
+    sets: tuple[str, ...]
+    every: str | float | None
+    offset: str | float
+    at: str
+    when: str
+    reads: tuple[str, ...] | None
+    pure: bool
+
+
+def mark(function: F, law: Law) -> F:
+    """Mark a method as a law, unless it is one already."""
+    before = getattr(function, "_atwood_law", None)
+    if before is not None:
+        advice = "Give each law a method of its own."
+        raise DeclarationError(f"it is marked as {before.kind} and as {law.kind}", where=law.name, advice=advice)
+    function._atwood_law = law  # type: ignore[attr-defined]
+    return function
+
+
+def _reaction(value: Any) -> str:
+    if not all(word.isidentifier() and not keyword.iskeyword(word) for word in NAME.read(value).split(".")):
+        raise Refused
+    return str(value)
+
+
+REACTION = ArgumentKind("a name of letters, digits and _", _reaction)
+
+
+def scalars(value: Any) -> list[Any]:
+    """Return what a law gave as a list of scalars."""
+    return list(value) if isinstance(value, Iterable) else [value]
+
+
+def _acting(kind: Kind, function: F | None, modes: Sequence[str]) -> F | Callable[[F], F]:
     """Mark a method by itself, or return what marks one with options."""
     options = ActingOptions(check(_NAMES, modes, "modes", kind, DeclarationError))
     if function is not None:
@@ -57,10 +186,10 @@ def _acting(kind: Kind, function: _F | None, modes: Sequence[str]) -> _F | Calla
 
 
 @overload
-def potential(function: _F) -> _F: ...
+def potential(function: F) -> F: ...
 @overload
-def potential(*, modes: Sequence[str] = ()) -> Callable[[_F], _F]: ...
-def potential(function: _F | None = None, *, modes: Sequence[str] = ()) -> _F | Callable[[_F], _F]:
+def potential(*, modes: Sequence[str] = ()) -> Callable[[F], F]: ...
+def potential(function: F | None = None, *, modes: Sequence[str] = ()) -> F | Callable[[F], F]:
     """Mark a method that returns a potential energy, J, from positions, angles and time.
 
     Parameters
@@ -75,10 +204,10 @@ def potential(function: _F | None = None, *, modes: Sequence[str] = ()) -> _F | 
 
 
 @overload
-def dissipation(function: _F) -> _F: ...
+def dissipation(function: F) -> F: ...
 @overload
-def dissipation(*, modes: Sequence[str] = ()) -> Callable[[_F], _F]: ...
-def dissipation(function: _F | None = None, *, modes: Sequence[str] = ()) -> _F | Callable[[_F], _F]:
+def dissipation(*, modes: Sequence[str] = ()) -> Callable[[F], F]: ...
+def dissipation(function: F | None = None, *, modes: Sequence[str] = ()) -> F | Callable[[F], F]:
     """Mark a method that returns a Rayleigh function, W: half the dissipated power, from velocities.
 
     The force on each connector is minus the derivative with respect to its velocity (Goldstein, section 1.5).
@@ -94,10 +223,10 @@ def dissipation(function: _F | None = None, *, modes: Sequence[str] = ()) -> _F 
 
 
 @overload
-def force(function: _F) -> _F: ...
+def force(function: F) -> F: ...
 @overload
-def force(*, modes: Sequence[str] = ()) -> Callable[[_F], _F]: ...
-def force(function: _F | None = None, *, modes: Sequence[str] = ()) -> _F | Callable[[_F], _F]:
+def force(*, modes: Sequence[str] = ()) -> Callable[[F], F]: ...
+def force(function: F | None = None, *, modes: Sequence[str] = ()) -> F | Callable[[F], F]:
     """Mark a method that returns the loads it puts on its connectors, an iterable of `Load`.
 
     Parameters
@@ -110,7 +239,7 @@ def force(function: _F | None = None, *, modes: Sequence[str] = ()) -> _F | Call
     return _acting("force", function, modes)
 
 
-def inertia(function: _F) -> _F:
+def inertia(function: F) -> F:
     """Mark a method that returns an iterable of `PointInertia` and `BodyInertia`; it reads parameters and time.
 
     Mass that changes with time comes, or goes, with the velocity that the body has where it is: it exerts no force, and
@@ -121,7 +250,7 @@ def inertia(function: _F) -> _F:
     return mark(function, Law("inertia", function.__name__))
 
 
-def lagrangian(function: _F) -> _F:
+def lagrangian(function: F) -> F:
     """Mark a method that returns a Lagrangian, J, from positions, velocities, orientations, their rates and time.
 
     It acts by ``dL/dq - d/dt dL/dq'`` on whatever its connectors are joined to (Goldstein, section 1.4), so that
@@ -154,7 +283,7 @@ def constraint(
     sign: float = 1.0,
     modes: Sequence[str] = (),
     spaces: Sequence[str] = ("line", "plane", "space"),
-) -> Callable[[_F], _F]:
+) -> Callable[[F], F]:
     """Mark a method that returns what must stay zero: one scalar, a `Vector`, or a sequence of scalars.
 
     Parameters
@@ -200,7 +329,7 @@ def joint(
     rigid: bool = False,
     reaction: str = "",
     modes: Sequence[str] = (),
-) -> Callable[[_F], _F]:
+) -> Callable[[F], F]:
     """Mark a method that returns the `Placement` of connector b seen from connector a, for given joint coordinates.
 
     A joint is a constraint together with coordinates that solve it.
@@ -236,7 +365,7 @@ def observable(
     rate: str = "",
     spaces: Sequence[str] = ("line", "plane", "space"),
     pole: str = "",
-) -> Callable[[Callable[[Any], _R]], ObservableLaw[_R]]:
+) -> Callable[[Callable[[Any], Reading]], ObservableLaw[Reading]]:
     """Mark a method that returns a quantity to report: a scalar or a `Vector`.
 
     Parameters
@@ -257,7 +386,7 @@ def observable(
     """
     parse_si_unit(unit)
 
-    def decorate(function: Callable[[Any], _R]) -> ObservableLaw[_R]:
+    def decorate(function: Callable[[Any], Reading]) -> ObservableLaw[Reading]:
         name, options = function.__name__, ObservableOptions(unit, doc, periodic, rate, tuple(spaces), pole)
 
         @functools.wraps(function)
@@ -289,7 +418,7 @@ def event(
     direction: int = 0,
     impact: bool = False,
     spaces: Sequence[str] = ("line", "plane", "space"),
-) -> Callable[[_F], _F]:
+) -> Callable[[F], F]:
     """Mark a method whose zero crossing changes the mode of the component, ends the run, or is noted.
 
     Parameters
@@ -315,7 +444,7 @@ def event(
     return lambda function: mark(function, Law("event", function.__name__, options))
 
 
-def derivative(*states: str, modes: Sequence[str] = ()) -> Callable[[_F], _F]:
+def derivative(*states: str, modes: Sequence[str] = ()) -> Callable[[F], F]:
     """Mark a method that returns the rates of states, each in its unit a second.
 
     It may read parameters, inputs, connectors with their velocities, states and time.
@@ -354,7 +483,7 @@ def update(
     when: str = "",
     reads: Sequence[str] | None = None,
     pure: bool = False,
-) -> Callable[[_F], _F]:
+) -> Callable[[F], F]:
     """Mark a method that is called at moments, on numbers, and returns new values of states.
 
     It is plain Python: parameters, inputs, states and the time are floats, and whatever Python can do with them may
@@ -381,3 +510,25 @@ def update(
     names = (sets,) if isinstance(sets, str) else tuple(sets)
     options = UpdateOptions(names, every, offset, at, when, None if reads is None else tuple(reads), pure)
     return lambda function: mark(function, Law("update", function.__name__, options))
+
+
+class ObservableLaw(Generic[Reading]):
+    """An observable in a class body: within a law it is a method, elsewhere it names its `Quantity`."""
+
+    def __init__(self, read: Any, law: Law) -> None:
+        self._read = read
+        self._atwood_law = law
+        self.__doc__ = read.__doc__
+        self.__name__ = law.name
+
+    @overload
+    def __get__(self, instance: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, instance: Component, owner: type) -> Quantity[Reading]: ...
+    def __get__(self, instance: Component | None, owner: type) -> Any:
+        if instance is None:
+            return self
+        if instance._bound is not None:
+            return self._read.__get__(instance, owner)
+        options = self._atwood_law.options
+        return Quantity(instance, self._atwood_law.name, options.unit, options.doc)

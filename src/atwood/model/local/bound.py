@@ -21,10 +21,9 @@ from atwood.model.local.joint_coordinates import (
 from atwood.model.local.parts import (
     LocalConnector,
     LocalPart,
+    state_values,
 )
-from atwood.model.local.states import state_values
-from atwood.model.values.space import FIXED_AXES, Space, make_space, planar_axes
-from atwood.model.values.vector import Vector
+from atwood.model.values.space import FIXED_AXES, Space, Vector, make_space, planar_axes
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,10 @@ from atwood.expr import Expression, Graph, live, tan
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.component import bind
 from atwood.model.declare.connectors import JointCoordinate
-from atwood.model.declare.law import ConstraintOptions, Law
+from atwood.model.declare.law_results import call_law
+from atwood.model.declare.laws import ConstraintOptions, Law
 from atwood.model.local.flatten import FlatScene, Part
 from atwood.model.local.parts import LocalConnector, LocalConstraint, LocalPart
-from atwood.model.returned import call_law
 from atwood.model.values.space import WHERE
 
 Formulas = Mapping[Expression, tuple[Expression, Expression | None]]

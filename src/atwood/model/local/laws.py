@@ -15,7 +15,7 @@ from atwood.errors import AtwoodError, DeclarationError, UnsupportedError, sugge
 from atwood.expr import Expression, Graph, Scalar, depends_on, live
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.declare.component import Binding, bind
-from atwood.model.declare.contributions import (
+from atwood.model.declare.law_results import (
     Asked,
     BodyInertia,
     Carried,
@@ -23,8 +23,13 @@ from atwood.model.declare.contributions import (
     Load,
     Placement,
     PointInertia,
+    call_law,
+    finite_scalar,
+    law_value,
+    listed,
+    one_scalar,
 )
-from atwood.model.declare.law import Law, scalars
+from atwood.model.declare.laws import Law, scalars
 from atwood.model.local.bound import ParameterTable, bind_part
 from atwood.model.local.flatten import FlatScene, Part
 from atwood.model.local.joint_coordinates import (
@@ -41,12 +46,11 @@ from atwood.model.local.parts import (
     LocalJoint,
     LocalPart,
     LocalState,
+    discrete_states,
+    local_states,
     multiplier_symbol,
 )
-from atwood.model.local.states import discrete_states, local_states
-from atwood.model.returned import call_law, finite_scalar, law_value, listed, one_scalar
-from atwood.model.values.space import WHERE, Space
-from atwood.model.values.vector import Vector
+from atwood.model.values.space import WHERE, Space, Vector
 
 
 def localize(

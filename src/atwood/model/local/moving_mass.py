@@ -6,10 +6,10 @@ from collections.abc import Collection, Iterable, Sequence
 
 from atwood.errors import DeclarationError, UnsupportedError
 from atwood.expr import Expression, Graph, Scalar, depends_on, vjp
-from atwood.model.declare.contributions import BodyInertia, PointInertia
 from atwood.model.declare.function_values import Function
+from atwood.model.declare.law_results import BodyInertia, PointInertia
 from atwood.model.local.parts import LocalConnector
-from atwood.model.values.vector import Vector, cross, dot
+from atwood.model.values.space import Vector, cross, dot
 
 Inertia = PointInertia | BodyInertia
 

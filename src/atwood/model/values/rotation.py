@@ -14,7 +14,7 @@ from atwood.errors import DeclarationError, UsageError
 from atwood.expr import Expression, Scalar, cos, sin
 from atwood.expr.core.functions import SCALAR
 from atwood.lazy_dataclasses import dataclass
-from atwood.model.values.vector import Vector, as_vector, cross
+from atwood.model.values.space import Vector, as_vector, cross
 
 Axes: TypeAlias = tuple[Vector, Vector, Vector]
 """The x, y and z axes of a frame, in the axes of another one: the columns of a rotation matrix."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from atwood.arguments import FILE, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import ResultError
-from atwood.model.declare.quantities import PATH, PATHS
+from atwood.model.declare.connectors import PATH, PATHS
 from atwood.plotting.canvas import COLOURS, GREY, INK, finished, new_figure, polish, with_unit
 from atwood.result.files import SavedResult
 from atwood.result.result import Result

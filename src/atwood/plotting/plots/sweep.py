@@ -10,7 +10,7 @@ import numpy as np
 
 from atwood.arguments import FILE, instance, optional, takes
 from atwood.errors import UsageError
-from atwood.model.declare.quantities import PATHS
+from atwood.model.declare.connectors import PATHS
 from atwood.plotting.canvas import COLOURS, INK, finished, new_figure, polish, with_unit
 from atwood.study.sweeps.result import Sweep
 

@@ -15,7 +15,7 @@ from atwood.forms.quantities import state_program
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.kinematics.mechanism import Mechanism, world_position
 from atwood.mechanics.kinematics.orientation import body_offsets
-from atwood.model.declare.contributions import BodyInertia
+from atwood.model.declare.law_results import BodyInertia
 from atwood.model.local.parts import LocalJoint, LocalPart
 from atwood.model.values.outline import Outline
 from atwood.model.values.rotation import FreeRotation, Rotation, as_rotation

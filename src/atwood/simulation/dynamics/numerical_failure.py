@@ -25,8 +25,8 @@ from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import local_map
 from atwood.model.declare.component import bind
-from atwood.model.declare.contributions import CoordinateLoad, Load
-from atwood.model.declare.law import scalars
+from atwood.model.declare.law_results import CoordinateLoad, Load
+from atwood.model.declare.laws import scalars
 from atwood.model.local.parts import LocalPart
 from atwood.simulation.dynamics.balance import Balance, balance_of
 from atwood.simulation.dynamics.scales import motion_names, motion_scales, scene_length

@@ -22,7 +22,7 @@ from atwood.forms.program import state_groups
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.model.declare.component import Binding, Component, bind
-from atwood.model.declare.law import Law
+from atwood.model.declare.laws import Law
 
 _ROUNDING = 16.0
 """Times that are so many units of rounding apart are one moment."""

@@ -24,7 +24,7 @@ from atwood.mechanics.dynamics.forces import local_map
 from atwood.mechanics.kinematics.orientation import node_axes
 from atwood.model.local.parts import LocalConnector, LocalConstraint, LocalPart
 from atwood.model.values.rotation import as_rotation, compose
-from atwood.model.values.vector import dot
+from atwood.model.values.space import dot
 from atwood.numerics.matrices import least_norm
 from atwood.tolerances import tolerances
 from atwood.topology.graph import Joint

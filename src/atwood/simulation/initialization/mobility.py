@@ -16,7 +16,7 @@ from atwood.forms.quantities import known_program
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.model.declare.component import Component
-from atwood.model.declare.law import Kind
+from atwood.model.declare.laws import Kind
 from atwood.numerics.matrices import LARGEST_FULL, Matrix, is_full, scaled, to_array
 from atwood.numerics.rank import independent_rows, open_directions
 from atwood.numerics.sparse import massless_directions

@@ -17,7 +17,7 @@ from atwood.forms.caches import Key
 from atwood.forms.quantities import to_maximal
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.model.local.states import declared_starts
+from atwood.model.local.parts import declared_starts
 from atwood.numerics.matrices import Matrix, least_norm, or_one, scaled
 from atwood.numerics.rank import certain, row_scales, row_sizes
 from atwood.simulation.dynamics.kinematic_map import (

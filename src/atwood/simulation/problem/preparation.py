@@ -22,7 +22,7 @@ from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import replace
 from atwood.model.declare.component import bind
 from atwood.model.local.parts import LocalPart
-from atwood.model.values.vector import Vector
+from atwood.model.values.space import Vector
 from atwood.numerics.matrices import to_array
 from atwood.simulation.dynamics.balance import balance_of, solve_balance
 from atwood.simulation.dynamics.numerical_failure import ADVICE_AT_START, undefined_value_at

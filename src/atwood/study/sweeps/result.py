@@ -17,7 +17,7 @@ from atwood.arrays import FloatArray
 from atwood.display import count_of, data_of, listed
 from atwood.errors import ResultError, near_matches, suggestion
 from atwood.lazy_dataclasses import dataclass
-from atwood.model.declare.quantities import PATH
+from atwood.model.declare.connectors import PATH
 from atwood.result.formats.dataset import Dataset, Variable, needed, to_xarray, unique_name
 from atwood.table import Shown, Table, facts
 

@@ -16,7 +16,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import find_observables
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.compose.composite import Model
-from atwood.model.declare.quantities import PATHS
+from atwood.model.declare.connectors import PATHS
 from atwood.pipeline import SCENE, assembly_of
 from atwood.progress import told
 from atwood.ranges import values_of

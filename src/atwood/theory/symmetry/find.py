@@ -16,7 +16,7 @@ from atwood.arrays import FloatArray
 from atwood.expr import Expression, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, replace
-from atwood.mechanics.outputs.observables import add_up
+from atwood.mechanics.outputs.totals import add_up
 from atwood.numerics.matrices import least_norm, or_one
 from atwood.simulation.dynamics.orientation_coordinates import COORDINATE_SWITCH
 from atwood.simulation.events.modes import find_event_functions

@@ -30,7 +30,7 @@ from atwood.expr.simplify.polynomial import (
 )
 from atwood.expr.simplify.trigonometry import sum_of_waves, without_squares
 from atwood.lazy_dataclasses import dataclass
-from atwood.mechanics.outputs.observables import add_up
+from atwood.mechanics.outputs.totals import add_up
 from atwood.numerics.matrices import least_norm, least_squares, or_one
 from atwood.simulation.dynamics.scales import motion_scales, scene_length
 from atwood.theory.formulas.notation import Notation

@@ -23,7 +23,7 @@ from atwood.forms.quantities import to_maximal
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.kinematics.mechanism import extent
 from atwood.mechanics.kinematics.orientation import spin_in_world
-from atwood.mechanics.outputs.observables import add_up
+from atwood.mechanics.outputs.totals import add_up
 from atwood.numerics.matrices import least_norm
 from atwood.numerics.rank import null_space, span
 from atwood.simulation.dynamics.orientation_coordinates import from_regular

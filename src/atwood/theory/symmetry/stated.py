@@ -13,7 +13,7 @@ from atwood.expr import Expression
 from atwood.expr.sympy_bridge import from_sympy
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
-from atwood.mechanics.outputs.observables import add_up
+from atwood.mechanics.outputs.totals import add_up
 from atwood.model.values.units import parse_unit
 from atwood.theory.equations.formulas import EquationFormulas
 from atwood.theory.formulas.printers import objects

@@ -1,7 +1,7 @@
-"""Reactions inside a body: what passes through a rigid joint.
+"""Reactions that components report: multipliers of constraints, and what passes through a rigid joint inside a body.
 
-The joint is cut in thought; what is exerted on the far side is its inertia less all other forces on it (Newton and
-Euler for a part of a rigid body).
+The rigid joint is cut in thought; what is exerted on the far side is its inertia less all other forces on it (Newton
+and Euler for a part of a rigid body).
 """
 
 from __future__ import annotations
@@ -12,13 +12,17 @@ from atwood.expr import Expression, InputGroup, OutputGroup, Program, Scalar
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations, push_body
-from atwood.mechanics.dynamics.forces import Forces, constraint_forces, in_coordinates, local_map, part_forces
+from atwood.mechanics.dynamics.forces import (
+    Forces,
+    constraint_forces,
+    in_coordinates,
+    local_map,
+    part_forces,
+)
 from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.mechanics.kinematics.orientation import spin_in_world
-from atwood.mechanics.outputs.observables import Reaction
 from atwood.model.local.parts import LocalPart
-from atwood.model.values.space import Space
-from atwood.model.values.vector import Vector, cross
+from atwood.model.values.space import Space, Vector, cross
 from atwood.topology.bodies import Body
 from atwood.topology.graph import Joint
 
@@ -159,3 +163,69 @@ def _far_side(body: Body, joint: Joint) -> list[int] | None:
         if other.parent in below and other.child not in below:
             below.append(other.child)
     return [node for node in body.nodes if node not in below] if step.backwards else below
+
+
+@dataclass(frozen=True)
+class Reaction:
+    """A reaction that a component reports.
+
+    Attributes
+    ----------
+    path
+        Its dotted path.
+    unit, doc
+        Unit and meaning.
+    symbol
+        What stands for it in the expressions of observables.
+    key
+        The constraint it belongs to, as (part, law, number); for a rigid joint, (part, law, -1).
+    sign
+        It is `sign` times the multiplier of that constraint.
+    axis
+        For a rigid joint: 0, 1, 2 for a force component, 3 for the torque in a plane, 3, 4, 5 for its components in
+        space; -1 otherwise.
+    """
+
+    path: str
+    unit: str
+    doc: str
+    symbol: Expression
+    key: tuple[str, str, int]
+    sign: float
+    axis: int = -1
+
+
+def list_reactions(mechanism: Mechanism) -> tuple[Reaction, ...]:
+    """Return every reaction that the components report, in the order of declaration."""
+    graph, found = mechanism.table.graph, []
+    reported = {f".{'xyz'[i]}" for i in mechanism.space.reported_axes}
+    for path, local in mechanism.locals_.items():
+        for law in local.part.component.laws("constraint"):
+            if not law.holds_in(mechanism.space.name):
+                continue
+            options = law.options
+            names = options.reactions
+            present = [c for c in local.constraints if c.law.name == law.name]
+            if len(names) == 1 and len(present) == 3:
+                names = tuple(f"{names[0]}.{axis}" for axis in "xyz")
+            for index, name in enumerate(names):
+                if any(name.endswith(f".{axis}") for axis in "xyz") and name[-2:] not in reported:
+                    continue
+                full = f"{path}.{name}"
+                symbol = graph.symbol(f"reaction:{full}")
+                found.append(Reaction(full, options.unit, options.doc, symbol, (path, law.name, index), options.sign))
+        for joint in local.joints:
+            options = joint.law.options
+            if not (options.rigid and options.reaction_doc):
+                continue
+            for axis in mechanism.space.reported_axes:
+                full, doc = f"{path}.force.{'xyz'[axis]}", f"Force {options.reaction_doc}, in world axes."
+                symbol = graph.symbol(f"reaction:{full}")
+                found.append(Reaction(full, "N", doc, symbol, (path, joint.law.name, -1), 1.0, axis))
+            about = "counter-clockwise" if mechanism.space.is_planar else "in world axes"
+            for number, axis_name in enumerate(mechanism.space.turn_names):
+                full, doc = f"{path}.torque{axis_name}", f"Torque {options.reaction_doc}, {about}."
+                symbol = graph.symbol(f"reaction:{full}")
+                key = (path, joint.law.name, -1)
+                found.append(Reaction(full, "N*m", doc, symbol, key, 1.0, 3 + number))
+    return tuple(found)
