@@ -9,7 +9,15 @@ from atwood.expr.core.analysis import (
     substitute,
 )
 from atwood.expr.core.arithmetic import DivisionByExactZeroError
-from atwood.expr.core.derivatives import SparseMatrix, affine_coefficients, jacobian, jvp, sweeps_exceed, vjp
+from atwood.expr.core.derivatives import (
+    SparseMatrix,
+    affine_coefficients,
+    jacobian,
+    jacobian_by_rows,
+    jvp,
+    sweeps_exceed,
+    vjp,
+)
 from atwood.expr.core.functions import (
     Scalar,
     absolute,
@@ -70,6 +78,7 @@ __all__ = [
     "hypot",
     "is_zero",
     "jacobian",
+    "jacobian_by_rows",
     "jvp",
     "live",
     "log",

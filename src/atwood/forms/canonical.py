@@ -15,7 +15,17 @@ forces of constraints are needed. H itself is never written out: only L is diffe
 from __future__ import annotations
 
 from atwood.errors import UnsupportedError, UsageError
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, substitute, vjp
+from atwood.expr import (
+    Expression,
+    InputGroup,
+    OutputGroup,
+    Program,
+    depends_on,
+    jacobian,
+    jacobian_by_rows,
+    substitute,
+    vjp,
+)
 from atwood.forms.accelerations import solve_symmetric
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key, as_by_hand
@@ -244,14 +254,9 @@ def _momenta_program(
     found: _Terms, momenta: list[Expression], name: str, parameters: tuple[Expression, ...]
 ) -> Program:
     """Return the program of (t, q, u) with the momenta along the speeds, and how rates follow from speeds."""
-    u, n = list(found.velocities), len(found.coordinates)
     outputs = [OutputGroup("momenta", tuple(momenta))]
     if not found.plain:
-        entries = [found.lagrangian.graph.zero] * (n * len(u))
-        slopes = jacobian(list(found.rates), u)
-        for row, column, entry in zip(slopes.rows, slopes.columns, slopes.entries, strict=True):
-            entries[row * len(u) + column] = entry
-        outputs.append(OutputGroup("rates by speeds", tuple(entries)))
+        outputs.append(OutputGroup("rates by speeds", tuple(jacobian_by_rows(found.rates, found.velocities))))
     groups = (
         InputGroup("t", (found.time,)),
         InputGroup("q", found.coordinates),

@@ -347,6 +347,16 @@ def jacobian(
     return SparseMatrix(tuple(rows), tuple(columns), tuple(entries))
 
 
+def jacobian_by_rows(outputs: Sequence[Expression], wrt: Sequence[Expression]) -> list[Expression]:
+    """Return all entries of the Jacobian, structural zeros included, row by row."""
+    n = len(wrt)
+    values = [wrt[0].graph.zero] * (len(outputs) * n) if wrt else []
+    found = jacobian(outputs, wrt)
+    for row, column, entry in zip(found.rows, found.columns, found.entries, strict=True):
+        values[row * n + column] = entry
+    return values
+
+
 def sweeps_exceed(
     outputs: Sequence[Expression | float],
     wrt: Sequence[Expression | Mapping[Expression, Expression | float]],

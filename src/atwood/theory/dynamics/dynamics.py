@@ -14,7 +14,17 @@ import numpy as np
 from atwood.arguments import NAME, check, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError, UnsupportedError, UsageError, suggestion_in_parts
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, jvp, substitute
+from atwood.expr import (
+    Expression,
+    InputGroup,
+    OutputGroup,
+    Program,
+    depends_on,
+    jacobian,
+    jacobian_by_rows,
+    jvp,
+    substitute,
+)
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.program import is_too_long, state_groups
@@ -303,11 +313,8 @@ class Dynamics:
     @cached_property
     def _slopes(self) -> Function:
         e, shape = self.equations, (len(self.equations.constraints), len(self.equations.speeds))
-
-        def entries() -> list[Expression]:
-            return by_speeds([one.rate for one in e.constraints], e)
-
-        return self._function("constraint Jacobian", entries, "q", shape)
+        rates = [one.rate for one in e.constraints]
+        return self._function("constraint Jacobian", lambda: jacobian_by_rows(rates, e.speeds), "q", shape)
 
     @cached_property
     def _gamma(self) -> Function:
@@ -421,19 +428,8 @@ def velocity_jacobian(assembly: Assembly, equations: Equations, path: str) -> tu
         )
     if not any(depends_on(value, e.speeds) for value in values):
         values = jvp(values, {e.time: 1.0, **dict(zip(e.coordinates, e.rates, strict=True))})
-    entries = by_speeds(values, e)
+    entries = jacobian_by_rows(values, e.speeds)
     if any(depends_on(one, e.speeds) for one in dict.fromkeys(entries)):
         raise UsageError("it is not linear in the speeds", where=path, advice="Ask for a position or a velocity.")
     shape = (len(e.speeds),)
     return entries, shape if path in observables else (len(vector), *shape)
-
-
-def by_speeds(values: Sequence[Expression], equations: Equations) -> list[Expression]:
-    """Return the derivatives of values by the speeds, row by row."""
-    n = len(equations.speeds)
-    entries = [equations.graph.zero] * (len(values) * n)
-    found = jacobian(list(values), list(equations.speeds)) if values else None
-    if found is not None:
-        for row, column, entry in zip(found.rows, found.columns, found.entries, strict=True):
-            entries[row * n + column] = entry
-    return entries

@@ -15,7 +15,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.display import count_of
 from atwood.errors import AtwoodError, KernelEvaluationError, SolveError, UnsupportedError, UsageError
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, jvp, substitute, vjp
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian_by_rows, jvp, substitute, vjp
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.lagrangian import Lagrangian
@@ -152,7 +152,7 @@ class LegendreTransform:
             "dL/dt": (lambda: jvp([found.lagrangian], {found.time: 1.0}), (1,)),
             "other forces": (lambda: self.force_expressions, (n,)),
             "columns": (self._mass_times_velocities, (n,)),
-            "mass matrix": (self._mass_entries, (n, n)),
+            "mass matrix": (lambda: jacobian_by_rows(self.momentum_expressions, self.velocity_symbols), (n, n)),
         }
 
     @cached_property
@@ -189,13 +189,6 @@ class LegendreTransform:
             graph.symbol(f"direction:{v.name}"): v for v in self.velocity_symbols
         }
         return substitute(self._inertia, back)
-
-    def _mass_entries(self) -> list[Expression]:
-        found, n = jacobian(self.momentum_expressions, list(self.velocity_symbols)), self.size
-        values = [self.lagrangian.graph.zero] * (n * n)
-        for row, column, entry in zip(found.rows, found.columns, found.entries, strict=True):
-            values[row * n + column] = entry
-        return values
 
     # -- numbers --------------------------------------------------------------------------------------------------
 

@@ -20,7 +20,7 @@ import numpy as np
 from atwood.arguments import PATHS, TEXT, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import StartError, UnsupportedError, UsageError, suggestion
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, jvp, substitute
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian_by_rows, jvp, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian, lagrangian_of
 from atwood.lazy_dataclasses import dataclass
@@ -230,12 +230,9 @@ PartsAt: TypeAlias = Callable[[FloatArray], Parts]
 def parts_of(assembly: Assembly, along: int, t: float) -> PartsAt:
     """Return what gives the parts of a scene's Lagrangian at places."""
     found = lagrangian_of(assembly, "reduced")
-    graph, n = found.graph, len(found.velocities)
+    n = len(found.velocities)
     still: dict[Expression, Expression | float] = dict.fromkeys(found.velocities, 0.0)
-    mass = [graph.zero] * (n * n)
-    slope = jacobian(list(found.momenta), list(found.velocities))
-    for row, column, entry in zip(slope.rows, slope.columns, slope.entries, strict=True):
-        mass[row * n + column] = entry
+    mass = jacobian_by_rows(found.momenta, found.velocities)
     if any(depends_on(one, found.velocities) for one in mass):
         raise UnsupportedError(
             "its Lagrangian is no polynomial of second degree in the velocities",

@@ -15,7 +15,7 @@ import numpy as np
 from atwood.arrays import BoolArray, FloatArray
 from atwood.codegen import compile_program
 from atwood.codegen.rounding import ROUGHNESS
-from atwood.expr import Expression, Graph, InputGroup, OutputGroup, Program, jacobian
+from atwood.expr import Expression, Graph, InputGroup, OutputGroup, Program, jacobian_by_rows
 from atwood.expr.core import algebra
 from atwood.expr.core.relations import TimeRelations
 from atwood.forms.assembly import Assembly
@@ -334,19 +334,10 @@ def _body_groups(assembly: Assembly, equations: Equations) -> tuple[tuple[Output
         OutputGroup("places", tuple(places)),
         OutputGroup("velocities", tuple(velocities)),
         OutputGroup("accelerations", tuple(seconds)),
-        OutputGroup("by place", _dense(velocities, equations)),
+        OutputGroup("by place", tuple(jacobian_by_rows(velocities, equations.speeds))),
         OutputGroup("axes", tuple(axes)),
         OutputGroup("spins", tuple(spins)),
         OutputGroup("turning", tuple(turns)),
-        OutputGroup("by spin", _dense(spins, equations)),
+        OutputGroup("by spin", tuple(jacobian_by_rows(spins, equations.speeds))),
     )
     return groups, (len(places) // 3, len(spins) // 3)
-
-
-def _dense(values: Sequence[Expression], equations: Equations) -> tuple[Expression, ...]:
-    n = len(equations.speeds)
-    found = [equations.graph.zero] * (len(values) * n)
-    slopes = jacobian(list(values), list(equations.speeds))
-    for row, column, entry in zip(slopes.rows, slopes.columns, slopes.entries, strict=True):
-        found[row * n + column] = entry
-    return tuple(found)
