@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, MutableMapping
 from typing import Any, Self
 
-from atwood.arguments import show
+from atwood.arguments import check, show
 from atwood.display import fitted, listed
 from atwood.errors import AtwoodError, StartError
 from atwood.model.compose.composite import Model
 from atwood.model.declare.field_functions import Number, Triple, parameter
 from atwood.model.declare.fields import ParameterSpec
 from atwood.model.declare.parameter_expressions import ParameterExpression
+from atwood.model.values.letters import LETTERS
 from atwood.model.values.units import parse_unit, split_quantity
 
 
@@ -20,6 +21,7 @@ class _Beginning:
 
     start: MutableMapping[str, Any] = {}  # noqa: RUF012 - each scene has a copy
     guess: MutableMapping[str, Any] = {}  # noqa: RUF012
+    symbols: MutableMapping[str, Any] = {}  # noqa: RUF012
 
 
 class Scene(_Beginning, Model):
@@ -45,6 +47,9 @@ class Scene(_Beginning, Model):
         which begins as that of its class.
     guess
         What holds roughly at the start; used where the start leaves a choice.
+    symbols
+        Letters in formulas, by path: ``{"hoop.angle": "theta", "hoop.radius": "a"}``. Of a part it is what stands
+        below its letters: ``{"crank": "c"}``.
     """
 
     space: str = parameter("plane", choices=("line", "plane", "space"), doc="What the scene lives in.")
@@ -68,21 +73,19 @@ class Scene(_Beginning, Model):
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        for name in ("start", "guess"):
+        for name, kind in _SAID.items():
             if not isinstance(getattr(cls, name), Mapping):
-                raise StartError(
-                    f"{name!r} must say values by path", where=cls.__name__, advice="Write {'rod.angle': 0.5}."
-                )
-            StartValues(getattr(cls, name), cls.__name__)
+                raise StartError(f"{name!r} must say {kind.what} by path", where=cls.__name__, advice=kind.advice)
+            kind(getattr(cls, name), cls.__name__)
 
     def _assemble(self) -> None:
         # Its own copy of the class's values for each scene: what is added in `build` or later belongs to it alone.
-        for name in ("start", "guess"):
-            object.__setattr__(self, name, StartValues(getattr(type(self), name)))
+        for name, kind in _SAID.items():
+            object.__setattr__(self, name, kind(getattr(type(self), name)))
         super()._assemble()
 
     def _start_values(self) -> Mapping[str, MutableMapping[str, Any]]:
-        return {name: getattr(self, name) for name in ("start", "guess")}
+        return {name: getattr(self, name) for name in _SAID}
 
     def _facts(self) -> Iterator[tuple[str, str]]:
         yield from super()._facts()
@@ -91,16 +94,16 @@ class Scene(_Beginning, Model):
                 yield name, listed((f"{path} = {value}" for path, value in values.items()), 4)
 
     def __setattr__(self, name: str, value: Any) -> None:
-        if name in ("start", "guess"):
-            object.__setattr__(self, name, StartValues(value, self.path))
+        if name in _SAID:
+            object.__setattr__(self, name, _SAID[name](value, self.path))
         else:
             super().__setattr__(name, value)
 
     def copy(self) -> Self:
         """Return a scene with the same settings and its own parts and start."""
         twin = super().copy()
-        for name in ("start", "guess"):
-            object.__setattr__(twin, name, StartValues(getattr(self, name)))
+        for name, kind in _SAID.items():
+            object.__setattr__(twin, name, kind(getattr(self, name)))
         return twin
 
 
@@ -127,20 +130,19 @@ class StartValues(MutableMapping[str, Any]):
     """
 
     __slots__ = ("_values",)
+    what, advice = "values", "Write {'rod.angle': 0.5}."
 
     def __init__(self, values: Mapping[str, Any] | None = None, where: str = "") -> None:
         given = {} if values is None else values
         if not isinstance(given, Mapping):
-            raise StartError(
-                f"{show(given)} does not say values by path", where=where, advice="Write {'rod.angle': 0.5}."
-            )
-        self._values: dict[str, Any] = {key: _checked(key, value, where) for key, value in given.items()}
+            raise StartError(f"{show(given)} does not say {self.what} by path", where=where, advice=self.advice)
+        self._values: dict[str, Any] = {key: self.checked(key, value, where) for key, value in given.items()}
 
     def __getitem__(self, path: str) -> Any:
         return self._values[path]
 
     def __setitem__(self, path: str, value: Any) -> None:
-        self._values[path] = _checked(path, value, "")
+        self._values[path] = self.checked(path, value, "")
 
     def __delitem__(self, path: str) -> None:
         del self._values[path]
@@ -153,6 +155,27 @@ class StartValues(MutableMapping[str, Any]):
 
     def __repr__(self) -> str:
         return fitted(repr(self._values))
+
+    @staticmethod
+    def checked(path: Any, value: Any, where: str) -> Any:
+        """Return a start value as it is kept, or refuse it."""
+        return _checked(path, value, where)
+
+
+class SymbolsByPath(StartValues):
+    """Letters in formulas by path."""
+
+    __slots__ = ()
+    what, advice = "letters", "Write {'rod.angle': 'theta'}."
+
+    @staticmethod
+    def checked(path: Any, value: Any, where: str) -> Any:
+        """Return a letter as it is kept, or refuse it."""
+        return check(LETTERS, {path: value}, "symbols", where)[path]
+
+
+_SAID = {"start": StartValues, "guess": StartValues, "symbols": SymbolsByPath}
+"""What a scene says by path, in dictionaries of its own."""
 
 
 def _checked(path: Any, value: Any, where: str) -> Any:

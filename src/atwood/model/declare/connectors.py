@@ -13,6 +13,7 @@ from atwood.arguments import ANYTHING, BY_PATH, DOC, NAME, TEXT, Kind, Refused, 
 from atwood.errors import DeclarationError, UsageError
 from atwood.expr import Scalar
 from atwood.lazy_dataclasses import dataclass
+from atwood.model.values.letters import OWN_LETTERS
 from atwood.model.values.space import Vector, dot
 
 if TYPE_CHECKING:
@@ -322,9 +323,11 @@ class ConnectorSpec:
         count: str | None,
         when: Mapping[str, Sequence[str]] | None = None,
         of: str = "",
+        symbol: Sequence[str] = (),
     ) -> None:
         self.kind = kind
         self.doc = doc
+        self.symbol = tuple(symbol)
         self.count = count
         self.of = of
         self.when = dict(when or {})
@@ -377,6 +380,7 @@ _C = TypeVar("_C", bound=Connector)
     count=optional(NAME),
     when=optional(BY_PATH),
     of=TEXT,
+    symbol=OWN_LETTERS,
     init=ANYTHING,
 )
 def connector(
@@ -386,6 +390,7 @@ def connector(
     count: str | None = None,
     when: Mapping[str, Sequence[str]] | None = None,
     of: str = "",
+    symbol: str | Sequence[str] = (),
     init: Literal[False] = False,
 ) -> Any:
     """Declare a connector in the class body of a component.
@@ -402,8 +407,11 @@ def connector(
         For a connector that is there only if asked for: names of choice parameters, each with the values that ask.
     of
         For a `Shaft` or a `Slide` that a joint offers: name of the joint coordinate that it is.
+    symbol
+        The letter in formulas of its position, or of the joint coordinate that it is; one for each component, or one
+        for all.
     """
-    return ConnectorSpec(kind, doc, count, when, of)
+    return ConnectorSpec(kind, doc, count, when, of, tuple(symbol))
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ from atwood.errors import DeclarationError, ParameterError
 from atwood.model.declare.connectors import Quantity
 from atwood.model.declare.fields import MISSING, Field, FieldReference, ParameterSpec, SignalSpec
 from atwood.model.declare.parameter_expressions import ParameterExpression
+from atwood.model.values.letters import OWN_LETTERS
 
 if TYPE_CHECKING:
     from atwood.model.declare.component import Component
@@ -59,6 +60,7 @@ _BOUND = optional(number())
     text=FLAG,
     function_of=optional(BY_PATH),
     array=either(FLAG, CALLBACK),
+    symbol=OWN_LETTERS,
 )
 def parameter(
     default: Any = MISSING,
@@ -78,6 +80,7 @@ def parameter(
     text: bool = False,
     function_of: Mapping[str, str] | None = None,
     array: Callable[[Any, str], Any] | bool = False,
+    symbol: str | Sequence[str] = (),
 ) -> Any:
     """Declare a parameter in the class body of a component.
 
@@ -120,6 +123,10 @@ def parameter(
     array
         Whether it is numbers in a row, or in rows and columns, as tuples; a NumPy array and a data frame will do. A
         function of a value and the path of the parameter may turn anything else that is given into numbers.
+    symbol
+        Its letter in formulas, such as ``"m"``, ``"l_0"`` or ``"theta"``; of a vector one for all components, or one
+        for each. What has the same letter elsewhere is told apart by an index. That of a model goes to whatever it is
+        passed on to, which is then one letter.
 
     Raises
     ------
@@ -145,7 +152,7 @@ def parameter(
         text=text,
         function_of=function_of,
         array=array,
-    )
+    ).with_symbol(symbol)
 
 
 @takes(DeclarationError, default=ANYTHING, unit=TEXT, doc=DOC, init=ANYTHING)
@@ -243,6 +250,7 @@ _NOMINAL = optional(number("a number above 0", above=0.0))
     doc=DOC,
     nominal=_NOMINAL,
     count=optional(either(NAME, CALLBACK)),
+    symbol=OWN_LETTERS,
     init=ANYTHING,
 )
 def state(
@@ -252,6 +260,7 @@ def state(
     doc: str,
     nominal: float | None = None,
     count: Count = None,
+    symbol: str | Sequence[str] = (),
     init: Literal[False] = False,
 ) -> Any:
     """Declare a continuous state in the class body of a component; a law marked `derivative` says its rate.
@@ -272,22 +281,33 @@ def state(
     count
         Name of the integer parameter that says how many numbers it is, or a function of the parameters by name that
         does; then it is read as a tuple.
+    symbol
+        Its letter in formulas.
 
     Raises
     ------
     DeclarationError
         If there is no line of meaning, or the unit is no SI unit.
     """
-    return StateSpec(start, unit, doc, nominal, count, is_discrete=False)
+    return StateSpec(start, unit, doc, nominal, count, is_discrete=False).with_symbol(symbol)
 
 
-@takes(DeclarationError, start=ANYTHING, unit=TEXT, doc=DOC, count=optional(either(NAME, CALLBACK)), init=ANYTHING)
+@takes(
+    DeclarationError,
+    start=ANYTHING,
+    unit=TEXT,
+    doc=DOC,
+    count=optional(either(NAME, CALLBACK)),
+    symbol=OWN_LETTERS,
+    init=ANYTHING,
+)
 def discrete_state(
     start: Any = 0.0,
     *,
     unit: str = "1",
     doc: str,
     count: Count = None,
+    symbol: str | Sequence[str] = (),
     init: Literal[False] = False,
 ) -> Any:
     """Declare a state that changes at moments only; laws marked `update` say when, and to what.
@@ -299,7 +319,7 @@ def discrete_state(
     start
         Its value before the first update, as for `state`; or a function of the parameters by name, and the time of
         the start, that returns one number for each of it.
-    unit, doc, count
+    unit, doc, count, symbol
         As for `state`.
 
     Raises
@@ -307,4 +327,4 @@ def discrete_state(
     DeclarationError
         If there is no line of meaning, or the unit is no SI unit.
     """
-    return StateSpec(start, unit, doc, None, count, is_discrete=True)
+    return StateSpec(start, unit, doc, None, count, is_discrete=True).with_symbol(symbol)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any, Self
 
@@ -69,11 +69,17 @@ class Field(FieldReference):
 
     unit: Unit
     default: Any
+    symbol: tuple[str, ...] = ()
 
     def __init__(self, kind: str, default: Any, unit: str, doc: str) -> None:
         super().__init__("", kind, parse_si_unit(unit))
         self.default = default
         self.doc = doc
+
+    def with_symbol(self, symbol: str | Sequence[str]) -> Self:
+        """Give the declaration its letter in formulas, or one for each component."""
+        self.symbol = tuple(symbol)
+        return self
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = self.name or name

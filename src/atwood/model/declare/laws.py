@@ -31,6 +31,7 @@ from atwood.arguments import (
 from atwood.errors import DeclarationError
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.connectors import Quantity, Reading
+from atwood.model.values.letters import OWN_LETTERS
 from atwood.model.values.units import parse_si_unit
 
 if TYPE_CHECKING:
@@ -115,6 +116,7 @@ class ObservableOptions:
     rate: str
     spaces: tuple[str, ...]
     pole: str = ""
+    symbol: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -356,7 +358,7 @@ def joint(
     return lambda function: mark(function, Law("joint", function.__name__, options))
 
 
-@takes(DeclarationError, unit=TEXT, doc=DOC, periodic=FLAG, rate=TEXT, spaces=_SPACES, pole=TEXT)
+@takes(DeclarationError, unit=TEXT, doc=DOC, periodic=FLAG, rate=TEXT, spaces=_SPACES, pole=TEXT, symbol=OWN_LETTERS)
 def observable(
     *,
     unit: str,
@@ -365,6 +367,7 @@ def observable(
     rate: str = "",
     spaces: Sequence[str] = ("line", "plane", "space"),
     pole: str = "",
+    symbol: str | Sequence[str] = (),
 ) -> Callable[[Callable[[Any], Reading]], ObservableLaw[Reading]]:
     """Mark a method that returns a quantity to report: a scalar or a `Vector`.
 
@@ -383,11 +386,16 @@ def observable(
     pole
         Of two periodic angles of which at a pole only the sum or the difference has a value: the name of the
         observable that is there the sign of the second in it, and elsewhere zero. Along a run the other stays.
+    symbol
+        The letter in formulas of the coordinate that has its name; of a vector one for all components, or one for each.
     """
     parse_si_unit(unit)
 
     def decorate(function: Callable[[Any], Reading]) -> ObservableLaw[Reading]:
-        name, options = function.__name__, ObservableOptions(unit, doc, periodic, rate, tuple(spaces), pole)
+        name, options = (
+            function.__name__,
+            ObservableOptions(unit, doc, periodic, rate, tuple(spaces), pole, tuple(symbol)),
+        )
 
         @functools.wraps(function)
         def read(self: Any) -> Any:

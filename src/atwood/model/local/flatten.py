@@ -6,6 +6,7 @@ import math
 import sys
 import warnings
 from collections.abc import Iterator, Mapping
+from dataclasses import field
 from types import FrameType
 from typing import Any
 
@@ -76,6 +77,8 @@ class FlatScene:
         Inputs (part path, input name) that have a variation: a quadratic function of the time since the start, whose
         three coefficients are parameters and zero. Derivatives by these are those by the input, its rate, and its
         second derivative.
+    symbols
+        Letters in formulas by path.
     """
 
     name: str
@@ -92,6 +95,7 @@ class FlatScene:
     start: Mapping[str, float]
     guess: Mapping[str, float]
     varied: frozenset[tuple[str, str]] = frozenset()
+    symbols: Mapping[str, str] = field(default_factory=dict)
 
 
 def flatten(scene: Model, name: str | None = None) -> FlatScene:
@@ -105,7 +109,8 @@ def flatten(scene: Model, name: str | None = None) -> FlatScene:
     joined: list[tuple[str, str]] = []
     start: dict[str, float] = {}
     guess: dict[str, float] = {}
-    _collect(scene, leaves, joined, start, guess)
+    symbols: dict[str, str] = {}
+    _collect(scene, leaves, joined, start, guess, symbols)
     if not leaves:
         where, advice = name or title(scene), "Add some: scene.add('bob', PointMass())."
         raise DeclarationError("the scene has no parts", where=where, advice=advice)
@@ -125,6 +130,7 @@ def flatten(scene: Model, name: str | None = None) -> FlatScene:
         links=links,
         start=start,
         guess=guess,
+        symbols=symbols,
     )
 
 
@@ -157,12 +163,13 @@ def _collect(
     joined: list[tuple[str, str]],
     start: dict[str, float],
     guess: dict[str, float],
+    symbols: dict[str, str],
 ) -> None:
     prefix = f"{model.path}." if model.path else ""
     joined.extend((prefix + a, prefix + b) for a, b in model._connections)
     for part in model.parts.values():
         if isinstance(part, Model):
-            _collect(part, leaves, joined, start, guess)
+            _collect(part, leaves, joined, start, guess, symbols)
         else:
             path = part.path
             signals = {name: part._value(name) for name in part.signal_specs()}
@@ -171,6 +178,7 @@ def _collect(
     if isinstance(model, Scene):  # after the parts, so that the outer scene has the last word
         for target, given in ((start, model.start), (guess, model.guess)):
             target.update({prefix + key: _number(value, model, key, prefix) for key, value in given.items()})
+        symbols |= {prefix + key: letter for key, letter in model.symbols.items()}
 
 
 def _number(value: Any, model: Model, key: str, prefix: str) -> float:
@@ -254,14 +262,16 @@ def _driven_inputs(end: InputRef, leaves: Mapping[str, Part]) -> Iterator[tuple[
         return
     for path, part in leaves.items():
         for name in part.signals:
-            component, source = part.component, name
-            while component is not end.component or source != end.name:
-                bound = component._settings.get(source)
-                if not isinstance(bound, FieldReference) or component._parent is None:
-                    break
-                component, source = component._parent, bound.name
-            else:
+            if any(one is end.component and source == end.name for one, source in passed_on(part.component, name)):
                 yield path, name
+
+
+def passed_on(component: Component, name: str) -> Iterator[tuple[Component, str]]:
+    """Yield a field of a component, and the fields of the models around it that are passed on to it as they are."""
+    yield component, name
+    while component._parent is not None and isinstance(bound := component._settings.get(name), FieldReference):
+        component, name = component._parent, bound.name
+        yield component, name
 
 
 def _unit_vector(axis: tuple[float, float, float]) -> tuple[float, float, float]:

@@ -5,7 +5,7 @@ The equations of motion of a scene, to be read.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -30,16 +30,18 @@ from atwood.theory.equations.pages import (
     symbol_table,
 )
 from atwood.theory.formulas import page
-from atwood.theory.formulas.notation import notation_of
+from atwood.theory.formulas.notation import SYMBOLS, notation_of
 from atwood.theory.formulas.page import Section
 from atwood.theory.formulas.printers import Sympy, objects
 from atwood.theory.formulas.tree import Sum
 
 
-def read_equations(assembly: Assembly, parameters: Parameters = "symbolic") -> EquationsOfMotion:
+def read_equations(
+    assembly: Assembly, parameters: Parameters = "symbolic", symbols: Mapping[str, str] | None = None
+) -> EquationsOfMotion:
     """Return the equations of motion of an assembly, to be read."""
     found = lagrangian_of(assembly)
-    return EquationsOfMotion(assembly, found, notation_of(assembly, found), parameters)
+    return EquationsOfMotion(assembly, found, notation_of(assembly, found, symbols), parameters)
 
 
 @dataclass(frozen=True, eq=False)
@@ -340,13 +342,14 @@ def _sympy_matrix(entries: Sequence[Sequence[Sum]]) -> Sympy:
 PARAMETERS = one_of(("symbolic", "values"))
 
 
-@takes(scene=SCENE, form=optional(FORM), parameters=PARAMETERS, orientation=optional(ORIENTATION))
+@takes(scene=SCENE, form=optional(FORM), parameters=PARAMETERS, orientation=optional(ORIENTATION), symbols=SYMBOLS)
 def equations(
     scene: Model | Assembly,
     *,
     form: str | None = None,
     parameters: str = "symbolic",
     orientation: str | None = None,
+    symbols: Mapping[str, str] | None = None,
 ) -> EquationsOfMotion:
     """Return the equations of motion of a scene, to be read.
 
@@ -368,6 +371,9 @@ def equations(
     orientation
         See `atwood.assemble`. With Euler angles L is a function of these and their derivatives; with quaternions the
         velocities are angular velocities in the axes of the body.
+    symbols
+        Letters by path, before those of declarations and of `Scene.symbols`: ``{"hoop.angle": "theta"}``. Of a part it
+        is what stands below its letters. Two parameters may share a letter where they are equal.
 
     Returns
     -------
@@ -378,8 +384,9 @@ def equations(
     Raises
     ------
     UsageError
-        If orientations are in three coordinates that are no Euler angles.
+        If orientations are in three coordinates that are no Euler angles, nothing has the path of a letter, or one
+        letter would stand for two things.
     """
     assembly = assembly_of(scene, form=form, orientation=orientation)
     chosen: Any = parameters
-    return read_equations(assembly, chosen)
+    return read_equations(assembly, chosen, symbols)

@@ -5,11 +5,19 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
+from atwood.arguments import optional
+from atwood.errors import UsageError, suggestion
 from atwood.expr import Expression
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian
-from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_dataclasses import dataclass, replace
+from atwood.model.declare.component import Component
+from atwood.model.local.flatten import passed_on
+from atwood.model.values.letters import GREEK, LETTERS, split_letter
 from atwood.theory.formulas.tree import Symbol
+
+SYMBOLS = optional(LETTERS)
+"""The kind of the argument ``symbols`` of every function that writes formulas; see `notation_of`."""
 
 _LETTERS: Mapping[str, tuple[str, ...]] = {
     "mass": ("m",),
@@ -66,13 +74,6 @@ _VECTORS: Mapping[str, tuple[str, Mapping[str, str]]] = {
 }
 """Letters of the components of vectors."""
 
-GREEK = (
-    *("alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "iota", "kappa", "lambda", "mu"),
-    *("nu", "xi", "pi", "rho", "sigma", "tau", "upsilon", "phi", "chi", "psi", "omega", "Gamma"),
-    *("Delta", "Theta", "Lambda", "Xi", "Pi", "Sigma", "Upsilon", "Phi", "Psi", "Omega"),
-)
-"""The names of Greek letters."""
-
 _COORDINATES: Mapping[str, tuple[str, ...]] = {
     "angle": ("theta",),
     "angle_a": ("alpha",),
@@ -113,7 +114,8 @@ class Notation:
     legend
         All symbols in order: coordinates, angular velocities, multipliers, sampled values, parameters.
     merged
-        Parameters that another stands for: equal principal moments of a body.
+        Parameters that another stands for: equal principal moments of a body, what one parameter of a model with a
+        letter of its own is passed on to, and equal values that were given one letter.
     """
 
     symbols: Mapping[Expression, Symbol]
@@ -124,7 +126,7 @@ class Notation:
 
 @dataclass(frozen=True)
 class _Wanted:
-    """Something that needs a symbol."""
+    """Something that needs a symbol; its whole name may be given, and it may share that of a model's parameter."""
 
     expression: Expression
     stem: tuple[str, ...]
@@ -134,26 +136,126 @@ class _Wanted:
     meaning: str
     value: float | None
     kind: str
+    is_given: bool = False
+    shared: str = ""
 
 
-def notation_of(assembly: Assembly, found: Lagrangian) -> Notation:
-    """Return the symbols of a scene."""
-    merged = _equal_moments(assembly)
+def notation_of(assembly: Assembly, found: Lagrangian, symbols: Mapping[str, str] | None = None) -> Notation:
+    """Return the symbols of a scene: letters that were given, those of declarations, and usual ones.
+
+    Parameters
+    ----------
+    assembly, found
+        The scene.
+    symbols
+        Letters by path, before those that the scene says itself. Of a part it is what stands below its letters. Two
+        parameters may have one letter where they are equal.
+
+    Raises
+    ------
+    UsageError
+        If nothing has such a path, or one letter would stand for two things.
+    """
+    said = {**assembly.flat.symbols, **(symbols or {})}
+    _check_paths(assembly, found, said)
     wanted = [*_coordinates(found), *_spins(found), *_multipliers(found)]
-    wanted += [*_sampled_values(assembly), *_parameters(assembly, merged)]
-    subscripts = _subscripts(wanted)
-    symbols: dict[Expression, Symbol] = {found.time: Symbol("t", path="time", unit="s", meaning="Time.", kind="time")}
-    for order, (one, more) in enumerate(zip(wanted, subscripts, strict=True)):
-        symbols[one.expression] = Symbol(
-            one.stem[0], (*one.stem[1:], *more), one.path, one.unit, one.meaning, one.value, one.kind, order
+    wanted += [*_sampled_values(assembly), *_parameters(assembly)]
+    wanted, merged = _put_together([_with_letter(assembly, one, said) for one in wanted], _equal_moments(assembly))
+    names: dict[tuple[str, ...], str] = {}
+    symbols_of: dict[Expression, Symbol] = {
+        found.time: Symbol("t", path="time", unit="s", meaning="Time.", kind="time")
+    }
+    for order, (one, more) in enumerate(zip(wanted, _subscripts(wanted), strict=True)):
+        name = (*one.stem, *more)
+        momentum = ("p", *name) if one.kind == "coordinate" else name
+        for taken in (name, momentum):
+            if names.setdefault(taken, one.path) != one.path:
+                raise UsageError(
+                    f"{'_'.join(taken)} stands for it and for {names[taken]}",
+                    where=one.path,
+                    advice="Give each a letter of its own; parameters may share one where they are equal.",
+                )
+        symbols_of[one.expression] = Symbol(
+            name[0], name[1:], one.path, one.unit, one.meaning, one.value, one.kind, order
         )
     velocities: dict[Expression, tuple[Symbol, int]] = {}
     for velocity, rate, place in zip(found.velocities, found.accelerations, found.moves, strict=True):
         dots = 0 if place is None else 1
-        own = symbols[velocity] if place is None else symbols[found.coordinates[place]]
+        own = symbols_of[velocity] if place is None else symbols_of[found.coordinates[place]]
         velocities[velocity], velocities[rate] = (own, dots), (own, dots + 1)
-    legend = [symbols[one.expression] for one in wanted]
-    return Notation(symbols, velocities, tuple(legend), merged)
+    return Notation(symbols_of, velocities, tuple(symbols_of[one.expression] for one in wanted), merged)
+
+
+def _check_paths(assembly: Assembly, found: Lagrangian, said: Mapping[str, str]) -> None:
+    """Refuse letters for what a scene does not have; what has none in one form may have one in the other."""
+    known = {one.name for one in (*found.names, *found.velocity_names)} | {one.label for one in found.constraints}
+    known |= {one.name for one in assembly.mechanism.table.values}
+    for path, local in assembly.mechanism.locals_.items() if said else ():
+        component: Component | None = local.part.component
+        known |= {f"{path}.{law.name}" for law in local.part.component.laws("observable")}
+        known |= {f"{path}.{name}" for name in local.part.component.connectors()}
+        while component is not None:
+            ahead = f"{component.path}." if component.path else ""
+            known |= {component.path, *(ahead + name for name in (*component._parameters, *component._signals))}
+            known |= {ahead + name for name in component._states}
+            component = component._parent
+    for path in said:
+        if path not in known and not (path[-2:] in (".x", ".y", ".z") and path[:-2] in known):
+            raise UsageError(
+                "there is nothing with this path to have a letter", where=path, advice=suggestion(path, known)
+            )
+
+
+def _with_letter(assembly: Assembly, one: _Wanted, said: Mapping[str, str]) -> _Wanted:
+    """Return what needs a symbol with the letter that it was given, or that is declared where it comes from."""
+    part, name, axis = _place(assembly, one.path)
+    local = assembly.mechanism.locals_.get(part)
+    ways: list[tuple[str, str, tuple[str, ...]]] = [(part, name, ())] if local is None else []
+    for component, own in passed_on(local.part.component, name) if local is not None else ():
+        ways.append((component.path, own, _declared(component, own)))
+    for path, own, declared in ways:
+        whole = f"{path}.{own}" if path else own
+        full = f"{whole}.{axis}" if axis else whole
+        given = said.get(full) or said.get(whole)
+        is_outer = path != part
+        if given:
+            stem = split_letter(given) + ((axis,) if axis and full not in said else ())
+            return replace(one, stem=stem, is_given=True, shared=full if is_outer else "")
+        if declared:
+            at = "xyz".find(axis) if len(declared) > 1 else 0
+            stem = split_letter(declared[at]) + ((axis,) if axis and len(declared) == 1 else ())
+            one = replace(one, stem=stem, shared=full if is_outer else "")
+    if one.part in said:
+        return replace(one, stem=(*one.stem, *split_letter(said[one.part])), is_given=True)
+    return one
+
+
+def _declared(component: Component, name: str) -> tuple[str, ...]:
+    """Return the letters that a class declares for one of its fields, observables or connectors."""
+    fields = (component._parameters, component._signals, component._states, type(component)._connectors)
+    for table in fields:
+        if name in table and table[name].symbol:
+            return tuple(table[name].symbol)
+    for law in component.laws("observable"):
+        if law.name == name and law.options.symbol:
+            return tuple(law.options.symbol)
+    return next((one.symbol for one in type(component)._connectors.values() if one.of == name and one.symbol), ())
+
+
+def _put_together(
+    wanted: Sequence[_Wanted], merged: Mapping[Expression, Expression]
+) -> tuple[list[_Wanted], dict[Expression, Expression]]:
+    """Return what needs symbols without parameters that others stand for, and these."""
+    by, kept, first = dict(merged), list[_Wanted](), dict[object, _Wanted]()
+    for one in wanted:
+        if one.kind == "parameter" and one.expression not in by:
+            key: object = ("shared", one.shared) if one.shared else ("given", one.stem) if one.is_given else one.path
+            before = first.setdefault(key, one)
+            if before is not one and before.value == one.value:
+                by[one.expression] = before.expression
+        if one.expression not in by:
+            kept.append(one)
+    return kept, by
 
 
 def _coordinates(found: Lagrangian) -> list[_Wanted]:
@@ -194,13 +296,11 @@ def _multipliers(found: Lagrangian) -> list[_Wanted]:
     return made
 
 
-def _parameters(assembly: Assembly, merged: Mapping[Expression, Expression]) -> list[_Wanted]:
+def _parameters(assembly: Assembly) -> list[_Wanted]:
     made = []
     for symbol, value in assembly.mechanism.table.values.items():
-        if symbol in merged:
-            continue
         path = symbol.name
-        part, name, axis = _parameter_place(assembly, path)
+        part, name, axis = _place(assembly, path)
         unit, meaning = _said(assembly, part, name)
         made.append(_Wanted(symbol, _parameter_stem(name, axis), path, part, unit, meaning, value, "parameter"))
     return made
@@ -216,8 +316,8 @@ def _sampled_values(assembly: Assembly) -> list[_Wanted]:
     return made
 
 
-def _parameter_place(assembly: Assembly, path: str) -> tuple[str, str, str]:
-    """Return the part, the name and the axis of a parameter."""
+def _place(assembly: Assembly, path: str) -> tuple[str, str, str]:
+    """Return the part, the name and the axis of a parameter, or of a coordinate."""
     part, _, name = path.rpartition(".")
     if part in assembly.mechanism.locals_:
         return part, name, ""
@@ -257,7 +357,7 @@ def _equal_moments(assembly: Assembly) -> dict[Expression, Expression]:
     """Return principal moments of a body that are equal to one before: a symmetric body has two, a ball one."""
     groups: dict[str, list[Expression]] = {}
     for symbol in assembly.mechanism.table.values:
-        part, name, axis = _parameter_place(assembly, symbol.name)
+        part, name, axis = _place(assembly, symbol.name)
         if axis and name == "moments":
             groups.setdefault(part, []).append(symbol)
     values, merged = assembly.mechanism.table.values, {}
@@ -276,10 +376,11 @@ def _subscripts(wanted: Sequence[_Wanted]) -> list[tuple[str, ...]]:
     """
     groups: dict[tuple[tuple[str, ...], bool], list[int]] = {}
     for i, one in enumerate(wanted):
-        groups.setdefault((one.stem, one.kind == "parameter"), []).append(i)
+        if not one.is_given:
+            groups.setdefault((one.stem, one.kind == "parameter"), []).append(i)
     numbered = _numbered(wanted, list(groups.values()))
     found: list[tuple[str, ...]] = [()] * len(wanted)
-    taken: set[tuple[str, ...]] = {("t",), ("pi",)}
+    taken: set[tuple[str, ...]] = {("t",), ("pi",), *(one.stem for one in wanted if one.is_given)}
     stems: set[tuple[str, ...]] = set()
     for (stem, _), members in sorted(groups.items(), key=lambda item: item[0][1]):
         parts = [wanted[i].part for i in members]

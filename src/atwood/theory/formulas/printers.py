@@ -14,7 +14,7 @@ from math import isqrt
 from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
 
 from atwood.lazy_modules import sympy
-from atwood.theory.formulas.notation import GREEK
+from atwood.model.values.letters import GREEK, GREEK_SIGNS
 from atwood.theory.formulas.tree import Call, Factor, Name, Node, Number, Sum, Symbol, Term
 
 Sympy: TypeAlias = Any
@@ -105,7 +105,7 @@ class _Text(_Lines):
         "pow": "({0})^({1})",
         "absolute": "|{0}|",
     }
-    _LETTERS: ClassVar = dict(zip(GREEK, "αβγδεζηθικλμνξπρστυφχψωΓΔΘΛΞΠΣΥΦΨΩ", strict=True))
+    _LETTERS: ClassVar = dict(zip(GREEK, GREEK_SIGNS, strict=True))
     _BELOW, _ABOVE = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉"), str.maketrans("0123456789-/", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻ᐟ")
     _DOTS = ("", "\u0307", "\u0308", "\u20db")
     _PARTS: ClassVar = {Fraction(1, n): part for n, part in zip((2, 3, 4, 6, 8), "½⅓¼⅙⅛", strict=True)}

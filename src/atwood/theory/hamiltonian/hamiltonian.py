@@ -29,7 +29,7 @@ from atwood.theory.dynamics.functions import Numbers
 from atwood.theory.equations.equations import PARAMETERS
 from atwood.theory.equations.formulas import EquationFormulas, Parameters
 from atwood.theory.formulas import page
-from atwood.theory.formulas.notation import Notation, notation_of
+from atwood.theory.formulas.notation import SYMBOLS, Notation, notation_of
 from atwood.theory.formulas.page import Line, Section
 from atwood.theory.formulas.printers import Sympy, latex, objects, text
 from atwood.theory.formulas.tree import Sum, Symbol, Term, cost, in_brackets, in_order, names_in, product
@@ -51,7 +51,9 @@ _GOLDSTEIN = "euler-zxz"
 """Orientation coordinates where a scene has quaternions, which have no momenta (Goldstein, section 4.4)."""
 
 
-def read_hamiltonian(assembly: Assembly, parameters: Parameters = "symbolic") -> Hamiltonian:
+def read_hamiltonian(
+    assembly: Assembly, parameters: Parameters = "symbolic", symbols: Mapping[str, str] | None = None
+) -> Hamiltonian:
     """Return the Hamiltonian of an assembly."""
     refuse_without_hamiltonian(assembly)
     if any(one.kind == "quaternion" for one in assembly.reduced.orientation_coordinates):
@@ -59,7 +61,7 @@ def read_hamiltonian(assembly: Assembly, parameters: Parameters = "symbolic") ->
     found = lagrangian_of(assembly)
     transform = LegendreTransform(assembly, found)
     check_mass(transform)
-    notation = with_momenta(notation_of(assembly, found), found)
+    notation = with_momenta(notation_of(assembly, found, symbols), found)
     return Hamiltonian(EquationFormulas(assembly, found, notation, parameters), transform, is_energy(transform))
 
 
@@ -376,9 +378,13 @@ class Hamiltonian:
         return page.as_html(f"{self.name}: Hamiltonian", self.sections) + f"<p>{self.sentence}</p>"
 
 
-@takes(scene=SCENE, parameters=PARAMETERS, orientation=optional(ORIENTATION))
+@takes(scene=SCENE, parameters=PARAMETERS, orientation=optional(ORIENTATION), symbols=SYMBOLS)
 def hamiltonian(
-    scene: Model | Assembly, *, parameters: str = "symbolic", orientation: str | None = None
+    scene: Model | Assembly,
+    *,
+    parameters: str = "symbolic",
+    orientation: str | None = None,
+    symbols: Mapping[str, str] | None = None,
 ) -> Hamiltonian:
     """Return the Hamiltonian of a scene, ``H(q, p, t) = p q' - L`` with ``p = dL/dq'``.
 
@@ -395,6 +401,8 @@ def hamiltonian(
     orientation
         Euler angles in which orientations in space are; quaternions have no momenta, and ``"euler-zxz"`` takes their
         place.
+    symbols
+        See `atwood.equations`.
 
     Returns
     -------
@@ -411,7 +419,7 @@ def hamiltonian(
     """
     assembly = assembly_of(scene, orientation=orientation)
     chosen: Any = parameters
-    return read_hamiltonian(assembly, chosen)
+    return read_hamiltonian(assembly, chosen, symbols)
 
 
 _LARGEST_BLOCK = 3

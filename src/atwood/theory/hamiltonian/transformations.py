@@ -20,7 +20,7 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE
-from atwood.theory.equations.equations import equations
+from atwood.theory.equations.equations import EquationsOfMotion
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian
 from atwood.theory.hamiltonian.phase_space import (
     BY_SYMBOL,
@@ -443,7 +443,7 @@ def point_transformation(
     moved = (sympy.Matrix(momenta).T * inverse * explicit)[0, 0]
     k = collected(space.read(h.expression).xreplace(where) - moved, momenta)
     velocities = list(by_new * sympy.Matrix(rates) + explicit)
-    eq = equations(h.assembly)
+    eq = EquationsOfMotion(h.assembly, h.formulas.expressions, h.formulas.notation)
     letters = dict(zip(eq.velocities, velocities, strict=True))
     lagrangian = eq.lagrangian.xreplace(letters).xreplace(dict(zip(eq.coordinates, values, strict=True)))
     lagrangian = collected(lagrangian, rates)

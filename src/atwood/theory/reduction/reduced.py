@@ -21,6 +21,7 @@ from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
+from atwood.theory.formulas.notation import SYMBOLS
 from atwood.theory.hamiltonian.transformations import PointTransformation
 from atwood.theory.reduction.quadrature import Path, find_path
 from atwood.theory.reduction.routhian import (
@@ -178,9 +179,13 @@ class ReducedMotion:
 _GIVEN = instance("a scene, an assembly, or what `point_transformation` returns", Model, Assembly, PointTransformation)
 
 
-@takes(scene=_GIVEN, coordinate=optional(TEXT), orientation=optional(TEXT))
+@takes(scene=_GIVEN, coordinate=optional(TEXT), orientation=optional(TEXT), symbols=SYMBOLS)
 def reduced(
-    scene: Model | Assembly | PointTransformation, coordinate: str | None = None, *, orientation: str | None = None
+    scene: Model | Assembly | PointTransformation,
+    coordinate: str | None = None,
+    *,
+    orientation: str | None = None,
+    symbols: Mapping[str, str] | None = None,
 ) -> ReducedMotion:
     """Return the motion of a scene from its start, reduced to one coordinate and done by quadrature.
 
@@ -198,6 +203,8 @@ def reduced(
         Path of the coordinate that is left; the one that is not ignorable if not given.
     orientation
         Euler angles in which orientations in space are; ``"euler-zxz"`` if not given.
+    symbols
+        See `atwood.equations`; a transformed scene has its letters already.
 
     Raises
     ------
@@ -248,7 +255,7 @@ def reduced(
         energy,
         radial,
         path,
-        routhian_of(assembly, found, ignorable),
+        routhian_of(assembly, found, ignorable, symbols),
         dict(zip(paths, map(float, q), strict=True)),
         start.time,
         scene=assembly.flat.name,

@@ -11,7 +11,7 @@ where C and m are the blocks ``M_cc`` and ``M_cs`` (Goldstein, section 8.3: Rout
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias
 
@@ -30,7 +30,7 @@ from atwood.pipeline import SCENE, assembly_of
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
 from atwood.theory.equations.formulas import EquationFormulas
-from atwood.theory.formulas.notation import notation_of
+from atwood.theory.formulas.notation import SYMBOLS, notation_of
 from atwood.theory.formulas.printers import objects
 from atwood.theory.formulas.tree import Sum
 from atwood.theory.hamiltonian.phase_space import Sympy, collected, short
@@ -147,9 +147,13 @@ def _formula(written: Sum) -> Sympy:
     return objects.formula(written)
 
 
-@takes(scene=SCENE, ignorable=optional(PATHS), orientation=optional(TEXT))
+@takes(scene=SCENE, ignorable=optional(PATHS), orientation=optional(TEXT), symbols=SYMBOLS)
 def routhian(
-    scene: Model | Assembly, ignorable: Sequence[str] | None = None, *, orientation: str | None = None
+    scene: Model | Assembly,
+    ignorable: Sequence[str] | None = None,
+    *,
+    orientation: str | None = None,
+    symbols: Mapping[str, str] | None = None,
 ) -> Routhian:
     """Return the Routhian of a scene: its ignorable coordinates are taken out, and their momenta stay as constants.
 
@@ -161,6 +165,8 @@ def routhian(
         Paths of the coordinates that are taken out; all that are ignorable if not given.
     orientation
         Euler angles in which orientations in space are; ``"euler-zxz"`` if not given.
+    symbols
+        See `atwood.equations`.
 
     Raises
     ------
@@ -177,12 +183,14 @@ def routhian(
             raise UsageError(
                 "it is not ignorable", where=f"{assembly.flat.name}: {path}", advice=suggestion(path, names) or told
             )
-    return routhian_of(assembly, found, chosen)
+    return routhian_of(assembly, found, chosen, symbols)
 
 
-def routhian_of(assembly: Assembly, found: Lagrangian, ignorable: tuple[str, ...]) -> Routhian:
+def routhian_of(
+    assembly: Assembly, found: Lagrangian, ignorable: tuple[str, ...], symbols: Mapping[str, str] | None
+) -> Routhian:
     """Return the Routhian with some coordinates taken out."""
-    return Routhian(EquationFormulas(assembly, found, notation_of(assembly, found)), ignorable)
+    return Routhian(EquationFormulas(assembly, found, notation_of(assembly, found, symbols)), ignorable)
 
 
 def ignorable_of(scene: Model | Assembly, orientation: str | None) -> tuple[Assembly, Lagrangian, tuple[str, ...]]:

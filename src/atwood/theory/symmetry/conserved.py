@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -28,7 +28,7 @@ from atwood.simulation.problem.arguments import ORIENTATION
 from atwood.simulation.run.recorder import SegmentRecord
 from atwood.table import Shown, Table, table
 from atwood.theory.equations.formulas import EquationFormulas
-from atwood.theory.formulas.notation import notation_of
+from atwood.theory.formulas.notation import SYMBOLS, notation_of
 from atwood.theory.formulas.printers import Sympy, latex, objects, text
 from atwood.theory.formulas.tree import Sum
 from atwood.theory.symmetry.find import Finding, find_conserved
@@ -265,9 +265,13 @@ _ROLLING = "integrals of rolling that belong to no symmetry"
 SYMMETRIES = Kind("a Symmetry, or a list of them", _listed)
 
 
-@takes(scene=SCENE, symmetries=SYMMETRIES, orientation=optional(ORIENTATION))
+@takes(scene=SCENE, symmetries=SYMMETRIES, orientation=optional(ORIENTATION), symbols=SYMBOLS)
 def conserved(
-    scene: Model | Assembly, symmetries: Symmetry | Sequence[Symmetry] = (), *, orientation: str | None = None
+    scene: Model | Assembly,
+    symmetries: Symmetry | Sequence[Symmetry] = (),
+    *,
+    orientation: str | None = None,
+    symbols: Mapping[str, str] | None = None,
 ) -> Conserved:
     """Return what is conserved along all motions of a scene.
 
@@ -286,6 +290,8 @@ def conserved(
         Symmetries that are stated, besides those that are found.
     orientation
         See `atwood.assemble`. With Euler angles, these can be ignorable coordinates.
+    symbols
+        See `atwood.equations`.
 
     Returns
     -------
@@ -301,7 +307,7 @@ def conserved(
     """
     assembly = assembly_of(scene, orientation=orientation)
     found = lagrangian_of(assembly, "reduced")
-    notation = notation_of(assembly, found)
+    notation = notation_of(assembly, found, symbols)
     quantities = Quantities(assembly, found)
     prover, formulas = Prover(quantities, notation), EquationFormulas(assembly, found, notation)
     every: Any = symmetries

@@ -1,0 +1,178 @@
+"""Letters of formulas: of declarations, of a scene, and of a call, which wins; paths stay as they are."""
+
+from __future__ import annotations
+
+import pytest
+
+from atwood import (
+    Component,
+    Number,
+    Point,
+    Scene,
+    UsageError,
+    connector,
+    conserved,
+    equations,
+    from_data,
+    hamiltonian,
+    parameter,
+    potential,
+    reduced,
+    routhian,
+    to_data,
+)
+from atwood_library import Ground, PointMass, Rod, Spring
+from atwood_library.scenes import DoublePendulum, MassSpringChain, RotatingHoopDriven, RotatingHoopFree
+
+LETTERS = {"hoop.angle": "theta", "hoop.radius": "a"}
+
+
+def names(scene: Scene, **given: object) -> dict[str, str]:
+    """Return the letter of each path."""
+    return {one.path: one.name for one in equations(scene, **given).legend}
+
+
+def test_the_letters_of_a_call_win_over_those_of_the_scene() -> None:
+    scene = RotatingHoopDriven()
+    scene.symbols = {"hoop.angle": "φ", "clock.slope": "ω₀"}
+    assert names(scene)["hoop.angle"] == "phi"
+    assert names(scene)["clock.slope"] == "omega_0"
+    assert names(scene, symbols=LETTERS)["hoop.angle"] == "theta"
+    assert names(scene, symbols=LETTERS)["clock.slope"] == "omega_0"
+    assert names(scene, symbols=LETTERS)["hoop.radius"] == "a"
+
+
+def test_a_scene_keeps_its_letters_when_it_is_copied_and_written() -> None:
+    scene = RotatingHoopDriven()
+    scene.symbols["hoop.angle"] = "phi"
+    assert dict(scene.copy().symbols) == dict(from_data(to_data(scene)).symbols) == {"hoop.angle": "phi"}
+    assert not RotatingHoopDriven().symbols
+    assert "symbols" not in str(to_data(RotatingHoopDriven()))
+
+
+def test_paths_stay_as_they_are() -> None:
+    eq = equations(RotatingHoopDriven(), symbols=LETTERS)
+    assert str(eq.symbol("hoop.radius")) == "a"
+    assert str(eq.symbol("hoop.angle")) == "theta(t)"
+    assert {one["path"] for one in eq.to_dict()["symbols"]} == set(names(RotatingHoopDriven()))
+    assert "a = 1.0  # hoop.radius" in eq.python().replace("a_ = ", "a = ")
+
+
+def test_every_function_that_writes_formulas_takes_letters() -> None:
+    scene = RotatingHoopFree()
+    angle = next(path for path in names(scene) if path.endswith("hoop.angle"))
+    given = {angle: "chi"}
+    assert "p_chi" in str(hamiltonian(scene, symbols=given).expression)
+    assert "chi" in str(routhian(scene, symbols=given).expression)
+    assert "chi" in str(reduced(scene, symbols=given).routhian.expression)
+    assert "chi" in str([one.expression for one in conserved(scene, symbols=given)])
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"hoop.angel": "theta"}, "hoop.angle"),
+        ({"hoop.angle": "m", "bead.mass": "m"}, "stands for it and for"),
+        ({"hoop.angle": "t"}, "time"),
+        ({"hoop.angle": "a b"}, "A letter has"),
+        ({"bead.mass": "p_theta", "hoop.angle": "theta"}, "stands for it and for"),
+    ],
+)
+def test_what_cannot_be_a_letter_is_refused(given: dict[str, str], said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        equations(RotatingHoopDriven(), symbols=given)
+
+
+def test_a_letter_in_a_scene_is_checked_when_it_is_given() -> None:
+    scene = RotatingHoopDriven()
+    with pytest.raises(UsageError, match="time"):
+        scene.symbols["hoop.angle"] = "t"
+
+
+def test_equal_parameters_may_share_a_letter_and_others_may_not() -> None:
+    scene = MassSpringChain()
+    given = {f"spring{i}.stiffness": "k" for i in (1, 2, 3)}
+    eq = equations(scene, symbols=given)
+    assert [one.path for one in eq.legend if one.name == "k"] == ["spring1.stiffness"]
+    assert all(str(eq.symbol(path)) == "k" for path in given)
+    scene.spring2.stiffness = 11.0
+    with pytest.raises(UsageError, match="k stands for it and for spring1"):
+        equations(scene, symbols=given)
+
+
+def test_a_letter_for_the_parameter_of_a_scene_goes_where_it_is_passed_on() -> None:
+    scene = MassSpringChain()
+    eq = equations(scene, symbols={"stiffness": "K"})
+    assert {str(eq.symbol(f"spring{i}.stiffness")) for i in (1, 2, 3)} == {"K"}
+    scene.spring2.stiffness = 11.0
+    eq = equations(scene, symbols={"stiffness": "K"})
+    assert str(eq.symbol("spring2.stiffness")) != "K"
+    assert eq.values[eq.symbol("spring2.stiffness")] == 11.0
+
+
+def test_a_part_has_what_stands_below_its_letters() -> None:
+    found = names(DoublePendulum(), symbols={"rod1": "a", "bob2": "b"})
+    assert found["rod1.angle"] == "theta_a"
+    assert found["rod1.length"] == "l_a"
+    assert found["bob2.mass"] == "m_b"
+
+
+def test_other_names_keep_clear_of_a_letter_that_was_given() -> None:
+    found = names(DoublePendulum(), symbols={"bob1.mass": "theta_2"})
+    assert found["bob1.mass"] == "theta_2"
+    assert len(set(found.values())) == len(found)
+
+
+class Well(Component):
+    """A potential with letters of its own."""
+
+    depth: Number = parameter(2.0, unit="N/m", doc="How steep it is.", symbol="kappa")
+    place: tuple[float, float, float] = parameter((0.1, 0.2, 0.3), unit="m", size=3, doc="Where it is.", symbol="s")
+    point: Point = connector(Point, "What is in it.")
+
+    @potential
+    def energy(self) -> object:
+        """Return the energy."""
+        r = self.point.position
+        return 0.5 * self.depth * ((r.x - self.place[0]) ** 2 + (r.z - self.place[2]) ** 2)
+
+
+def test_declarations_have_letters_and_their_components() -> None:
+    scene = Scene()
+    well, other = scene.add("well", Well()), scene.add("other", Well())
+    bob = scene.add("bob", PointMass(mass=1.0))
+    scene.connect(well.point, bob.point)
+    scene.connect(other.point, bob.point)
+    found = names(scene)
+    assert {found["well.depth"], found["other.depth"]} == {"kappa_well", "kappa_other"}
+    assert found["well.place.x"].startswith("s_x")
+    assert names(scene, symbols={"well.place": "c"})["well.place.z"] == "c_z"
+
+
+class Pair(Scene):
+    """Two rods of one length, which has a letter."""
+
+    length: Number = parameter(1.0, unit="m", doc="Length of both.", symbol="L")
+    ground: Ground = Ground()
+    rod1: Rod = Rod(length=length)
+    rod2: Rod = Rod(length=length)
+    bob1: PointMass = PointMass(mass=1.0)
+    bob2: PointMass = PointMass(mass=2.0)
+    spring: Spring = Spring()
+
+    def build(self) -> None:
+        """Hang one below the other."""
+        self.connect(self.ground.frame, self.rod1.a)
+        self.connect(self.rod1.b, self.bob1.point)
+        self.connect(self.bob1.point, self.rod2.a)
+        self.connect(self.rod2.b, self.bob2.point)
+        self.connect(self.ground.frame, self.spring.a)
+        self.connect(self.bob2.point, self.spring.b)
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+def test_a_parameter_with_a_letter_is_one_wherever_it_is_passed_on(form: str) -> None:
+    eq = equations(Pair(), form=form)
+    assert str(eq.symbol("rod1.length")) == str(eq.symbol("rod2.length")) == "L"
+    assert eq.symbol("rod1.length") in eq.mass_matrix.free_symbols if form == "reduced" else True
+    assert names(Pair(), form=form, symbols={"rod1.angle": "phi"}).get("rod1.angle", "phi") == "phi"
