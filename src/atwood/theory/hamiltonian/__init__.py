@@ -1,13 +1,12 @@
 """Hamiltonian mechanics: the Legendre transform, Poisson brackets, canonical and point transformations."""
 
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian
+from atwood.theory.hamiltonian.point_transformations import PointTransformation, point_transformation
 from atwood.theory.hamiltonian.transformations import (
     CanonicalTransformation,
-    PointTransformation,
     canonical_transformation,
     fundamental_brackets,
     generated_transformation,
-    point_transformation,
     poisson_bracket,
     poisson_brackets,
     total_derivative,

@@ -34,7 +34,7 @@ from atwood.theory.formulas.notation import SYMBOLS, notation_of
 from atwood.theory.formulas.printers import objects
 from atwood.theory.formulas.tree import Sum
 from atwood.theory.hamiltonian.phase_space import Sympy, collected, short
-from atwood.theory.hamiltonian.transformations import PointTransformation
+from atwood.theory.hamiltonian.point_transformations import PointTransformation
 from atwood.theory.symmetry.find import find_conserved
 from atwood.theory.symmetry.proof import Prover
 from atwood.theory.symmetry.quantities import Quantities
@@ -382,9 +382,22 @@ def transformed_parts(given: PointTransformation, along: int) -> PartsAt:
     return at
 
 
+def refuse_letters(given: PointTransformation) -> None:
+    """Refuse what has letters that are neither coordinates nor parameters of the scene."""
+    held = {*given.coordinates, *given.velocities, *given.source.values, sympy.Symbol("t")}
+    stray = sorted(map(str, given.lagrangian.free_symbols - held))
+    if stray:
+        raise UnsupportedError(
+            f"{', '.join(stray)} in its coordinates have no value",
+            where=given.source.name,
+            advice="Transform with numbers in their places.",
+        )
+
+
 def start_in(given: PointTransformation) -> tuple[float, FloatArray, FloatArray]:
     """Return time, new coordinates and their derivatives where a scene starts."""
     h = given.source
+    refuse_letters(given)
     start = find_start(h.assembly)
     q = from_regular(h.assembly, start.coordinates)
     v = h.velocities_at(q, h.start()[1], start.time)
@@ -396,6 +409,9 @@ def start_in(given: PointTransformation) -> tuple[float, FloatArray, FloatArray]
         sympy.lambdify(symbols, what, "numpy") for what in (old, by_new, [one.diff(t) for one in old])
     )
 
+    positive = [one for one in given.coordinates if one.is_positive]
+    signs = sympy.lambdify(symbols, [one.xreplace(h.values) for one in (*positive, *given.positive)], "numpy")
+
     def missing(x: Any) -> FloatArray:
         return np.asarray(place(*x, start.time), dtype=float) - q
 
@@ -405,7 +421,7 @@ def start_in(given: PointTransformation) -> tuple[float, FloatArray, FloatArray]
         with np.errstate(all="ignore"):
             found = scipy.optimize.least_squares(missing, guess, xtol=3e-16, ftol=3e-16, gtol=3e-16)
         is_met = np.max(np.abs(found.fun)) <= 1e-13 * (np.max(np.abs(q)) + start.length)
-        if is_met and all(x > 0.0 or not one.is_positive for x, one in zip(found.x, given.coordinates, strict=True)):
+        if is_met and min(signs(*found.x, start.time), default=1.0) > 0.0:
             matrix = np.array(slope(*found.x, start.time), dtype=float)
             own = np.asarray(explicit(*found.x, start.time), dtype=float)
             return start.time, found.x, np.linalg.solve(matrix, v - own)

@@ -1,0 +1,258 @@
+"""Scenes in other coordinates: polar, relative and of the centre of mass, in frames that move; one after another.
+
+With ``L = v.M v/2 + b.v + L_0`` and old coordinates ``x(q, t)``, ``J = dx/dq``, ``e = dx/dt``, the parts of L in new
+coordinates are ``J^T M J``, ``J^T (b + M e)`` and ``L_0 + b.e + e.M e/2``, and its Legendre transform is
+``K = H + dF/dt`` with ``F = P . q(x, t)`` (Goldstein, section 9.1). Factors of the determinant of J are positive: a
+distance r where it is zero at r = 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+from atwood.arguments import BY_PATH, check, command, instance, takes
+from atwood.errors import UnsupportedError, UsageError, suggestion
+from atwood.forms.assembly import Assembly
+from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_modules import sympy
+from atwood.model.compose.composite import Model
+from atwood.theory.equations.equations import EquationsOfMotion
+from atwood.theory.formulas.notation import SYMBOLS as LETTERS
+from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian
+from atwood.theory.hamiltonian.phase_space import EXPRESSION, SYMBOLS, Sympy
+from atwood.theory.hamiltonian.tidied import is_positive, tidied
+
+
+@dataclass(frozen=True, eq=False)
+class PointTransformation:
+    """A scene in new coordinates; everything in sympy, with new coordinates and momenta as symbols.
+
+    Attributes
+    ----------
+    coordinates, velocities, momenta
+        Symbols of the new coordinates, of their derivatives, and of their momenta.
+    old
+        What the old coordinates are in terms of the new and of time.
+    lagrangian
+        L in new coordinates and velocities.
+    definitions
+        The new momenta ``dL/dQ'`` in terms of velocities.
+    hamiltonian
+        The new Hamiltonian: ``K = H + dF/dt`` with ``F = P . Q(q, t)``.
+    source
+        The Hamiltonian in the old coordinates.
+    positive
+        What is taken to be positive: factors of the Jacobian determinant, such as the distance from a centre. Where one
+        of them is zero the new coordinates are singular.
+    solved
+        The new velocities in terms of the new momenta.
+    """
+
+    coordinates: tuple[Sympy, ...]
+    velocities: tuple[Sympy, ...]
+    momenta: tuple[Sympy, ...]
+    old: Mapping[Sympy, Sympy]
+    lagrangian: Sympy
+    definitions: tuple[Sympy, ...]
+    hamiltonian: Sympy
+    source: Hamiltonian
+    positive: tuple[Sympy, ...]
+    solved: tuple[Sympy, ...]
+
+    @property
+    def ignorable(self) -> tuple[Sympy, ...]:
+        """The new coordinates that K does not depend on: their momenta are conserved."""
+        return tuple(one for one in self.coordinates if not self.hamiltonian.has(one))
+
+    @cached_property
+    def jacobian(self) -> Sympy:
+        """Derivatives of the old coordinates by the new."""
+        return sympy.ImmutableMatrix([[x.diff(q) for q in self.coordinates] for x in self.old.values()])
+
+    @cached_property
+    def old_momenta(self) -> dict[Sympy, Sympy]:
+        """The old momenta in terms of the new coordinates and momenta."""
+        h = self.source
+        explicit = [x.diff(sympy.Symbol("t")) for x in self.old.values()]
+        moved = list(self.jacobian * sympy.Matrix(self.solved) + sympy.Matrix(explicit))
+        rates = dict(zip((q.diff(sympy.Symbol("t")) for q in h.coordinates), moved, strict=True))
+        made = [sympy.expand(one.xreplace(rates).xreplace(dict(self.old))) for one in h.definitions]
+        return {
+            p: sympy.Add(*(tidied(one.coeff(new)) * new for new in self.momenta), tidied(one.xreplace(self._still)))
+            for p, one in zip(h.momenta, made, strict=True)
+        }
+
+    @cached_property
+    def new_momenta(self) -> dict[Sympy, Sympy]:
+        """The new momenta in terms of the old ones: ``P = J^T p``, in new coordinates."""
+        found = self.jacobian.T * sympy.Matrix(self.source.momenta)
+        return dict(zip(self.momenta, found, strict=True))
+
+    @property
+    def _still(self) -> dict[Sympy, Sympy]:
+        return dict.fromkeys(self.momenta, sympy.Integer(0))
+
+    def __repr__(self) -> str:
+        return f"<PointTransformation to {', '.join(map(str, self.coordinates))}: K = {self.hamiltonian}>"
+
+
+_SCENE = instance("a scene, an assembly, or what `point_transformation` returns", Model, Assembly, PointTransformation)
+
+
+@command("transform")
+@takes(scene=_SCENE, old=BY_PATH, coordinates=SYMBOLS, symbols=LETTERS)
+def point_transformation(
+    scene: Model | Assembly | PointTransformation,
+    old: Mapping[str, Any],
+    coordinates: Sequence[Any],
+    *,
+    symbols: Mapping[str, str] | None = None,
+) -> PointTransformation:
+    """Return a scene in other coordinates: polar, relative and of the centre of mass, in a rotating frame.
+
+    Parameters
+    ----------
+    scene
+        The scene, or an assembly of it; or the scene in other coordinates, which are then transformed further.
+    old
+        Every coordinate of the scene by its path, in terms of the new ones, parameters and t; in sympy. Of a scene in
+        other coordinates these by their names; those that are left out stay.
+    coordinates
+        Symbols of the new coordinates, as many as old ones.
+    symbols
+        See `atwood.equations`.
+
+    Returns
+    -------
+    PointTransformation
+        L, momenta and Hamiltonian in the new coordinates.
+
+    Raises
+    ------
+    UsageError
+        If a coordinate is missing or there is none of that path, or the new ones do not determine the old.
+    UnsupportedError
+        If the scene has no Hamiltonian in symbols, or L is of higher than second degree in the velocities.
+    """
+    old = {path: check(EXPRESSION, value, path, "point_transformation") for path, value in old.items()}
+    if isinstance(scene, PointTransformation):
+        paths: tuple[str, ...] = tuple(map(str, scene.coordinates))
+        stay = [one for one in scene.coordinates if str(one) not in old]
+        old |= {str(one): one for one in stay}
+        coordinates = (*(one for one in stay if one not in coordinates), *coordinates)
+        h = scene.source
+    else:
+        h = hamiltonian(scene, symbols=symbols)
+        paths = h.paths
+    for path in old:
+        if path not in paths:
+            told = suggestion(path, paths) or f"There are {', '.join(paths)}."
+            raise UsageError("no coordinate has this path", where=path, advice=told)
+    missing = [path for path in paths if path not in old]
+    n = len(paths)
+    new = tuple(coordinates)
+    if missing or len(new) != n or len(set(new)) != n:
+        told = f"{missing[0]} is not given" if missing else f"{n} new coordinates are needed"
+        advice = f"Give {', '.join(paths)}, each in terms of {n} new ones that are all different."
+        raise UsageError(f"the coordinates are not all transformed: {told}", where=h.name, advice=advice)
+    values = [old[path] for path in paths]
+    if isinstance(scene, PointTransformation):
+        before = dict(zip(scene.coordinates, values, strict=True))
+        whole = {x: one.xreplace(before) for x, one in scene.old.items()}
+        return _moved(h, scene.lagrangian, scene.coordinates, scene.velocities, values, new, whole)
+    if not h.is_short:
+        raise UnsupportedError(
+            "its Hamiltonian would fill a page", where=h.name, advice="Use the scene's own coordinates."
+        )
+    eq = EquationsOfMotion(h.assembly, h.formulas.expressions, h.formulas.notation)
+    whole = dict(zip(h.coordinates, values, strict=True))
+    return _moved(h, eq.lagrangian, eq.coordinates, eq.velocities, values, new, whole)
+
+
+def _moved(
+    h: Hamiltonian,
+    lagrangian: Sympy,
+    coordinates: Sequence[Sympy],
+    velocities: Sequence[Sympy],
+    values: Sequence[Sympy],
+    new: tuple[Sympy, ...],
+    whole: Mapping[Sympy, Sympy],
+) -> PointTransformation:
+    """Return a scene in new coordinates from L in old ones, and these in terms of the new."""
+    v = [sympy.Dummy() for _ in velocities]
+    plain = lagrangian.xreplace(dict(zip(velocities, v, strict=True)))
+    plain = plain.xreplace(dict(zip(coordinates, values, strict=True)))
+    still = dict.fromkeys(v, sympy.Integer(0))
+    slopes = [plain.diff(one) for one in v]
+    mass = sympy.Matrix([[one.diff(other) for other in v] for one in slopes])
+    if mass.has(*v):
+        raise UnsupportedError("its Lagrangian is of higher than second degree in the velocities", where=h.name)
+    linear = sympy.Matrix([one.xreplace(still) for one in slopes])
+    by_new = sympy.Matrix([[one.diff(x) for x in new] for one in values])
+    explicit = sympy.Matrix([one.diff(sympy.Symbol("t")) for one in values])
+    known = [one for one in new if one.is_positive] + [one for one, value in h.values.items() if value > 0.0]
+    inertia = (by_new.T * mass * by_new).applyfunc(lambda one: tidied(one, known))
+    inverse, determinant = _inverted(inertia, known)
+    if determinant == 0:
+        raise UsageError(
+            "the new coordinates do not determine the old ones: they depend on each other",
+            where=h.name,
+            advice="Give as many independent coordinates as the scene has.",
+        )
+    positive = _factors(determinant, new)
+    own = (by_new.T * (linear + mass * explicit)).applyfunc(lambda one: tidied(one, [*known, *positive]))
+    rest = plain.xreplace(still) + (linear.T * explicit)[0, 0] + (explicit.T * mass * explicit)[0, 0] / 2
+    rates = sympy.Matrix([sympy.Symbol(f"{one.name}'") for one in new])
+    momenta = sympy.Matrix([sympy.Symbol(f"p_{one.name}") for one in new])
+    n, signs = len(new), [*known, *positive]
+
+    def quadratic(matrix: Sympy, vector: Sympy, of: Sympy, last: Sympy) -> Sympy:
+        """Return a polynomial of second degree, each coefficient as short as it comes."""
+        pairs = [(i, j) for i in range(n) for j in range(i + 1)]
+        squares = (matrix[i, j] * of[i] * of[j] * sympy.Rational(2 - (i == j), 2) for i, j in pairs)
+        return sympy.Add(*squares, *(tidied(vector[i], signs) * of[i] for i in range(n)), last)
+
+    apart = sympy.Add(*(_shorter(one, signs) for one in sympy.Add.make_args(rest)))
+    found = quadratic(inertia, own, rates, _shorter(apart, signs))
+    turned = inverse * own
+    last = _shorter((own.T * turned)[0, 0] / 2 - apart, signs)
+    k = quadratic(inverse, -turned, momenta, last)
+    solved = (inverse * (momenta - own)).applyfunc(sympy.expand)
+    definitions = tuple(_shorter(one, signs) for one in inertia * rates + own)
+    return PointTransformation(
+        new, tuple(rates), tuple(momenta), dict(whole), found, definitions, k, h, positive, tuple(solved)
+    )
+
+
+def _shorter(value: Sympy, positive: Sequence[Sympy]) -> Sympy:
+    """Return an expression as a sum of tidied terms, or tidied as a whole where that is far shorter."""
+    parts = sympy.Add(*(tidied(one, positive) for one in sympy.Add.make_args(value)))
+    whole = tidied(parts, positive)
+    return min((sympy.expand(whole), 1), (parts, 1), (whole, 2), key=lambda one: int(one[0].count_ops()) * one[1])[0]
+
+
+def _inverted(matrix: Sympy, known: Sequence[Sympy]) -> tuple[Sympy, Sympy]:
+    """Return the inverse of a symmetric matrix and its determinant, block by block."""
+    n = matrix.shape[0]
+    inverse, determinant = sympy.zeros(n, n), sympy.Integer(1)
+    for block in sympy.utilities.iterables.connected_components(
+        (list(range(n)), [(i, j) for i in range(n) for j in range(n) if matrix[i, j] != 0])
+    ):
+        part = matrix.extract(block, block)
+        own = tidied(part.det(method="berkowitz"), known)
+        determinant *= own
+        if determinant == 0:
+            break
+        inside = part.adjugate() if len(block) > 1 else sympy.ones(1, 1)
+        for a, i in enumerate(block):
+            for b, j in enumerate(block):
+                inverse[i, j] = tidied(inside[a, b] / own, known)
+    return inverse, determinant
+
+
+def _factors(determinant: Sympy, new: Sequence[Sympy]) -> tuple[Sympy, ...]:
+    """Return the factors of a determinant of a mass matrix that depend on coordinates."""
+    found = (one.as_base_exp()[0] for one in sympy.Mul.make_args(sympy.factor(determinant)))
+    return tuple(-one if is_positive(-one, ()) else one for one in found if one.has(*new))

@@ -1,0 +1,165 @@
+"""Scenes in other coordinates: chained, tidied, with what is ignorable; momenta of both, and frames that move."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy
+
+from atwood import Scene, UnsupportedError, equations, hamiltonian, point_transformation, reduced, simulate
+from atwood.theory.hamiltonian import PointTransformation
+from atwood.theory.hamiltonian.phase_space import vanishes
+from atwood.theory.hamiltonian.tidied import tidied
+from atwood_library import PointMass, Potential
+from atwood_library.scenes import SCENES
+
+R, X, Z, phi, theta, t, w = sympy.symbols("r X Z phi theta t omega")
+SPHERE = {"x": "r*sin(theta)*cos(phi)", "y": "r*sin(theta)*sin(phi)", "z": "r*cos(theta)"}
+
+
+def same(a: Any, b: Any) -> bool:
+    return vanishes([a - b]).proven
+
+
+def relative(scene: Scene) -> PointTransformation:
+    """Return two bodies in coordinates of the centre of mass, X, and of the way between them, x."""
+    m1, m2 = (equations(scene).symbol(f"body{k}.mass") for k in (1, 2))
+    axes = "xz" if scene.space == "plane" else "xyz"
+    old = {}
+    for x in axes:
+        old[f"body1.position.{x}"] = sympy.Symbol(x.upper()) - m2 / (m1 + m2) * sympy.Symbol(x)
+        old[f"body2.position.{x}"] = sympy.Symbol(x.upper()) + m1 / (m1 + m2) * sympy.Symbol(x)
+    return point_transformation(scene, old, [*axes.upper(), *axes])
+
+
+def agree(found: PointTransformation, count: int = 4, time: float = 0.0) -> float:
+    """Return by how much K is off H of the scene in numbers, relative, where frames are at rest."""
+    h, random, worst = found.source, np.random.default_rng(4), 0.0
+    for _ in range(count):
+        at = dict(zip((*found.coordinates, *found.momenta), random.uniform(0.3, 1.4, 2 * len(h.paths)), strict=True))
+        at |= {t: time, **h.values}
+        q, p = ([float(one.xreplace(at)) for one in held.values()] for held in (found.old, found.old_momenta))
+        worst = max(worst, abs(float(found.hamiltonian.xreplace(at)) / float(h(q, p)) - 1.0))
+    return worst
+
+
+def test_two_bodies_in_space_in_two_steps() -> None:
+    """``P^2/2M + (p_r^2 + p_theta^2/r^2 + p_phi^2/(r^2 sin^2 theta))/2 mu - G m1 m2/r`` (Goldstein, section 3.1)."""
+    scene = SCENES["two-body"]()
+    found = point_transformation(relative(scene), SPHERE, ["r", "theta", "phi"])
+    eq = equations(scene)
+    m1, m2, G = (eq.symbol(path) for path in ("body1.mass", "body2.mass", "force.gravitational_constant"))
+    mu = m1 * m2 / (m1 + m2)
+    assert list(map(str, found.coordinates)) == ["X", "Y", "Z", "r", "theta", "phi"]
+    *P, pr, pt, pp = found.momenta
+    expected = sum(one**2 for one in P) / (2 * (m1 + m2)) - G * m1 * m2 / R
+    expected += (pr**2 + pt**2 / R**2 + pp**2 / (R * sympy.sin(theta)) ** 2) / (2 * mu)
+    assert same(found.hamiltonian, expected)
+    assert found.hamiltonian.count_ops() <= expected.count_ops() + 20
+    assert list(map(str, found.ignorable)) == ["X", "Y", "Z", "phi"]
+    assert found.positive == (R, sympy.sin(theta))
+    assert agree(found) < 1e-13
+    whole = dict(zip(hamiltonian(scene).paths, found.old.values(), strict=True))
+    assert same(point_transformation(scene, whole, found.coordinates).lagrangian, found.lagrangian)
+
+
+def test_two_bodies_in_the_plane_are_reduced_to_the_distance() -> None:
+    scene = SCENES["two-body"](space="plane", eccentricity=0.4, mass1=1.3, mass2=0.6)
+    found = point_transformation(relative(scene), {"x": "r*cos(phi)", "z": "r*sin(phi)"}, ["r", "phi"])
+    assert list(map(str, found.ignorable)) == ["X", "Z", "phi"]
+    motion = reduced(found)
+    assert motion.turning_points == pytest.approx((0.6, 1.4), rel=1e-10)
+    assert motion.period == pytest.approx(2.0 * np.pi / np.sqrt(1.9), rel=1e-10)
+    run = simulate(scene, t_end=2.0, rtol=1e-13, solver="taylor", outputs=9)
+    apart = [run[f"body2.position.{x}"] - run[f"body1.position.{x}"] for x in "xz"]
+    along = motion.at(run.time)
+    assert along["r"] * np.exp(1j * along["phi"]) == pytest.approx(apart[0] + 1j * apart[1], abs=1e-9)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.7])
+def test_momenta_of_both_are_inverse_to_each_other(offset: float) -> None:
+    """``p_phi = x p_z - z p_x``, whichever way the polar axes are turned."""
+    scene = SCENES["kepler"](mass=1.7)
+    polar = {"body.position.x": f"r*cos(phi + {offset})", "body.position.z": f"r*sin(phi + {offset})"}
+    found = point_transformation(scene, polar, ["r", "phi"])
+    pr, pphi = found.momenta
+    x, z = found.old.values()
+    px, pz = found.old_momenta
+    assert same(found.new_momenta[pphi], x * pz - z * px)
+    for new in (pr, pphi):
+        back = found.new_momenta[new].xreplace(found.old_momenta)
+        assert same(back, new)
+    assert found.positive == (R,)
+    assert agree(found) < 1e-13
+
+
+def test_a_frame_that_turns_and_then_polar_coordinates() -> None:
+    """``K = H - omega p_phi``, and the centrifugal energy in L (Goldstein, section 8.2)."""
+    scene = SCENES["kepler"]()
+    c, s = sympy.cos(w * t), sympy.sin(w * t)
+    turning = point_transformation(scene, {"body.position.x": X * c - Z * s, "body.position.z": X * s + Z * c}, [X, Z])
+    found = point_transformation(turning, {"X": "r*cos(phi)", "Z": "r*sin(phi)"}, ["r", "phi"])
+    plain = point_transformation(
+        scene, {"body.position.x": "r*cos(phi)", "body.position.z": "r*sin(phi)"}, ["r", "phi"]
+    )
+    assert same(found.hamiltonian, plain.hamiltonian - w * found.momenta[1])
+    m = equations(scene).symbol("body.mass")
+    still = dict.fromkeys(found.velocities, 0)
+    assert same(found.lagrangian.xreplace(still) - plain.lagrangian.xreplace(still), m * w**2 * R**2 / 2)
+    with pytest.raises(UnsupportedError, match="omega in its coordinates have no value"):
+        reduced(found)
+    with_number = found_with(scene, 0.3)
+    run, motion = simulate(scene, t_end=3.0, rtol=1e-13, outputs=7), reduced(with_number)
+    angle = np.arctan2(run["body.position.z"], run["body.position.x"])
+    assert motion.at(run.time)["phi"] == pytest.approx(angle - 0.3 * run.time, abs=1e-9)
+
+
+def found_with(scene: Scene, rate: float) -> PointTransformation:
+    r = sympy.Symbol("r", positive=True)
+    turn = phi + sympy.Float(rate) * t
+    old = {"body.position.x": r * sympy.cos(turn), "body.position.z": r * sympy.sin(turn)}
+    return point_transformation(scene, old, [r, phi])
+
+
+def test_a_frame_that_accelerates() -> None:
+    """``L = m (X' + a t)^2/2``: the momentum is that seen from outside, and K has ``-a t P``."""
+    scene = Scene(gravity=0.0, space="line")
+    scene.add("body", PointMass(mass=1.3))
+    a, m = sympy.Symbol("a"), equations(scene).symbol("body.mass")
+    found = point_transformation(scene, {"body.position.x": X + a * t**2 / 2}, [X])
+    [rate], [momentum] = found.velocities, found.momenta
+    assert same(found.lagrangian, m * (rate + a * t) ** 2 / 2)
+    assert same(found.hamiltonian, momentum**2 / (2 * m) - a * t * momentum)
+
+
+@pytest.mark.parametrize("law", ["(x**2 + z**2)**2/3 + x*z", "exp(-x**2)/(1 + z**2)"])
+@pytest.mark.parametrize(
+    "new",
+    [
+        {"x": "r*cos(phi)", "z": "r*sin(phi)"},
+        {"x": "xi*eta", "z": "(xi**2 - eta**2)/2"},
+        {"x": "cosh(u)*cos(v)", "z": "sinh(u)*sin(v)"},
+        {"x": "a + b", "z": "a*b"},
+    ],
+)
+def test_any_coordinates_of_any_field(law: str, new: dict[str, str]) -> None:
+    scene = Scene(gravity=0.4)
+    field, body = scene.add("field", Potential(energy_function=law)), scene.add("body", PointMass(mass=1.2))
+    scene.connect(field.point, body.point)
+    names = sorted({str(one) for whole in new.values() for one in sympy.sympify(whole).free_symbols})
+    found = point_transformation(scene, {f"body.position.{axis}": one for axis, one in new.items()}, names)
+    assert agree(found) < 1e-12
+
+
+def test_roots_of_squares_keep_their_sign() -> None:
+    a, b, u, v = sympy.symbols("a b u v")
+    assert tidied(sympy.sqrt((a - b) ** 2)) == sympy.Abs(a - b)
+    assert tidied(sympy.sqrt((a - b) ** 2), [a - b]) == a - b
+    assert tidied(sympy.sqrt(sympy.sin(u) ** 2)) == sympy.Abs(sympy.sin(u))
+    whole = (sympy.cosh(u) * sympy.cos(v) - 1) ** 2 + sympy.sinh(u) ** 2 * sympy.sin(v) ** 2
+    assert tidied(sympy.sqrt(whole)) == sympy.cosh(u) - sympy.cos(v)
+    for place in ((0.3, 2.0), (-1.2, 0.4), (2.0, -3.0)):
+        at = dict(zip((u, v), map(sympy.Float, place), strict=True))
+        assert float(tidied(1 / sympy.sqrt(whole)).xreplace(at)) == pytest.approx(float(whole.xreplace(at)) ** -0.5)
