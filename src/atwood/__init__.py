@@ -127,6 +127,7 @@ if TYPE_CHECKING:
         poincare_section,
         tangent_flow,
     )
+    from atwood.theory.formulas.sheet import FormulaSheet, Statement
     from atwood.theory.hamiltonian import (
         CanonicalTransformation,
         Hamiltonian,
@@ -158,6 +159,7 @@ if TYPE_CHECKING:
         trim,
     )
     from atwood.theory.reduction import ReducedMotion, Routhian, reduced, routhian
+    from atwood.theory.rigid import inertia_tensor, rigid_body, rotation_kinematics
     from atwood.theory.symmetry import Conserved, ConservedQuantity, Symmetry, conserved
 
     __version__: str
@@ -209,6 +211,7 @@ __all__ += [
     "Equilibrium",
     "EquilibriumBranch",
     "EquilibriumBranches",
+    "FormulaSheet",
     "Hamiltonian",
     "JoiningMotion",
     "LinearModel",
@@ -226,6 +229,7 @@ __all__ += [
     "SeparatedMotion",
     "Separation",
     "StartSolution",
+    "Statement",
     "Symmetry",
     "TangentFlow",
     "Trim",
@@ -242,6 +246,7 @@ __all__ += [
     "fundamental_brackets",
     "generated_transformation",
     "hamiltonian",
+    "inertia_tensor",
     "linearize",
     "lyapunov_exponents",
     "normal_modes",
@@ -251,7 +256,9 @@ __all__ += [
     "poisson_bracket",
     "poisson_brackets",
     "reduced",
+    "rigid_body",
     "root_locus",
+    "rotation_kinematics",
     "routhian",
     "separation",
     "solve_initial_values",
@@ -344,6 +351,8 @@ _ROOMS = {
         "RootLocus", "Trim", "equilibria", "equilibrium_branches", "linearize", "normal_modes", "root_locus", "trim",
     ),
     "atwood.theory.reduction": ("ReducedMotion", "Routhian", "reduced", "routhian"),
+    "atwood.theory.formulas.sheet": ("FormulaSheet", "Statement"),
+    "atwood.theory.rigid": ("inertia_tensor", "rigid_body", "rotation_kinematics"),
     "atwood.theory.symmetry": ("Conserved", "ConservedQuantity", "Symmetry", "conserved"),
 }  # fmt: skip
 _LATER = {name: room for room, names in _ROOMS.items() for name in names}

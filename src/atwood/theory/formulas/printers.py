@@ -50,11 +50,17 @@ class _Lines(_Printer[str]):
 
     zero: ClassVar[str]
     times: ClassVar[str]
+    relations: ClassVar[Mapping[str, str]] = {}
+    """How conditions are written, which stand in brackets within sums."""
     forms: ClassVar[Mapping[str, str]]
     """How functions are written that are not their name before their arguments in brackets."""
 
     def _sum(self, terms: Iterable[Term]) -> str:
-        written = ""
+        terms, written = tuple(terms), ""
+        if len(terms) == 1 and terms[0].number == 1 and len(terms[0].factors) == 1:
+            node, power = terms[0].factors[0]
+            if power == 1 and isinstance(node, Call) and node.function in self.relations:
+                return self.formula(node)
         for term in terms:
             sign, one = "-" if term.number < 0 else "+", self._term(term)
             written += f" {sign} {one}" if written else f"-{one}" if sign == "-" else one
@@ -98,12 +104,13 @@ class _Text(_Lines):
     """Plain text, with the letters, dots and small figures of Unicode."""
 
     zero, times = "0", " "
-    relations = _relations("≤", "∧", "∨")
+    relations = _relations("≤", "∧", "∨") | {"equal": "{0} = {1}"}
     forms = relations | {
         "select": "({1} if {0} else {2})",
         "logical_not": "¬({0})",
         "pow": "({0})^({1})",
         "absolute": "|{0}|",
+        "integral": "∫[{2}, {3}] {0} d{1}",
     }
     _LETTERS: ClassVar = dict(zip(GREEK, GREEK_SIGNS, strict=True))
     _BELOW, _ABOVE = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉"), str.maketrans("0123456789-/", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻ᐟ")
@@ -148,13 +155,14 @@ class _Latex(_Lines):
     """LaTeX, for use between dollar signs."""
 
     zero, times = "0", " "
-    relations = _relations(r"\le", r"\wedge", r"\vee")
+    relations = _relations(r"\le", r"\wedge", r"\vee") | {"equal": "{0} = {1}"}
     forms = relations | {
         "select": r"\begin{{cases}} {1} & {0} \\ {2} & \text{{else}} \end{{cases}}",
         "logical_not": r"\neg \left({0}\right)",
         "pow": r"\left({0}\right)^{{{1}}}",
         "absolute": r"\left|{0}\right|",
         "floor": r"\left\lfloor {0} \right\rfloor",
+        "integral": r"\int_{{{2}}}^{{{3}}} {0} \, d{1}",
         "exp": "e^{{{0}}}",
     }
     _DOTS = ("", r"\dot", r"\ddot", r"\dddot")

@@ -1,0 +1,216 @@
+"""Sheets of formulas in sympy, written as textbooks write them: in plain text, LaTeX, Markdown and HTML."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from fractions import Fraction
+from typing import Any
+
+from atwood.arguments import Kind, Refused, optional
+from atwood.errors import UsageError, suggestion
+from atwood.lazy_dataclasses import dataclass, replace
+from atwood.lazy_modules import sympy
+from atwood.theory.formulas import page
+from atwood.theory.formulas.book import PI
+from atwood.theory.formulas.page import Line, Matrix, Section
+from atwood.theory.formulas.printers import Sympy, latex, text
+from atwood.theory.formulas.tree import (
+    Call,
+    Factor,
+    Name,
+    Node,
+    Sum,
+    Symbol,
+    Term,
+    alone,
+    in_brackets,
+    in_order,
+    names_in,
+    product,
+)
+
+_UNITS = {"m": "kg", "M": "kg", "I": "kg*m^2", "J": "kg*m^2", "g": "m/s^2"}
+"""Units of letters, by which textbooks order factors: what stands for masses comes first."""
+
+_FUNCTIONS = {"StrictLessThan": "less", "LessThan": "less_equal", "Abs": "absolute", "And": "logical_and"}
+_FUNCTIONS |= {"Or": "logical_or", "Equality": "equal", "Integral": "integral"}
+
+
+def node_of(value: Sympy) -> Node:
+    """Return an expression of sympy as a formula, its products and fractions as they are."""
+    if value.is_Symbol or (isinstance(value, sympy.core.function.AppliedUndef) and value.args == (sympy.Symbol("t"),)):
+        return Name(_symbol_of(str(value) if value.is_Symbol else value.func.__name__, not value.is_Symbol))
+    if isinstance(value, sympy.Derivative):
+        inner = node_of(value.expr)
+        return (
+            Name(inner.symbol, int(value.derivative_count)) if isinstance(inner, Name) else Call("derivative", (inner,))
+        )
+    if value is sympy.pi:
+        return PI
+    if value.is_Number:
+        number = Fraction(int(value.p), int(value.q)) if value.is_Rational else float(value)
+        return Sum((Term(number),) if number else ())
+    if value.is_Add:
+        return in_brackets(map(_term_of, value.args))
+    if value.is_Mul or (value.is_Pow and value.exp.is_Rational):
+        return Sum((_term_of(value),))
+    if isinstance(value, sympy.GreaterThan | sympy.StrictGreaterThan):
+        value = value.reversed
+    name = value.func.__name__
+    arguments = [part for one in value.args for part in (one if isinstance(one, sympy.Tuple) else (one,))]
+    return Call("pow" if value.is_Pow else _FUNCTIONS.get(name, name), tuple(map(node_of, arguments)))
+
+
+def _term_of(value: Sympy) -> Term:
+    factors: list[Factor] = []
+    for one in sympy.Mul.make_args(value):
+        base, power = one.as_base_exp() if one.is_Pow and one.exp.is_Rational else (one, sympy.Integer(1))
+        factors.append((node_of(base), Fraction(int(power.p), int(power.q))))
+    found = in_order(product(Fraction(1), factors))
+    return replace(found, factors=tuple(sorted(found.factors, key=_is_plain_bracket)))
+
+
+def _is_plain_bracket(factor: Factor) -> bool:
+    """Return whether a factor is a sum of what has no mass, which stands last."""
+    return isinstance(factor[0], Sum) and not any("kg" in one.symbol.unit for one in names_in([factor[0]]))
+
+
+def _symbol_of(name: str, moves: bool) -> Symbol:
+    letter, *below = name.split("_")
+    kind = "coordinate" if moves else "momentum" if letter == "p" and below else "parameter"
+    return Symbol(letter, tuple(below), unit=_UNITS.get(letter, "1"), kind=kind)
+
+
+@dataclass(frozen=True, eq=False)
+class Statement:
+    """A formula with its name.
+
+    Attributes
+    ----------
+    name
+        By which a sheet finds it.
+    meaning
+        What it is, in a line.
+    value
+        An expression, a matrix or a relation of sympy.
+    left
+        What it is equal to; a matrix of letters for a vector, None where it stands alone.
+    """
+
+    name: str
+    meaning: str
+    value: Sympy
+    left: Sympy | None = None
+
+
+class FormulaSheet(Mapping[str, Sympy]):
+    """Formulas by name, each an expression, a matrix or a relation of sympy; what moves is a function of `t`.
+
+    Parameters
+    ----------
+    title
+        What they are about.
+    statements
+        The formulas, in order.
+    values
+        Numbers for letters, in SI units, where there are some.
+    """
+
+    def __init__(self, title: str, statements: Iterable[Statement], values: Mapping[str, float] | None = None) -> None:
+        self.title, self.statements, self.values = title, tuple(statements), dict(values or {})
+
+    def __len__(self) -> int:
+        return len(self.statements)
+
+    def __iter__(self) -> Any:
+        return (one.name for one in self.statements)
+
+    def __getitem__(self, name: str) -> Sympy:
+        for one in self.statements:
+            if one.name == name:
+                return one.value
+        advice = suggestion(name, list(self)) or f"There are {', '.join(self)}."
+        raise UsageError("there is no such formula", where=f"{self.title}: {name}", advice=advice)
+
+    def in_letters(self, symbols: Mapping[str, str] | None) -> FormulaSheet:
+        """Return the same formulas in other letters, given by those that they stand for."""
+        known = {one.name: one for s in self.statements for one in _letters_of(s.value, s.left)}
+        by = {}
+        for old, new in (symbols or {}).items():
+            if old not in known:
+                told = suggestion(old, known)
+                raise UsageError("no formula has this letter", where=f"{self.title}: {old}", advice=told)
+            one = known[old]
+            by[one] = sympy.Symbol(new) if one.is_Symbol else sympy.Function(new)(*one.args)
+        if not by:
+            return self
+        moved = [replace(s, value=s.value.xreplace(by), left=s.left and s.left.xreplace(by)) for s in self.statements]
+        return FormulaSheet(self.title, moved, {(symbols or {}).get(name, name): v for name, v in self.values.items()})
+
+    @property
+    def sections(self) -> list[Section]:
+        """The formulas on a page, each under what it means."""
+        return [Section(one.meaning, _lines(one)) for one in self.statements]
+
+    def text(self) -> str:
+        """Return the formulas in plain text."""
+        known = [f"  {text.letter(_symbol_of(name, False))} = {value:.9g}" for name, value in self.values.items()]
+        return "\n".join([page.as_text(self.sections), *(["", "Values, SI units", *known] if known else [])])
+
+    def latex(self) -> str:
+        """Return the formulas in LaTeX, as one aligned block."""
+        return page.as_latex([line for one in self.statements for line in _lines(one)])
+
+    def markdown(self) -> str:
+        """Return a page of Markdown with the formulas between dollar signs."""
+        return page.as_markdown(self.title, self.sections)
+
+    def to_data(self) -> dict[str, Any]:
+        """Return the formulas as plain data: each in sympy's words, in LaTeX, and what it means."""
+        told = {one.name: (str(one.value), page.as_latex(_lines(one)), one.meaning) for one in self.statements}
+        return {name: dict(zip(("formula", "latex", "meaning"), said, strict=True)) for name, said in told.items()}
+
+    def __repr__(self) -> str:
+        return f"<FormulaSheet {self.title}: {', '.join(self)}>"
+
+    def __str__(self) -> str:
+        return self.text()
+
+    def _repr_latex_(self) -> str:
+        return f"$\\displaystyle {self.latex()}$"
+
+    def _repr_html_(self) -> str:
+        return page.as_html(self.title, self.sections)
+
+
+def _letters_of(*values: Sympy | None) -> set[Sympy]:
+    known = [one for one in values if one is not None]
+    return set().union(*(one.free_symbols | one.atoms(sympy.core.function.AppliedUndef) for one in known))
+
+
+def _lines(one: Statement) -> tuple[Line | Matrix, ...]:
+    """Return a statement as it is written: a vector that is equal to named components one by one."""
+    if isinstance(one.left, sympy.MatrixBase):
+        return tuple(Line(_head(left), alone(node_of(value))) for left, value in zip(one.left, one.value, strict=True))
+    left = ("", "") if one.left is None else _head(one.left)
+    if isinstance(one.value, sympy.MatrixBase):
+        rows = one.value.tolist()
+        return (Matrix(left, tuple(tuple(alone(node_of(entry)) for entry in row) for row in rows)),)
+    return (Line(left, alone(node_of(one.value))),)
+
+
+def _head(value: Sympy) -> tuple[str, str]:
+    node = node_of(value)
+    return latex.formula(node), text.formula(node)
+
+
+def _new_letters(value: Any) -> Mapping[str, str]:
+    if not isinstance(value, Mapping) or not all(
+        isinstance(one, str) and one for pair in value.items() for one in pair
+    ):
+        raise Refused
+    return value
+
+
+LETTERS: Kind = optional(Kind("a dictionary of letters, such as {'phi': 'alpha'}", _new_letters))
+"""Other letters by those that formulas have."""
