@@ -28,7 +28,7 @@ def test_euler_s_equations_are_those_of_a_scene() -> None:
     u = np.random.default_rng(1).normal(size=6)
     own = [i for i, name in enumerate(found.speeds) if "spin" in name or "omega" in name or "angular" in name]
     assert len(own) == 3
-    values = dict(zip(W, u[own], strict=True)) | {sympy.Symbol(k): v for k, v in sheet.values.items()}
+    values = dict(zip(W, u[own], strict=True)) | {sympy.Symbol(k): v for k, v in sheet.numbers.items()}
     values |= dict.fromkeys(sympy.symbols("N_1:4"), 0)
     right = np.array(sheet["euler"].subs(values), dtype=float).ravel()
     assert found.forward_dynamics(q, u)[own] == pytest.approx(right / [1.0, 2.0, 3.0], abs=1e-13)
@@ -38,7 +38,7 @@ def test_euler_s_equations_are_those_of_a_scene() -> None:
 def test_energy_and_angular_momentum_along_a_run(form: str) -> None:
     result = atwood.simulate(FreeBody(), t_end=2.0, rtol=1e-10, form=form)
     sheet = rigid_body(FreeBody())
-    numbers = {sympy.Symbol(k): v for k, v in sheet.values.items()}
+    numbers = {sympy.Symbol(k): v for k, v in sheet.numbers.items()}
     written = sympy.lambdify(W, [sheet["T"].subs(numbers), sheet["L"].subs(numbers).norm()])
     energy, size = written(*(result[f"body.spin.{axis}"] for axis in "xyz"))
     assert result["body.turning_energy"] == pytest.approx(energy, rel=1e-12)
@@ -75,7 +75,7 @@ def test_orbital_and_internal_parts_make_the_whole() -> None:
     names = {sympy.Function(n)(T): result[f"body.position.{n}"][-1] for n in "xyz"}
     rates = {sympy.Function(n)(T).diff(T): result[f"body.velocity.{n}"][-1] for n in "xyz"}
     own = {sympy.Symbol(f"L_S{n}"): result[f"body.angular_momentum.{n}"][-1] for n in "xyz"}
-    values = {sympy.Symbol("m"): sheet.values["m"], sympy.Symbol("T_S"): result["body.turning_energy"][-1], **own}
+    values = {sympy.Symbol("m"): sheet.numbers["m"], sympy.Symbol("T_S"): result["body.turning_energy"][-1], **own}
     whole = np.array(sheet["total"].subs(rates).subs(names).subs(values), dtype=float).ravel()
     assert whole == pytest.approx([result[f"angular_momentum.{n}"][-1] for n in "xyz"], abs=1e-9)
     energy = float(sheet["energy"].subs(rates).subs(values))

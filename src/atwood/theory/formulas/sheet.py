@@ -112,12 +112,12 @@ class FormulaSheet(Mapping[str, Sympy]):
         What they are about.
     statements
         The formulas, in order.
-    values
-        Numbers for letters, in SI units, where there are some.
+    numbers
+        Values of letters, in SI units, where there are some.
     """
 
-    def __init__(self, title: str, statements: Iterable[Statement], values: Mapping[str, float] | None = None) -> None:
-        self.title, self.statements, self.values = title, tuple(statements), dict(values or {})
+    def __init__(self, title: str, statements: Iterable[Statement], numbers: Mapping[str, float] | None = None) -> None:
+        self.title, self.statements, self.numbers = title, tuple(statements), dict(numbers or {})
 
     def __len__(self) -> int:
         return len(self.statements)
@@ -145,7 +145,7 @@ class FormulaSheet(Mapping[str, Sympy]):
         if not by:
             return self
         moved = [replace(s, value=s.value.xreplace(by), left=s.left and s.left.xreplace(by)) for s in self.statements]
-        return FormulaSheet(self.title, moved, {(symbols or {}).get(name, name): v for name, v in self.values.items()})
+        return FormulaSheet(self.title, moved, {(symbols or {}).get(name, name): v for name, v in self.numbers.items()})
 
     @property
     def sections(self) -> list[Section]:
@@ -154,7 +154,7 @@ class FormulaSheet(Mapping[str, Sympy]):
 
     def text(self) -> str:
         """Return the formulas in plain text."""
-        known = [f"  {text.letter(_symbol_of(name, False))} = {value:.9g}" for name, value in self.values.items()]
+        known = [f"  {text.letter(_symbol_of(name, False))} = {value:.9g}" for name, value in self.numbers.items()]
         return "\n".join([page.as_text(self.sections), *(["", "Values, SI units", *known] if known else [])])
 
     def latex(self) -> str:

@@ -1,4 +1,4 @@
-"""A rigid body in its principal axes: of a scene, as numbers, and in letters: energy, angular momentum, Euler's equations."""
+"""A rigid body in its principal axes, of a scene or in letters: energy, angular momentum, Euler's equations."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ def rigid_body(
     -------
     FormulaSheet
         ``T``, ``L``, ``euler``: the rates of the angular velocity under a torque N; ``T_angles`` and ``momenta`` in
-        angles; ``energy`` and ``total``: of the whole motion. `FormulaSheet.values` are those of the scene's body.
+        angles; ``energy`` and ``total``: of the whole motion. `FormulaSheet.numbers` are those of the scene's body.
     """
     own = None if scene is None else principal_body(assembly_of(scene), body)
     symmetric = symmetric or (own is not None and bool(abs(own.moments[0] - own.moments[1]) <= 1e-9 * max(own.moments)))
