@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from typing import Any
 
-from atwood.arguments import Kind, Refused, optional
 from atwood.errors import UsageError, suggestion
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import sympy
@@ -202,15 +201,3 @@ def _lines(one: Statement) -> tuple[Line | Matrix, ...]:
 def _head(value: Sympy) -> tuple[str, str]:
     node = node_of(value)
     return latex.formula(node), text.formula(node)
-
-
-def _new_letters(value: Any) -> Mapping[str, str]:
-    if not isinstance(value, Mapping) or not all(
-        isinstance(one, str) and one for pair in value.items() for one in pair
-    ):
-        raise Refused
-    return value
-
-
-LETTERS: Kind = optional(Kind("a dictionary of letters, such as {'phi': 'alpha'}", _new_letters))
-"""Other letters by those that formulas have."""

@@ -9,8 +9,9 @@ from atwood.arguments import check, one_of, takes_names
 from atwood.lazy_modules import sympy
 from atwood.model.values.rotation import Rotation, Turn
 from atwood.model.values.space import Vector
+from atwood.theory.formulas.notation import SYMBOLS
 from atwood.theory.formulas.printers import Sympy
-from atwood.theory.formulas.sheet import LETTERS, FormulaSheet, Statement
+from atwood.theory.formulas.sheet import FormulaSheet, Statement
 
 SEQUENCES = tuple("".join(one) for one in product("xyz", repeat=3) if one[0] != one[1] != one[2])
 
@@ -53,7 +54,7 @@ def rotation_kinematics(
     angles, turns = (check(kind, v, n) for kind, v, n in ((_ANGLES, angles, "angles"), (_TURNS, turns, "turns")))
     found = _quaternion() if angles == "quaternion" else _turned(angles, turns == "fixed")
     sense = "" if angles == "quaternion" else f", {turns} axes"
-    return FormulaSheet(f"Rotation: {angles}{sense}", found).in_letters(check(LETTERS, symbols, "symbols"))
+    return FormulaSheet(f"Rotation: {angles}{sense}", found).in_letters(check(SYMBOLS, symbols, "symbols"))
 
 
 def matrix_of(*turns: Turn) -> Sympy:

@@ -21,8 +21,9 @@ from atwood.pipeline import SCENE, assembly_of
 from atwood.simulation.initialization.start import find_start
 from atwood.solids.properties import MassProperties
 from atwood.theory.dynamics.dynamics import dynamics
+from atwood.theory.formulas.notation import SYMBOLS
 from atwood.theory.formulas.printers import Sympy
-from atwood.theory.formulas.sheet import LETTERS, FormulaSheet, Statement
+from atwood.theory.formulas.sheet import FormulaSheet, Statement
 from atwood.theory.rigid.angles import SEQUENCES, rotation_kinematics
 
 _STILL = 1e-5
@@ -122,7 +123,7 @@ def _vector(assembly: Assembly, path: str, t: float, q: FloatArray, u: FloatArra
     return np.asarray(assembly.kernel(program)([t], q, u, *idle)[0], dtype=float)
 
 
-@takes(scene=optional(SCENE), body=optional(TEXT), angles=one_of(SEQUENCES), symmetric=FLAG, symbols=LETTERS)
+@takes(scene=optional(SCENE), body=optional(TEXT), angles=one_of(SEQUENCES), symmetric=FLAG, symbols=SYMBOLS)
 def rigid_body(
     scene: Model | Assembly | None = None,
     body: str | None = None,

@@ -7,8 +7,9 @@ from typing import Any, NamedTuple
 
 from atwood.arguments import Kind, Refused, check, either, one_of, optional, takes_names
 from atwood.lazy_modules import sympy
+from atwood.theory.formulas.notation import SYMBOLS
 from atwood.theory.formulas.printers import Sympy
-from atwood.theory.formulas.sheet import LETTERS, FormulaSheet, Statement
+from atwood.theory.formulas.sheet import FormulaSheet, Statement
 from atwood.theory.hamiltonian.phase_space import as_expression
 
 
@@ -102,7 +103,7 @@ def inertia_tensor(shape: str, about: Any = "centre", *, symbols: Mapping[str, s
         Statement("I", "Inertia tensor about the point", tensor, sympy.Symbol("I")),
         *_principal(each, m),
     ]
-    return FormulaSheet(f"Inertia of a {kind}", found).in_letters(check(LETTERS, symbols, "symbols"))
+    return FormulaSheet(f"Inertia of a {kind}", found).in_letters(check(SYMBOLS, symbols, "symbols"))
 
 
 def _principal(tensor: Sympy, m: Sympy) -> list[Statement]:
