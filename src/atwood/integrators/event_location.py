@@ -31,7 +31,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.codegen.tangents import FULL, SECANT, STEEP
 from atwood.errors import KernelEvaluationError
-from atwood.integrators.protocol import JUST_HAPPENED, ImplicitProblem, State, Values
+from atwood.integrators.protocol import JUST_HAPPENED, ExplicitProblem, ImplicitProblem, State, Values
 from atwood.lazy_dataclasses import dataclass
 
 Interpolant = Callable[[float], State]
@@ -129,7 +129,7 @@ class EventLocator:
         A typical length of the run: what is shorter by the rounding of the arithmetic counts as one moment.
     """
 
-    def __init__(self, problem: ImplicitProblem, horizon: float) -> None:
+    def __init__(self, problem: ImplicitProblem | ExplicitProblem, horizon: float) -> None:
         assert problem.events is not None
         self._function = problem.events
         self._directions = problem.event_directions or (0,) * problem.event_count

@@ -9,24 +9,23 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from math import inf, isfinite
-from typing import cast
 
 import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import StartError, UsageError
-from atwood.integrators.event_location import ROUNDING, EventLocator, Root
+from atwood.integrators.event_location import ROUNDING
 from atwood.integrators.protocol import (
     Budget,
     ExplicitProblem,
-    ImplicitProblem,
     Lookout,
     SolverOptions,
+    State,
     Statistics,
     Status,
     StepResult,
 )
-from atwood.integrators.session import Session, copied
+from atwood.integrators.session import SteppingSession, copied
 from atwood.integrators.stepper import Outcome, Stepper
 
 FIRST_CHUNK, LARGEST_CHUNK = 4000, 100_000
@@ -42,7 +41,7 @@ _STALLED = 50
 Leave = Callable[[float, FloatArray], bool]
 
 
-class ExplicitSession(Session):
+class ExplicitSession(SteppingSession):
     """A run in progress.
 
     Parameters
@@ -76,34 +75,21 @@ class ExplicitSession(Session):
         leave: Leave | None = None,
         end: float = inf,
     ) -> None:
-        self._size = problem.size
+        super().__init__(problem, options.horizon, budget)
         self._stepper = stepper
-        self._problem = problem
-        self._watch(options.horizon)
         events = problem.compiled_events
         self._notices = events is not None and stepper.watch(events)  # whether the stepper looks for events by itself
         if leave is not None:
             stepper.heed_stiffness()
-        self._no_events = (0,) * problem.event_count
         self._is_watched = False
         self._chunk = max(1, FIRST_CHUNK // problem.size)
-        self._begin(t, y, budget, leave, end)
+        self._begin(t, y, leave, end)
 
-    def _begin(self, t: float, y: FloatArray, budget: Budget | None, leave: Leave | None, end: float) -> None:
-        """Set all that belongs to one run."""
-        self.budget = budget or Budget()
-        self._opened = 0.0  # when it first went on
+    def _begin(self, t: float, y: FloatArray, leave: Leave | None, end: float) -> None:
+        """Start a run that has cost nothing so far."""
         self._end = end
         self._leave, self._judged, self._is_left = leave, 0, False
-        self._starts = 0
-        self._seconds = 0.0
         self.reinitialize(t, y)
-
-    def _watch(self, horizon: float) -> None:
-        """Look for events, if there are any, with signs that are not known yet."""
-        # The watch reads nothing of a problem but its events.
-        watched = cast("ImplicitProblem", self._problem)
-        self._locator = EventLocator(watched, horizon) if watched.events is not None else None
 
     def begin_again(
         self,
@@ -121,8 +107,8 @@ class ExplicitSession(Session):
         sessions that were opened to leave stiff problems to others or not, as this run does.
         """
         self._stepper.renew(horizon, absolute)
-        self._watch(horizon)
-        self._begin(t, y, budget, leave, end)
+        self._begin_count(horizon, budget)
+        self._begin(t, y, leave, end)
 
     def look_out(self, lookout: Lookout) -> bool:
         """Let the motion be looked at, and end with `Status.NOTICED` where something is seen; return whether it can."""
@@ -164,9 +150,10 @@ class ExplicitSession(Session):
         if not self._stepper.start(float(t), values):
             raise StartError(f"the right-hand side has no finite value at the start, t = {t:.9g}")
         self._here = self._newest = self._stepper.state()
+        self._reached = min(self._here[0], self._end)
         if self._locator is not None:
             self._locator.restart(self._here)
-        self._root: Root | None = None
+        self._root = None
         self._searched = self._here[0]
         self._stalled = 0
         self._stale = self._sees = False
@@ -220,7 +207,7 @@ class ExplicitSession(Session):
         self._learn(time.perf_counter() - looked, outcome)
         count = len(y)
         values[:count], rates[:count] = y, yp
-        self._arrive(outcome)
+        self._take_up(outcome)
         if count:
             self._here = (float(times[count - 1]), y[-1].copy(), yp[-1].copy())
         return count, outcome
@@ -231,17 +218,18 @@ class ExplicitSession(Session):
         self._tell_signs()
         outcome = self._stepper.run(t_out, steps)
         self._learn(time.perf_counter() - looked, outcome)
-        self._arrive(outcome)
+        self._take_up(outcome)
         return outcome
 
     def _tell_signs(self) -> None:
         if self._notices and self._locator is not None:
             self._stepper.expect(self._locator.signs)
 
-    def _arrive(self, outcome: Outcome) -> None:
+    def _take_up(self, outcome: Outcome) -> None:
         """Take up where the stepper came to, and up to where nothing has happened for certain."""
         before = self._newest[0]
         self._newest = self._stepper.state()
+        self._reached = min(self._newest[0], self._end)
         self._sees = self._sees or (self._is_watched and self._stepper.has_seen())
         if self._locator is None:
             self._searched = self._newest[0]
@@ -249,38 +237,18 @@ class ExplicitSession(Session):
             last = self._newest[0] if outcome is not Outcome.NOTICED else self._stepper.begin_of_step()
             self._searched = max(self._searched, last)
 
-    def _run(self, t_out: float) -> StepResult:
-        if self._stale:
-            self.reinitialize(self._here[0], self._here[1])
-        while True:
-            root = self._find_root()
-            if root is not None and root.state[0] <= t_out:
-                self._root = None
-                self._here = root.state
-                return StepResult(*copied(root.state), Status.EVENT, root.events)
-            if self._sees:
-                self._sees = False
-                self._here = self._newest if t_out >= self._newest[0] else self._stepper.interpolate(t_out)
-                return StepResult(*copied(self._here), Status.NOTICED, self._no_events)
-            if t_out <= self._newest[0]:
-                self._here = self._newest if t_out == self._newest[0] else self._stepper.interpolate(t_out)
-                return StepResult(*copied(self._here), Status.REACHED, self._no_events)
-            self._here = self._newest
-            limit = self._limit()
-            if limit is not None:
-                return limit
-            failure = self._step(t_out)
-            if failure is not None:
-                return failure
+    def _interpolate(self, t: float) -> State:
+        return self._stepper.interpolate(t)
 
-    def _find_root(self) -> Root | None:
-        """Return the first root in the part of the last step that has not been handed out."""
-        locator = self._locator
-        end = min(self._newest[0], self._end)
-        if locator is not None and self._root is None and self._searched < end:
-            self._root = locator.search(self._searched, end, self._stepper.interpolate)
-            self._searched = self._root.state[0] if self._root else end
-        return self._root
+    def _arrive(self, t_out: float) -> StepResult | None:
+        status, newest = Status.NOTICED if self._sees else Status.REACHED, self._newest[0]
+        is_there = self._sees or t_out <= newest
+        self._here = self._newest if t_out >= newest or not is_there else self._stepper.interpolate(t_out)
+        self._sees = False
+        return StepResult(*copied(self._here), status, self._no_events) if is_there else None
+
+    def _count_steps(self) -> int:
+        return self._stepper.counts.steps
 
     def _allowed(self) -> int:
         """Return how many steps may be taken before the next look at limits and events."""
@@ -331,4 +299,4 @@ class ExplicitSession(Session):
         """Return the end of a run that is to be left to an implicit method, or has used up a limit."""
         if self._leave is not None and self._leaves():
             return self._stopped(Status.STIFF, "steps are kept short by stability alone")
-        return self._exceeded(lambda: self._stepper.counts.steps)
+        return super()._limit()

@@ -107,8 +107,7 @@ class ImplicitProblem:
     begin: Callable[[float, FloatArray, FloatArray], None] | None = None
 
     def __post_init__(self) -> None:
-        if self.size < 1:
-            raise UsageError("a problem needs at least one unknown")
+        _check_watch(self)
         rows, columns = (np.asarray(part, dtype=np.intp) for part in self.pattern)
         object.__setattr__(self, "pattern", (rows, columns))
         if rows.ndim != 1 or rows.shape != columns.shape:
@@ -119,12 +118,6 @@ class ImplicitProblem:
             raise UsageError("the pattern must go by column and then by row, and name each place once")
         if not all(0 <= index < self.size for index in self.algebraic):
             raise UsageError(f"the algebraic unknowns must lie in 0..{self.size - 1}")
-        if (self.events is None) != (self.event_count == 0):
-            raise UsageError("give both the event function and the number of events, or neither")
-        if self.event_directions and len(self.event_directions) != self.event_count:
-            raise UsageError(f"{self.event_count} events need as many directions")
-        if not set(self.event_directions) <= {-1, 0, 1}:
-            raise UsageError("an event direction is -1, 0 or +1")
 
     @property
     def density(self) -> float:
@@ -502,14 +495,7 @@ class ExplicitProblem:
     guard: StepGuard | None = None
 
     def __post_init__(self) -> None:
-        if self.size < 1:
-            raise UsageError("a problem needs at least one unknown")
-        if (self.events is None) != (self.event_count == 0):
-            raise UsageError("give both the event function and the number of events, or neither")
-        if self.event_directions and len(self.event_directions) != self.event_count:
-            raise UsageError(f"{self.event_count} events need as many directions")
-        if not set(self.event_directions) <= {-1, 0, 1}:
-            raise UsageError("an event direction is -1, 0 or +1")
+        _check_watch(self)
 
 
 LOOSEST = 1e-3
@@ -519,12 +505,24 @@ LOOSEST = 1e-3
 _TINY = float(np.finfo(float).tiny)
 
 
-def absolute_tolerances(options: SolverOptions, size: int) -> FloatArray:
-    """Return the absolute tolerance of each unknown; nothing is divided by zero where it is zero."""
+def absolute_tolerances(options: SolverOptions, size: int, least: float = _TINY) -> FloatArray:
+    """Return the absolute tolerance of each unknown; by default nothing is divided by zero where it is zero."""
     if isinstance(options.absolute_tolerances, float):
-        return np.full(size, max(options.absolute_tolerances, _TINY))
+        return np.full(size, max(options.absolute_tolerances, least))
     try:
         given = np.asarray(options.absolute_tolerances, dtype=np.float64)
-        return np.maximum(given if given.shape == (size,) else np.broadcast_to(given, (size,)), _TINY)
+        return np.maximum(given if given.shape == (size,) else np.broadcast_to(given, (size,)), least)
     except ValueError:
         raise UsageError(f"give one absolute tolerance, or one for each of the {size} unknowns") from None
+
+
+def _check_watch(problem: ImplicitProblem | ExplicitProblem) -> None:
+    """Refuse a problem without unknowns, or with events that do not fit each other."""
+    if problem.size < 1:
+        raise UsageError("a problem needs at least one unknown")
+    if (problem.events is None) != (problem.event_count == 0):
+        raise UsageError("give both the event function and the number of events, or neither")
+    if problem.event_directions and len(problem.event_directions) != problem.event_count:
+        raise UsageError(f"{problem.event_count} events need as many directions")
+    if not set(problem.event_directions) <= {-1, 0, 1}:
+        raise UsageError("an event direction is -1, 0 or +1")

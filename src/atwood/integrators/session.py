@@ -13,7 +13,16 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, UsageError
 from atwood.integrators.event_location import EventLocator, Root
-from atwood.integrators.protocol import Budget, Lookout, State, Statistics, Status, StepResult
+from atwood.integrators.protocol import (
+    Budget,
+    ExplicitProblem,
+    ImplicitProblem,
+    Lookout,
+    State,
+    Statistics,
+    Status,
+    StepResult,
+)
 
 _T = TypeVar("_T")
 
@@ -29,41 +38,12 @@ class Session(ABC):
     """Whether it integrates independent coordinates alone and hands out all."""
 
     budget: Budget
-    _here: State
+    _here: State  # what was handed out last
     _no_events: tuple[int, ...]
-    _locator: EventLocator | None
-    _root: Root | None
-    _opened: float
-    _seconds: float
-    _stale: bool
-
-    def advance(self, t_out: float) -> StepResult:
-        """Go on to exactly a time, or stop earlier at an event, a limit or a failure."""
-        if not self._here[0] <= t_out < inf:
-            raise UsageError(f"cannot advance from t = {self._here[0]:.9g} to t = {t_out:.9g}")
-        return self._taken(lambda: self._run(float(t_out)))
 
     @abstractmethod
-    def _run(self, t_out: float) -> StepResult:
-        """Go on to a time, or as far as nothing stops it."""
-
-    def _taken(self, go: Callable[[], _T]) -> _T | StepResult:
-        """Return what a way on gives, or why it ended; it then goes on from the state that was handed out last."""
-        began = time.perf_counter()
-        self._opened = self._opened or began
-        try:
-            return go()
-        except KeyboardInterrupt:
-            self._stale = True
-            return self._stopped(Status.INTERRUPTED, "interrupted")
-        except KernelEvaluationError as error:
-            self._stale = True
-            return self._stopped(Status.FAILED, str(error))
-        except BaseException:
-            self._stale = True
-            raise
-        finally:
-            self._seconds += time.perf_counter() - began
+    def advance(self, t_out: float) -> StepResult:
+        """Go on to exactly a time, or stop earlier at an event, a limit or a failure."""
 
     @abstractmethod
     def reinitialize(self, t: float, y: FloatArray, yp: FloatArray | None = None) -> None:
@@ -84,9 +64,9 @@ class Session(ABC):
         return StepResult(*copied(self._here), Status.REACHED, self._no_events)
 
     @property
+    @abstractmethod
     def handed_on(self) -> tuple[int, ...]:
         """What a start from here is to know of the events; see `EventLocator.handed_on`."""
-        return () if self._locator is None else self._locator.handed_on(self._here[0], self._root)
 
     def sample(self, times: FloatArray) -> tuple[FloatArray, FloatArray, StepResult]:
         """Integrate until an event; return values and rates at the times that were reached, and how it ended."""
@@ -115,12 +95,110 @@ class Session(ABC):
         """Take no longer steps from now on than this, nor than the options allow, where they can be limited."""
         return
 
-    def _exceeded(self, steps: Callable[[], int]) -> StepResult | None:
+
+class SteppingSession(Session):
+    """A run in progress by steps of a method, of which each leaves an interpolant behind.
+
+    Parameters
+    ----------
+    problem
+        The equations.
+    horizon
+        A typical length of the run, s.
+    budget
+        Limits of the session.
+    """
+
+    _problem: ImplicitProblem | ExplicitProblem
+    _reached: float  # up to where the solution is known
+    _searched: float  # up to where no event has happened for certain
+    _root: Root | None  # the next event, where it is known
+    _stale: bool  # whether the method starts anew where it goes on
+
+    def __init__(self, problem: ImplicitProblem | ExplicitProblem, horizon: float, budget: Budget | None) -> None:
+        self._size, self._problem = problem.size, problem
+        self._no_events = (0,) * problem.event_count
+        self._begin_count(horizon, budget)
+
+    def _begin_count(self, horizon: float, budget: Budget | None) -> None:
+        """Begin a run that has cost nothing so far, and knows no sign of an event."""
+        self.budget = budget or Budget()
+        self._opened, self._seconds, self._starts = 0.0, 0.0, 0
+        problem = self._problem
+        self._locator = None if problem.events is None else EventLocator(problem, horizon)
+
+    @property
+    def handed_on(self) -> tuple[int, ...]:
+        """What a start from here is to know of the events; see `EventLocator.handed_on`."""
+        return () if self._locator is None else self._locator.handed_on(self._here[0], self._root)
+
+    def advance(self, t_out: float) -> StepResult:
+        """Go on to exactly a time, or stop earlier at an event, a limit or a failure."""
+        if not self._here[0] <= t_out < inf:
+            raise UsageError(f"cannot advance from t = {self._here[0]:.9g} to t = {t_out:.9g}")
+        return self._taken(lambda: self._run(float(t_out)))
+
+    def _taken(self, go: Callable[[], _T]) -> _T | StepResult:
+        """Return what a way on gives, or why it ended; it then goes on from the state that was handed out last."""
+        began = time.perf_counter()
+        self._opened = self._opened or began
+        try:
+            return go()
+        except KeyboardInterrupt:
+            self._stale = True
+            return self._stopped(Status.INTERRUPTED, "interrupted")
+        except KernelEvaluationError as error:
+            self._stale = True
+            return self._stopped(Status.FAILED, str(error))
+        except BaseException:
+            self._stale = True
+            raise
+        finally:
+            self._seconds += time.perf_counter() - began
+
+    def _run(self, t_out: float) -> StepResult:
+        """Go on to a time, or as far as nothing stops it."""
+        if self._stale:
+            self.reinitialize(*self._here)
+        while True:
+            root = self._find_root(t_out)
+            if root is not None and root.state[0] <= t_out:
+                self._root, self._here = None, root.state
+                return StepResult(*copied(root.state), Status.EVENT, root.events)
+            ended = self._arrive(t_out) or self._limit() or self._step(t_out)
+            if ended is not None:
+                return ended
+
+    def _find_root(self, t_out: float = inf) -> Root | None:
+        """Return the first root in the part of the last step that has not been handed out."""
+        locator, end = self._locator, self._reached
+        if locator is not None and self._root is None and self._searched < end:
+            self._root = locator.search(self._searched, end, self._interpolate)
+            self._searched = self._root.state[0] if self._root else end
+        return self._root
+
+    @abstractmethod
+    def _interpolate(self, t: float) -> State:
+        """Return the state at a time within the last step."""
+
+    @abstractmethod
+    def _arrive(self, t_out: float) -> StepResult | None:
+        """Return the state at a time that has been reached; otherwise stand at the end of the last step."""
+
+    @abstractmethod
+    def _step(self, t_out: float) -> StepResult | None:
+        """Take a step, or several towards a time, and return an answer only if that ended the run."""
+
+    @abstractmethod
+    def _count_steps(self) -> int:
+        """Return how many steps were taken so far, over all restarts."""
+
+    def _limit(self) -> StepResult | None:
         """Return the end of a run that has used up a limit."""
         budget = self.budget
         if budget.poll is not None:
             budget.poll(self._here[0])
-        if budget.max_steps is not None and steps() >= budget.max_steps:
+        if budget.max_steps is not None and self._count_steps() >= budget.max_steps:
             return self._stopped(Status.STEP_LIMIT, f"the limit of {budget.max_steps} steps was used up")
         if budget.wall_seconds is not None and time.perf_counter() - self._opened >= budget.wall_seconds:
             return self._stopped(Status.TIME_LIMIT, f"the limit of {budget.wall_seconds:g} s was used up")

@@ -38,8 +38,8 @@ class Record:
 
     Attributes
     ----------
-    undefined
-        How often there was no finite value.
+    residuals, jacobians, undefined
+        How often Python functions were called, as far as somebody counts it, and how often there was no finite value.
     complaint, equation, time
         The last of these: in words, in which equation, and when.
     error
@@ -50,6 +50,8 @@ class Record:
         Whether any of the functions is one of Python.
     """
 
+    residuals: int = 0
+    jacobians: int = 0
     undefined: int = 0
     complaint: str = ""
     equation: int | None = None
@@ -58,13 +60,40 @@ class Record:
     interrupted: bool = False
     calls_python: bool = False
 
-    def note(self, t: float, what: str, equation: int | None = None) -> int:
-        """Take up that there was no value, and return the answer to IDA."""
+    def note(self, t: float, what: str, equation: int | None = None) -> None:
+        """Take up that there was no value."""
         self.undefined += 1
         self.complaint = f"at t = {t:.9g} {what}"
         self.equation = equation
         self.time = t
-        return RECOVERABLE
+
+    def take_residual(self, problem: ImplicitProblem, t: float, y: FloatArray, yp: FloatArray, out: FloatArray) -> bool:
+        """Write the residual; return whether it has a value, which is noted where it has none."""
+        try:
+            out[:] = problem.residual(t, y, yp)
+        except NO_VALUE as error:
+            self.note(t, f"the residual has no value: {error}")
+            return False
+        bad = _first_undefined(out)
+        if bad is not None:
+            self.note(t, f"the residual of equation {bad} is {out[bad]}", bad)
+        return bad is None
+
+    def take_jacobian(
+        self, problem: ImplicitProblem, t: float, y: FloatArray, yp: FloatArray, cj: float
+    ) -> FloatArray | None:
+        """Return the entries of the Jacobian; None where they have no value, which is noted."""
+        try:
+            entries = np.asarray(problem.jacobian(t, y, yp, cj), dtype=np.float64)
+        except NO_VALUE as error:
+            self.note(t, f"the Jacobian has no value: {error}")
+            return None
+        bad = _first_undefined(entries)
+        if bad is None:
+            return entries
+        equation = int(problem.pattern[0][bad])
+        self.note(t, f"the Jacobian of equation {equation} is not finite", equation)
+        return None
 
     def fail(self, error: BaseException) -> int:
         """Keep an exception, and return the answer to IDA."""
@@ -79,6 +108,14 @@ class Record:
         if self.interrupted:
             self.interrupted = False
             raise KeyboardInterrupt
+
+
+def _first_undefined(values: FloatArray) -> int | None:
+    """Return the number of the first value that is not finite."""
+    if np.dot(values, values) < inf:
+        return None
+    finite = np.isfinite(values)
+    return None if finite.all() else int(finite.argmin())
 
 
 class _Views:
@@ -110,38 +147,36 @@ def address(function: Any) -> int:
     return ctypes.cast(function, c_void_p).value or 0
 
 
+def _answering(record: Record, function: Callable[..., int]) -> Callable[..., int]:
+    """Return a function that IDA may call: no exception leaves it."""
+
+    def answer(*given: Any) -> int:
+        if record.interrupted:
+            return BROKEN
+        try:
+            return function(*given)
+        except BaseException as error:
+            return record.fail(error)
+
+    record.calls_python = True
+    return answer
+
+
 def residual_function(problem: ImplicitProblem, record: Record, library: SundialsLibrary) -> Any:
     """Return the residual as an ``IDAResFn``."""
-    function, dot = problem.residual, np.dot
     given = _Views(problem.size, library.N_VGetArrayPointer, writeable=False)
     wanted = _Views(problem.size, library.N_VGetArrayPointer, writeable=True)
 
     def residual(t: float, y: int, yp: int, out: int, _: int | None) -> int:
-        if record.interrupted:
-            return BROKEN
-        try:
-            values = wanted(out)
-            values[:] = function(t, given(y), given(yp))
-            if not dot(values, values) < inf:
-                finite = np.isfinite(values)
-                if not finite.all():
-                    equation = int(finite.argmin())
-                    return record.note(t, f"the residual of equation {equation} is {values[equation]}", equation)
-        except NO_VALUE as error:
-            return record.note(t, f"the residual has no value: {error}")
-        except BaseException as error:
-            return record.fail(error)
-        return GOOD
+        return GOOD if record.take_residual(problem, t, given(y), given(yp), wanted(out)) else RECOVERABLE
 
-    record.calls_python = True
-    return RESIDUAL(residual)
+    return RESIDUAL(_answering(record, residual))
 
 
 def jacobian_function(
     problem: ImplicitProblem, record: Record, library: SundialsLibrary, linear_solver: LinearSolver
 ) -> Any:
     """Return the Jacobian as an ``IDALsJacFn``."""
-    function, dot = problem.jacobian, np.dot
     rows, columns = problem.pattern
     given = _Views(problem.size, library.N_VGetArrayPointer, writeable=False)
     if linear_solver == "sparse":
@@ -153,24 +188,13 @@ def jacobian_function(
         places = columns * problem.size + rows
 
     def jacobian(t: float, cj: float, y: int, yp: int, _: int, matrix: int, *more: int | None) -> int:
-        if record.interrupted:
-            return BROKEN
-        try:
-            entries = np.asarray(function(t, given(y), given(yp), cj), dtype=np.float64)
-            entries_of(matrix)[places] = entries
-            if not dot(entries, entries) < inf:
-                finite = np.isfinite(entries)
-                if not finite.all():
-                    equation = int(rows[finite.argmin()])
-                    return record.note(t, f"the Jacobian of equation {equation} is not finite", equation)
-        except NO_VALUE as error:
-            return record.note(t, f"the Jacobian has no value: {error}")
-        except BaseException as error:
-            return record.fail(error)
+        entries = record.take_jacobian(problem, t, given(y), given(yp), cj)
+        if entries is None:
+            return RECOVERABLE
+        entries_of(matrix)[places] = entries
         return GOOD
 
-    record.calls_python = True
-    return JACOBIAN(jacobian)
+    return JACOBIAN(_answering(record, jacobian))
 
 
 def _sparse_writer(problem: ImplicitProblem, library: SundialsLibrary) -> tuple[Callable[[int], FloatArray], Places]:
@@ -201,34 +225,20 @@ def weight_function(relative: FloatArray, absolute: FloatArray, record: Record, 
     wanted = _Views(len(relative), library.N_VGetArrayPointer, writeable=True)
 
     def weights(y: int, out: int, _: int | None) -> int:
-        if record.interrupted:
+        allowed = relative * np.abs(given(y)) + absolute
+        if not (allowed > 0.0).all():
             return BROKEN
-        try:
-            allowed = relative * np.abs(given(y)) + absolute
-            if not (allowed > 0.0).all():
-                return BROKEN
-            np.divide(1.0, allowed, out=wanted(out))
-        except BaseException as error:
-            return record.fail(error)
+        np.divide(1.0, allowed, out=wanted(out))
         return GOOD
 
-    record.calls_python = True
-    return WEIGHTS(weights)
+    return WEIGHTS(_answering(record, weights))
 
 
 def explain(problem: ImplicitProblem, record: Record, states: Iterable[State]) -> None:
     """Ask the Python residual what compiled functions cannot say: which equation has no value."""
     undefined = record.undefined
     for t, y, yp in states:
-        try:
-            values = np.asarray(problem.residual(t, y, yp), dtype=np.float64)
-        except NO_VALUE as error:
-            record.note(t, f"the residual has no value: {error}")
-            break
-        finite = np.isfinite(values)
-        if not finite.all():
-            equation = int(finite.argmin())
-            record.note(t, f"the residual of equation {equation} is {values[equation]}", equation)
+        if not record.take_residual(problem, t, y, yp, np.empty(problem.size)):
             break
     record.undefined = undefined
 

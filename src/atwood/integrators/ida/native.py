@@ -20,7 +20,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, UsageError
-from atwood.integrators.event_location import EventLocator, Root
+from atwood.integrators.event_location import Root
 from atwood.integrators.ida.callbacks import Record, explain
 from atwood.integrators.ida.library import library
 from atwood.integrators.ida.memory import ONE_STEP, ROOT_RETURN, STOPPED_BY_WEIGHTS, TO_TIME, TOO_MUCH_WORK, Counts
@@ -39,7 +39,7 @@ from atwood.integrators.protocol import (
     StepResult,
     choose_linear_solver,
 )
-from atwood.integrators.session import Session, copied
+from atwood.integrators.session import SteppingSession, copied
 from atwood.interrupts import InterruptLater
 from atwood.lazy_dataclasses import replace
 
@@ -49,7 +49,7 @@ NO_EVENT_VALUE = -10
 EVENT_REASONS = {NO_EVENT_VALUE: "an event function has no value"}
 
 
-class NativeSession(Session):
+class NativeSession(SteppingSession):
     """A run in progress.
 
     Its memory is freed by `close`, at the end of a ``with`` block, or when nobody refers to it any more.
@@ -73,6 +73,8 @@ class NativeSession(Session):
         If the libraries cannot be used; `available` tells beforehand.
     """
 
+    _problem: ImplicitProblem
+
     def __init__(
         self,
         problem: ImplicitProblem,
@@ -83,9 +85,7 @@ class NativeSession(Session):
         budget: Budget | None = None,
         tuning: IdaTuning | None = None,
     ) -> None:
-        self.budget = budget or Budget()
-        self._opened = 0.0  # when it first went on
-        self._problem = problem
+        super().__init__(problem, options.horizon, budget)
         self._horizon = options.horizon
         self._given_step = options.first_step or 0.0
         self._record = Record()
@@ -97,7 +97,6 @@ class NativeSession(Session):
         )
         self._stop_time = None if tuning is None else tuning.stop_time
         self._guard = self._memory.library.sparse_guard if linear_solver == "sparse" else nullcontext()
-        self._locator = EventLocator(problem, options.horizon) if problem.events is not None else None
         # Whether IDA itself can tell in which steps something happens.
         self._finds_events = self._native is not None and self._native.events != 0
         self._by_steps = self.budget.poll is not None or (self._locator is not None and not self._finds_events)
@@ -106,10 +105,7 @@ class NativeSession(Session):
         self._noticed_flag: int | None = None
         self._paused_flag, self._goes_on = 0, False
         self._due: Callable[[], float] = lambda: inf
-        self._no_events = (0,) * problem.event_count
         self._earlier = Statistics(error_test_failures=0, convergence_failures=0)
-        self._starts = 0
-        self._seconds = 0.0
         self._pending: StepResult | None = None
         self._pace = Pace(FIRST_CHUNK if self._record.calls_python else first_chunk(problem.size))
         self._begin(state)
@@ -157,7 +153,7 @@ class NativeSession(Session):
     def reinitialize(self, t: float, y: FloatArray, yp: FloatArray | None = None) -> None:
         """Go on from another consistent state, after an event, a change of mode, or a projection."""
         self._check_open()
-        self._restart(checked_state(self._problem.size, t, y, yp))
+        self._restart(checked_state(self._size, t, y, yp))
 
     def advance(self, t_out: float) -> StepResult:
         """Go on to exactly a time, or stop earlier at an event, a limit or a failure; see `Session.advance`."""
@@ -171,10 +167,10 @@ class NativeSession(Session):
 
     def _run(self, t_out: float) -> StepResult:
         if not self._record.calls_python and (self._locator is None or self._finds_events):
-            return self._stride_on(t_out)
+            return super()._run(t_out)
         try:
             with np.errstate(all="ignore"), InterruptLater(self._record):
-                end = self._stride_on(t_out)
+                end = super()._run(t_out)
                 self._record.raise_again()
                 return end
         except KeyboardInterrupt:
@@ -206,7 +202,7 @@ class NativeSession(Session):
         self._reached = state[0]
         self._is_first = True
         self._behind = False  # whether IDA last handed out a time before the end of its last step
-        self._root: Root | None = None
+        self._root = None
         self._searched = state[0]
         self._looks_on = False  # whether IDA itself looks at what is left of its last step when it goes on
         self._pace.mark, self._pace.lap = (state[0], 0), (state[0], 0, 0)
@@ -224,29 +220,15 @@ class NativeSession(Session):
             convergence_failures=counts.solve_failures,
         )
 
-    def _stride_on(self, t_out: float) -> StepResult:
-        """Go on to a time; see `_run`."""
-        if self._stale:
-            self._restart(self._here)
-        by_steps = self._by_steps
-        while True:
-            is_known = self._looks_on and not self._searched < t_out <= self._reached
-            root = None if is_known else self._find_root()
-            if root is not None and root.state[0] <= t_out:
-                self._root, self._here = None, root.state
-                return StepResult(*copied(root.state), Status.EVENT, root.events)
-            if t_out <= self._reached and not self._due() <= t_out:
-                return self._arrive(t_out)
-            if by_steps:
-                self._here = self._end_of_step()
-            limit = self._exceeded(self._steps)
-            if limit is not None:
-                return limit
-            failure = self._step() if by_steps or self._is_first else self._stride(t_out)
-            if failure is not None:
-                return failure
+    def _find_root(self, t_out: float = inf) -> Root | None:
+        is_known = self._looks_on and not self._searched < t_out <= self._reached
+        return None if is_known else super()._find_root(t_out)
 
-    def _arrive(self, t_out: float) -> StepResult:
+    def _arrive(self, t_out: float) -> StepResult | None:
+        is_there = t_out <= self._reached and not self._due() <= t_out
+        if not is_there:
+            self._here = self._end_of_step() if self._by_steps else self._here
+            return None
         if t_out > self._here[0]:
             state = self._interpolate(t_out)
             if not is_finite(state[1], state[2]):
@@ -254,14 +236,6 @@ class NativeSession(Session):
                 return self._stopped(Status.FAILED, "the solution is no longer finite")
             self._here = state
         return StepResult(*copied(self._here), Status.REACHED, self._no_events)
-
-    def _find_root(self) -> Root | None:
-        """Return the first root in the part of the last step that has not been handed out."""
-        locator = self._locator
-        if locator is not None and self._root is None and self._searched < self._reached:
-            self._root = locator.search(self._searched, self._reached, self._interpolate)
-            self._searched = self._root.state[0] if self._root else self._reached
-        return self._root
 
     def _interpolate(self, t: float) -> State:
         if self._newest is not None and t == self._newest[0]:
@@ -280,7 +254,7 @@ class NativeSession(Session):
         """Read, or let IDA itself go on and fill a table where nothing is to be looked for."""
         self._check_open()
         if past <= first or self._stale or self._pending is not None:
-            return np.empty((0, self._problem.size))
+            return np.empty((0, self._size))
         if self._goes_on and not self._is_first and self.budget.is_unlimited:
             return self._filled(np.array(times[first:past], dtype=float))
         known = self._reached if self._locator is None else min(self._searched, self._reached)
@@ -288,7 +262,7 @@ class NativeSession(Session):
         limit = min(self._due(), *(one[0] for one in (self._newest, root) if one is not None), inf)
         past = min(bisect_right(times, known, first, past), bisect_left(times, limit, first, past))
         if past <= first:
-            return np.empty((0, self._problem.size))
+            return np.empty((0, self._size))
         began = time.perf_counter()
         try:
             return self._table(times[first:past])
@@ -305,7 +279,7 @@ class NativeSession(Session):
 
     def _filled(self, times: FloatArray) -> FloatArray:
         """Let IDA go on through times by itself; what ended that is told by the next advance."""
-        fill, before, table = self._fill, self._here, np.empty((len(times), self._problem.size))
+        fill, before, table = self._fill, self._here, np.empty((len(times), self._size))
         assert fill is not None
         allowed, filled = self._allow(), 0
         began = time.perf_counter()
@@ -343,10 +317,13 @@ class NativeSession(Session):
         if filled and self._memory.interpolate(self._here[0]) == 0:
             self._here = (*self._here[:2], self._memory.yp.copy())
 
-    def _steps(self) -> int:
+    def _count_steps(self) -> int:
         return self._earlier.steps + self._memory.steps()
 
-    def _step(self) -> StepResult | None:
+    def _step(self, t_out: float) -> StepResult | None:
+        return self._single_step() if self._by_steps or self._is_first else self._stride(t_out)
+
+    def _single_step(self) -> StepResult | None:
         """Take one internal step, and return an answer only if that failed."""
         before = self._reached
         flag, t = self._first_step() if self._is_first else self._solve(before + self._horizon, ONE_STEP)
@@ -387,7 +364,7 @@ class NativeSession(Session):
         """Tell IDA how many steps it may take; return that."""
         pace, allowed = self._pace, self._pace.chunk
         if self.budget.max_steps is not None:
-            allowed = min(allowed, self.budget.max_steps - self._steps())
+            allowed = min(allowed, self.budget.max_steps - self._count_steps())
         if allowed != pace.allowed:
             self._memory.call("IDASetMaxNumSteps", allowed)
             pace.allowed = allowed

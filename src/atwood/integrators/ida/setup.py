@@ -9,7 +9,14 @@ from atwood.errors import UsageError
 from atwood.integrators.ida.callbacks import Record, address, jacobian_function, residual_function, weight_function
 from atwood.integrators.ida.library import library
 from atwood.integrators.ida.memory import IdaMemory
-from atwood.integrators.protocol import ImplicitProblem, LinearSolver, NativeCallbacks, SolverOptions, State
+from atwood.integrators.protocol import (
+    ImplicitProblem,
+    LinearSolver,
+    NativeCallbacks,
+    SolverOptions,
+    State,
+    absolute_tolerances,
+)
 from atwood.lazy_dataclasses import dataclass
 
 LOOSE_NEWTON, TIGHT_NEWTON, FIXED_NEWTON = 0.33, 0.01, 0.1
@@ -145,10 +152,7 @@ def _set_weights(
 ) -> None:
     """Tell IDA which error each unknown may have."""
     n, share = problem.size, options.relative_tolerance
-    try:
-        absolute = np.broadcast_to(np.asarray(options.absolute_tolerances, dtype=np.float64), (n,)).copy()
-    except ValueError:
-        raise UsageError(f"give one absolute tolerance, or one for each of the {n} unknowns") from None
+    absolute = absolute_tolerances(options, n, least=0.0)
     fixed = list(tuning.angle_like)
     if not all(0 <= index < n for index in fixed):
         raise UsageError(f"the angle-like unknowns must lie in 0..{n - 1}")

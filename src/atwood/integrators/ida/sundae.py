@@ -18,14 +18,15 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from math import inf, isfinite
+from math import isfinite
 from typing import Any
 
 import numpy as np
 
 from atwood.arrays import FloatArray, IndexArray
-from atwood.errors import KernelEvaluationError, UsageError
-from atwood.integrators.event_location import ROUNDING, EventLocator, Root
+from atwood.errors import KernelEvaluationError
+from atwood.integrators.event_location import ROUNDING
+from atwood.integrators.ida.callbacks import Record
 from atwood.integrators.ida.library import without_solver_messages
 from atwood.integrators.ida.states import checked_state
 from atwood.integrators.protocol import (
@@ -36,14 +37,12 @@ from atwood.integrators.protocol import (
     Statistics,
     Status,
     StepResult,
+    absolute_tolerances,
     choose_linear_solver,
 )
-from atwood.integrators.session import Session, copied
-from atwood.lazy_dataclasses import dataclass, replace
+from atwood.integrators.session import SteppingSession, copied
+from atwood.lazy_dataclasses import replace
 from atwood.lazy_modules import scipy
-
-NO_VALUE = (KernelEvaluationError, ArithmeticError)
-"""What a function raises where it has no value."""
 
 STALLED_STEPS = 50
 """So many steps in a row that do not move the time beyond rounding are a failure."""
@@ -71,26 +70,7 @@ REASONS = {
 }
 
 
-@dataclass
-class _Record:
-    """What the callbacks count, and the last evaluation without a value since the last good step."""
-
-    residuals: int = 0
-    jacobians: int = 0
-    undefined: int = 0
-    complaint: str = ""
-    equation: int | None = None
-
-    def note(self, t: float, what: str, equation: int | None = None) -> None:
-        self.undefined += 1
-        self.complaint = f"at t = {t:.9g} {what}"
-        self.equation = equation
-
-    def clear(self) -> None:
-        self.complaint, self.equation = "", None
-
-
-class SundaeSession(Session):
+class SundaeSession(SteppingSession):
     """A run in progress.
 
     Parameters
@@ -114,20 +94,15 @@ class SundaeSession(Session):
         yp: FloatArray,
         budget: Budget | None = None,
     ) -> None:
-        self.budget = budget or Budget()
-        self._opened = 0.0  # when it first went on
-        self._size, self._begins = problem.size, problem.begin
+        super().__init__(problem, options.horizon, budget)
+        self._begins = problem.begin
         self._horizon = options.horizon
-        self._record = _Record()
+        self._record = Record()
         self._create: Callable[[float], Any] = lambda share: _create_solver(
             problem, replace(options, first_step=share * options.horizon), self._record
         )
         self._solver = _create_solver(problem, options, self._record)
-        self._locator = EventLocator(problem, options.horizon) if problem.events is not None else None
-        self._no_events = (0,) * problem.event_count
-        self._steps = 0
-        self._starts = 0
-        self._seconds = 0.0
+        self._taken_steps = 0
         self.reinitialize(t, y, yp)
 
     @property
@@ -135,7 +110,7 @@ class SundaeSession(Session):
         """What the session has cost so far, over all its restarts."""
         record, locator = self._record, self._locator
         return Statistics(
-            steps=self._steps,
+            steps=self._taken_steps,
             residual_evaluations=record.residuals,
             jacobian_evaluations=record.jacobians,
             event_evaluations=locator.evaluations if locator else 0,
@@ -146,9 +121,7 @@ class SundaeSession(Session):
 
     def reinitialize(self, t: float, y: FloatArray, yp: FloatArray | None = None) -> None:
         """Go on from another consistent state, after an event, a change of mode, or a projection."""
-        self._restart(checked_state(self._size, t, y, yp))
-
-    def _restart(self, state: State) -> None:
+        state = checked_state(self._size, t, y, yp)
         if self._begins is not None:
             self._begins(*state)
         self._solver.init_step(*state)
@@ -156,46 +129,23 @@ class SundaeSession(Session):
             self._locator.restart(state)
         self._here = self._newest = state
         self._behind = False  # whether IDA last handed out a time before the newest
-        self._root: Root | None = None
-        self._searched = state[0]
+        self._root = None
+        self._reached = self._searched = state[0]
         self._stalled = 0
         self._stale, self._is_first = False, True
         self._starts += 1
 
     def _run(self, t_out: float) -> StepResult:
         with without_solver_messages(), np.errstate(all="ignore"):
-            return self._go_on(t_out)
+            return super()._run(t_out)
 
-    def _go_on(self, t_out: float) -> StepResult:
-        if self._stale:
-            self._restart(self._here)
-        while True:
-            root = self._find_root()
-            if root is not None and root.state[0] <= t_out:
-                return self._deliver(root)
-            if t_out <= self._newest[0]:
-                self._here = self._interpolate(t_out)
-                return StepResult(*copied(self._here), Status.REACHED, self._no_events)
-            self._here = self._newest
-            limit = self._exceeded(lambda: self._steps)
-            if limit is not None:
-                return limit
-            failure = self._step()
-            if failure is not None:
-                return failure
+    def _arrive(self, t_out: float) -> StepResult | None:
+        is_there = t_out <= self._reached
+        self._here = self._interpolate(t_out) if is_there else self._newest
+        return StepResult(*copied(self._here), Status.REACHED, self._no_events) if is_there else None
 
-    def _find_root(self) -> Root | None:
-        """Return the first root in the part of the last step that has not been handed out."""
-        locator = self._locator
-        if locator is not None and self._root is None and self._searched < self._newest[0]:
-            self._root = locator.search(self._searched, self._newest[0], self._interpolate)
-            self._searched = self._root.state[0] if self._root else self._newest[0]
-        return self._root
-
-    def _deliver(self, root: Root) -> StepResult:
-        self._root = None
-        self._here = root.state
-        return StepResult(*copied(root.state), Status.EVENT, root.events)
+    def _count_steps(self) -> int:
+        return self._taken_steps
 
     def _interpolate(self, t: float) -> State:
         if t == self._newest[0]:
@@ -206,7 +156,7 @@ class SundaeSession(Session):
         self._behind = True
         return t, result.y, result.yp
 
-    def _step(self) -> StepResult | None:
+    def _step(self, t_out: float) -> StepResult | None:
         """Take one internal step, and return an answer only if that failed."""
         t_before = self._newest[0]
         result = self._solver.step(t_before + self._horizon, "onestep", None)
@@ -224,13 +174,12 @@ class SundaeSession(Session):
         if not isfinite(result.y.dot(result.y)) and not np.isfinite(result.y).all():
             self._stale = True
             return self._stopped(Status.FAILED, "the solution is no longer finite")
-        self._newest, self._behind = (result.t, result.y, result.yp), False
+        self._newest, self._reached, self._behind = (result.t, result.y, result.yp), result.t, False
         self._is_first = False
-        self._steps += 1
+        self._taken_steps += 1
         if result.t - t_before > 4 * ROUNDING * abs(result.t):
             self._stalled = 0
-            if self._record.complaint:
-                self._record.clear()
+            self._record.complaint, self._record.equation = "", None
         else:
             self._stalled += 1
         if self._stalled >= STALLED_STEPS:
@@ -245,19 +194,15 @@ class SundaeSession(Session):
         return replace(ended, message=f"{ended.message}; {record.complaint}", equation=record.equation)
 
 
-def _create_solver(problem: ImplicitProblem, options: SolverOptions, record: _Record) -> Any:
+def _create_solver(problem: ImplicitProblem, options: SolverOptions, record: Record) -> Any:
     """Return scikit-sundae's solver of a problem, with callbacks that count."""
     from sksundae.ida import IDA
 
     n = problem.size
     rows, columns = problem.pattern
-    try:
-        tolerances = np.broadcast_to(np.asarray(options.absolute_tolerances, dtype=np.float64), (n,))
-    except ValueError:
-        raise UsageError(f"give one absolute tolerance, or one for each of the {n} unknowns") from None
     settings: dict[str, Any] = {
         "rtol": float(options.relative_tolerance),
-        "atol": tolerances.copy(),
+        "atol": absolute_tolerances(options, n, least=0.0),
         "first_step": options.first_step or 0.0,
         "max_step": options.max_step or 0.0,
         "max_order": options.max_order,
@@ -281,52 +226,24 @@ def _sparsity(problem: ImplicitProblem) -> Any:
     return scipy.sparse.csc_matrix(parts, shape=(problem.size, problem.size))
 
 
-def _residual_callback(problem: ImplicitProblem, record: _Record) -> Callable[..., None]:
-    function, dot, nan = problem.residual, np.dot, float("nan")
-
+def _residual_callback(problem: ImplicitProblem, record: Record) -> Callable[..., None]:
     def residual(t: float, y: FloatArray, yp: FloatArray, out: FloatArray) -> None:
         record.residuals += 1
-        if record.complaint and not np.isfinite(y).all():
-            # Newton's iteration goes on for a while after a value was missing; that says nothing new.
-            out.fill(nan)
-            return
-        try:
-            out[:] = function(t, y, yp)
-        except NO_VALUE as error:
-            record.note(t, f"the residual has no value: {error}")
-            out.fill(nan)
-            return
-        if not dot(out, out) < inf:
-            finite = np.isfinite(out)
-            if not finite.all():
-                equation = int(finite.argmin())
-                record.note(t, f"the residual of equation {equation} is {out[equation]}", equation)
-                out.fill(nan)
+        # Newton's iteration goes on for a while after a value was missing; that says nothing new.
+        is_known = bool(record.complaint) and not np.isfinite(y).all()
+        if is_known or not record.take_residual(problem, t, y, yp, out):
+            out.fill(np.nan)
 
     return residual
 
 
-def _jacobian_callback(problem: ImplicitProblem, record: _Record, places: slice | IndexArray) -> Callable[..., None]:
+def _jacobian_callback(problem: ImplicitProblem, record: Record, places: slice | IndexArray) -> Callable[..., None]:
     """Return the callback that writes the entries to their places in a flat view of scikit-sundae's array."""
-    function, dot, nan = problem.jacobian, np.dot, float("nan")
-    rows = problem.pattern[0]
 
     def jacobian(t: float, y: FloatArray, yp: FloatArray, _: FloatArray, cj: float, out: FloatArray) -> None:
         record.jacobians += 1
-        flat = out.reshape(-1)
-        try:
-            entries = np.asarray(function(t, y, yp, cj), dtype=np.float64)
-        except NO_VALUE as error:
-            record.note(t, f"the Jacobian has no value: {error}")
-            flat[places] = nan
-            return
-        flat[places] = entries
-        if not dot(entries, entries) < inf:
-            finite = np.isfinite(entries)
-            if not finite.all():
-                equation = int(rows[finite.argmin()])
-                record.note(t, f"the Jacobian of equation {equation} is not finite", equation)
-                flat[places] = nan
+        entries = record.take_jacobian(problem, t, y, yp, cj)
+        out.reshape(-1)[places] = np.nan if entries is None else entries
 
     return jacobian
 

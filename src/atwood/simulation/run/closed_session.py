@@ -113,9 +113,6 @@ class ClosedLoopSession(Session):
 
     def advance(self, t_out: float) -> StepResult:
         """Go on to exactly a time, or stop earlier at an event, a limit or a failure."""
-        return self._run(t_out)
-
-    def _run(self, t_out: float) -> StepResult:
         while True:
             found = self._handed_out(self._session.advance(t_out))
             if found is not None:
