@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import ctypes
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from ctypes import c_double, c_int, c_int64, c_void_p
 from enum import IntEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.codegen.llvm.build import Built, RoutineSource, build_code
 from atwood.codegen.llvm.module import CodeOptions
-from atwood.codegen.routines import ADDRESS, INTEGER, Operand, Record, Routine, Value
+from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Kind, Lanes, Operand, Record, Routine, Value
 from atwood.errors import KernelEvaluationError, UsageError
 from atwood.integrators.protocol import Lookout, State
 from atwood.lazy_dataclasses import dataclass, names_of
@@ -142,31 +142,99 @@ COUNTED = len(names_of(Counts))
 _UNLIMITED = 2**62
 _NO_VALUE = 3
 
+WIDTH = 4
+"""How many unknowns a loop works on at a time; rows are padded to a multiple of it with finite numbers."""
+
+
+def fields_of(pointers: Iterable[str], numbers: Iterable[str], counts: Iterable[str]) -> dict[str, Kind]:
+    """Return the fields with which the memory of a session begins, 8 bytes each: addresses, numbers and counts."""
+    return {
+        **dict.fromkeys(pointers, ADDRESS),
+        **dict.fromkeys(numbers, NUMBER),
+        **dict.fromkeys((*counts, "limit", "filled", *names_of(Counts)), INTEGER),
+    }
+
+
+class Memory(Record):
+    """The memory of a session within a routine: its fields, and rows of a table of arrays.
+
+    Parameters
+    ----------
+    fields
+        The fields, among them `arrays`, where the table is, `size`, the number of unknowns, and `padded`, that of a
+        row.
+    rows
+        The rows by name.
+    session
+        Its address.
+    """
+
+    session: Value
+    rows: Mapping[str, int]
+    arrays: Value
+    size: Value
+    padded: Value
+
+    def __init__(self, fields: Mapping[str, Kind], rows: Mapping[str, int], session: Value) -> None:
+        super().__init__(session, fields)
+        known = {name: self.__getattr__(name) for name in ("arrays", "size", "padded")}
+        self.__dict__.update(session=session, rows=rows, **known)
+
+    def row(self, row: Operand | str) -> Value:
+        """Return the address of a row of the table of arrays, by its name or number."""
+        return self.arrays.at(self.padded * (self.rows[row] if isinstance(row, str) else row))
+
+    def lanes(self, row: Value, j: Value) -> Value:
+        """Return the lanes of a row from an unknown on."""
+        return row.read(j, Lanes(WIDTH))
+
+
+_M = TypeVar("_M", bound=Record)
+
+
+def open_routine(
+    memory: Callable[[Value], _M],
+    name: str,
+    more: Mapping[str, Kind] | None = None,
+    result: Kind | None = CODE,
+    exported: bool = False,
+) -> tuple[Routine, _M, list[Value]]:
+    """Return a new routine of a session, its memory, and its further arguments."""
+    routine = Routine(name, {"session": ADDRESS, **(more or {})}, result, exported)
+    return routine, memory(routine.arguments[0]), routine.arguments[1:]
+
+
+Functions = Mapping[str, Callable[..., int]]
+
+_SHAPES: dict[str, tuple[Any, ...]] = {
+    "run": (),
+    "interpolate": (c_double, c_void_p, c_void_p),
+    "sample": (c_void_p, c_int64, c_void_p, c_void_p),
+    "begin": (c_double, c_void_p),
+}
+
+
+def bind_functions(built: Built, **others: tuple[Any, ...]) -> Functions:
+    """Return the functions of a method that Python calls, by name, each with a session for its first argument.
+
+    `others` are the arguments of those that it has besides, or has otherwise.
+    """
+    shapes, addresses = {**_SHAPES, **others}, built.code.addresses
+    return {name: ctypes.CFUNCTYPE(c_int, c_void_p, *shape)(addresses[name]) for name, shape in shapes.items()}
+
 
 @dataclass(frozen=True, eq=False)
 class Routines:
-    """The compiled routines of a method, and the addresses of two of them."""
+    """The compiled routines of a method, and those of them that Python calls."""
 
     built: Built
-    run: Callable[..., int]
-    interpolate: Callable[..., int]
-    sample: Callable[..., int]
-    begin: Callable[..., int]
-    addresses: dict[str, int]
+    functions: Functions
 
 
 def routines_of(source: RoutineSource) -> Routines:
     """Return the routines of a method, compiled; whoever asks keeps them."""
-    shapes = {
-        "run": (c_void_p,),
-        "interpolate": (c_void_p, c_double, c_void_p, c_void_p),
-        "sample": (c_void_p, c_void_p, c_int64, c_void_p, c_void_p),
-        "begin": (c_void_p, c_double, c_void_p),
-    }
-    built = build_code([], CodeOptions(level=2), exports=tuple(shapes), routines=source)
-    addresses = built.code.addresses
-    found = {name: ctypes.CFUNCTYPE(c_int, *shape)(addresses[name]) for name, shape in shapes.items()}
-    return Routines(built, **found, addresses=addresses)
+    built = build_code([], CodeOptions(level=2), exports=tuple(_SHAPES), routines=source)
+    return Routines(built, bind_functions(built))
 
 
 class NativeStepper(Stepper):
@@ -176,88 +244,118 @@ class NativeStepper(Stepper):
 
     Attributes
     ----------
-    _routines
+    _fields
+        The fields with which it begins.
+    _functions
         Its routines.
     _session, _outputs
         The address of the session, and those of values and rates that it hands out.
     _values
         Both of these, shape (2, unknowns).
-    _numbers, _counts
-        Tables of the session.
-    _number, _count
-        Where what they hold stands in these, by name.
+    _numbers
+        The memory from the session on.
     _ends
         Values and rates at the end of the last step.
     _size
         The number of unknowns.
     """
 
-    _routines: Routines
+    _fields: Mapping[str, Kind]
+    _places: Mapping[str, int]
+    _functions: Functions
     _session: int
     _outputs: tuple[int, int]
     _values: FloatArray
     _numbers: FloatArray
-    _counts: NDArray[np.int64]
-    _number: Mapping[str, int]
-    _count: Mapping[str, int]
     _ends: tuple[FloatArray, FloatArray]
     _size: int
 
-    def _call(self, function: Callable[..., int], *arguments: float) -> int:
+    def __init_subclass__(cls) -> None:
+        cls._places = {name: place for place, name in enumerate(cls._fields)}
+
+    def _begin_at(self, numbers: FloatArray, **fields: float) -> None:
+        """Take the memory of a session from its beginning on, and set some of its fields."""
+        self._numbers, self._integers = numbers, numbers.view(np.int64)
+        self._session = numbers.ctypes.data
+        self._set(**fields)
+
+    def _set(self, **fields: float) -> None:
+        """Set fields of the session."""
+        for name, value in fields.items():
+            table: NDArray[Any] = self._numbers if self._fields[name] is NUMBER else self._integers
+            table[self._places[name]] = value
+
+    def _number(self, name: str) -> float:
+        return float(self._numbers[self._places[name]])
+
+    def _count(self, name: str) -> int:
+        return int(self._integers[self._places[name]])
+
+    def _call(self, function: str, *arguments: float) -> int:
         """Call a routine and return its code."""
-        return function(self._session, *arguments)
+        return self._functions[function](self._session, *arguments)
 
     @property
     def counts(self) -> Counts:
         """What it has done so far, over all starts."""
-        first = self._count["steps"]
-        return Counts(*self._counts[first : first + COUNTED].tolist())
+        first = self._places["steps"]
+        return Counts(*self._integers[first : first + COUNTED].tolist())
 
     def start(self, t: float, y: FloatArray) -> bool:
         """Start anew from a state; return whether it has finite rates."""
         self._values[0] = y
-        return self._call(self._routines.begin, t, self._outputs[0]) == 0
+        return self._call("begin", t, self._outputs[0]) == 0
 
     def state(self) -> State:
         """Return time, values and rates at the end of the last step."""
         y, yp = self._ends
-        return float(self._numbers[self._number["t"]]), y.copy(), yp.copy()
+        return self._number("t"), y.copy(), yp.copy()
 
     def run(self, t_stop: float, steps: int) -> Outcome:
         """Take steps until one ends at or after a time, but no more than so many."""
-        self._numbers[self._number["stop"]] = t_stop
-        self._allow(steps)
-        return Outcome(self._call(self._routines.run))
+        self._numbers[self._places["stop"]] = t_stop
+        last = self._count("steps") + min(steps, _UNLIMITED)
+        while True:
+            code = self._go_on(last, "run")
+            if code is not None:
+                return Outcome(code)
+
+    def _go_on(self, last: int, function: str, *arguments: int) -> int | None:
+        """Take steps up to a number of them; None where the rest is to be taken in another way."""
+        self._integers[self._places["limit"]] = last
+        return self._call(function, *arguments)
 
     def interpolate(self, t: float) -> State:
         """Return the state at a time within the last step."""
-        if self._call(self._routines.interpolate, t, *self._outputs) or not np.isfinite(self._values).all():
-            raise no_interpolation(t)
+        if self._call("interpolate", t, *self._outputs) or not np.isfinite(self._values).all():
+            raise self._no_interpolation(t)
         return t, self._values[0].copy(), self._values[1].copy()
 
     def sample(self, times: FloatArray, steps: int) -> tuple[FloatArray, FloatArray, Outcome]:
         """Take steps, and return values and rates at as many of the times, one row each, as were reached."""
         times = np.ascontiguousarray(times, dtype=np.float64)
         y, yp = np.empty((2, len(times), self._size))
-        self._allow(steps)
-        tables = (array.ctypes.data for array in (y, yp))
-        outcome = self._call(self._routines.sample, times.ctypes.data, len(times), *tables)
-        filled = int(self._counts[self._count["filled"]])
-        if outcome == _NO_VALUE:
-            raise no_interpolation(float(times[filled]))
-        return y[:filled], yp[:filled], Outcome(outcome)
+        last, filled, code = self._count("steps") + min(steps, _UNLIMITED), 0, None
+        while code is None:
+            left, *tables = (array[filled:].ctypes.data for array in (times, y, yp))
+            code = self._go_on(last, "sample", left, len(times) - filled, *tables)
+            filled += self._count("filled")
+        if code == _NO_VALUE:
+            raise self._no_interpolation(float(times[filled]))
+        return y[:filled], yp[:filled], Outcome(code)
 
-    def _allow(self, steps: int) -> None:
-        self._counts[self._count["limit"]] = self._counts[self._count["steps"]] + min(steps, _UNLIMITED)
+    def _no_interpolation(self, t: float) -> KernelEvaluationError:
+        """Return the error of a step within which there is no value."""
+        return no_interpolation(t)
 
-    def _places(
-        self, tolerances: FloatArray, factor: float = 1.0, parameters: tuple[int, int, int] = (0, 0, 0)
+    def _batch_places(
+        self, built: Built, tolerances: FloatArray, factor: float = 1.0, parameters: tuple[int, int, int] = (0, 0, 0)
     ) -> BatchPlaces:
         """Return the addresses with which many runs can be made in one call."""
         from atwood.integrators.batch import BatchPlaces
 
-        begin, sample = (self._routines.addresses[name] for name in ("begin", "sample"))
-        limit, steps, filled = (self._counts[self._count[name] :].ctypes.data for name in ("limit", "steps", "filled"))
+        begin, sample = (built.code.addresses[name] for name in ("begin", "sample"))
+        limit, steps, filled = (self._session + 8 * self._places[name] for name in ("limit", "steps", "filled"))
         places = begin, sample, self._session, limit, steps, filled, tolerances.ctypes.data, COUNTED
         return BatchPlaces(*places, parameters, factor, self)
 
@@ -266,17 +364,17 @@ SAMPLE_ARGUMENTS = {"times": ADDRESS, "wanted": INTEGER, "ys": ADDRESS, "yps": A
 """What the routine takes behind its session."""
 
 
-def write_sample(r: Routine, numbers: Record, counts: Record, width: Operand) -> Routine:
+def write_sample(r: Routine, m: Record, width: Operand) -> Routine:
     """Write the body of ``sample``: fill a table with values and rates at output times; it ends as ``run`` does."""
     session, times, wanted, ys, yps = r.arguments
     i = r.variable(0, INTEGER)
     with r.forever():
         now = i.now
-        counts.filled = now
+        m.filled = now
         with r.when(now >= wanted):
             r.give(0)
         moment, place = times[now], now * width
-        numbers.stop = moment
+        m.stop = moment
         steps: tuple[Callable[[], Value], ...] = (
             lambda: r.call("run", session),
             lambda: r.call("interpolate", session, moment, ys.at(place), yps.at(place)),

@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 
 from atwood.codegen.routines import ADDRESS, CODE, NUMBER, Routine, Value
-from atwood.integrators.embedded.stepper import LANES, Memory, open_routine
+from atwood.integrators.embedded.stepper import open_routine
 from atwood.integrators.embedded.tableau import Tableau
+from atwood.integrators.stepper import WIDTH, Memory
 
 
 def write_dense_output(pair: Tableau) -> list[Routine]:
@@ -26,11 +27,13 @@ def weighted(m: Memory, weights: Mapping[int, float], j: Value) -> Value:
     return total
 
 
-def slopes(r: Routine, m: Memory, stages: Iterable[int], t: Value, h: Value, failed: Callable[[], None]) -> None:
+def slopes(
+    pair: Tableau, r: Routine, m: Memory, stages: Iterable[int], t: Value, h: Value, failed: Callable[[], None]
+) -> None:
     """Take the slopes of stages one after the other."""
     for stage in stages:
         r.call(f"stage{stage}", m.session, h)
-        code = r.call("evaluate", m.session, t + h * m.pair.nodes[stage], m.row("trial"), m.row(stage))
+        code = r.call("evaluate", m.session, t + h * pair.nodes[stage], m.row("trial"), m.row(stage))
         with r.when(code != 0):
             failed()
 
@@ -38,19 +41,19 @@ def slopes(r: Routine, m: Memory, stages: Iterable[int], t: Value, h: Value, fai
 def _densify(pair: Tableau) -> Routine:
     """Make the dense output of the last step, unless it is there; 1 where there is none."""
     r, m, () = open_routine(pair, "densify")
-    with r.when(m.counts.is_dense != 0):
+    with r.when(m.is_dense != 0):
         r.give(0)
-    h, dense = m.numbers.h, m.row("dense")
-    slopes(r, m, range(pair.end + 1, len(pair.nodes)), m.numbers.t_old, h, lambda: r.give(1))
+    h, dense = m.h, m.row("dense")
+    slopes(pair, r, m, range(pair.end + 1, len(pair.nodes)), m.t_old, h, lambda: r.give(1))
     y, y_old, begin, end = m.row("y"), m.row("y_old"), m.row(0), m.row("end slope")
-    with r.count(m.padded, step=LANES) as j:
+    with r.count(m.padded, step=WIDTH) as j:
         step = m.lanes(y, j) - m.lanes(y_old, j)
         rise, fall = m.lanes(begin, j) * h, m.lanes(end, j) * h
         rows = [step, rise - step, (step + step) - (rise + fall)]
         rows += [weighted(m, weights, j) * h for weights in pair.dense]
         for number, row in enumerate(rows):
             dense[j + m.padded * number] = row
-    m.counts.is_dense = 1
+    m.is_dense = 1
     r.give(0)
     return r
 
@@ -60,7 +63,7 @@ def _polynomial(pair: Tableau) -> Routine:
     r, m, (x,) = open_routine(pair, "polynomial", {"x": NUMBER})
     rows = [m.row("dense").at(m.padded * k) for k in range(pair.terms)]
     below, trial, rest = [m.row("y_old"), *rows[:-1]], m.row("trial"), 1.0 - x
-    with r.count(m.padded, step=LANES) as j:
+    with r.count(m.padded, step=WIDTH) as j:
         value = m.lanes(rows[-1], j)
         for power in reversed(range(pair.terms)):
             value = value * (rest if power % 2 else x) + m.lanes(below[power], j)
@@ -73,9 +76,9 @@ def _slope(pair: Tableau) -> Routine:
     """Write the slope of the cubic through both ends of the last step, at a share of it, to `last`."""
     r, m, (x,) = open_routine(pair, "slope", {"x": NUMBER})
     rest = 1.0 - x
-    both, begin, end = x * rest * 6.0 / m.numbers.h, rest * (1.0 - x * 3.0), x * (x * 3.0 - 2.0)
+    both, begin, end = x * rest * 6.0 / m.h, rest * (1.0 - x * 3.0), x * (x * 3.0 - 2.0)
     y, y_old, first, second, last = m.row("y"), m.row("y_old"), m.row(0), m.row("end slope"), m.row("last")
-    with r.count(m.padded, step=LANES) as j:
+    with r.count(m.padded, step=WIDTH) as j:
         step = m.lanes(y, j) - m.lanes(y_old, j)
         last[j] = step * both + m.lanes(first, j) * begin + m.lanes(second, j) * end
     r.give(0)
@@ -86,16 +89,16 @@ def _interpolate(pair: Tableau) -> Routine:
     """Write values and rates at a time within the last step."""
     arguments = {"time": NUMBER, "y_out": ADDRESS, "yp_out": ADDRESS}
     r, m, (time, y_out, yp_out) = open_routine(pair, "interpolate", arguments, exported=True)
-    with r.when(time == m.numbers.t):
+    with r.when(time == m.t):
         r.copy(y_out, m.row("y"), m.size)
         r.copy(yp_out, m.row("end slope"), m.size)
         r.give(0)
     with r.when(r.call("densify", m.session) != 0):
         r.give(3)
-    r.call("polynomial", m.session, (time - m.numbers.t_old) / m.numbers.h)
+    r.call("polynomial", m.session, (time - m.t_old) / m.h)
     trial = m.row("trial")
     r.copy(y_out, trial, m.size)
-    code = r.call(m.at.function, time, trial, yp_out, m.at.data)
-    m.counts.evaluations = m.counts.evaluations + 1
+    code = r.call(m.function, time, trial, yp_out, m.data)
+    m.evaluations = m.evaluations + 1
     r.give(r.choose(code == 0, 0, 3, CODE))
     return r

@@ -12,9 +12,9 @@ from math import inf, prod
 
 from atwood.codegen.routines import ADDRESS, BOOLEAN, INTEGER, NUMBER, Lanes, Routine, Value
 from atwood.integrators.embedded.dense_output import slopes, weighted, write_dense_output
-from atwood.integrators.embedded.stepper import LANES, Memory, open_routine
+from atwood.integrators.embedded.stepper import open_routine
 from atwood.integrators.embedded.tableau import Tableau
-from atwood.integrators.stepper import CALM, SAMPLE_ARGUMENTS, STIFF, write_sample
+from atwood.integrators.stepper import CALM, SAMPLE_ARGUMENTS, STIFF, WIDTH, Memory, write_sample
 
 SAFETY = 0.9
 GROWTH, SHRINKAGE = 6.0, 3.0
@@ -51,7 +51,7 @@ def _stage(pair: Tableau, stage: int) -> Routine:
     """Write the values at which a slope is taken, or the new values."""
     r, m, (h,) = open_routine(pair, f"stage{stage}", {"h": NUMBER})
     base, trial, last = m.row("y_old" if stage > pair.end else "y"), m.row("trial"), m.row("last")
-    with r.count(m.padded, step=LANES) as j:
+    with r.count(m.padded, step=WIDTH) as j:
         value = m.lanes(base, j) + weighted(m, pair.stages[stage - 1], j) * h
         trial[j] = value
         if stage == pair.end - 1:
@@ -62,15 +62,15 @@ def _stage(pair: Tableau, stage: int) -> Routine:
 
 def _sum(r: Routine, m: Memory, square: Callable[[Value], Value]) -> Value:
     """Return the sum of squares over all unknowns."""
-    total = r.variable(0.0, Lanes(LANES))
-    with r.count(m.padded, step=LANES) as j:
+    total = r.variable(0.0, Lanes(WIDTH))
+    with r.count(m.padded, step=WIDTH) as j:
         total.now = total.now + square(j)
     return r.sum_of_lanes(total.now)
 
 
 def _squares(r: Routine, m: Memory, weights: Mapping[int, float]) -> Value:
     """Return the sum of the squares of an error estimate in units of the tolerances."""
-    y, trial, absolute, relative = m.row("y"), m.row("trial"), m.row("absolute"), m.numbers.relative
+    y, trial, absolute, relative = m.row("y"), m.row("trial"), m.row("absolute"), m.relative
 
     def square(j: Value) -> Value:
         size = r.most(r.size(m.lanes(y, j)), r.size(m.lanes(trial, j)))
@@ -82,7 +82,7 @@ def _squares(r: Routine, m: Memory, weights: Mapping[int, float]) -> Value:
 
 def _size(r: Routine, m: Memory, row: int | str, less: int | str | None = None) -> Value:
     """Return the root of the mean square of a row, or of a difference, in units of what is allowed at y."""
-    y, absolute, relative, a = m.row("y"), m.row("absolute"), m.numbers.relative, m.row(row)
+    y, absolute, relative, a = m.row("y"), m.row("absolute"), m.relative, m.row(row)
     b = None if less is None else m.row(less)
 
     def square(j: Value) -> Value:
@@ -107,9 +107,9 @@ def _distance(r: Routine, m: Memory, a: int | str, b: int | str) -> Value:
 def _evaluate(pair: Tableau) -> Routine:
     """Take a slope from a row to a row, and count it; what the right-hand side returned."""
     r, m, (t, source, target) = open_routine(pair, "evaluate", {"t": NUMBER, "source": ADDRESS, "target": ADDRESS})
-    code = r.call(m.at.function, t, source, target, m.at.data)
-    m.counts.evaluations = m.counts.evaluations + 1
-    m.counts.undefined = m.counts.undefined + (code != 0).integer()
+    code = r.call(m.function, t, source, target, m.data)
+    m.evaluations = m.evaluations + 1
+    m.undefined = m.undefined + (code != 0).integer()
     r.give(code)
     return r
 
@@ -127,40 +127,40 @@ def _root(r: Routine, a: Value, order: int) -> Value:
     return prod(found[1:], start=found[0])
 
 
-def _first_step(r: Routine, m: Memory, t: Value) -> None:
+def _first_step(pair: Tableau, r: Routine, m: Memory, t: Value) -> None:
     """Choose the first step by the size of the first two derivatives (Hairer, Norsett and Wanner, section II.4)."""
-    longest = m.numbers.longest
-    bound = r.least(m.numbers.horizon, longest)
-    given = m.numbers.first
+    longest = m.longest
+    bound = r.least(m.horizon, longest)
+    given = m.first
     with r.when(given > 0.0):
-        m.numbers.next = r.least(given, longest)
+        m.next = r.least(given, longest)
         r.give(_REACHED)
     y, trial, end, probe = m.row("y"), m.row("trial"), m.row("end slope"), m.row(1)
     d0, d1 = _size(r, m, "y"), _size(r, m, "end slope")
     usual = (d0 >= 1e-5) & (d1 >= 1e-5) & (d0 / d1 < inf)
     h0 = r.least(r.choose(usual, d0 * 0.01 / d1, 1e-6), bound)
-    m.numbers.next = h0
-    with r.count(m.padded, step=LANES) as j:
+    m.next = h0
+    with r.count(m.padded, step=WIDTH) as j:
         trial[j] = m.lanes(y, j) + m.lanes(end, j) * h0
     code = r.call("evaluate", m.session, t + h0, trial, probe)
     d2 = _size(r, m, 1, "end slope") / h0
     with r.when((code == 0) & (d2 < inf)):
         steepest = r.most(d2, d1)
-        root = _root(r, 0.01 / steepest, m.pair.order)
+        root = _root(r, 0.01 / steepest, pair.order)
         h1 = r.choose(steepest <= 1e-15, r.most(h0 * 1e-3, 1e-6), root)
-        m.numbers.next = r.least(r.least(h0 * 100.0, h1), bound)
+        m.next = r.least(r.least(h0 * 100.0, h1), bound)
 
 
 def _begin(pair: Tableau) -> Routine:
     """Start anew from a state."""
     r, m, (t, start) = open_routine(pair, "begin", {"t": NUMBER, "start": ADDRESS}, exported=True)
-    m.numbers.t, m.numbers.t_old, m.numbers.looked, m.numbers.likeness = t, t, t, 0.0
-    m.counts.edgy, m.counts.calm, m.counts.looks = 0, 0, m.counts.steps
+    m.t, m.t_old, m.looked, m.likeness = t, t, t, 0.0
+    m.edgy, m.calm, m.looks = 0, 0, m.steps
     r.copy(m.row("y"), start, m.size)
     r.copy(m.row("y_old"), start, m.size)
     with r.when(r.call("evaluate", m.session, t, m.row("y"), m.row("end slope")) != 0):
         r.give(_NO_RATES)
-    _first_step(r, m, t)
+    _first_step(pair, r, m, t)
     r.give(_REACHED)
     return r
 
@@ -168,9 +168,9 @@ def _begin(pair: Tableau) -> Routine:
 def _look(pair: Tableau) -> Routine:
     """Tell whether an event may have happened in the last step."""
     r, m, (t,) = open_routine(pair, "look", {"t": NUMBER})
-    count, values, signs = m.counts.event_count, m.at.values, m.at.signs
+    count, values, signs = m.event_count, m.values, m.signs
     with r.when(count > 0):
-        code = r.call(m.at.events, t, m.row("y"), m.row("end slope"), values, m.at.events_data)
+        code = r.call(m.events, t, m.row("y"), m.row("end slope"), values, m.events_data)
         with r.when(code != 0):
             r.give(1)
         with r.count(count) as i, r.when(~(values[i] * signs[i] > 0.0)):
@@ -187,31 +187,31 @@ def _watched(pair: Tableau) -> Routine:
     in the step are taken when the steps go on.
     """
     r, m, (t_new,) = open_routine(pair, "watched", {"t_new": NUMBER})
-    watch, t, steps = m.at.watch, m.numbers.t_old, m.counts.steps
+    watch, t, steps = m.watch, m.t_old, m.steps
     with r.when(r.is_null(watch)):
         r.give(0)
     with r.when(~(t < t_new)):
         r.give(0)
     y, end, trial, last = m.row("y"), m.row("end slope"), m.row("trial"), m.row("last")
     with r.forever():
-        due = m.at.due[0]
+        due = m.due[0]
         is_within = due <= t_new
-        with r.when(~is_within & (steps - m.counts.looks < _PATIENCE)):
+        with r.when(~is_within & (steps - m.looks < _PATIENCE)):
             r.give(0)
-        looked, inside = m.numbers.looked, r.variable(False, BOOLEAN)
+        looked, inside = m.looked, r.variable(False, BOOLEAN)
         with r.when(is_within & ~(t_new - looked <= (due - looked) * _STRETCH)):
             is_dense = r.call("densify", m.session) == 0
             with r.when(is_dense):
-                share = (due - t) / m.numbers.h
+                share = (due - t) / m.h
                 r.call("polynomial", m.session, share)
                 r.call("slope", m.session, share)
                 inside.now = True
         is_inside = inside.now
         moment = r.choose(is_inside, due, t_new)
-        m.numbers.looked, m.counts.looks = moment, steps
+        m.looked, m.looks = moment, steps
         places = r.choose(is_inside, trial, y), r.choose(is_inside, last, end)
-        with r.when(r.call(watch, moment, *places, m.at.watch_data) != 0):
-            m.counts.seen = 1
+        with r.when(r.call(watch, moment, *places, m.watch_data) != 0):
+            m.seen = 1
             r.give(1)
     return r
 
@@ -223,21 +223,21 @@ def _held(pair: Tableau) -> Routine:
     the dense output meets the constraints at both ends.
     """
     r, m, (t,) = open_routine(pair, "held", {"t": NUMBER})
-    project = m.at.project
+    project = m.project
     with r.when(r.is_null(project)):
         r.give(0)
-    r.give(r.call(project, t, m.row("trial"), m.at.project_data))
+    r.give(r.call(project, t, m.row("trial"), m.project_data))
     return r
 
 
 def _guarded(pair: Tableau) -> Routine:
     """Ask what judges steps about one that is good enough otherwise; 0 where it is good."""
     r, m, (t, t_new) = open_routine(pair, "guarded", {"t": NUMBER, "t_new": NUMBER})
-    guard = m.at.guard
+    guard = m.guard
     with r.when(r.is_null(guard)):
         r.give(0)
     ends = (t, m.row("y"), m.row(0), t_new, m.row("trial"), m.row("end slope"))
-    r.give(r.call(guard, *ends, m.at.guard_data))
+    r.give(r.call(guard, *ends, m.guard_data))
     return r
 
 
@@ -254,9 +254,9 @@ def _error(pair: Tableau) -> Routine:
         return r
     third = _squares(r, m, pair.errors[1])
     h4 = h * h * (h * h)
-    before = third * r.least(h4 * m.numbers.likeness, APART)
+    before = third * r.least(h4 * m.likeness, APART)
     fifth, spread = r.choose(own < before, before, own), h4 * third
-    m.numbers.tried = r.choose(spread > 0.0, own / spread, 0.0)
+    m.tried = r.choose(spread > 0.0, own / spread, 0.0)
     both = fifth + third * 0.01
     error = h * fifth / r.sqrt(both * m.size.number())
     r.give(r.choose(both == 0.0, 0.0, error))
@@ -268,11 +268,11 @@ def _stability(pair: Tableau) -> Routine:
     r, m, (h,) = open_routine(pair, "stability", {"h": NUMBER})
     turned, apart = _distance(r, m, "end slope", pair.end - 1), _distance(r, m, "trial", "last")
     is_edgy = (h * r.sqrt(turned / apart) > pair.edge) & (apart > 0.0)
-    edgy = r.choose(is_edgy, m.counts.edgy + 1, m.counts.edgy)
-    calm = r.choose(is_edgy, 0, m.counts.calm + 1, INTEGER)
+    edgy = r.choose(is_edgy, m.edgy + 1, m.edgy)
+    calm = r.choose(is_edgy, 0, m.calm + 1, INTEGER)
     found = is_edgy & (edgy == STIFF)
-    m.counts.stiff, m.counts.calm = m.counts.stiff + found.integer(), calm
-    m.counts.edgy = r.choose((calm == CALM) | found, 0, edgy, INTEGER)
+    m.stiff, m.calm = m.stiff + found.integer(), calm
+    m.edgy = r.choose((calm == CALM) | found, 0, edgy, INTEGER)
     r.give(found.code())
     return r
 
@@ -280,8 +280,8 @@ def _stability(pair: Tableau) -> Routine:
 def _attempt(pair: Tableau) -> Routine:
     """Try steps until one is good enough, and keep it; `_TOO_SMALL` where none is."""
     r, m, () = open_routine(pair, "attempt")
-    t, h, shortened = m.numbers.t, r.variable(m.numbers.next), r.variable(False, BOOLEAN)
-    least, longest = r.size(t) * (10.0 * 2.0**-52), m.numbers.longest
+    t, h, shortened = m.t, r.variable(m.next), r.variable(False, BOOLEAN)
+    least, longest = r.size(t) * (10.0 * 2.0**-52), m.longest
     with r.forever() as attempts:
         h.now = r.least(h.now, longest)
         step = h.now
@@ -290,10 +290,10 @@ def _attempt(pair: Tableau) -> Routine:
 
         def retreat() -> None:
             h.now, shortened.now = step * RETREAT, True
-            m.counts.failures = m.counts.failures + 1
+            m.failures = m.failures + 1
             r.repeat(attempts)
 
-        slopes(r, m, range(1, pair.end), t, step, retreat)
+        slopes(pair, r, m, range(1, pair.end), t, step, retreat)
         r.call(f"stage{pair.end}", m.session, step)
         t_new = t + step
 
@@ -311,7 +311,7 @@ def _attempt(pair: Tableau) -> Routine:
             with r.when(~(error < inf)):
                 retreat()
             h.now, shortened.now = step * (1.0 / r.least(factor, SHRINKAGE)), True
-            m.counts.failures = m.counts.failures + 1
+            m.failures = m.failures + 1
             r.repeat(attempts)
         if not pair.judges_end:
             arrive()
@@ -319,10 +319,10 @@ def _attempt(pair: Tableau) -> Routine:
             retreat()
         within = r.least(r.choose(factor < 1.0 / GROWTH, 1.0 / GROWTH, factor), SHRINKAGE)
         grown = step / within
-        m.numbers.next = r.choose((grown > step) & shortened.now, step, grown)
-        m.numbers.likeness = m.numbers.tried
-        m.numbers.h, m.numbers.t_old, m.numbers.t = step, t, t_new
-        m.counts.steps = m.counts.steps + 1
+        m.next = r.choose((grown > step) & shortened.now, step, grown)
+        m.likeness = m.tried
+        m.h, m.t_old, m.t = step, t, t_new
+        m.steps = m.steps + 1
         r.give(0)
     return r
 
@@ -331,23 +331,23 @@ def _run(pair: Tableau) -> Routine:
     """Take steps until one ends at or after the time to stop at."""
     r, m, () = open_routine(pair, "run", exported=True)
     with r.forever():
-        t = m.numbers.t
-        with r.when(t >= m.numbers.stop):
+        t = m.t
+        with r.when(t >= m.stop):
             r.give(_REACHED)
-        with r.when(m.counts.steps >= m.counts.limit):
+        with r.when(m.steps >= m.limit):
             r.give(_USED_UP)
         with r.when(r.call("watched", m.session, t) != 0):
             r.give(_NOTICED)
         begin, end = m.row(0), m.row("end slope")
         r.copy(begin, end, m.padded)
-        m.counts.is_dense = 0
+        m.is_dense = 0
         with r.when(r.call("attempt", m.session) != 0):
             r.copy(end, begin, m.padded)
             r.give(_TOO_SMALL)
-        stiffens = (r.call("stability", m.session, m.numbers.h) != 0) & (m.counts.heeds != 0)
+        stiffens = (r.call("stability", m.session, m.h) != 0) & (m.heeds != 0)
         r.copy(m.row("y_old"), m.row("y"), m.padded)
         r.copy(m.row("y"), m.row("trial"), m.padded)
-        t_new = m.numbers.t
+        t_new = m.t
         is_seen = r.call("watched", m.session, t_new) != 0
         happens = r.call("look", m.session, t_new) != 0
         with r.when(happens | stiffens | is_seen):
@@ -358,14 +358,13 @@ def _run(pair: Tableau) -> Routine:
 def _sample(pair: Tableau) -> Routine:
     """Go through output times and fill a table; it ends as `run` does."""
     r, m, _ = open_routine(pair, "sample", SAMPLE_ARGUMENTS, exported=True)
-    return write_sample(r, m.numbers, m.counts, m.size)
+    return write_sample(r, m, m.size)
 
 
 def write_routines(pair: Tableau) -> list[Routine]:
     """Return the routines of a pair.
 
-    They take a pointer to the pointers of a session; numbers and counts are behind two of these
-    (`atwood.integrators.embedded.stepper`).
+    They take the address of a session; see `atwood.integrators.embedded.stepper`.
     """
     ends = (_begin, _run, _sample)
     inner = (_evaluate, _attempt, _error, _stability, _held, _guarded, _look, _watched)

@@ -18,8 +18,8 @@ from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.codegen.routines import ADDRESS, NUMBER, Routine, Value, call_kernel, place_of
 from atwood.expr import Program
 from atwood.integrators.symplectic.fixed_steps import (
+    FIELDS,
     FILES,
-    POINTERS,
     Layout,
     Memory,
     copy_numbers,
@@ -31,7 +31,7 @@ from atwood.integrators.symplectic.fixed_steps import (
     unless_found,
 )
 from atwood.integrators.symplectic.gauss import FUNCTIONS
-from atwood.integrators.symplectic.stepper import bind_functions
+from atwood.integrators.symplectic.stepper import bind_steps
 
 
 def composition_source(layout: Layout, order: int) -> RoutineSource:
@@ -50,7 +50,7 @@ def write_routines(layout: Layout, order: int) -> list[Routine]:
 
 def _velocities(r: Routine, m: Memory, momenta: Value) -> Value:
     """Write velocities to the F of the main work area."""
-    return call_kernel(r, "flow", [momenta], m.pointers.derived_2, m.pointers.scratch, [m.at("main.F")])
+    return call_kernel(r, "flow", [momenta], m.derived_2, m.scratch, [m.at("main.F")])
 
 
 def _add(r: Routine, m: Memory, y: Value, rest: Value, amount: Value, count: int) -> None:
@@ -78,8 +78,8 @@ def _kick(layout: Layout) -> Routine:
     arguments = {"y": ADDRESS, "rest": ADDRESS, "t": NUMBER, "amount": NUMBER}
     r, m, (y, rest, t, amount) = open_routine(layout, "kick", arguments)
     n, time = layout.coordinates, place_of(r, t)
-    m.counts.evaluations = m.counts.evaluations + 1
-    derived, scratch = m.pointers.derived, m.pointers.scratch
+    m.evaluations = m.evaluations + 1
+    derived, scratch = m.derived, m.scratch
     unless_found(r, call_kernel(r, "kernel", [time, y], derived, scratch, [m.at("main.F")]))
     _add(r, m, y.at(n), rest.at(n), amount, n)
     r.give(0)
@@ -105,10 +105,10 @@ def _compose(layout: Layout, steps: tuple[float, ...]) -> Routine:
 def _begin(layout: Layout) -> Routine:
     """Start at the y of a session; 1 where there is no force."""
     r, m, _ = open_routine(layout, "begin", exported=True)
-    y, rest, y_old, t = m.at("y"), m.at("rest"), m.at("y_old"), m.numbers.t
+    y, rest, y_old, t = m.at("y"), m.at("rest"), m.at("y_old"), m.t
     with r.count(layout.size) as i:
         rest[i], y_old[i] = 0.0, y[i]
-    m.numbers.t_old, m.numbers.origin, m.counts.since = t, t, 0
+    m.t_old, m.origin, m.since = t, t, 0
     r.give(r.call("kick", m.session, y, rest, t, r.value(0.0, NUMBER)))
     return r
 
@@ -190,15 +190,15 @@ class CompiledComposition:
         options = CodeOptions(level=2, sincos=default_options(parts).sincos)
         routines = composition_source(self.layout, order)
         self._built = build_code(parts, options, exports=FUNCTIONS, routines=routines)
-        self.functions = bind_functions(self._built)
+        self.functions = bind_steps(self._built)
         self._programs = {"kernel": forces, "flow": velocities}
 
     def memory(self, parameter_values: FloatArray) -> tuple[FloatArray, tuple[object, ...]]:
         """Return the array of a session, and what it leads to."""
         found = [self._built.derive(name, one, parameter_values) for name, one in self._programs.items()]
         memory = np.zeros(self.layout.places["end"])
-        pointers = memory[: len(POINTERS)].view(np.uint64)
+        addresses, places = memory.view(np.int64), list(FIELDS)
         for name, (derived, scratch) in zip(("derived", "derived_2"), found, strict=True):
-            pointers[POINTERS.index(name)] = derived.ctypes.data
-            pointers[POINTERS.index("scratch")] = scratch.ctypes.data
+            addresses[places.index(name)] = derived.ctypes.data
+            addresses[places.index("scratch")] = scratch.ctypes.data
         return memory, (self._built, found)

@@ -6,10 +6,11 @@ Memory of a session of fixed steps: what routines and Python agree on.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from itertools import accumulate
 
 from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Kind, Operand, Record, Routine, Value
-from atwood.integrators.stepper import SAMPLE_ARGUMENTS, write_sample
+from atwood.integrators.stepper import SAMPLE_ARGUMENTS, fields_of, open_routine as session_routine, write_sample
 from atwood.lazy_dataclasses import dataclass
 
 FILES = ("integrators/symplectic/fixed_steps.py", "integrators/stepper.py")
@@ -40,21 +41,21 @@ def run(
     Times are multiples of the step from where it began, so that rounding does not add up.
     """
     r, m, _ = open_routine(layout, "run", exported=True)
-    stop, h, origin, limit = m.numbers.stop, m.numbers.step, m.numbers.origin, m.counts.limit
+    stop, h, origin, limit = m.stop, m.step, m.origin, m.limit
     with r.forever():
-        t, steps = m.numbers.t, m.counts.steps
+        t, steps = m.t, m.steps
         with r.when(t >= stop):
             r.give(0)
         with r.when(steps >= limit):
             r.give(1)
         with r.when(attempt(r, m, t, h) != 0):
             failed(r, m)
-            m.counts.failures = m.counts.failures + 1
+            m.failures = m.failures + 1
             r.give(2)
         good(r, m)
-        following = m.counts.since + 1
-        m.counts.since, m.counts.steps = following, steps + 1
-        m.numbers.t_old, m.numbers.t = t, origin + h * following.number()
+        following = m.since + 1
+        m.since, m.steps = following, steps + 1
+        m.t_old, m.t = t, origin + h * following.number()
         with r.when(r.call("judge", m.session) != 0):
             r.give(4)
     return r
@@ -66,10 +67,10 @@ def judge(layout: Layout) -> Routine:
     It is asked about what lies around the step, too: the parts of a composition reach beyond it, to both sides.
     """
     r, m, _ = open_routine(layout, "judge")
-    guard, data, width = m.pointers.guard, m.pointers.guard_data, layout.width
+    guard, data, width = m.guard, m.guard_data, layout.width
     with r.when(r.is_null(guard)):
         r.give(0)
-    t, t_old, h = m.numbers.t, m.numbers.t_old, m.numbers.step
+    t, t_old, h = m.t, m.t_old, m.step
     begin, begin_rates, end, end_rates = (m.at("ends").at(k * width) for k in range(4))
     before, after = (m.at("around").at(k * width) for k in range(2))
 
@@ -80,10 +81,10 @@ def judge(layout: Layout) -> Routine:
     def read(time: Value, state: str, values: Value, rates: Value) -> None:
         with r.when(r.call("speeds", m.session, time, m.at(state), values) != 0):
             r.give(4)
-        with r.when(r.call(m.pointers.rates, time, values, rates, m.pointers.rates_data) != 0):
+        with r.when(r.call(m.rates, time, values, rates, m.rates_data) != 0):
             r.give(4)
 
-    with r.when(m.counts.since == 1):
+    with r.when(m.since == 1):
         read(t_old, "y_old", begin, begin_rates)
     with r.otherwise():
         copy_numbers(r, begin, end, 2 * width)
@@ -107,13 +108,13 @@ def interpolate(layout: Layout) -> Routine:
         with r.when(code != 0):
             r.give(3)
 
-    t, t_old = m.numbers.t, m.numbers.t_old
+    t, t_old = m.t, m.t_old
     with r.when(time == t):
         unless_found(r.call("speeds", m.session, time, m.at("y"), out))
     with r.otherwise():
         unless_found(r.call("trial", m.session, t_old, time - t_old, m.at("y_old"), there))
         unless_found(r.call("speeds", m.session, time, there, out))
-    unless_found(r.call(m.pointers.rates, time, out, yps, m.pointers.rates_data))
+    unless_found(r.call(m.rates, time, out, yps, m.rates_data))
     r.give(0)
     return r
 
@@ -122,12 +123,14 @@ def sample(layout: Layout) -> Routine:
     """Go through output times and fill a table; it ends as `run` does."""
     r, m, _ = open_routine(layout, "sample", SAMPLE_ARGUMENTS, exported=True)
     width: Operand = r.value(layout.width, INTEGER)
-    return write_sample(r, m.numbers, m.counts, width)
+    return write_sample(r, m, width)
 
 
-POINTERS = ("derived", "scratch", "rates", "rates_data", "derived_2", "guard", "guard_data")
-NUMBERS = ("t", "t_old", "stop", "step", "origin")
-COUNTS = ("limit", "steps", "failures", "evaluations", "undefined", "filled", "since")
+FIELDS = fields_of(
+    ("derived", "scratch", "rates", "rates_data", "derived_2", "guard", "guard_data"),
+    ("t", "t_old", "stop", "step", "origin"),
+    ("since",),
+)
 
 
 @dataclass(frozen=True)
@@ -164,8 +167,7 @@ class Layout:
     def places(self) -> dict[str, int]:
         """Where each group begins; ``end`` is the length of the whole."""
         n, m, s = self.size, max(self.speeds, 1), self.stages
-        sizes = {"pointers": len(POINTERS), "numbers": len(NUMBERS), "counts": len(COUNTS)}
-        sizes |= {"y": n, "y_old": n, "rest": n, "per_size": n}
+        sizes = {"fields": len(FIELDS), "y": n, "y_old": n, "rest": n, "per_size": n}
         sizes |= {"ends": 4 * self.width, "around": 2 * self.width}
         work = {"L": s * n, "G": s * n, "Y": n, "F": n, "V": m, "U": s * m, "scale": n}
         for name in ("main", "aside"):
@@ -179,26 +181,22 @@ class Layout:
         return places[f"main.{key}"] - places["main.L"]
 
 
-class Memory:
+class Memory(Record):
     """The memory of a session within a routine."""
 
-    def __init__(self, mem: Value, layout: Layout) -> None:
-        self.session, self._places = mem, layout.places
-        self.pointers = Record(mem.at(self._places["pointers"]), dict.fromkeys(POINTERS, ADDRESS))
-        self.numbers = Record(mem.at(self._places["numbers"]), dict.fromkeys(NUMBERS, NUMBER))
-        self.counts = Record(mem.at(self._places["counts"]), dict.fromkeys(COUNTS, INTEGER))
+    session: Value
+
+    def __init__(self, layout: Layout, session: Value) -> None:
+        super().__init__(session, FIELDS)
+        self.__dict__.update(session=session, groups=layout.places)
 
     def at(self, group: str) -> Value:
         """Return where a group of numbers begins."""
-        return self.session.at(self._places[group])
+        return self.session.at(self.__dict__["groups"][group])
 
 
 def open_routine(
-    layout: Layout,
-    name: str,
-    more: Mapping[str, Kind] | None = None,
-    exported: bool = False,
+    layout: Layout, name: str, more: Mapping[str, Kind] | None = None, exported: bool = False
 ) -> tuple[Routine, Memory, list[Value]]:
     """Return a new routine of a session, its memory, and its further arguments."""
-    routine = Routine(name, {"mem": ADDRESS, **(more or {})}, exported=exported)
-    return routine, Memory(routine.arguments[0], layout), routine.arguments[1:]
+    return session_routine(partial(Memory, layout), name, more, exported=exported)

@@ -79,8 +79,8 @@ def _evaluate(layout: Layout) -> Routine:
     y, f, v = (w.at(layout.within(key)) for key in ("Y", "F", "V"))
     inputs = [time, y, y.at(n), guess][: 4 if layout.takes_speeds else 3]
     outputs = [f, f.at(n), v][: 3 if layout.has_speeds else 2]
-    m.counts.evaluations = m.counts.evaluations + 1
-    r.give(call_kernel(r, "kernel", inputs, m.pointers.derived, m.pointers.scratch, outputs))
+    m.evaluations = m.evaluations + 1
+    r.give(call_kernel(r, "kernel", inputs, m.derived, m.scratch, outputs))
     return r
 
 
@@ -191,16 +191,16 @@ def _speeds(layout: Layout) -> Routine:
 def _begin(layout: Layout) -> Routine:
     """Start at the y of a session; 1 where the equations have no value there."""
     r, m, _ = open_routine(layout, "begin", exported=True)
-    y, w, t = m.at("y"), m.at("main.L"), m.numbers.t
+    y, w, t = m.at("y"), m.at("main.L"), m.t
     rest, y_old, scales = m.at("rest"), m.at("y_old"), w.at(layout.within("scale"))
-    unless_found(r, r.call("flat", m.session, w, y, t, m.numbers.step))
+    unless_found(r, r.call("flat", m.session, w, y, t, m.step))
     with r.count(layout.size) as i:
         rest[i], y_old[i] = 0.0, y[i]
         scale = r.size(y[i])
         for j in range(layout.stages):
             scale = scale + r.size(w[i + j * layout.size])
         scales[i] = scale
-    m.numbers.t_old, m.numbers.origin, m.counts.since = t, t, 0
+    m.t_old, m.origin, m.since = t, t, 0
     r.give(0)
     return r
 
@@ -208,7 +208,7 @@ def _begin(layout: Layout) -> Routine:
 def _run(layout: Layout) -> Routine:
     def attempt(r: Routine, m: Memory, t: Value, h: Value) -> Value:
         w, y = m.at("main.L"), m.at("y")
-        with r.when(m.counts.since != 0):
+        with r.when(m.since != 0):
             r.call("ahead", w, result=None)
         code = r.variable(r.call("solve", m.session, w, y, t, h), CODE)
         with r.when(code.now != 0):  # from a poor guess the iteration may lead where the equations have no value

@@ -5,11 +5,10 @@ Hamilton's equations of a scene, as methods of equal steps are given them.
 
 from __future__ import annotations
 
-import ctypes
 import warnings
 from collections.abc import Callable
-from ctypes import c_double, c_int, c_int64, c_void_p
-from typing import TYPE_CHECKING, Any, Protocol
+from ctypes import c_double, c_void_p
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -19,35 +18,22 @@ from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.errors import KernelEvaluationError, SolveError
 from atwood.expr import Program
 from atwood.integrators.protocol import CompiledRates, SolverOptions, State, StepGuard
-from atwood.integrators.stepper import Counts, Outcome, Stepper
-from atwood.integrators.symplectic.fixed_steps import COUNTS, NUMBERS, POINTERS, Layout
+from atwood.integrators.stepper import Functions, NativeStepper, Outcome, bind_functions
+from atwood.integrators.symplectic.fixed_steps import FIELDS, Layout
 from atwood.integrators.symplectic.gauss import FUNCTIONS, gauss_source
 from atwood.lazy_dataclasses import dataclass
 
-if TYPE_CHECKING:
-    from atwood.integrators.symplectic.fixed_steps import Layout
-
-_UNLIMITED = 2**62
 _CALM, _SHORTEST = 8, 1e-12
 """After so many good steps one that was divided is made longer again; none is shorter than such a share."""
-_NO_VALUE, _UNSEEN = 3, 4
+_UNSEEN = 4
 _HALVINGS, _LOOKED_AT, _CLOSE = 60, 40, 0.2
 """So many steps are tried, on so many steps of the motion each, until an error is so near to what is allowed."""
 
-_SHAPES = {
-    "run": (c_void_p,),
-    "interpolate": (c_void_p, c_double, c_void_p, c_void_p),
-    "sample": (c_void_p, c_void_p, c_int64, c_void_p, c_void_p),
-    "begin": (c_void_p,),
-    "trial": (c_void_p, c_double, c_double, c_void_p, c_void_p),
-    "speeds": (c_void_p, c_double, c_void_p, c_void_p),
-}
 
-
-def bind_functions(built: Built) -> dict[str, Callable[..., int]]:
+def bind_steps(built: Built) -> Functions:
     """Return the functions of a method by name, to be called from Python."""
-    addresses = built.code.addresses
-    return {name: ctypes.CFUNCTYPE(c_int, *shape)(addresses[name]) for name, shape in _SHAPES.items()}
+    trial = c_double, c_double, c_void_p, c_void_p
+    return bind_functions(built, begin=(), trial=trial, speeds=(c_double, c_void_p, c_void_p))
 
 
 class CompiledGauss:
@@ -71,14 +57,14 @@ class CompiledGauss:
         level = max(2, default_options([part]).level) if equations.size < _LARGE else default_options([part]).level
         options = CodeOptions(level=level, sincos=default_options([part]).sincos)
         self._built = build_code([part], options, exports=FUNCTIONS, routines=gauss_source(self.layout, order))
-        self.functions = bind_functions(self._built)
+        self.functions = bind_steps(self._built)
         self._equations = equations
 
     def memory(self, parameter_values: FloatArray) -> tuple[FloatArray, tuple[object, ...]]:
         """Return the array of a session, and what it leads to."""
         derived, scratch = self._built.derive("kernel", self._equations, parameter_values)
         memory = np.zeros(self.layout.places["end"])
-        memory[:2].view(np.uint64)[:] = derived.ctypes.data, scratch.ctypes.data
+        memory[:2].view(np.int64)[:] = derived.ctypes.data, scratch.ctypes.data
         return memory, (self._built, derived, scratch)
 
 
@@ -86,7 +72,7 @@ _LARGE = 3_000
 """Equations of more nodes are compiled with less effort."""
 
 
-class GaussStepper(Stepper):
+class GaussStepper(NativeStepper):
     """Takes the steps of a method of Gauss or a composition, all equally long; outputs are steps of their own.
 
     The state that it is given and gives is (q, u); what it integrates is (q, p).
@@ -109,6 +95,8 @@ class GaussStepper(Stepper):
         What judges steps. One that is not good is divided where that is allowed (`vary_step`), and told of elsewhere.
     """
 
+    _fields = FIELDS
+
     def __init__(
         self,
         compiled: CompiledMethod,
@@ -119,35 +107,29 @@ class GaussStepper(Stepper):
         sizes: FloatArray,
         guard: StepGuard | None = None,
     ) -> None:
-        self._compiled, self._momenta, self._rates = compiled, momenta, rates
-        layout = compiled.layout
-        self._memory, self._keep = compiled.memory(parameter_values)
-        self._pointers = self._memory[: len(POINTERS)].view(np.uint64)
-        self._pointers[2:4] = rates.function, rates.data
+        self._compiled, self._momenta = compiled, momenta
+        layout, self._functions = compiled.layout, compiled.functions
+        self._memory, kept = compiled.memory(parameter_values)
+        self._keep = kept, rates, guard
+        self._begin_at(self._memory, rates=rates.function, rates_data=rates.data, step=step)
         if guard is not None:
-            self._keep = (self._keep, guard)
-            self._pointers[_GUARD : _GUARD + 2] = guard.function, guard.data
-        places, n = layout.places, layout.size
-        self._places, self._session = places, c_void_p(self._memory.ctypes.data)
-        self._numbers = self._memory[places["numbers"] : places["numbers"] + len(NUMBERS)]
-        self._counts = self._memory[places["counts"] : places["counts"] + len(COUNTS)].view(np.int64)
-        self._y = self._memory[places["y"] : places["y"] + n]
-        self._numbers[_STEP] = step
-        self._memory[places["per_size"] : places["per_size"] + n] = 1.0 / sizes
-        self._width = layout.width
-        self._functions = compiled.functions
+            self._set(guard=guard.function, guard_data=guard.data)
+        self._groups, self._size = layout.places, layout.width
+        self._y = self._group("y", layout.size)
+        self._group("per_size", layout.size)[:] = 1.0 / sizes
+        self._values = np.empty((2, layout.width))
+        y, yp = (one.ctypes.data for one in self._values)
+        self._outputs = y, yp
         self._longest, self._good = 0.0, 0
 
-    @property
-    def counts(self) -> Counts:
-        """What it has done so far, over all starts."""
-        steps, failures, evaluations, undefined = (int(self._counts[k]) for k in _COUNTED)
-        return Counts(steps, failures, evaluations, undefined)
+    def _group(self, name: str, size: int) -> FloatArray:
+        """Return so many numbers of the session from the begin of a group on."""
+        return self._memory[self._groups[name] : self._groups[name] + size]
 
     @property
     def step(self) -> float:
         """The step, s."""
-        return float(self._numbers[_STEP])
+        return self._number("step")
 
     def choose_step(self, t: float, y: FloatArray, end: float, options: SolverOptions) -> None:
         """Find a step that is accurate enough from a start, and let steps be shorter than it where they need to be."""
@@ -159,7 +141,7 @@ class GaussStepper(Stepper):
 
     def take_step(self, step: float) -> None:
         """Take steps of another length from the next start on."""
-        self._numbers[_STEP] = step
+        self._set(step=step)
 
     def vary_step(self) -> None:
         """Let steps be shorter than now where they would pass over something."""
@@ -172,42 +154,30 @@ class GaussStepper(Stepper):
         q, u = y[:n], y[n:]
         self._y[:n], self._y[n:] = q, self._momenta(t, q, u)
         for area in ("main", "aside"):
-            at = self._places[f"{area}.U"]
-            self._memory[at : at + layout.stages * m] = np.tile(u, layout.stages)
-        self._numbers[_T] = t
-        return bool(np.isfinite(self._y).all()) and self._functions["begin"](self._session) == 0
+            self._group(f"{area}.U", layout.stages * m)[:] = np.tile(u, layout.stages)
+        self._set(t=t)
+        return bool(np.isfinite(self._y).all()) and self._call("begin") == 0
 
-    def run(self, t_stop: float, steps: int) -> Outcome:
-        """Take steps until one ends at or after a time, but no more than so many."""
-        self._numbers[_STOP] = t_stop
-        last = self._counts[_STEPS] + min(steps, _UNLIMITED)
-        while True:
-            code = self._go_on("run", last)
-            if code is not None and (code != Outcome.USED_UP or self._counts[_STEPS] >= last):
-                return Outcome(code)
-
-    def _go_on(self, function: str, last: int, *arguments: object) -> int | None:
+    def _go_on(self, last: int, function: str, *arguments: int) -> int | None:
         """Take steps, one by one while they are divided; None where the last one was divided or told of."""
-        before, is_divided = self._counts[_STEPS], self.step < self._longest
-        self._counts[_LIMIT] = min(last, before + 1) if is_divided else last
-        code = self._functions[function](self._session, *arguments)
+        before, is_divided = self._count("steps"), self.step < self._longest
+        code = super()._go_on(min(last, before + 1) if is_divided else last, function, *arguments)
         if code in (Outcome.TOO_SMALL, _UNSEEN):
             self._divide(code == _UNSEEN)
             return None
-        if is_divided and self._counts[_STEPS] > before:
+        if is_divided and self._count("steps") > before:
             self._good += 1
             if self._good >= _CALM:
                 self._change_step(min(2.0 * self.step, self._longest))
-        return code
+        return None if code == Outcome.USED_UP and self._count("steps") < last else code
 
     def _divide(self, is_unseen: bool) -> None:
         """Take shorter steps from where the last one began, which failed or may have passed over something."""
         if self._longest and self.step > _SHORTEST * self._longest:
             if is_unseen:
-                self._y[:] = self._memory[self._places["y_old"] :][: len(self._y)]
-                self._numbers[_T] = self._numbers[_T_OLD]
-                self._counts[_STEPS] -= 1
-                self._counts[_FAILURES] += 1
+                self._y[:] = self._group("y_old", len(self._y))
+                self._set(t=self._number("t_old"))
+                self._set(steps=self._count("steps") - 1, failures=self._count("failures") + 1)
             self._change_step(0.5 * self.step)
         elif not is_unseen:
             raise KernelEvaluationError(
@@ -215,9 +185,9 @@ class GaussStepper(Stepper):
                 "step"
             )
         elif not self._longest:
-            self._pointers[_GUARD] = 0
+            self._set(guard=0)
             warnings.warn(
-                f"at t = {self._numbers[_T_OLD]:.6g} a law may change by more within a step of {self.step:.3g} s than "
+                f"at t = {self._number('t_old'):.6g} a law may change by more within a step of {self.step:.3g} s than "
                 "the method sees: give a smaller step, or none",
                 stacklevel=2,
             )
@@ -225,33 +195,15 @@ class GaussStepper(Stepper):
     def _change_step(self, step: float) -> None:
         self._good = 0
         self.take_step(step)
-        self._functions["begin"](self._session)
+        self._call("begin")
 
     def state(self) -> State:
         """Return time, values and rates at the end of the last step."""
-        return self.interpolate(float(self._numbers[_T]))
+        return self.interpolate(self._number("t"))
 
-    def interpolate(self, t: float) -> State:
-        """Return the state at a time within the last step, by a step that ends there."""
-        y, yp = np.empty((2, self._width))
-        if self._functions["interpolate"](self._session, t, y.ctypes.data, yp.ctypes.data):
-            raise KernelEvaluationError(f"there is no step to t = {t:.9g} within one that there is")
-        return t, y, yp
-
-    def sample(self, times: FloatArray, steps: int) -> tuple[FloatArray, FloatArray, Outcome]:
-        """Take steps, and return values and rates at as many of the times, one row each, as were reached."""
-        times = np.ascontiguousarray(times, dtype=np.float64)
-        y, yp = np.empty((2, len(times), self._width))
-        last, filled = self._counts[_STEPS] + min(steps, _UNLIMITED), 0
-        while True:
-            tables = (array[filled:].ctypes.data for array in (y, yp))
-            left = times[filled:]
-            code = self._go_on("sample", last, left.ctypes.data, len(left), *tables)
-            filled += int(self._counts[_FILLED])
-            if code == _NO_VALUE:
-                raise KernelEvaluationError(f"there is no step to t = {times[filled]:.9g} within one that there is")
-            if code is not None and (code != Outcome.USED_UP or self._counts[_STEPS] >= last):
-                return y[:filled], yp[:filled], Outcome(code)
+    def _no_interpolation(self, t: float) -> KernelEvaluationError:
+        """Return the error of a time to which there is no step, by which values within one are found."""
+        return KernelEvaluationError(f"there is no step to t = {t:.9g} within one that there is")
 
     def find_step(self, t: float, y: FloatArray, end: float, tolerances: FloatArray, relative: float) -> float:
         """Return a step whose error is within tolerances along the first steps of a motion, and take it from here on.
@@ -272,7 +224,7 @@ class GaussStepper(Stepper):
                 too_long = step
                 step = max(step * min(0.9, max(0.1, factor)), 0.5 * (best + step) if best else 0.0)
         if best:
-            self._numbers[_STEP] = best
+            self.take_step(best)
             return best
         raise SolveError(f"no step is as accurate as asked for from t = {t:.9g} on", advice="Give a step, or rtol.")
 
@@ -280,7 +232,7 @@ class GaussStepper(Stepper):
         self, t: float, y: FloatArray, step: float, end: float, tolerances: FloatArray, relative: float
     ) -> float:
         """Return the largest error of the first steps, in units of the tolerances; infinite where there is none."""
-        self._numbers[_STEP] = step
+        self.take_step(step)
         if not self.start(t, y):
             raise KernelEvaluationError(f"the equations have no value at t = {t:.9g}")
         here, worst = self._y.copy(), 0.0
@@ -292,12 +244,12 @@ class GaussStepper(Stepper):
             middle, short = now + 0.5 * step, 0.5 * step
             parts = ((now, step, here, whole), (now, short, here, half), (middle, short, half, other))
             for begin, length, source, target in parts:
-                if self._functions["trial"](self._session, begin, length, source.ctypes.data, target.ctypes.data):
+                if self._call("trial", begin, length, source.ctypes.data, target.ctypes.data):
                     return np.inf
             ends = []
             for one in (whole, other):
-                found = np.empty(self._width)
-                if self._functions["speeds"](self._session, now + step, one.ctypes.data, found.ctypes.data):
+                found = np.empty(self._size)
+                if self._call("speeds", now + step, one.ctypes.data, found.ctypes.data):
                     return np.inf
                 ends.append(found)
             allowed = tolerances + relative * np.abs(ends[1])
@@ -306,20 +258,12 @@ class GaussStepper(Stepper):
         return worst
 
 
-_T, _T_OLD, _STOP, _STEP = map(NUMBERS.index, ("t", "t_old", "stop", "step"))
-_GUARD = POINTERS.index("guard")
-_LIMIT, _STEPS, _FILLED = map(COUNTS.index, ("limit", "steps", "filled"))
-_FAILURES = COUNTS.index("failures")
-_COUNTED = tuple(map(COUNTS.index, ("steps", "failures", "evaluations", "undefined")))
-assert POINTERS[:2] == ("derived", "scratch")
-
-
 class CompiledMethod(Protocol):
     """A method with fixed steps, for any parameter values and any step."""
 
     order: int
     layout: Layout
-    functions: dict[str, Callable[..., int]]
+    functions: Functions
 
     def memory(self, parameter_values: FloatArray) -> tuple[FloatArray, tuple[object, ...]]:
         """Return the array of a session, and what it leads to."""

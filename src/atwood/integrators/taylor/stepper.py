@@ -24,10 +24,10 @@ its recurrences, as two compiled programs.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from functools import partial
 from itertools import accumulate
 from math import ceil, exp, frexp, inf, log, log2
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,10 +36,18 @@ from numpy.typing import ArrayLike
 from atwood.arrays import FloatArray
 from atwood.codegen.llvm.build import RoutineSource, build_code, default_options, once
 from atwood.codegen.llvm.module import Part
-from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Kind, Lanes, Operand, Record, Routine, Value
+from atwood.codegen.routines import ADDRESS
 from atwood.expr.series.taylor import TaylorPrograms
 from atwood.integrators.protocol import SolverOptions, StepGuard, absolute_tolerances
-from atwood.integrators.stepper import NativeStepper, Routines, routines_of
+from atwood.integrators.stepper import (
+    WIDTH,
+    Memory,
+    NativeStepper,
+    Routines,
+    fields_of,
+    open_routine as session_routine,
+    routines_of,
+)
 from atwood.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
@@ -129,9 +137,6 @@ def logarithm(value: float) -> float:
     return 2.0 * mantissa + (exponent - 2)
 
 
-WIDTH = 4
-"""How many unknowns a loop works on at a time; rows are padded to a multiple of it with finite numbers."""
-
 LANES = 8
 """How many convolutions are worked out at a time."""
 
@@ -145,21 +150,19 @@ _NAMES = (
 ROWS = {"x": 0, **{name: HIGHEST + 1 + i for i, name in enumerate(_NAMES)}, "all": HIGHEST + 1 + len(_NAMES)}
 """The rows of the table of arrays: the coefficients of the unknowns from order zero on, and what steps need."""
 
-NUMBERS = (
-    *("order_number", "order_inverse", "order_step", "order_tick"),  # what the program of an order is told
-    *("t", "t_old", "t_new", "time"),
-    *("unit", "last", "first", "stop", "stop_time", "share", "allowed", "longest", "horizon", "reach"),
-)
-COUNTS = (
-    *("size", "padded", "order", "pair_blocks", "square_blocks", "limit"),
-    *("steps", "failures", "evaluations", "undefined", "stiff", "filled"),
-)
-POINTERS = (
-    *("start", "prologue", "recurrence"),  # functions
-    *("start_derived", "derived", "scratch", "known"),
-    *("new_in", "new_out", "trial_in", "trial_out", "order_in", "order_out"),  # tables of pointers
-    *("arrays", "table", "pair_sums", "square_sums", "numbers", "counts"),
-    *("guard", "guard_data"),
+FIELDS = fields_of(
+    (
+        *("start", "prologue", "recurrence"),  # functions
+        *("start_derived", "derived", "scratch", "known"),
+        *("new_in", "new_out", "trial_in", "trial_out", "order_in", "order_out"),  # tables of pointers
+        *("arrays", "table", "pair_sums", "square_sums", "guard", "guard_data"),
+    ),
+    (
+        *("order_number", "order_inverse", "order_step", "order_tick"),  # what the program of an order is told
+        *("t", "t_old", "t_new", "time"),
+        *("unit", "last", "first", "stop", "stop_time", "share", "allowed", "longest", "horizon", "reach"),
+    ),
+    ("size", "padded", "order", "pair_blocks", "square_blocks"),
 )
 
 
@@ -175,32 +178,8 @@ def positions(pairs: int, squares: int, size: int) -> tuple[int, ...]:
     return (*left, *(at + STRIDE for at in left), *last, *range(size))
 
 
-class Memory:
-    """The memory of a session within a routine."""
-
-    def __init__(self, session: Value) -> None:
-        self.session = session
-        self.at = Record(session, dict.fromkeys(POINTERS, ADDRESS))
-        self.numbers = Record(self.at.numbers, dict.fromkeys(NUMBERS, NUMBER))
-        self.counts = Record(self.at.counts, dict.fromkeys(COUNTS, INTEGER))
-        self.arrays, self.size, self.padded = self.at.arrays, self.counts.size, self.counts.padded
-
-    def row(self, row: Operand | str) -> Value:
-        """Return the address of a row of the table of arrays, by its name or number."""
-        return self.arrays.at(self.padded * (ROWS[row] if isinstance(row, str) else row))
-
-    def lanes(self, row: Value, j: Value) -> Value:
-        """Return the lanes of a row from an unknown on."""
-        return row.read(j, Lanes(WIDTH))
-
-
-def open_routine(
-    name: str, more: Mapping[str, Kind] | None = None, result: Kind | None = CODE, exported: bool = False
-) -> tuple[Routine, Memory, list[Value]]:
-    """Return a new routine of a session, its memory, and its further arguments."""
-    routine = Routine(name, {"session": ADDRESS, **(more or {})}, result, exported)
-    return routine, Memory(routine.arguments[0]), routine.arguments[1:]
-
+open_routine = partial(session_routine, partial(Memory, FIELDS, ROWS))
+"""Returns a new routine of a session, its memory, and its further arguments."""
 
 _PACKED = (0, 1, 2)
 """The groups of results of the program of an order whose rows lie in blocks: left, right and squares."""
@@ -256,9 +235,7 @@ class _Layout:
         known = len(programs.order.parameters)
         pairs, squares = -(-programs.pairs // LANES), -(-programs.squares // LANES)
         lengths = {
-            "pointers": len(POINTERS),
-            "numbers": len(NUMBERS),
-            "counts": len(COUNTS),
+            "fields": len(FIELDS),
             "tables": 16,
             "values": 2 * n,
             "known": known,
@@ -278,12 +255,12 @@ class _Layout:
             return far["arrays"] + 8 * self.padded * ROWS[name]
 
         def number(name: str) -> int:
-            return far["numbers"] + 8 * NUMBERS.index(name)
+            return far["fields"] + 8 * list(FIELDS).index(name)
 
         pairs_of_tables = (
             *(number("t_new"), row("new"), row("new_rates"), far["known"]),
             *(number("time"), row("trial"), row("trial_rates"), far["spare"]),
-            *(far["pair_sums"], far["square_sums"], far["numbers"]),
+            *(far["pair_sums"], far["square_sums"], number("order_number")),
         )
         self.tables = np.array(pairs_of_tables, dtype=np.int64)
         names = ("new_in", "new_out", "trial_in", "trial_out", "order_in", "order_out")
@@ -291,8 +268,9 @@ class _Layout:
         code = recurrences.addresses
         given = {"start": code["start"], "prologue": code["order_prologue"], "recurrence": code["order"]}
         given |= dict.fromkeys(("start_derived", "guard", "guard_data"), 0)  # of each session
-        self.pointers = np.array([{**far, **given}[name] for name in POINTERS], dtype=np.int64)
-        self.is_own = np.array([name not in given for name in POINTERS], dtype=np.int64)
+        pointers = [name for name, kind in FIELDS.items() if kind is ADDRESS]
+        self.pointers = np.array([{**far, **given}[name] for name in pointers], dtype=np.int64)
+        self.is_own = np.array([name not in given for name in pointers], dtype=np.int64)
 
 
 class CompiledStepper(NativeStepper):
@@ -310,8 +288,7 @@ class CompiledStepper(NativeStepper):
         What judges steps besides their error.
     """
 
-    _number = MappingProxyType({name: place for place, name in enumerate(NUMBERS)})
-    _count = MappingProxyType({name: place for place, name in enumerate(COUNTS)})
+    _fields = FIELDS
 
     def __init__(
         self,
@@ -330,12 +307,12 @@ class CompiledStepper(NativeStepper):
         self._arrays[ROWS["floors"], :n] = absolute_tolerances(options, n) / options.relative_tolerance
         programs = recurrences.programs
         pairs, squares = -(-programs.pairs // LANES), -(-programs.squares // LANES)
-        self._counts[: COUNTS.index("limit")] = n, self._arrays.shape[1], chosen, pairs, squares
-        share = log2(share_of_radius(chosen, options.relative_tolerance))
-        allowed = DEFECT * options.relative_tolerance + FLOOR
-        limits = allowed, options.max_step or inf, options.horizon, problem.reach
-        self._numbers[_FIRST:] = options.first_step or 0.0, 0.0, problem.stop_time, share, *limits
-        self._routines = _routines()
+        self._set(size=n, padded=self._arrays.shape[1], order=chosen, pair_blocks=pairs, square_blocks=squares)
+        self._set(first=options.first_step or 0.0, longest=options.max_step or inf, horizon=options.horizon)
+        self._set(stop_time=problem.stop_time, reach=problem.reach)
+        self._set(share=log2(share_of_radius(chosen, options.relative_tolerance)))
+        self._set(allowed=DEFECT * options.relative_tolerance + FLOOR)
+        self._functions = _routines().functions
 
     def _lay_out(self, recurrences: CompiledRecurrences, derived: FloatArray, guard: StepGuard | None) -> None:
         """Find a place for everything, in one piece of memory that begins with a cache line."""
@@ -346,19 +323,15 @@ class CompiledStepper(NativeStepper):
         memory, base = memory[skipped:], begins + 8 * skipped
         at = layout.places
         whole = memory.view(np.int64)
-        self._numbers = memory[at["numbers"] : at["numbers"] + len(NUMBERS)]
-        self._counts = whole[at["counts"] : at["counts"] + len(COUNTS)]
         self._arrays = memory[at["arrays"] : at["arrays"] + ROWS["all"] * layout.padded].reshape(-1, layout.padded)
         self._ends = self._arrays[ROWS["y"], :n], self._arrays[ROWS["rates"], :n]
         self._values = memory[at["values"] : at["values"] + 2 * n].reshape(2, n)
         whole[at["tables"] : at["tables"] + len(layout.tables)] = layout.tables + base
-        pointers = whole[at["pointers"] : at["pointers"] + len(POINTERS)]
-        pointers[:] = layout.pointers + base * layout.is_own
-        pointers[POINTERS.index("start_derived")] = derived.ctypes.data
+        whole[at["fields"] : at["fields"] + len(layout.pointers)] = layout.pointers + base * layout.is_own
+        self._begin_at(memory[at["fields"] :], start_derived=derived.ctypes.data)
         if guard is not None:
             self._guard = guard
-            pointers[POINTERS.index("guard") :] = guard.function, guard.data
-        self._session = base + 8 * at["pointers"]
+            self._set(guard=guard.function, guard_data=guard.data)
         self._parameters = recurrences.addresses["start_prologue"], derived.ctypes.data, base + 8 * at["scratch"]
         self._outputs = base + 8 * at["values"], base + 8 * (at["values"] + n)
 
@@ -368,10 +341,7 @@ class CompiledStepper(NativeStepper):
         What this session knows of parameters is written over by a run that has others.
         """
         factor = 1.0 / self._options.relative_tolerance
-        return self._places(self._arrays[ROWS["floors"]], factor, self._parameters)
-
-
-_FIRST = NUMBERS.index("first")
+        return self._batch_places(_routines().built, self._arrays[ROWS["floors"]], factor, self._parameters)
 
 
 _ROUTINES = RoutineSource(

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from math import inf
 
 from atwood.codegen.routines import ADDRESS, BOOLEAN, INTEGER, NUMBER, Lanes, Routine, Value
-from atwood.integrators.stepper import SAMPLE_ARGUMENTS, write_sample
+from atwood.integrators.stepper import SAMPLE_ARGUMENTS, WIDTH, Memory, write_sample
 from atwood.integrators.taylor.stepper import (
     HIGHEST,
     LANES,
@@ -23,8 +23,6 @@ from atwood.integrators.taylor.stepper import (
     SMALLER,
     STRIDE,
     WATCHED,
-    WIDTH,
-    Memory,
     open_routine,
 )
 
@@ -43,9 +41,9 @@ def write_routines() -> list[Routine]:
 def _evaluate() -> Routine:
     """Find rates and what recurrences need, by tables of addresses, and count: 1 where one is not finite."""
     r, m, (source, target) = open_routine("evaluate", {"source": ADDRESS, "target": ADDRESS})
-    code = r.call(m.at.start, source, m.at.start_derived, m.at.scratch, target)
-    m.counts.evaluations = m.counts.evaluations + 1
-    m.counts.undefined = m.counts.undefined + code.integer()
+    code = r.call(m.start, source, m.start_derived, m.scratch, target)
+    m.evaluations = m.evaluations + 1
+    m.undefined = m.undefined + code.integer()
     r.give(code)
     return r
 
@@ -53,23 +51,23 @@ def _evaluate() -> Routine:
 def _begin() -> Routine:
     """Start anew from a state, with a unit of time in which the fastest unknown changes by its size."""
     r, m, (t, state) = open_routine("begin", {"t": NUMBER, "state": ADDRESS}, exported=True)
-    m.numbers.t, m.numbers.t_old, m.numbers.t_new, m.numbers.last = t, t, t, 0.0
+    m.t, m.t_old, m.t_new, m.last = t, t, t, 0.0
     # Nothing that is not finite must be left among the coefficients.
     r.clear(m.arrays, m.row("y"))
-    blocks = m.counts.pair_blocks * 2 + m.counts.square_blocks
-    r.clear(m.at.table, m.at.table.at(blocks * STRIDE))
+    blocks = m.pair_blocks * 2 + m.square_blocks
+    r.clear(m.table, m.table.at(blocks * STRIDE))
     r.clear(m.row("y_low"), m.row("new"))
     for row in ("y", "new", "x"):
         r.copy(m.row(row), state, m.size)
-    with r.when(r.call("evaluate", m.session, m.at.new_in, m.at.new_out) != 0):
+    with r.when(r.call("evaluate", m.session, m.new_in, m.new_out) != 0):
         r.give(_NO_RATES)
     rates, floors, steepest = m.row("rates"), m.row("floors"), r.variable(0.0)
     r.copy(rates, m.row("new_rates"), m.padded)
     with r.count(m.size) as i:
         pace = r.size(rates[i]) / (floors[i] + r.size(state[i]))
         steepest.now = r.most(pace, steepest.now)
-    bound = r.least(m.numbers.horizon, m.numbers.longest)
-    m.numbers.unit = r.choose(steepest.now > 0.0, r.least(1.0 / steepest.now, bound), bound)
+    bound = r.least(m.horizon, m.longest)
+    m.unit = r.choose(steepest.now > 0.0, r.least(1.0 / steepest.now, bound), bound)
     r.give(_REACHED)
     return r
 
@@ -77,13 +75,13 @@ def _begin() -> Routine:
 def _expand() -> Routine:
     """Find the coefficients at the state: 0, or 1 where one is not finite."""
     r, m, _ = open_routine("expand")
-    last, tries = m.numbers.last, r.variable(0, INTEGER)
-    unit = r.variable(r.choose(last > 0.0, last, m.numbers.unit))
-    r.call(m.at.prologue, m.at.known, m.at.derived, m.at.scratch, result=None)
+    last, tries = m.last, r.variable(0, INTEGER)
+    unit = r.variable(r.choose(last > 0.0, last, m.unit))
+    r.call(m.prologue, m.known, m.derived, m.scratch, result=None)
     y, rates, values, slopes = m.row("y"), m.row("rates"), m.row(0), m.row(1)
     with r.forever() as attempts:
         now = unit.now
-        m.numbers.unit = now
+        m.unit = now
         with r.count(m.padded, step=WIDTH) as j:
             values[j] = m.lanes(y, j)
             slopes[j] = m.lanes(rates, j) * now
@@ -94,12 +92,12 @@ def _expand() -> Routine:
                     failed.now = True
                     r.leave(orders)
                 if k + 1 >= LOWEST:
-                    with r.when(m.counts.order == k + 1):
+                    with r.when(m.order == k + 1):
                         r.leave(orders)
             r.leave(orders)
         with r.when(~failed.now):
             r.give(0)
-        m.counts.undefined = m.counts.undefined + 1
+        m.undefined = m.undefined + 1
         tries.now = tries.now + 1
         with r.when(tries.now >= RETRIES):
             r.leave(attempts)
@@ -110,17 +108,17 @@ def _expand() -> Routine:
 
 def _order(r: Routine, m: Memory, k: int, unit: Value) -> Value:
     """Find the coefficients of one order, and those of the unknowns of the next; return 1 where one is not finite."""
-    pairs, squares, table = m.counts.pair_blocks, m.counts.square_blocks, m.at.table
-    r.call(f"pairs{k}", table, m.at.pair_sums, pairs, result=None)
+    pairs, squares, table = m.pair_blocks, m.square_blocks, m.table
+    r.call(f"pairs{k}", table, m.pair_sums, pairs, result=None)
     with r.when(squares > 0):
-        r.call(f"squares{k}", table.at(pairs * (2 * STRIDE)), m.at.square_sums, squares, result=None)
-    m.numbers.order_number, m.numbers.order_inverse = float(k), 1.0 / k
-    m.numbers.order_step, m.numbers.order_tick = unit * (1.0 / (k + 1)), unit if k == 1 else 0.0
+        r.call(f"squares{k}", table.at(pairs * (2 * STRIDE)), m.square_sums, squares, result=None)
+    m.order_number, m.order_inverse = float(k), 1.0 / k
+    m.order_step, m.order_tick = unit * (1.0 / (k + 1)), unit if k == 1 else 0.0
     row = table.at(LANES * (k - 1))
     for place, target in enumerate((row, row, row, m.row(k + 1))):
-        m.at.order_out.write(place, target, ADDRESS)
-    m.at.order_in.write(3, m.row(k), ADDRESS)
-    return r.call(m.at.recurrence, m.at.order_in, m.at.derived, m.at.scratch, m.at.order_out)
+        m.order_out.write(place, target, ADDRESS)
+    m.order_in.write(3, m.row(k), ADDRESS)
+    return r.call(m.recurrence, m.order_in, m.derived, m.scratch, m.order_out)
 
 
 def _largest() -> Routine:
@@ -140,9 +138,9 @@ def _choose() -> Routine:
     between powers of two, and finite at zero.
     """
     r, m, _ = open_routine("choose", result=NUMBER)
-    first = m.numbers.first
+    first = m.first
     with r.when(first > 0.0):
-        m.numbers.first = 0.0
+        m.first = 0.0
         r.give(first)
     y, floors, sizes = m.row("y"), m.row("floors"), m.row("sizes")
     with r.count(m.padded, step=WIDTH) as j:
@@ -153,30 +151,30 @@ def _choose() -> Routine:
 
     growth = r.value(-1e9, NUMBER)
     for i in range(WATCHED):
-        order = m.counts.order - i
+        order = m.order - i
         top = largest(order)
         bits = top.bits()
         mantissa = ((bits & (2**52 - 1)) | (1023 << 52)).number_of_bits()
         logarithm = mantissa + ((bits >> 52) - 1024).number()
         rate = r.choose(top < 2.0**-1022, -1023.0, logarithm) / order.number()
         growth = r.most(rate, growth)
-    power = m.numbers.share - growth
+    power = m.share - growth
     floor = r.floor(power)
     part = power - floor
     factor = part * (part * 0.3398 + 0.6602) + 1.0
     value = r.variable(factor * ((r.truncated(floor) + 1023) << 52).number_of_bits())
-    reach = m.numbers.reach
+    reach = m.reach
     with r.when(reach < inf):  # no unknown changes too much for events to be seen
         for number in (1, 2):
             ratio = reach / largest(r.value(number, INTEGER))
             value.now = r.least(ratio if number == 1 else r.sqrt(ratio), value.now)
-    r.give(m.numbers.unit * value.now)
+    r.give(m.unit * value.now)
     return r
 
 
 def _horner(r: Routine, m: Memory, j: Value, share: Value) -> tuple[Value, Value]:
     """Return the polynomial less its first term at a share of its unit, and its slope, by Horner's scheme."""
-    order = m.counts.order
+    order = m.order
     value, turn, k = r.variable(m.lanes(m.row(order), j), _PART), r.variable(0.0, _PART), r.variable(order - 1, INTEGER)
     with r.forever() as terms:
         now = value.now
@@ -211,8 +209,8 @@ def _move() -> Routine:
 def _misses() -> Routine:
     """Tell whether rates at the end of a step are not the slope of the polynomial."""
     r, m, (h,) = open_routine("misses", {"h": NUMBER}, result=BOOLEAN)
-    weight, allowed = h / m.counts.order.number(), m.numbers.allowed
-    pace, missed = 1.0 / m.numbers.unit, r.variable(False, Lanes(WIDTH, is_float=False))
+    weight, allowed = h / m.order.number(), m.allowed
+    pace, missed = 1.0 / m.unit, r.variable(False, Lanes(WIDTH, is_float=False))
     y, new, slope, rates, floors = (m.row(name) for name in ("y", "new", "slope", "new_rates", "floors"))
     with r.count(m.padded, step=WIDTH) as j:
         apart = r.size(m.lanes(slope, j) * pace - m.lanes(rates, j)) * weight
@@ -225,7 +223,7 @@ def _misses() -> Routine:
 def _guarded() -> Routine:
     """Ask what judges steps about each part of one; 0 where all are good."""
     r, m, (t, h) = open_routine("guarded", {"t": NUMBER, "h": NUMBER})
-    guard, unit = m.at.guard, m.numbers.unit
+    guard, unit = m.guard, m.unit
     with r.when(r.is_null(guard)):
         r.give(0)
     first, pace = m.row(0), 1.0 / unit
@@ -240,7 +238,7 @@ def _guarded() -> Routine:
             moved, slope = _horner(r, m, j, share)
             trial[j] = m.lanes(first, j) + moved
             slopes[j] = slope * pace
-        code = r.call(guard, begin.now, kept, kept_slopes, end, trial, slopes, m.at.guard_data)
+        code = r.call(guard, begin.now, kept, kept_slopes, end, trial, slopes, m.guard_data)
         with r.when(code != 0):
             r.give(1)
         r.copy(kept, trial, m.size)
@@ -255,24 +253,24 @@ def _run() -> Routine:
     r, m, _ = open_routine("run", exported=True)
     h, t_new = r.variable(0.0), r.variable(0.0)
     with r.forever():
-        t = m.numbers.t
-        with r.when(t >= m.numbers.stop):
+        t = m.t
+        with r.when(t >= m.stop):
             r.give(_REACHED)
-        with r.when(m.counts.steps >= m.counts.limit):
+        with r.when(m.steps >= m.limit):
             r.give(_USED_UP)
         with r.when(r.call("expand", m.session) != 0):
             r.give(_TOO_SMALL)
-        h.now = r.least(r.call("choose", m.session, result=NUMBER), m.numbers.longest)
-        least, stop = r.size(t) * (10.0 * 2.0**-52), m.numbers.stop_time
+        h.now = r.least(r.call("choose", m.session, result=NUMBER), m.longest)
+        least, stop = r.size(t) * (10.0 * 2.0**-52), m.stop_time
         with r.forever() as attempts:
             ends = t + h.now >= stop
             t_new.now = r.choose(ends, stop, t + h.now)
             step = t_new.now - t
             with r.when(~(((step > least) & (step >= 1e-300)) | (ends & (step > 0.0)))):
                 r.give(_TOO_SMALL)
-            m.numbers.t_new = t_new.now
-            r.call("move", m.session, step / m.numbers.unit, result=None)
-            fits = r.variable(r.call("evaluate", m.session, m.at.new_in, m.at.new_out) == 0, BOOLEAN)
+            m.t_new = t_new.now
+            r.call("move", m.session, step / m.unit, result=None)
+            fits = r.variable(r.call("evaluate", m.session, m.new_in, m.new_out) == 0, BOOLEAN)
             with r.when(fits.now):
                 fits.now = ~r.call("misses", m.session, step, result=BOOLEAN)
             with r.when(fits.now):
@@ -280,9 +278,9 @@ def _run() -> Routine:
             with r.when(fits.now):
                 r.leave(attempts)
             h.now = step * RETREAT
-            m.counts.failures = m.counts.failures + 1
-        m.numbers.t_old, m.numbers.t, m.numbers.last = t, t_new.now, t_new.now - t
-        m.counts.steps = m.counts.steps + 1
+            m.failures = m.failures + 1
+        m.t_old, m.t, m.last = t, t_new.now, t_new.now - t
+        m.steps = m.steps + 1
         for source, target in (("new", "y"), ("new_low", "y_low"), ("new_rates", "rates")):
             r.copy(m.row(target), m.row(source), m.padded)
     return r
@@ -292,16 +290,16 @@ def _interpolate() -> Routine:
     """Write values and rates at a time within the last step."""
     arguments = {"time": NUMBER, "y_out": ADDRESS, "yp_out": ADDRESS}
     r, m, (time, y_out, yp_out) = open_routine("interpolate", arguments, exported=True)
-    with r.when(time == m.numbers.t):
+    with r.when(time == m.t):
         r.copy(y_out, m.row("y"), m.size)
         r.copy(yp_out, m.row("rates"), m.size)
         r.give(_REACHED)
-    m.numbers.time = time
+    m.time = time
     first, trial = m.row(0), m.row("trial")
-    share = r.value((time - m.numbers.t_old) / m.numbers.unit, _PART)
+    share = r.value((time - m.t_old) / m.unit, _PART)
     with r.count(m.padded, step=WIDTH) as j:
         trial[j] = m.lanes(first, j) + _horner(r, m, j, share)[0]
-    code = r.call("evaluate", m.session, m.at.trial_in, m.at.trial_out)
+    code = r.call("evaluate", m.session, m.trial_in, m.trial_out)
     r.copy(y_out, trial, m.size)
     r.copy(yp_out, m.row("trial_rates"), m.size)
     with r.when(code != 0):
@@ -313,7 +311,7 @@ def _interpolate() -> Routine:
 def _sample() -> Routine:
     """Go through output times and fill a table; it ends as `run` does."""
     r, m, _ = open_routine("sample", SAMPLE_ARGUMENTS, exported=True)
-    return write_sample(r, m.numbers, m.counts, m.size)
+    return write_sample(r, m, m.size)
 
 
 _CHAINS = 4
