@@ -10,9 +10,9 @@ class FirstOrder(Component):
 
     synonyms = ("Continuous.FirstOrder", "Lag", "PT1", "Low-pass filter")
 
-    gain: Number = parameter(1.0, unit="any", doc="What is left of a constant input.")
-    time_constant: Number = parameter(1.0, unit="s", above=0.0, doc="In which a step comes to 63 %.")
-    start: Number = parameter(0.0, unit="any", doc="Value at the start.")
+    gain: Number = parameter(1.0, unit="any", doc="What is left of a constant input.", symbol="K")
+    time_constant: Number = parameter(1.0, unit="s", above=0.0, doc="In which a step comes to 63 %.", symbol="T")
+    start: Number = parameter(0.0, unit="any", doc="Value at the start.", symbol="y_0")
     u: Number = signal(0.0, unit="any", doc="What it follows.")
     y: Scalar = state(start, unit="any", doc="What follows.")
 

@@ -10,7 +10,7 @@ class Gain(Component):
 
     synonyms = ("Math.Gain", "P controller", "Proportional controller")
 
-    gain: Number = parameter(1.0, unit="any", doc="What it is multiplied by.")
+    gain: Number = parameter(1.0, unit="any", doc="What it is multiplied by.", symbol="K")
     offset: Number = parameter(0.0, unit="any", doc="What is added.")
     u: Number = signal(0.0, unit="any", doc="What is multiplied.")
 

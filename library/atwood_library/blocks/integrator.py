@@ -10,8 +10,8 @@ class Integrator(Component):
 
     synonyms = ("Continuous.Integrator", "I controller", "LimIntegrator")
 
-    gain: Number = parameter(1.0, unit="any", doc="What the rate is of the input.")
-    start: Number = parameter(0.0, unit="any", doc="Value at the start.")
+    gain: Number = parameter(1.0, unit="any", doc="What the rate is of the input.", symbol="K")
+    start: Number = parameter(0.0, unit="any", doc="Value at the start.", symbol="y_0")
     u: Number = signal(0.0, unit="any", doc="What is integrated.")
     y: Scalar = state(start, unit="any", doc="The integral.")
 

@@ -10,8 +10,10 @@ class PI(Component):
 
     synonyms = ("Continuous.PI", "PI controller", "Proportional-integral controller")
 
-    gain: Number = parameter(1.0, unit="any", doc="Gain.")
-    integral_time: Number = parameter(1.0, unit="s", above=0.0, doc="Time in which a step is integrated to its height.")
+    gain: Number = parameter(1.0, unit="any", doc="Gain.", symbol="K")
+    integral_time: Number = parameter(
+        1.0, unit="s", above=0.0, doc="Time in which a step is integrated to its height.", symbol="T_i"
+    )
     u: Number = signal(0.0, unit="any", doc="What is to become zero, as set point less measurement.")
     integral: Scalar = state(0.0, unit="any", doc="Integral of the input over the integral time.")
 

@@ -28,9 +28,9 @@ class PID(Component):
 
     synonyms = ("LimPID", "Continuous.PID", "PID controller", "Anti-windup")
 
-    gain: Number = parameter(1.0, unit="any", above=0.0, doc="Gain.")
-    integral_time: Number = parameter(0.5, unit="s", above=0.0, doc="Time of the integral part.")
-    derivative_time: Number = parameter(0.1, unit="s", minimum=0.0, doc="Time of the derivative part.")
+    gain: Number = parameter(1.0, unit="any", above=0.0, doc="Gain.", symbol="K")
+    integral_time: Number = parameter(0.5, unit="s", above=0.0, doc="Time of the integral part.", symbol="T_i")
+    derivative_time: Number = parameter(0.1, unit="s", minimum=0.0, doc="Time of the derivative part.", symbol="T_d")
     filter_ratio: Number = parameter(10.0, above=0.0, doc="Derivative time over the time of its filter.")
     set_point_weight: Number = parameter(1.0, doc="Share b of the set point in the proportional part.")
     derivative_weight: Number = parameter(0.0, doc="Share c of the set point in the derivative part.")

@@ -10,8 +10,8 @@ class SampleAndHold(Component):
 
     synonyms = ("ZeroOrderHold", "Sampler", "Discrete.Sampler", "TriggeredSampler")
 
-    period: Number = parameter(0.1, unit="s", doc="Sample time.")
-    start: Number = parameter(0.0, unit="any", doc="Value before the first sample.")
+    period: Number = parameter(0.1, unit="s", doc="Sample time.", symbol="T")
+    start: Number = parameter(0.0, unit="any", doc="Value before the first sample.", symbol="y_0")
     u: Number = signal(0.0, unit="any", doc="What is taken.")
     y: Scalar = discrete_state(start, unit="any", doc="What is held.")
 

@@ -12,9 +12,9 @@ class SampleDelay(Component):
 
     synonyms = ("UnitDelay", "Discrete.UnitDelay", "Delay", "Dead time")
 
-    period: Number = parameter(0.1, unit="s", doc="Sample time.")
+    period: Number = parameter(0.1, unit="s", doc="Sample time.", symbol="T")
     samples: int = parameter(1, integer=True, minimum=1, doc="By how many samples it is late.")
-    start: Number = parameter(0.0, unit="any", doc="Value before there is any.")
+    start: Number = parameter(0.0, unit="any", doc="Value before there is any.", symbol="y_0")
     u: Number = signal(0.0, unit="any", doc="What is taken.")
     stored: Any = discrete_state(start, unit="any", count="samples", doc="What has been taken, the last first.")
     y: Scalar = discrete_state(start, unit="any", doc="What is put out.")

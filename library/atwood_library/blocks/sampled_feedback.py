@@ -17,7 +17,7 @@ class SampledFeedback(Component):
 
     gains: Any = parameter((1.0,), array=True, doc="One for each measurement, in their order.")
     targets: Any = parameter((0.0,), array=True, doc="What each measurement is to be; zero for those not given.")
-    period: Number = parameter(0.02, unit="s", doc="Sample time.")
+    period: Number = parameter(0.02, unit="s", doc="Sample time.", symbol="T")
     u_1: Number = signal(0.0, unit="any", doc="First measurement.")
     u_2: Number = signal(0.0, unit="any", doc="Second measurement.")
     u_3: Number = signal(0.0, unit="any", doc="Third measurement.")

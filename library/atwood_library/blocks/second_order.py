@@ -13,10 +13,10 @@ class SecondOrder(Component):
 
     synonyms = ("Continuous.SecondOrder", "PT2", "Low-pass filter", "Butterworth filter")
 
-    gain: Number = parameter(1.0, unit="any", doc="What is left of a constant input.")
+    gain: Number = parameter(1.0, unit="any", doc="What is left of a constant input.", symbol="K")
     angular_frequency: Number = parameter(1.0, unit="rad/s", above=0.0, doc="Angular frequency w.")
     damping: Number = parameter(0.7071067811865476, minimum=0.0, doc="Damping ratio.")
-    start: Number = parameter(0.0, unit="any", doc="Value at the start.")
+    start: Number = parameter(0.0, unit="any", doc="Value at the start.", symbol="y_0")
     u: Number = signal(0.0, unit="any", doc="What it follows.")
     y: Scalar = state(start, unit="any", doc="What follows.")
     rate: Scalar = state(0.0, unit="any", doc="Rate of what follows, in its unit a second.")

@@ -16,10 +16,16 @@ class ServoController(Component):
 
     synonyms = ("Cascade controller", "Position controller", "Axis controller", "AxisControlBus", "PD controller")
 
-    position_gain: Number = parameter(10.0, unit="1/s", minimum=0.0, doc="Wanted speed for a unit of position error.")
-    gain: Number = parameter(1.0, unit="any", minimum=0.0, doc="Command for a unit of speed error.")
+    position_gain: Number = parameter(
+        10.0, unit="1/s", minimum=0.0, doc="Wanted speed for a unit of position error.", symbol="K_p"
+    )
+    gain: Number = parameter(1.0, unit="any", minimum=0.0, doc="Command for a unit of speed error.", symbol="K")
     integral_time: Number | None = parameter(
-        None, unit="s", above=0.0, doc="Time of the speed's integral part; none for no such part."
+        None,
+        unit="s",
+        above=0.0,
+        doc="Time of the speed's integral part; none for no such part.",
+        symbol="T_i",
     )
     set_point: Number = signal(0.0, unit="any", doc="What the measurement is to become.")
     set_rate: Number = signal(0.0, unit="any", doc="Rate of the set point.")

@@ -23,12 +23,16 @@ class RotationalResistance(Component):
     )
     spaces = ("plane", "space")
 
-    linear: Number = parameter(0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque for a unit of speed.")
+    linear: Number = parameter(0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque for a unit of speed.", symbol="b")
     quadratic: Number = parameter(
-        0.0, unit="N*m*s^2/rad^2", minimum=0.0, doc="Torque for the square of a unit of speed."
+        0.0,
+        unit="N*m*s^2/rad^2",
+        minimum=0.0,
+        doc="Torque for the square of a unit of speed.",
+        symbol="b_2",
     )
-    constant: Number = parameter(0.0, unit="N*m", minimum=0.0, doc="Torque at any speed.")
-    power: Number = parameter(0.0, unit="W", minimum=0.0, doc="Power that is taken at any speed.")
+    constant: Number = parameter(0.0, unit="N*m", minimum=0.0, doc="Torque at any speed.", symbol="M_0")
+    power: Number = parameter(0.0, unit="W", minimum=0.0, doc="Power that is taken at any speed.", symbol="P")
     smooth_below: Number = parameter(
         1e-3,
         unit="rad/s",

@@ -17,7 +17,7 @@ class RotationalSpringDamper(Component):
 
     stiffness: Number = parameter(0.0, unit="N*m/rad", minimum=0.0, doc="Torque for a unit of extension.")
     damping: Number = parameter(0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque for a unit of its rate.")
-    natural: Number = parameter(0.0, unit="rad", doc="Extension at which the spring has no torque.")
+    natural: Number = parameter(0.0, unit="rad", doc="Extension at which the spring has no torque.", symbol="theta_0")
     against: str = parameter("flange", choices=("flange", "ground"), doc="What it acts against.")
     a: Shaft = connector(Shaft, "The angle that it acts against.", when={"against": ("flange",)})
     b: Shaft = connector(Shaft, "The angle that it acts on.")

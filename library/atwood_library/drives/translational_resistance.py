@@ -22,10 +22,12 @@ class TranslationalResistance(Component):
         *("SupportFriction", "Translational.Components.Brake"),
     )
 
-    linear: Number = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force for a unit of speed.")
-    quadratic: Number = parameter(0.0, unit="N*s^2/m^2", minimum=0.0, doc="Force for the square of a unit of speed.")
-    constant: Number = parameter(0.0, unit="N", minimum=0.0, doc="Force at any speed.")
-    power: Number = parameter(0.0, unit="W", minimum=0.0, doc="Power that is taken at any speed.")
+    linear: Number = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force for a unit of speed.", symbol="b")
+    quadratic: Number = parameter(
+        0.0, unit="N*s^2/m^2", minimum=0.0, doc="Force for the square of a unit of speed.", symbol="b_2"
+    )
+    constant: Number = parameter(0.0, unit="N", minimum=0.0, doc="Force at any speed.", symbol="F_0")
+    power: Number = parameter(0.0, unit="W", minimum=0.0, doc="Power that is taken at any speed.", symbol="P")
     smooth_below: Number = parameter(
         1e-3, unit="m/s", above=0.0, doc="Speed below which what does not vanish with the speed is proportional to it."
     )

@@ -16,7 +16,7 @@ class TranslationalSpringDamper(Component):
 
     stiffness: Number = parameter(0.0, unit="N/m", minimum=0.0, doc="Force for a unit of extension.")
     damping: Number = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force for a unit of its rate.")
-    natural: Number = parameter(0.0, unit="m", doc="Extension at which the spring has no force.")
+    natural: Number = parameter(0.0, unit="m", doc="Extension at which the spring has no force.", symbol="l_0")
     against: str = parameter("flange", choices=("flange", "ground"), doc="What it acts against.")
     a: Slide = connector(Slide, "The displacement that it acts against.", when={"against": ("flange",)})
     b: Slide = connector(Slide, "The displacement that it acts on.")

@@ -46,16 +46,34 @@ class Bushing(Component):
     )
     damping: Triple = parameter(_ZERO, unit="N*s/m", size=3, minimum=0.0, doc="Damping along the axes of frame a.")
     free_displacement: Triple = parameter(
-        _ZERO, unit="m", size=3, doc="Displacement of frame b without force, in the axes of frame a."
+        _ZERO,
+        unit="m",
+        size=3,
+        doc="Displacement of frame b without force, in the axes of frame a.",
+        symbol="d_0",
     )
     turning_stiffness: Triple = parameter(
-        (1.0, 1.0, 1.0), unit="N*m/rad", size=3, minimum=0.0, doc="Stiffness about the axes of frame a."
+        (1.0, 1.0, 1.0),
+        unit="N*m/rad",
+        size=3,
+        minimum=0.0,
+        doc="Stiffness about the axes of frame a.",
+        symbol="kappa",
     )
     turning_damping: Triple = parameter(
-        _ZERO, unit="N*m*s/rad", size=3, minimum=0.0, doc="Damping about the axes of frame a."
+        _ZERO,
+        unit="N*m*s/rad",
+        size=3,
+        minimum=0.0,
+        doc="Damping about the axes of frame a.",
+        symbol="c_phi",
     )
     free_rotation: Triple = parameter(
-        _ZERO, unit="rad", size=3, doc="Rotation vector of frame b without torque; about y, clockwise in a plane."
+        _ZERO,
+        unit="rad",
+        size=3,
+        doc="Rotation vector of frame b without torque; about y, clockwise in a plane.",
+        symbol="phi_0",
     )
     a: Frame = connector(Frame, "The frame that displacement and rotation are measured from.")
     b: Frame = connector(Frame, "The other frame.")

@@ -34,21 +34,25 @@ class Drag(Component):
 
     synonyms = ("Air resistance", "Viscous drag")
 
-    linear: Number = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force for one metre a second, where it is slow.")
+    linear: Number = parameter(
+        0.0, unit="N*s/m", minimum=0.0, doc="Force for one metre a second, where it is slow.", symbol="b"
+    )
     quadratic: Number | None = parameter(
         None,
         unit="N*s^2/m^2",
         minimum=0.0,
         doc="Force for one metre a second, where it is fast; half density times area times c_d if not given.",
+        symbol="b_2",
     )
     density: Number = parameter(1.225, unit="kg/m^3", minimum=0.0, doc="Density of the medium.")
     area: Number = parameter(0.0, unit="m^2", minimum=0.0, doc="Area that faces the stream.")
-    drag_coefficient: Number = parameter(1.0, minimum=0.0, doc="Drag coefficient c_d of that area.")
+    drag_coefficient: Number = parameter(1.0, minimum=0.0, doc="Drag coefficient c_d of that area.", symbol="C_D")
     wind: Triple = parameter(
         (0.0, 0.0, 0.0),
         unit="m/s",
         size=3,
         doc="Velocity of the medium in world axes; in a plane or on a line, only what lies there.",
+        symbol="w",
     )
     wind_field: Any = parameter(
         (0.0, 0.0, 0.0),

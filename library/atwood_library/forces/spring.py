@@ -43,7 +43,11 @@ class Spring(Component):
     )
     mass: Number = parameter(0.0, unit="kg", minimum=0.0, doc="Mass of the spring.")
     mass_at: Number | None = parameter(
-        None, minimum=0.0, maximum=1.0, doc="Where the mass is, from 0 at a to 1 at b; none if it is spread evenly."
+        None,
+        minimum=0.0,
+        maximum=1.0,
+        doc="Where the mass is, from 0 at a to 1 at b; none if it is spread evenly.",
+        symbol="eta",
     )
     a: Point = connector(Point, "One end.")
     b: Point = connector(Point, "The other end.")

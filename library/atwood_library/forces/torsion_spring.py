@@ -25,7 +25,7 @@ class TorsionSpring(Twisted):
     synonyms = ("Rotational spring", "Torsional spring")
 
     stiffness: Number = parameter(1.0, unit="N*m/rad", minimum=0.0, doc="Torque for a twist by one radian.")
-    natural_angle: Number = parameter(0.0, unit="rad", doc="Angle without torque.")
+    natural_angle: Number = parameter(0.0, unit="rad", doc="Angle without torque.", symbol="theta_0")
 
     @potential
     def elastic_energy(self) -> Scalar:

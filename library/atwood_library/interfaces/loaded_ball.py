@@ -36,7 +36,11 @@ class LoadedBall(Component):
     stiffness: Number = parameter(0.0, unit="N*m/rad", minimum=0.0, doc="Torque of the spring for one small radian.")
     damping: Number = parameter(0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque of the damper for one radian a second.")
     stop_stiffness: Number = parameter(
-        0.0, unit="N*m/rad", minimum=0.0, doc="Torque of the stop for one radian beyond it."
+        0.0,
+        unit="N*m/rad",
+        minimum=0.0,
+        doc="Torque of the stop for one radian beyond it.",
+        symbol="k_s",
     )
     stop_axis: Triple = parameter(
         (0.0, 0.0, 1.0), direction=True, doc="Axis of the cone in frame a, and what stays within it in frame b."

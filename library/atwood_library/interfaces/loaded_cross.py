@@ -13,27 +13,59 @@ class LoadedCross(Component):
     """A joint with `angle_a` and `rate_a` about `axis_a` of frame a, and `angle_b` and `rate_b` about `axis_b` of b."""
 
     stiffness_a: Number = parameter(
-        0.0, unit="N*m/rad", minimum=0.0, doc="Torque of the spring about the first axis for one radian."
+        0.0,
+        unit="N*m/rad",
+        minimum=0.0,
+        doc="Torque of the spring about the first axis for one radian.",
+        symbol="kappa_a",
     )
-    natural_angle_a: Number = parameter(0.0, unit="rad", doc="First angle at which its spring has no torque.")
+    natural_angle_a: Number = parameter(
+        0.0, unit="rad", doc="First angle at which its spring has no torque.", symbol="alpha_0"
+    )
     damping_a: Number = parameter(
-        0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque of the damper about the first axis for one radian a second."
+        0.0,
+        unit="N*m*s/rad",
+        minimum=0.0,
+        doc="Torque of the damper about the first axis for one radian a second.",
+        symbol="c_a",
     )
-    lower_stop_a: Number | None = parameter(None, unit="rad", doc="First angle below which a stop acts, if any.")
-    upper_stop_a: Number | None = parameter(None, unit="rad", doc="First angle above which a stop acts, if any.")
+    lower_stop_a: Number | None = parameter(
+        None, unit="rad", doc="First angle below which a stop acts, if any.", symbol="alpha_min"
+    )
+    upper_stop_a: Number | None = parameter(
+        None, unit="rad", doc="First angle above which a stop acts, if any.", symbol="alpha_max"
+    )
     motor_a: Number = signal(0.0, unit="N*m", doc="Torque of the motor about the first axis on frame b, against a.")
     stiffness_b: Number = parameter(
-        0.0, unit="N*m/rad", minimum=0.0, doc="Torque of the spring about the second axis for one radian."
+        0.0,
+        unit="N*m/rad",
+        minimum=0.0,
+        doc="Torque of the spring about the second axis for one radian.",
+        symbol="kappa_b",
     )
-    natural_angle_b: Number = parameter(0.0, unit="rad", doc="Second angle at which its spring has no torque.")
+    natural_angle_b: Number = parameter(
+        0.0, unit="rad", doc="Second angle at which its spring has no torque.", symbol="beta_0"
+    )
     damping_b: Number = parameter(
-        0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque of the damper about the second axis for one radian a second."
+        0.0,
+        unit="N*m*s/rad",
+        minimum=0.0,
+        doc="Torque of the damper about the second axis for one radian a second.",
+        symbol="c_b",
     )
-    lower_stop_b: Number | None = parameter(None, unit="rad", doc="Second angle below which a stop acts, if any.")
-    upper_stop_b: Number | None = parameter(None, unit="rad", doc="Second angle above which a stop acts, if any.")
+    lower_stop_b: Number | None = parameter(
+        None, unit="rad", doc="Second angle below which a stop acts, if any.", symbol="beta_min"
+    )
+    upper_stop_b: Number | None = parameter(
+        None, unit="rad", doc="Second angle above which a stop acts, if any.", symbol="beta_max"
+    )
     motor_b: Number = signal(0.0, unit="N*m", doc="Torque of the motor about the second axis on frame b, against a.")
     stop_stiffness: Number = parameter(
-        0.0, unit="N*m/rad", minimum=0.0, doc="Torque of a stop for one radian beyond it."
+        0.0,
+        unit="N*m/rad",
+        minimum=0.0,
+        doc="Torque of a stop for one radian beyond it.",
+        symbol="k_s",
     )
 
     @potential

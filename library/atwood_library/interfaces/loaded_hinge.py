@@ -16,13 +16,21 @@ class LoadedHinge(AxisMotor):
     """A joint between frames a and b with the observables `angle` and `angular_velocity`, which can carry loads."""
 
     stiffness: Number = parameter(0.0, unit="N*m/rad", minimum=0.0, doc="Torque of the spring for one radian.")
-    natural_angle: Number = parameter(0.0, unit="rad", doc="Angle at which the spring has no torque.")
+    natural_angle: Number = parameter(0.0, unit="rad", doc="Angle at which the spring has no torque.", symbol="theta_0")
     damping: Number = parameter(0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque of the damper for one radian a second.")
     stop_stiffness: Number = parameter(
-        0.0, unit="N*m/rad", minimum=0.0, doc="Torque of a stop for one radian beyond it."
+        0.0,
+        unit="N*m/rad",
+        minimum=0.0,
+        doc="Torque of a stop for one radian beyond it.",
+        symbol="k_s",
     )
-    lower_stop: Number | None = parameter(None, unit="rad", doc="Angle below which a stop acts; none if not given.")
-    upper_stop: Number | None = parameter(None, unit="rad", doc="Angle above which a stop acts; none if not given.")
+    lower_stop: Number | None = parameter(
+        None, unit="rad", doc="Angle below which a stop acts; none if not given.", symbol="theta_min"
+    )
+    upper_stop: Number | None = parameter(
+        None, unit="rad", doc="Angle above which a stop acts; none if not given.", symbol="theta_max"
+    )
 
     @potential
     def spring_energy(self) -> Scalar:

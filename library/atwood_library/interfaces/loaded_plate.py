@@ -34,7 +34,9 @@ class LoadedPlate(Component):
 
     stiffness: Number = parameter(0.0, unit="N/m", minimum=0.0, doc="Force of the spring a metre from the origin.")
     damping: Number = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force of the damper for one metre a second.")
-    stop_stiffness: Number = parameter(0.0, unit="N/m", minimum=0.0, doc="Force of the rim for one metre beyond it.")
+    stop_stiffness: Number = parameter(
+        0.0, unit="N/m", minimum=0.0, doc="Force of the rim for one metre beyond it.", symbol="k_s"
+    )
     rim: Number | None = parameter(
         None, unit="m", above=0.0, doc="Distance from the origin at which the stop acts; none if not given."
     )

@@ -18,12 +18,20 @@ class LoadedSlide(Component):
     stiffness: Number = parameter(0.0, unit="N/m", minimum=0.0, doc="Force of the spring for one metre.")
     natural_length: Number = parameter(0.0, unit="m", doc="Displacement at which the spring has no force.")
     damping: Number = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force of the damper for one metre a second.")
-    stop_stiffness: Number = parameter(0.0, unit="N/m", minimum=0.0, doc="Force of a stop for one metre beyond it.")
+    stop_stiffness: Number = parameter(
+        0.0, unit="N/m", minimum=0.0, doc="Force of a stop for one metre beyond it.", symbol="k_s"
+    )
     lower_stop: Number | None = parameter(
-        None, unit="m", doc="Displacement below which a stop acts; none if not given."
+        None,
+        unit="m",
+        doc="Displacement below which a stop acts; none if not given.",
+        symbol="x_min",
     )
     upper_stop: Number | None = parameter(
-        None, unit="m", doc="Displacement above which a stop acts; none if not given."
+        None,
+        unit="m",
+        doc="Displacement above which a stop acts; none if not given.",
+        symbol="x_max",
     )
     actuator: Number = signal(0.0, unit="N", doc="Force of the actuator on frame b, and against frame a.")
 

@@ -13,20 +13,40 @@ class LoadedTwist(AxisMotor):
     """A joint with `angle` and `angular_velocity` about an axis, beside displacements with loads of their own."""
 
     torsional_stiffness: Number = parameter(
-        0.0, unit="N*m/rad", minimum=0.0, doc="Torque of the torsion spring for one radian."
+        0.0,
+        unit="N*m/rad",
+        minimum=0.0,
+        doc="Torque of the torsion spring for one radian.",
+        symbol="kappa",
     )
-    natural_angle: Number = parameter(0.0, unit="rad", doc="Angle at which the torsion spring has no torque.")
+    natural_angle: Number = parameter(
+        0.0, unit="rad", doc="Angle at which the torsion spring has no torque.", symbol="theta_0"
+    )
     torsional_damping: Number = parameter(
-        0.0, unit="N*m*s/rad", minimum=0.0, doc="Torque of the torsion damper for one radian a second."
+        0.0,
+        unit="N*m*s/rad",
+        minimum=0.0,
+        doc="Torque of the torsion damper for one radian a second.",
+        symbol="c_phi",
     )
     angle_stop_stiffness: Number = parameter(
-        0.0, unit="N*m/rad", minimum=0.0, doc="Torque of a stop of the angle for one radian beyond it."
+        0.0,
+        unit="N*m/rad",
+        minimum=0.0,
+        doc="Torque of a stop of the angle for one radian beyond it.",
+        symbol="k_s",
     )
     lower_angle_stop: Number | None = parameter(
-        None, unit="rad", doc="Angle below which a stop acts; none if not given."
+        None,
+        unit="rad",
+        doc="Angle below which a stop acts; none if not given.",
+        symbol="theta_min",
     )
     upper_angle_stop: Number | None = parameter(
-        None, unit="rad", doc="Angle above which a stop acts; none if not given."
+        None,
+        unit="rad",
+        doc="Angle above which a stop acts; none if not given.",
+        symbol="theta_max",
     )
 
     @potential

@@ -51,16 +51,21 @@ class PointOnCurve(Component):
     curve: Any = parameter(
         ("p", 0.0, 0.0), size=3, function_of={"p": "rad"}, doc="The curve in the axes of frame a, in units of scale."
     )
-    scale: Number = parameter(1.0, unit="m", above=0.0, doc="Length for a unit of the curve's functions.")
+    scale: Number = parameter(1.0, unit="m", above=0.0, doc="Length for a unit of the curve's functions.", symbol="a")
     offset: Number = parameter(
         0.0,
         unit="m",
         doc="Distance of the point from a curve in the x-z plane of frame a, to its left as the parameter grows.",
     )
     lower_end: Number | None = parameter(
-        None, unit="rad", doc="Parameter at which the curve begins; none if it goes on."
+        None,
+        unit="rad",
+        doc="Parameter at which the curve begins; none if it goes on.",
+        symbol="u_min",
     )
-    upper_end: Number | None = parameter(None, unit="rad", doc="Parameter at which the curve ends; none if it goes on.")
+    upper_end: Number | None = parameter(
+        None, unit="rad", doc="Parameter at which the curve ends; none if it goes on.", symbol="u_max"
+    )
     a: Frame = connector(Frame, "The frame that carries the curve.")
     b: Point = connector(Point, "The point.")
     marker: Point = connector(Point, "The marker on the x axis of frame a; nothing need be joined to it.")
@@ -150,7 +155,9 @@ class PointOnCurve(Component):
         """Return the parameter as the marker says it."""
         return dot(self.marker.position - self.a.position, self.a.axes[0]) / self.scale
 
-    @observable(unit="rad", doc="Parameter of the curve at the point.", rate="rate", spaces=("plane", "space"))
+    @observable(
+        unit="rad", doc="Parameter of the curve at the point.", rate="rate", spaces=("plane", "space"), symbol="u"
+    )
     def parameter(self) -> Scalar:
         """Return the parameter."""
         return self.measured()

@@ -33,7 +33,7 @@ class PointOnLevelSurface(Component):
     function: Any = parameter(
         "z", function_of={"x": "1", "y": "1", "z": "1"}, doc="What is zero there; of place in units of scale."
     )
-    scale: Number = parameter(1.0, unit="m", above=0.0, doc="Unit of length of the function.")
+    scale: Number = parameter(1.0, unit="m", above=0.0, doc="Unit of length of the function.", symbol="a")
     a: Frame = connector(Frame, "The frame that carries the surface.")
     b: Point = connector(Point, "The point.")
 

@@ -44,7 +44,7 @@ class PointOnSurface(Component):
         function_of=_PARAMETERS,
         doc="The surface in the axes of frame a, in units of scale.",
     )
-    scale: Number = parameter(1.0, unit="m", above=0.0, doc="Length for a unit of the surface's functions.")
+    scale: Number = parameter(1.0, unit="m", above=0.0, doc="Length for a unit of the surface's functions.", symbol="a")
     edge: Any = parameter(
         1.0, function_of=_PARAMETERS, doc="A function that is positive within the surface and zero at its edge."
     )
@@ -92,12 +92,16 @@ class PointOnSurface(Component):
         """Return the function of the edge."""
         return self.edge(self.parameter_1(), self.parameter_2())
 
-    @observable(unit="rad", doc="First parameter of the surface at the point.", rate="rate_1", spaces=("space",))
+    @observable(
+        unit="rad", doc="First parameter of the surface at the point.", rate="rate_1", spaces=("space",), symbol="u"
+    )
     def parameter_1(self) -> Scalar:
         """Return the parameter."""
         return self.measured(0)
 
-    @observable(unit="rad", doc="Second parameter of the surface at the point.", rate="rate_2", spaces=("space",))
+    @observable(
+        unit="rad", doc="Second parameter of the surface at the point.", rate="rate_2", spaces=("space",), symbol="v"
+    )
     def parameter_2(self) -> Scalar:
         """Return the parameter."""
         return self.measured(1)

@@ -19,7 +19,11 @@ class RollingEllipsoid(Rolling):
 
     radius: Number = parameter(1.0, unit="m", above=0.0, doc="Unit of the semi-axes.")
     semi_axes: Triple = parameter(
-        (1.0, 1.0, 1.0), size=3, above=0.0, doc="Semi-axes along x, y and z of frame b, in units of the radius."
+        (1.0, 1.0, 1.0),
+        size=3,
+        above=0.0,
+        doc="Semi-axes along x, y and z of frame b, in units of the radius.",
+        symbol=("a", "b", "c"),
     )
 
     def scaled(self) -> tuple[Vector, Scalar]:

@@ -35,7 +35,7 @@ class RollingOnRound(Component):
 
     shape: str = parameter("sphere", choices=("sphere", "cylinder"), doc="What it rolls on; in a plane a circle.")
     rolls: str = parameter("inside", choices=("inside", "outside"), doc="Whether it rolls in it or on it.")
-    ground_radius: Number = parameter(1.0, unit="m", above=0.0, doc="Radius R of what it rolls on.")
+    ground_radius: Number = parameter(1.0, unit="m", above=0.0, doc="Radius R of what it rolls on.", symbol="R")
     radius: Number = parameter(0.1, unit="m", above=0.0, doc="Radius r of the ball.")
     axis: Triple = parameter(
         (0.0, 1.0, 0.0), turning=True, doc="Axis of a cylinder, in frame a; in a plane its normal."

@@ -31,9 +31,9 @@ class Box(Shape):
 
     synonyms = ("BodyBox", "Cuboid")
 
-    length_x: Number = parameter(1.0, unit="m", above=0.0, doc="Length along x, from a to b.")
-    length_y: Number = parameter(1.0, unit="m", above=0.0, doc="Length along y.")
-    length_z: Number = parameter(1.0, unit="m", above=0.0, doc="Length along z.")
+    length_x: Number = parameter(1.0, unit="m", above=0.0, doc="Length along x, from a to b.", symbol="a")
+    length_y: Number = parameter(1.0, unit="m", above=0.0, doc="Length along y.", symbol="b")
+    length_z: Number = parameter(1.0, unit="m", above=0.0, doc="Length along z.", symbol="c")
     direction: Triple = parameter(
         (1.0, 0.0, 0.0), direction=True, doc="Direction in the frame of the edges of length_x, from a to b."
     )

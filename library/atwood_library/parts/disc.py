@@ -20,8 +20,10 @@ class Disc(Shape):
     synonyms = ("Disk",)
 
     radius: Number = parameter(0.5, unit="m", above=0.0, doc="Outer radius, R.")
-    inner_radius: Number = parameter(0.0, unit="m", minimum=0.0, doc="Radius of the hole, r; at most the outer one.")
-    thickness: Number = parameter(0.0, unit="m", minimum=0.0, doc="Thickness along the axis, h.")
+    inner_radius: Number = parameter(
+        0.0, unit="m", minimum=0.0, doc="Radius of the hole, r; at most the outer one.", symbol="r_i"
+    )
+    thickness: Number = parameter(0.0, unit="m", minimum=0.0, doc="Thickness along the axis, h.", symbol="h")
     axis: str = parameter("y", choices=("x", "y", "z"), doc="Axis of the frame that it is square to.")
 
     def check_values(self) -> None:

@@ -34,7 +34,10 @@ class Link(Component):
     length: Number = parameter(1.0, unit="m", above=0.0, doc="Distance from a to b.")
     mass: Number = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
     center: Number | None = parameter(
-        None, unit="m", doc="Distance of the centre of mass from a, towards b; half the length if not given."
+        None,
+        unit="m",
+        doc="Distance of the centre of mass from a, towards b; half the length if not given.",
+        symbol="c",
     )
     moment: Number | None = parameter(
         None, unit="kg*m^2", minimum=0.0, doc="Moment of inertia about the centre of mass; m l^2/12 if not given."

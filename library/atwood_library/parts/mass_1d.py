@@ -36,7 +36,12 @@ class Mass1D(Component):
 
     mass: Number = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
     origin: Triple = parameter(
-        (0.0, 0.0, 0.0), unit="m", size=3, place=True, doc="Point of the line where the displacement is zero."
+        (0.0, 0.0, 0.0),
+        unit="m",
+        size=3,
+        place=True,
+        doc="Point of the line where the displacement is zero.",
+        symbol="x_0",
     )
     axis: Triple = parameter((1.0, 0.0, 0.0), direction=True, doc="Direction of the line.")
     flange: Point = connector(Point, "The mass.")

@@ -19,7 +19,9 @@ class MeshBody(Shape):
     """
 
     file: str = parameter(text=True, doc="Path of the STL file, text or binary, from where the program runs.")
-    scale: Number = parameter(1.0, unit="m", above=0.0, doc="Length of the file's unit: 1 mm for most drawings.")
+    scale: Number = parameter(
+        1.0, unit="m", above=0.0, doc="Length of the file's unit: 1 mm for most drawings.", symbol="a"
+    )
 
     def check_values(self) -> None:
         """Refuse a file that cannot be read, and a mesh that is not closed."""

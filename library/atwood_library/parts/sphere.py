@@ -18,7 +18,9 @@ class Sphere(Shape):
     synonyms = ("Ball",)
 
     radius: Number = parameter(0.1, unit="m", above=0.0, doc="Outer radius, R.")
-    inner_radius: Number = parameter(0.0, unit="m", minimum=0.0, doc="Radius of the cavity, r; at most the outer one.")
+    inner_radius: Number = parameter(
+        0.0, unit="m", minimum=0.0, doc="Radius of the cavity, r; at most the outer one.", symbol="r_i"
+    )
 
     def check_values(self) -> None:
         """Refuse a cavity that is larger than the ball."""

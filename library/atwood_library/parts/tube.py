@@ -18,8 +18,10 @@ class Tube(StraightShape):
 
     synonyms = ("Hollow cylinder",)
 
-    outer_radius: Number = parameter(0.1, unit="m", above=0.0, doc="Outer radius, R.")
-    inner_radius: Number = parameter(0.08, unit="m", minimum=0.0, doc="Inner radius, r; at most the outer one.")
+    outer_radius: Number = parameter(0.1, unit="m", above=0.0, doc="Outer radius, R.", symbol="R")
+    inner_radius: Number = parameter(
+        0.08, unit="m", minimum=0.0, doc="Inner radius, r; at most the outer one.", symbol="r_i"
+    )
 
     def check_values(self) -> None:
         """Refuse a bore that is wider than the tube."""

@@ -45,7 +45,11 @@ class Rope(Component):
         "stop", choices=("stop", "slack"), doc="What happens when the tension becomes negative."
     )
     pulley_inertia: Number = parameter(
-        0.0, unit="kg", minimum=0.0, doc="Moment of inertia of each pulley it passes, over the square of its radius."
+        0.0,
+        unit="kg",
+        minimum=0.0,
+        doc="Moment of inertia of each pulley it passes, over the square of its radius.",
+        symbol="M",
     )
     paid_out: Number = signal(0.0, unit="m", doc="Length that is let out besides, a function of time.")
     release: Number = signal(1.0, unit="any", doc="The rope lets go where this falls through zero.")

@@ -24,7 +24,7 @@ class BeadOnSurface(Scene):
     """
 
     shape: str = parameter("sphere", choices=tuple(_SHAPES), doc="Shape of the surface.")
-    scale: Number = parameter(1.0, unit="m", above=0.0, doc="Size of the surface: radius of the sphere.")
+    scale: Number = parameter(1.0, unit="m", above=0.0, doc="Size of the surface: radius of the sphere.", symbol="a")
     mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of the bead.")
     away: Number = parameter(1.0, unit="rad", doc="First parameter at the start: angle, or distance over size.")
     azimuth_rate: Number = parameter(2.0, unit="rad/s", doc="Rate of the azimuth at the start.")
@@ -45,3 +45,5 @@ class BeadOnSurface(Scene):
     def build(self) -> None:
         """Bend the surface."""
         self.set("surface.surface", _SHAPES[self.shape])
+        first = {"sphere": "theta", "torus": "theta"}.get(self.shape, "rho")
+        self.symbols.update({"surface.parameter_1": first, "surface.parameter_2": "phi"})

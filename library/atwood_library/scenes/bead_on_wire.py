@@ -32,10 +32,10 @@ class BeadOnWire(Scene):
     """
 
     shape: str = parameter("cycloid", choices=tuple(_SHAPES), doc="Shape of the wire.")
-    scale: Number = parameter(1.0, unit="m", above=0.0, doc="Size a of the wire.")
+    scale: Number = parameter(1.0, unit="m", above=0.0, doc="Size a of the wire.", symbol="a")
     mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of the bead.")
     turning: str = parameter("z", choices=("z", "x"), doc="Axis about which the wire is turned.")
-    rate: Number = parameter(0.0, unit="rad/s", doc="Rate at which it is turned.")
+    rate: Number = parameter(0.0, unit="rad/s", doc="Rate at which it is turned.", symbol="omega")
     away: Number = parameter(1.0, unit="rad", doc="Parameter of the bead at the start, where it rests on the wire.")
     space = "space"
     t_end = 5.0

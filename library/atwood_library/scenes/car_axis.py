@@ -52,8 +52,7 @@ class CarAxis(Scene):
 
     def build(self) -> None:
         """Drive the axis, and start with the springs at their length."""
-        share, rate = self.height / self.length, self.rate
-        self.set("axis.rotation", lambda t: asin(share * sin(rate * t)))
+        self.set("axis.rotation", lambda t, *, height, length, rate: asin(height / length * sin(rate * t)))
         self.set("far.displacement", (self.length, 0.0, 0.0))
         self.start.update({"guide.displacement": self.spring_length, "guide.speed": 0.0})
         self.start.update({"right.position.z": self.spring_length, "right.velocity.z": 0.0})

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood import Number, Scene, connect, parameter
+from atwood import Number, Scalar, Scene, connect, parameter
 from atwood_library.fields.charge import Charge
 from atwood_library.parts.point_mass import PointMass
 
@@ -22,10 +23,10 @@ class ChargedParticle(Scene):
     """
 
     mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass.")
-    charge: Number = parameter(1.0, unit="C", doc="Charge.")
-    magnetic: Number = parameter(2.0, unit="T", doc="Magnetic field along y.")
-    electric_x: Number = parameter(0.0, unit="V/m", doc="Electric field along x.")
-    electric_z: Number = parameter(0.5, unit="V/m", doc="Electric field along z.")
+    charge: Number = parameter(1.0, unit="C", doc="Charge.", symbol="q")
+    magnetic: Number = parameter(2.0, unit="T", doc="Magnetic field along y.", symbol="B")
+    electric_x: Number = parameter(0.0, unit="V/m", doc="Electric field along x.", symbol="E_x")
+    electric_z: Number = parameter(0.5, unit="V/m", doc="Electric field along z.", symbol="E_z")
     speed: Number = parameter(1.0, unit="m/s", doc="Speed along x at the start.")
     gauge: str = parameter("symmetric", choices=("symmetric", "x", "z"), doc="Gauge of the vector potential.")
     gravity = 0.0
@@ -44,9 +45,15 @@ class ChargedParticle(Scene):
     def build(self) -> None:
         """Give the fields their potentials."""
         share = {"symmetric": 0.5, "x": 1.0, "z": 0.0}[self.gauge]
-        along_x, along_z = share * self.magnetic, (share - 1.0) * self.magnetic
-        self.set("source.scalar_potential", lambda x, z: -(self.electric_x * x + self.electric_z * z))
-        self.set("source.vector_potential", lambda x, z: (along_x * z, 0.0, along_z * x))
+
+        def energy(x: Scalar, z: Scalar, *, electric_x: Scalar, electric_z: Scalar) -> Scalar:
+            return -(electric_x * x + electric_z * z)
+
+        def potential(x: Scalar, z: Scalar, *, magnetic: Scalar) -> Sequence[Scalar]:
+            return share * magnetic * z, 0.0, (share - 1.0) * magnetic * x
+
+        self.set("source.scalar_potential", energy)
+        self.set("source.vector_potential", potential)
 
     def closed_form(self, t: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
         """Return the circle that drifts; for a magnetic field that is not zero."""

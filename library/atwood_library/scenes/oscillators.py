@@ -23,8 +23,10 @@ class Oscillators(Scene):
 
     kind: str = parameter("harmonic", choices=("free", "harmonic", "inverted", "pendulum"), doc="The potential.")
     mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass.")
-    stiffness: Number = parameter(4.0, unit="N/m", above=0.0, doc="Size k of the potential.")
-    radius: Number = parameter(1.0, unit="m", above=0.0, doc="Radius a of the pendulum, and unit of the displacement.")
+    stiffness: Number = parameter(4.0, unit="N/m", above=0.0, doc="Size k of the potential.", symbol="k")
+    radius: Number = parameter(
+        1.0, unit="m", above=0.0, doc="Radius a of the pendulum, and unit of the displacement.", symbol="a"
+    )
     away: Number = parameter(0.5, unit="rad", doc="Displacement at the start, over a.")
     rate: Number = parameter(0.3, unit="rad/s", doc="Its rate at the start.")
     gravity = 0.0
@@ -39,13 +41,12 @@ class Oscillators(Scene):
 
     def build(self) -> None:
         """Bend the track, and give it its potential."""
-        k, a = self.stiffness, self.radius
         self.set("track.curve", ("sin(p)", 0.0, "-cos(p)") if self.kind == "pendulum" else ("p", 0.0, 0.0))
         energies = {
             "free": 0.0,
-            "harmonic": lambda x: 0.5 * k * x**2,
-            "inverted": lambda x: -0.5 * k * x**2,
-            "pendulum": lambda z: k * a * z,
+            "harmonic": lambda x, *, stiffness: 0.5 * stiffness * x**2,
+            "inverted": lambda x, *, stiffness: -0.5 * stiffness * x**2,
+            "pendulum": lambda z, *, stiffness, radius: stiffness * radius * z,
         }
         self.set("field.energy_function", energies[self.kind])
 

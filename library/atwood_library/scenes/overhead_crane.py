@@ -17,8 +17,10 @@ class OverheadCrane(Scene):
     """
 
     mass: Number = parameter(500.0, unit="kg", above=0.0, doc="Mass of the load.")
-    length: Number = parameter(4.0, unit="m", above=0.0, doc="Length of the rope at the start.")
-    hoist: Number = parameter(0.5, unit="m/s", doc="Speed at which the rope is let out; negative to haul the load up.")
+    length: Number = parameter(4.0, unit="m", above=0.0, doc="Length of the rope at the start.", symbol="l_0")
+    hoist: Number = parameter(
+        0.5, unit="m/s", doc="Speed at which the rope is let out; negative to haul the load up.", symbol="v"
+    )
     acceleration: Number = parameter(0.0, unit="m/s^2", doc="Acceleration of the trolley along x, from rest.")
     sway: Number = parameter(1e-3, unit="rad", doc="Angle of the rope at the start.")
     t_end = 10.0
@@ -38,6 +40,5 @@ class OverheadCrane(Scene):
 
     def build(self) -> None:
         """Drive the trolley and the hoist."""
-        length, hoist, acceleration = self.length, self.hoist, self.acceleration
-        self.set("trolley.motion", lambda t: 0.5 * acceleration * t**2)
-        self.set("rope.motion", lambda t: length + hoist * t)
+        self.set("trolley.motion", lambda t, *, acceleration: 0.5 * acceleration * t**2)
+        self.set("rope.motion", lambda t, *, length, hoist: length + hoist * t)

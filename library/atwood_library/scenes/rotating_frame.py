@@ -23,8 +23,8 @@ class RotatingFrame(Scene):
     """
 
     mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of the puck.")
-    rate: Number = parameter(1.5, unit="rad/s", doc="Rate of the table at the start.")
-    speed_up: Number = parameter(0.4, unit="rad/s^2", doc="Angular acceleration of the table.")
+    rate: Number = parameter(1.5, unit="rad/s", doc="Rate of the table at the start.", symbol="omega")
+    speed_up: Number = parameter(0.4, unit="rad/s^2", doc="Angular acceleration of the table.", symbol="alpha")
     acceleration: Number = parameter(0.3, unit="m/s^2", doc="Acceleration of the table's middle along x, from rest.")
     away: Number = parameter(0.5, unit="m", doc="Distance of the puck from the middle at the start, along x.")
     speed: Number = parameter(0.2, unit="m/s", doc="Speed of the puck on the table at the start, along y.")
@@ -55,9 +55,8 @@ class RotatingFrame(Scene):
 
     def build(self) -> None:
         """Say how the table moves."""
-        rate, speed_up, acceleration = self.rate, self.speed_up, self.acceleration
-        self.set("carriage.motion", lambda t: 0.5 * acceleration * t**2)
-        self.set("turntable.rotation", lambda t: rate * t + 0.5 * speed_up * t**2)
+        self.set("carriage.motion", lambda t, *, acceleration: 0.5 * acceleration * t**2)
+        self.set("turntable.rotation", lambda t, *, rate, speed_up: rate * t + 0.5 * speed_up * t**2)
 
     def closed_form(self, t: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
         """Return the straight motion, seen from outside and on the table."""

@@ -20,9 +20,9 @@ class RotatingHoopDriven(Scene):
     the bead rests at ``cos theta = -g/(omega^2 a)``.
     """
 
-    radius: Number = parameter(1.0, unit="m", above=0.0, doc="Radius of the hoop.")
+    radius: Number = parameter(1.0, unit="m", above=0.0, doc="Radius of the hoop.", symbol="a")
     mass: Number = parameter(1.0, unit="kg", above=0.0, doc="Mass of the bead.")
-    rate: Number = parameter(5.0, unit="rad/s", doc="Rate of the hoop about the vertical.")
+    rate: Number = parameter(5.0, unit="rad/s", doc="Rate of the hoop about the vertical.", symbol="omega")
     inclination: Number = parameter(
         2.0 * math.pi / 3.0, unit="rad", doc="Angle of the bead from the upward vertical at the start."
     )

@@ -25,7 +25,7 @@ class WilberforcePendulum(Scene):
     mass: Number = parameter(0.5, unit="kg", above=0.0, doc="Mass of the body.")
     inertia: Number = parameter(1.4e-4, unit="kg*m^2", above=0.0, doc="Moment of inertia about the vertical.")
     rate: Number = parameter(2.3, unit="rad/s", above=0.0, doc="Rate w of either motion without the other.")
-    coupling: Number = parameter(9.3e-3, unit="N", doc="Coupling e.")
+    coupling: Number = parameter(9.3e-3, unit="N", doc="Coupling e.", symbol="e")
     lift: Number = parameter(0.1, unit="m", doc="Height above rest at the start.")
     space = "space"
     gravity = 0.0
@@ -44,7 +44,9 @@ class WilberforcePendulum(Scene):
         self.set("body.moments", (self.inertia, self.inertia, self.inertia))
         self.set("coil.stiffness", self.mass * square)
         self.set("coil.torsional_stiffness", self.inertia * square)
-        self.set("twist.function", lambda angle_1, displacement_1: -0.5 * self.coupling * angle_1 * displacement_1)
+        self.set(
+            "twist.function", lambda angle_1, displacement_1, *, coupling: -0.5 * coupling * angle_1 * displacement_1
+        )
         self.connect(self.coil.shaft, self.twist.shaft[0])
         self.connect(self.coil.carriage, self.twist.slide[0])
 

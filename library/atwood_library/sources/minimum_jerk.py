@@ -14,9 +14,9 @@ class MinimumJerk(Component):
 
     synonyms = ("Minimum-jerk trajectory", "Smooth step", "Quintic rest-to-rest polynomial")
 
-    travel: Number = parameter(1.0, unit="any", doc="How far it goes, in the unit of the input.")
-    duration: Number = parameter(1.0, unit="s", above=0.0, doc="How long it takes.")
-    start_time: Number = parameter(0.0, unit="s", doc="When it begins.")
+    travel: Number = parameter(1.0, unit="any", doc="How far it goes, in the unit of the input.", symbol="s")
+    duration: Number = parameter(1.0, unit="s", above=0.0, doc="How long it takes.", symbol="T")
+    start_time: Number = parameter(0.0, unit="s", doc="When it begins.", symbol="t_0")
     offset: Number = parameter(0.0, unit="any", doc="Where it begins, in the unit of the input.")
 
     def share(self) -> Scalar:

@@ -14,10 +14,10 @@ class PointToPoint(Component):
 
     synonyms = ("KinematicPTP", "KinematicPTP2", "Trapezoidal speed profile", "Bang-bang trajectory")
 
-    travel: Number = parameter(1.0, unit="any", doc="How far it goes, in the unit of the input.")
+    travel: Number = parameter(1.0, unit="any", doc="How far it goes, in the unit of the input.", symbol="s")
     largest_rate: Number = parameter(1.0, unit="any", above=0.0, doc="Largest rate.")
     largest_acceleration: Number = parameter(1.0, unit="any", above=0.0, doc="Largest second rate.")
-    start_time: Number = parameter(0.0, unit="s", doc="When it begins.")
+    start_time: Number = parameter(0.0, unit="s", doc="When it begins.", symbol="t_0")
     offset: Number = parameter(0.0, unit="any", doc="Where it begins, in the unit of the input.")
 
     def times(self) -> tuple[Scalar, Scalar]:

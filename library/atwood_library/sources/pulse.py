@@ -15,9 +15,9 @@ class Pulse(Component):
 
     amplitude: Number = parameter(1.0, unit="any", doc="How much more it is while on, in the unit of the input.")
     offset: Number = parameter(0.0, unit="any", doc="Value while off, in the unit of the input.")
-    period: Number = parameter(1.0, unit="s", above=0.0, doc="Time from one pulse to the next.")
+    period: Number = parameter(1.0, unit="s", above=0.0, doc="Time from one pulse to the next.", symbol="T")
     width: Number = parameter(0.5, minimum=0.0, maximum=1.0, doc="Share of the period for which it is on.")
-    start_time: Number = parameter(0.0, unit="s", doc="When the first pulse begins.")
+    start_time: Number = parameter(0.0, unit="s", doc="When the first pulse begins.", symbol="t_0")
     count: int | None = parameter(None, integer=True, minimum=1, doc="Number of pulses; endless if none.")
 
     @observable(unit="any", doc="Value of the function, in the unit of the input.")

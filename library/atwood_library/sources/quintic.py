@@ -13,8 +13,8 @@ class Quintic(Component):
 
     synonyms = ("Quintic trajectory", "Fifth-degree polynomial", "Hermite interpolation")
 
-    start_time: Number = parameter(0.0, unit="s", doc="When it begins.")
-    duration: Number = parameter(1.0, unit="s", above=0.0, doc="How long it takes.")
+    start_time: Number = parameter(0.0, unit="s", doc="When it begins.", symbol="t_0")
+    duration: Number = parameter(1.0, unit="s", above=0.0, doc="How long it takes.", symbol="T")
     start_value: Number = parameter(0.0, unit="any", doc="Value at its start, in the unit of the input.")
     end_value: Number = parameter(1.0, unit="any", doc="Value at its end.")
     start_rate: Number = parameter(0.0, unit="any", doc="Rate at its start.")

@@ -15,8 +15,10 @@ class Ramp(Component):
 
     slope: Number = parameter(1.0, unit="any", doc="Rise in a second, in the unit of the input.")
     offset: Number = parameter(0.0, unit="any", doc="Value where it begins to rise, in the unit of the input.")
-    start_time: Number | None = parameter(None, unit="s", doc="When it begins to rise; none if always.")
-    duration: Number | None = parameter(None, unit="s", minimum=0.0, doc="For how long it rises; none if for ever.")
+    start_time: Number | None = parameter(None, unit="s", doc="When it begins to rise; none if always.", symbol="t_0")
+    duration: Number | None = parameter(
+        None, unit="s", minimum=0.0, doc="For how long it rises; none if for ever.", symbol="T"
+    )
 
     def check_values(self) -> None:
         """Refuse an end without a beginning."""

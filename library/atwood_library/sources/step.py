@@ -15,7 +15,7 @@ class Step(Component):
 
     height: Number = parameter(1.0, unit="any", doc="By how much it jumps, in the unit of the input.")
     offset: Number = parameter(0.0, unit="any", doc="Value before, in the unit of the input.")
-    start_time: Number = parameter(0.0, unit="s", doc="When it jumps.")
+    start_time: Number = parameter(0.0, unit="s", doc="When it jumps.", symbol="t_0")
 
     @observable(unit="any", doc="Value of the function, in the unit of the input.")
     def value(self) -> Scalar:

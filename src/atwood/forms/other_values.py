@@ -48,12 +48,13 @@ class Slot:
     name
         Its parameter or input.
     axis
-        Which component, for a parameter with several; None for a single number.
+        Which component, for a parameter with several, or which parameter that a function takes by name; None for a
+        single number.
     """
 
     part: str
     name: str
-    axis: int | None = None
+    axis: int | str | None = None
 
     @property
     def path(self) -> str:
@@ -67,6 +68,8 @@ class Slot:
             return flat.gravity
         part = flat.parts[self.part]
         value = part.values[self.name] if self.name in part.values else part.signals[self.name]
+        if isinstance(self.axis, str):
+            return value.letters[self.axis]
         return value if self.axis is None or value is None else value[self.axis]
 
 
@@ -77,12 +80,16 @@ def find_slots(flat: FlatScene) -> Iterator[tuple[str, Slot]]:
         for name, spec in part.component.parameter_specs().items():
             if spec.size is None or part.values[name] is None:
                 yield f"{path}.{name}", Slot(path, name)
+                for letter in getattr(part.values[name], "letters", ()):
+                    yield f"{path}.{name}.{letter}", Slot(path, name, letter)
                 continue
             for axis in range(spec.size):
                 label = "xyz"[axis] if spec.size == 3 else str(axis)
                 yield f"{path}.{name}.{label}", Slot(path, name, axis)
         for name in part.signals:
             yield f"{path}.{name}", Slot(path, name)
+            for letter in getattr(part.signals[name], "letters", ()):
+                yield f"{path}.{name}.{letter}", Slot(path, name, letter)
 
 
 @dataclass(frozen=True)

@@ -249,9 +249,9 @@ def test_free_hoop() -> None:
 
 
 def test_hoops_of_the_library() -> None:
-    m, r, g, W = sympy.symbols("m r g Omega")
+    m, r, a, g, W = sympy.symbols("m r a g omega")
     (theta,) = of_time("theta")
-    L = m * r**2 * (theta.diff(t) ** 2 + W**2 * sin(theta) ** 2) / 2 - m * g * r * cos(theta)
+    L = m * a**2 * (theta.diff(t) ** 2 + W**2 * sin(theta) ** 2) / 2 - m * g * a * cos(theta)
     check(equations(SCENES["rotating-hoop-driven"]()), L, [theta])
     free = equations(SCENES["rotating-hoop-free"]())
     phi, theta = free.symbol("axle.angle"), free.symbol("hoop.angle")

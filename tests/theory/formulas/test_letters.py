@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
+import sympy
 
 from atwood import (
     Component,
     Number,
+    ParameterError,
     Point,
     Scene,
     UsageError,
+    assemble,
     connector,
     conserved,
     equations,
@@ -19,10 +23,21 @@ from atwood import (
     potential,
     reduced,
     routhian,
+    simulate,
     to_data,
 )
-from atwood_library import Ground, PointMass, Rod, Spring
-from atwood_library.scenes import DoublePendulum, MassSpringChain, RotatingHoopDriven, RotatingHoopFree
+from atwood_library import Ground, PointMass, Potential, Rod, Spring
+from atwood_library.scenes import (
+    BeadOnSurface,
+    ChargedParticle,
+    DoublePendulum,
+    MassSpringChain,
+    Oscillators,
+    OverheadCrane,
+    RotatingFrame,
+    RotatingHoopDriven,
+    RotatingHoopFree,
+)
 
 LETTERS = {"hoop.angle": "theta", "hoop.radius": "a"}
 
@@ -176,3 +191,70 @@ def test_a_parameter_with_a_letter_is_one_wherever_it_is_passed_on(form: str) ->
     assert str(eq.symbol("rod1.length")) == str(eq.symbol("rod2.length")) == "L"
     assert eq.symbol("rod1.length") in eq.mass_matrix.free_symbols if form == "reduced" else True
     assert names(Pair(), form=form, symbols={"rod1.angle": "phi"}).get("rod1.angle", "phi") == "phi"
+
+
+# -- parameters that functions take by name ---------------------------------------------------------------------------
+
+
+def test_field_strengths_stay_letters_and_the_motion_is_as_before() -> None:
+    scene = ChargedParticle(electric_x=0.25)
+    eq = equations(scene)
+    m, q, B, E_x, E_z, t = sympy.symbols("m q B E_x E_z t")
+    x, z = eq.coordinates
+    lorentz = q * B * (z * x.diff(t) - x * z.diff(t)) / 2 + q * (E_x * x + E_z * z)
+    assert sympy.expand(eq.lagrangian - m * (x.diff(t) ** 2 + z.diff(t) ** 2) / 2 - lorentz) == 0
+    run = simulate(scene, rtol=1e-11)
+    for path, expected in scene.closed_form(run.time).items():
+        assert np.allclose(run[path], expected, rtol=0.0, atol=1e-8)
+
+
+def test_other_values_of_what_a_function_takes_by_name() -> None:
+    made = assemble(ChargedParticle())
+    other = made.with_values({"magnetic": 3.0})
+    values = equations(other).values
+    assert values[sympy.Symbol("B")] == 3.0
+    assert other.shared is made.shared
+    anew = simulate(ChargedParticle(magnetic=3.0), t_end=2.0)
+    assert np.allclose(simulate(other, t_end=2.0)["particle.position.x"], anew["particle.position.x"], atol=1e-12)
+
+
+def test_functions_with_letters_are_written_and_read_again() -> None:
+    scene = from_data(to_data(ChargedParticle()))
+    assert equations(scene).lagrangian == equations(ChargedParticle()).lagrangian
+    scene = from_data(to_data(OverheadCrane()))
+    assert equations(scene).lagrangian == equations(OverheadCrane()).lagrangian
+
+
+def test_the_rate_of_a_frame_and_its_derivative_stay_letters() -> None:
+    eq = equations(RotatingFrame())
+    m, a, w, alpha, t = sympy.symbols("m a omega alpha t")
+    x, y = eq.coordinates
+    turn, rate = w * t + alpha * t**2 / 2, w + alpha * t
+    along = x.diff(t) - rate * y + a * t * sympy.cos(turn)
+    across = y.diff(t) + rate * x - a * t * sympy.sin(turn)
+    difference = eq.kinetic_energy - m * (along**2 + across**2) / 2
+    assert sympy.expand(difference).subs(sympy.sin(turn) ** 2, 1 - sympy.cos(turn) ** 2).expand() == 0
+
+
+@pytest.mark.parametrize("kind", ["harmonic", "inverted", "pendulum"])
+def test_oscillators_have_k_and_a(kind: str) -> None:
+    eq = equations(Oscillators(kind=kind))
+    assert {str(one) for one in eq.lagrangian.free_symbols} == {"m", "k", "a", "t"}
+
+
+def test_parameters_of_a_surface_have_the_letters_of_its_shape() -> None:
+    eq = equations(BeadOnSurface())
+    theta, phi, a, m, t = *eq.coordinates, *sympy.symbols("a m t")
+    book = m * a**2 * (theta.diff(t) ** 2 + sympy.sin(theta) ** 2 * phi.diff(t) ** 2) / 2
+    assert [str(theta), str(phi)] == ["theta(t)", "phi(t)"]
+    assert sympy.expand(eq.kinetic_energy - book) == 0
+    assert "T = ½ m a² (θ̇² + φ̇² sin² θ)" in eq.text()
+
+
+def test_a_function_may_not_take_what_the_model_around_does_not_have() -> None:
+    scene = Scene()
+    well = scene.add("well", Potential())
+    well.energy_function = lambda x, *, stiffness: stiffness * x**2
+    scene.connect(well.point, scene.add("bob", PointMass(mass=1.0)).point)
+    with pytest.raises(ParameterError, match="stiffness"):
+        equations(scene)

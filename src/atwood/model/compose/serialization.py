@@ -329,8 +329,8 @@ def _read_value(value: Any, where: str) -> Any:
         return value
     if set(value) == {"function"}:
         return StoredFunction(value["function"], where)
-    if set(value) == {"function", "arguments", "text"}:
-        return read_function(value["function"], value["arguments"], value["text"], where)
+    if set(value) - {"letters"} == {"function", "arguments", "text"}:
+        return read_function(value["function"], value["arguments"], value["text"], where, value.get("letters", ()))
     if set(value) == {"bound"}:
         return _read_bound(value["bound"], where)
     raise UsageError(f"the value {str(value)[:60]!r} cannot be read", where=where)

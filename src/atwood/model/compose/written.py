@@ -70,7 +70,8 @@ def _write_value(value: Any, where: str) -> Any:
     if isinstance(value, tuple):
         return list(value)
     if isinstance(value, Function):
-        return {"function": value.steps(where), "arguments": list(value.arguments), "text": value.text}
+        letters = {"letters": list(value.letters)} if value.letters else {}
+        return {"function": value.steps(where), "arguments": list(value.arguments), "text": value.text, **letters}
     if callable(value):
         return {"function": write_function(value, where)}
     return value

@@ -23,7 +23,8 @@ from atwood.model.declare.declaring import (
     no_such_reaction,
 )
 from atwood.model.declare.field_functions import StateSpec, discrete_state, state
-from atwood.model.declare.fields import MISSING, Field, ParameterSpec, SignalSpec
+from atwood.model.declare.fields import MISSING, Field, FieldReference, ParameterSpec, SignalSpec
+from atwood.model.declare.function_values import Function
 from atwood.model.declare.laws import Kind, Law
 from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.values.outline import Outline
@@ -287,6 +288,10 @@ class Component(metaclass=ComponentType):
         given = name in self._settings
         value = self._settings[name] if given else spec.default
         scope = self._parent if given else self
+        if isinstance(value, Function) and value.letters and scope is not None:
+            known = {one: FieldReference(one).value_in(scope) for one in value.letters}
+            is_open = any(isinstance(one, ParameterExpression) for one in known.values())
+            return value if is_open else value.with_letters({one: float(held) for one, held in known.items()})
         if not isinstance(value, ParameterExpression) or scope is None:
             return value
         return self._checked(name, value.worked_out(scope, f"{self.path or type(self).__name__}.{name}"))

@@ -18,7 +18,7 @@ from atwood.arguments import (
     show,
 )
 from atwood.errors import AtwoodError, ParameterError, near_matches, suggestion
-from atwood.model.declare.function_values import is_sympy, make_function
+from atwood.model.declare.function_values import by_name_only, is_sympy, make_function
 from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.declare.time_functions import check_function
 from atwood.model.values.units import Unit, parse_quantity, parse_si_unit
@@ -266,6 +266,8 @@ class SignalSpec(Field):
                 return formula
             value = formula(0.0)
         if callable(value):
+            if by_name_only(value):
+                return make_function(value, ("t",), 1, self.unit, where)
             check_function(value, where)
             return value
         return ParameterSpec(0.0, self.unit.text, self.doc).check(value, where)

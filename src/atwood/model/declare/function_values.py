@@ -1,7 +1,9 @@
 """Parameters that are functions: of places, of angles, of time; a law calls them like any function.
 
 A function is given as a number, as a formula in text or in sympy, or as a Python function in plain arithmetic. It is
-traced once, on a graph of its own, so that it can be differentiated, compared, written to a file and read again.
+traced once, on a graph of its own, so that it can be differentiated, compared, written to a file and read again. What a
+Python function takes by name only, ``lambda x, *, stiffness: stiffness * x``, are parameters of the model around
+the part (or of the part, in its own default), which stay letters in formulas.
 """
 
 from __future__ import annotations
@@ -33,10 +35,18 @@ class Function:
         The names of its arguments, in the order in which they are given.
     text
         What it was given as, for people to read.
+    letters
+        Parameters that it takes by name, with their values where they are known.
     """
 
-    def __init__(self, arguments: Sequence[str], results: Sequence[Expression], text: str) -> None:
-        self.arguments, self.text = tuple(arguments), text
+    def __init__(
+        self,
+        arguments: Sequence[str],
+        results: Sequence[Expression],
+        text: str,
+        letters: Mapping[str, Scalar] | None = None,
+    ) -> None:
+        self.arguments, self.text, self.letters = tuple(arguments), text, dict(letters or {})
         self._results = tuple(results)
         self._graph = results[0].graph
         self._nodes = live(self._results)
@@ -46,11 +56,12 @@ class Function:
         if len(values) != len(self.arguments):
             names = ", ".join(self.arguments)
             raise AtwoodError(f"the function {self.text} takes {names}, which are not {len(values)} values")
+        values = (*values, *self.letters.values())
         graph = graph_of(*values)
         if graph is not None:
             found: list[Any] = list(self._rebuilt(graph, values))
         elif all(isinstance(value, (int, float)) for value in values):
-            known = {self._symbol(name): float(value) for name, value in zip(self.arguments, values, strict=True)}
+            known = {self._symbol(name): float(value) for name, value in zip(self._names, values, strict=True)}
             found = evaluate(self._results, known)
         else:
             found = [one(*values) for one in self._stored("")]
@@ -66,7 +77,15 @@ class Function:
         return self.text
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return read_function, (self.steps(""), self.arguments, self.text, "")
+        return read_function, (self.steps(""), self.arguments, self.text, "", self.letters)
+
+    @property
+    def _names(self) -> tuple[str, ...]:
+        return *self.arguments, *self.letters
+
+    def with_letters(self, letters: Mapping[str, Scalar]) -> Function:
+        """Return it with values of the parameters that it takes by name."""
+        return Function(self.arguments, self._results, self.text, letters)
 
     @property
     def is_zero(self) -> bool:
@@ -80,13 +99,13 @@ class Function:
     def derivative(self, name: str) -> Function:
         """Return the partial derivative by an argument."""
         slopes = jvp(self._results, {self._symbol(name): 1.0})
-        return Function(self.arguments, slopes, f"d({self.text})/d{name}")
+        return Function(self.arguments, slopes, f"d({self.text})/d{name}", self.letters)
 
     def scaled(self, arguments: Sequence[float], result: float) -> Function:
         """Return the same function where its arguments, and its value, are counted in other units."""
         symbols = [self._symbol(name) / size for name, size in zip(self.arguments, arguments, strict=True)]
-        made = [one * result for one in self._rebuilt(self._graph, symbols)]
-        return Function(self.arguments, made, self.text)
+        made = [one * result for one in self._rebuilt(self._graph, (*symbols, *map(self._symbol, self.letters)))]
+        return Function(self.arguments, made, self.text, self.letters)
 
     def steps(self, where: str) -> list[Any]:
         """Return it as plain data: a list of steps for each result."""
@@ -100,13 +119,13 @@ class Function:
                 found.append(node.arguments[0])
             elif node.operation in ("minimum", "maximum", "less", "less_equal"):
                 found.append(algebra.subtract(*node.arguments))
-        return [Function(self.arguments, [one], self.text) for one in dict.fromkeys(found)]
+        return [Function(self.arguments, [one], self.text, self.letters) for one in dict.fromkeys(found)]
 
     def _symbol(self, name: str) -> Expression:
         return self._graph.symbol(name)
 
     def _rebuilt(self, graph: Graph, values: Sequence[Scalar]) -> Sequence[Expression]:
-        given = zip(self.arguments, values, strict=True)
+        given = zip(self._names, values, strict=True)
         made = {self._symbol(name): graph.convert(value) for name, value in given}
         for node in self._nodes:
             if node.is_constant:
@@ -116,24 +135,25 @@ class Function:
         return [made[one] for one in self._results]
 
     def _stored(self, where: str) -> list[StoredFunction]:
-        return [StoredFunction(steps, where, self.arguments) for steps in self.steps(where)]
+        return [StoredFunction(steps, where, self._names) for steps in self.steps(where)]
 
     def _key(self) -> Any:
         try:
-            return self.arguments, self.steps("")
+            return self._names, self.steps("")
         except ParameterError:  # it calls an external function, and is like no other
             return id(self)
 
 
-def read_function(written: Any, arguments: Any, text: Any, where: str) -> Function:
+def read_function(written: Any, arguments: Any, text: Any, where: str, letters: Any = ()) -> Function:
     """Return the function that `Function.steps` wrote."""
+    given = dict(letters) if isinstance(letters, Mapping) else dict.fromkeys(letters, None)
     names_are_right = isinstance(arguments, (list, tuple)) and all(isinstance(name, str) for name in arguments)
     if not isinstance(written, list) or len(written) not in (1, 3) or not names_are_right:
         raise ParameterError("the stored function cannot be read", where=where, advice="Save the scene again.")
-    stored = [StoredFunction(steps, where, arguments) for steps in written]
+    stored = [StoredFunction(steps, where, (*arguments, *given)) for steps in written]
     graph = Graph()
-    symbols = [graph.symbol(name) for name in arguments]
-    return Function(arguments, [graph.convert(one(*symbols)) for one in stored], str(text))
+    symbols = [graph.symbol(name) for name in (*arguments, *given)]
+    return Function(arguments, [graph.convert(one(*symbols)) for one in stored], str(text), given)
 
 
 def make_function(value: Any, arguments: Sequence[str], size: int, unit: Unit, where: str) -> Function:
@@ -141,7 +161,9 @@ def make_function(value: Any, arguments: Sequence[str], size: int, unit: Unit, w
     if isinstance(value, Function) and value.arguments == tuple(arguments) and len(value._results) == size:
         return value
     graph = Graph()
-    symbols = {name: graph.symbol(name) for name in arguments}
+    letters = [name for one in (value if isinstance(value, (list, tuple)) else [value]) for name in by_name_only(one)]
+    letters = [name for name in dict.fromkeys(letters) if name not in arguments]
+    symbols = {name: graph.symbol(name) for name in (*arguments, *letters)}
     if size > 1 and not callable(value):
         if isinstance(value, str) or not isinstance(value, Sequence) or len(value) != size:
             raise ParameterError(
@@ -161,7 +183,7 @@ def make_function(value: Any, arguments: Sequence[str], size: int, unit: Unit, w
         results = [graph.convert(one) for one in found]
     except AtwoodError:
         raise ParameterError(f"{show(value)} does not give numbers", where=where, advice=_PLAIN) from None
-    return Function(arguments, results, text)
+    return Function(arguments, results, text, dict.fromkeys(letters, None))
 
 
 _PLAIN = "Write it in plain arithmetic with Atwood's own functions (atwood.sin, atwood.select, ...)."
@@ -196,6 +218,16 @@ def _traced(value: Any, symbols: Mapping[str, Expression], unit: Unit, where: st
         where=where,
         advice=_PLAIN,
     )
+
+
+def by_name_only(value: Any) -> list[str]:
+    """Return what a Python function takes by name only."""
+    try:
+        given = inspect.signature(value).parameters.values() if callable(value) else ()
+    except (TypeError, ValueError):
+        return []
+    empty = inspect.Parameter.empty
+    return [one.name for one in given if one.kind is one.KEYWORD_ONLY and one.default is empty]
 
 
 def _called(value: Callable[..., Any], symbols: Mapping[str, Expression], where: str) -> Any:

@@ -12,6 +12,7 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.component import Binding, bind
 from atwood.model.declare.connectors import Frame, JointCoordinate, Motion
 from atwood.model.declare.fields import ParameterSpec
+from atwood.model.declare.function_values import Function
 from atwood.model.local.flatten import FlatScene, Part
 from atwood.model.local.joint_coordinates import (
     JointCoordinateUse,
@@ -141,6 +142,8 @@ class ParameterTable:
 def read_parameter(part: Part, spec: ParameterSpec, table: ParameterTable) -> Any:
     """Return a parameter as laws see it: symbols for numbers that may change, the value itself for what shapes laws."""
     value, name = part.values[spec.name], f"{part.path}.{spec.name}"
+    if isinstance(value, Function):
+        return _with_symbols(value, name, table)
     if value is None or spec.integer or spec.choices or spec.text or spec.function_of or spec.array:
         return value
     if spec.turning and table.space == "plane" and (value[0] != 0.0 or value[2] != 0.0):
@@ -153,6 +156,11 @@ def read_parameter(part: Part, spec: ParameterSpec, table: ParameterTable) -> An
     axes = "xyz" if spec.size == 3 else [str(i) for i in range(spec.size)]
     made = [table.scalar(f"{name}.{axis}", one, spec.structural) for axis, one in zip(axes, value, strict=True)]
     return Vector(*made) if spec.size == 3 else tuple(made)
+
+
+def _with_symbols(function: Function, path: str, table: ParameterTable) -> Function:
+    """Return a function with symbols for the parameters that it takes by name."""
+    return function.with_letters({one: table.scalar(f"{path}.{one}", held) for one, held in function.letters.items()})
 
 
 def read_signal(
@@ -175,7 +183,8 @@ def read_signal(
     if not callable(given):
         return table.scalar(path, given)
     try:
-        return table.graph.convert(given(time))
+        function = _with_symbols(given, path, table) if isinstance(given, Function) else given
+        return table.graph.convert(function(time))
     except (TypeError, AtwoodError) as error:
         raise DeclarationError(
             f"this function of time cannot be evaluated on an expression ({error})",

@@ -211,8 +211,15 @@ def _with_letter(assembly: Assembly, one: _Wanted, said: Mapping[str, str]) -> _
     part, name, axis = _place(assembly, one.path)
     local = assembly.mechanism.locals_.get(part)
     ways: list[tuple[str, str, tuple[str, ...]]] = [(part, name, ())] if local is None else []
-    for component, own in passed_on(local.part.component, name) if local is not None else ():
-        ways.append((component.path, own, _declared(component, own)))
+    source, own = (None, name) if local is None else (local.part.component, name)
+    spec = None if source is None else source._parameters.get(name) or source._signals.get(name)
+    if source is not None and axis and spec is not None and getattr(spec, "size", None) is None:
+        source = source._parent if name in source._settings else source  # what a function takes by name
+        field = source._parameters[axis]
+        one = replace(one, stem=_parameter_stem(axis, ""), unit=field.unit.text, meaning=field.doc)
+        one, own, axis = replace(one, shared=f"{source.path}.{axis}" if source.path else axis), axis, ""
+    for component, place in passed_on(source, own) if source is not None else ():
+        ways.append((component.path, place, _declared(component, place)))
     for path, own, declared in ways:
         whole = f"{path}.{own}" if path else own
         full = f"{whole}.{axis}" if axis else whole
@@ -220,11 +227,11 @@ def _with_letter(assembly: Assembly, one: _Wanted, said: Mapping[str, str]) -> _
         is_outer = path != part
         if given:
             stem = split_letter(given) + ((axis,) if axis and full not in said else ())
-            return replace(one, stem=stem, is_given=True, shared=full if is_outer else "")
+            return replace(one, stem=stem, is_given=True, shared=full if is_outer else one.shared)
         if declared:
             at = "xyz".find(axis) if len(declared) > 1 else 0
             stem = split_letter(declared[at]) + ((axis,) if axis and len(declared) == 1 else ())
-            one = replace(one, stem=stem, shared=full if is_outer else "")
+            one = replace(one, stem=stem, shared=full if is_outer else one.shared)
     if one.part in said:
         return replace(one, stem=(*one.stem, *split_letter(said[one.part])), is_given=True)
     return one
