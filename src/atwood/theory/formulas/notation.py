@@ -214,7 +214,7 @@ def _with_letter(assembly: Assembly, one: _Wanted, said: Mapping[str, str]) -> _
     source, own = (None, name) if local is None else (local.part.component, name)
     spec = None if source is None else source._parameters.get(name) or source._signals.get(name)
     if source is not None and axis and spec is not None and getattr(spec, "size", None) is None:
-        source = source._parent if name in source._settings else source  # what a function takes by name
+        source = source._parent or source if name in source._settings else source  # what a function takes by name
         field = source._parameters[axis]
         one = replace(one, stem=_parameter_stem(axis, ""), unit=field.unit.text, meaning=field.doc)
         one, own, axis = replace(one, shared=f"{source.path}.{axis}" if source.path else axis), axis, ""
