@@ -63,7 +63,8 @@ class ConservedQuantity:
         """By what it is conserved.
 
         ``"energy function"``, ``"ignorable coordinate"``, ``"linear momentum"``, ``"angular momentum"``, ``"boost"``,
-        ``"symmetric body"``, ``"total energy"`` where that is not the energy function, or ``"stated symmetry"``.
+        ``"symmetric body"``, ``"rolling body"``, ``"affine symmetry"``, ``"symmetry in time"``, ``"quadratic in
+        momenta"``, ``"total energy"`` where that is not the energy function, or ``"stated symmetry"``.
         """
         return self.finding.kind
 
@@ -259,9 +260,9 @@ def _listed(value: Any) -> Any:
 
 _SYMMETRIES = each(instance("a Symmetry", Symmetry), "symmetries, as a list")
 _BEYOND = (
-    "integrals of symmetries that depend on velocities, as that of Laplace, Runge and Lenz: state them, `Symmetry`"
+    "integrals of more than second order in the momenta, or whose terms are more than quadratic: state them, `Symmetry`"
 )
-_ROLLING = "integrals of rolling that belong to no symmetry"
+_ROLLING = "integrals of rolling besides angular momenta"
 SYMMETRIES = Kind("a Symmetry, or a list of them", _listed)
 
 
@@ -277,7 +278,9 @@ def conserved(
 
     Momenta of ignorable coordinates; the energy function ``h = sum p q' - L`` (Jacobi integral), and whether it is
     T + V; linear and angular momentum along all directions in which the scene is invariant, whatever these are; boosts
-    of closed scenes; angular momenta of symmetric bodies about their own axes.
+    of closed scenes; angular momenta of symmetric bodies about their own axes; of scenes of few free coordinates, also
+    polynomials in momenta, coordinates and time, to second order in the momenta: p + m g t, h - Omega L, the vector of
+    Laplace, Runge and Lenz.
 
     Each is proven on the expression graph, for all states and parameters, or where that is too large, checked at random
     states, which it says.

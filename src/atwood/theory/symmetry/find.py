@@ -13,13 +13,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.expr import Expression, depends_on
+from atwood.expr import Expression, depends_on, evaluate
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.outputs.totals import add_up
 from atwood.numerics.matrices import least_norm, or_one
 from atwood.simulation.dynamics.orientation_coordinates import COORDINATE_SWITCH
 from atwood.simulation.events.modes import find_event_functions
+from atwood.theory.symmetry.ansatz import Integral, find_integrals
 from atwood.theory.symmetry.proof import Generator, Prover
 from atwood.theory.symmetry.quantities import (
     Quantities,
@@ -41,6 +42,17 @@ _FEW = 24
 
 _FAR = 10.0
 """In sizes of the scene: beyond that far from the origin, angular momenta are compared about the middle of it."""
+
+_INTEGRALS = {
+    "first": ("C", "affine symmetry", "integral of a symmetry that is affine in the coordinates"),
+    "time": ("C", "symmetry in time", "integral of a symmetry with coefficients in time"),
+    "second": (
+        "Q",
+        "quadratic in momenta",
+        "integral of second order in the momenta, as those of Laplace, Runge and Lenz",
+    ),
+}
+"""What integrals of an ansatz are called."""
 
 _ALIKE = 1e-11
 """Relative to the largest: values of one quantity, computed in two ways."""
@@ -132,6 +144,8 @@ class _Search:
         motions = q.motions
         linear, angular = self.add(motions.momentum), self.add(motions.angular_momentum)
         moments = self.add(motions.moments)
+        rolls = not all(one.holonomic for one in self.assembly.reduced.constraints) or found.is_restricted
+        rolling = [(body, self.add(values)) for body, values in motions.spins.items() if rolls]
         states = RandomStates(self.assembly, q.on_speeds(self._values))
         count = max(12, len(found.velocities) + 6) if len(found.velocities) <= _FEW else 12
         self.states = states.draw(count, q.center[1])
@@ -144,6 +158,10 @@ class _Search:
         for body, numbers, speeds in spins:
             self._spins(body, numbers, speeds)
         self._totals(linear, angular, moments)
+        for body, numbers in rolling:
+            self._rolling(body, numbers)
+        for one in find_integrals(q, self.prover, self.states, [item.value for item in self.items]):
+            self._integral(one)
         self._caveats()
         return Findings(tuple(self.items), tuple(self.notes))
 
@@ -209,6 +227,17 @@ class _Search:
             meaning = f"angular momentum about the axis {axis_text(axis)} of {body}"
             name = f"spin:{body}" + axis_name(axis)
             self._take(name, "symmetric body", "kg*m^2/s", meaning, value, proven, numeric, tuple(map(float, axis)))
+
+    def _rolling(self, body: str, numbers: Sequence[int]) -> None:
+        kept = conserved_directions(self.states, numbers, np.ones(3))
+        for axis in readable_basis(kept).T if kept.shape[1] else ():
+            value, numeric = self._combined(axis, self.quantities.motions.spins[body], numbers)
+            if not self._is_known(numeric):
+                moved = [axis @ one.generators[list(numbers)] for one in self.states]
+                proven = self.prover.of_motion(value, self.prover.fitted(self.states, moved))
+                meaning = f"angular momentum of {body} about {axis_text(axis)} through its own centre"
+                name = f"S:{body}{axis_name(axis)}"
+                self._take(name, "rolling body", "kg*m^2/s", meaning, value, proven, numeric, tuple(map(float, axis)))
 
     def _totals(self, linear: Sequence[int], angular: Sequence[int], moments: Sequence[int]) -> None:
         motions, n = self.quantities.motions, len(linear)
@@ -286,6 +315,17 @@ class _Search:
         direction = told.removeprefix("linear momentum ")
         meaning = f"boost {direction}: K = m r - p t, so that the centre of mass moves steadily"
         self._take(f"K{name}", "boost", "kg*m", meaning, value, proven, numeric, tuple(self._in_world(axis)))
+
+    def _integral(self, one: Integral) -> None:
+        name, kind, meaning = _INTEGRALS[one.kind]
+        [value] = self.quantities.on_speeds([one.value])
+        e = self.found.equations
+        table = self.assembly.mechanism.table.values
+        numeric = []
+        for state in self.states:
+            here = {e.time: state.t, **dict(zip(e.coordinates, state.q, strict=True))}
+            numeric += evaluate([value], {**table, **here, **dict(zip(e.speeds, state.u, strict=True))})
+        self._take(name, kind, "", meaning, one.value, True, np.array(numeric))
 
     # -- what they share ----------------------------------------------------------------------------------------------
 

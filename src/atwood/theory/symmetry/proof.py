@@ -78,7 +78,8 @@ class Prover:
         return "no proof was found" if self.is_small else "too large to be proven on the graph"
 
     @cached_property
-    def _angles(self) -> tuple[Expression, ...]:
+    def angles(self) -> tuple[Expression, ...]:
+        """The coordinates that are angles."""
         found = self.quantities.found
         return tuple(q for q, one in zip(found.coordinates, found.names, strict=True) if one.unit == "rad")
 
@@ -89,15 +90,17 @@ class Prover:
         if not self.is_small:
             return False
         merged: dict[Expression, Expression | float] = dict(self.notation.merged)
-        if is_proven_zero(substitute([value], merged)[0] if merged else value, self._angles):
+        if is_proven_zero(substitute([value], merged)[0] if merged else value, self.angles):
             return True
         numbers: dict[Expression, Expression | float] = dict(self.quantities.assembly.mechanism.table.values)
-        return is_proven_zero(substitute([value], numbers)[0], self._angles)
+        return is_proven_zero(substitute([value], numbers)[0], self.angles)
 
     def along(self, value: Expression, generator: Generator, with_rates: bool = False) -> bool:
         """Return whether a quantity is proven to be conserved."""
-        if generator is None:
-            return False
+        return generator is not None and self.is_zero(self.rest(value, generator, with_rates))
+
+    def rest(self, value: Expression, generator: Mapping[int, Expression], with_rates: bool = False) -> Expression:
+        """Return what is left of the rate of a quantity without the equations of motion times displacements."""
         found = self.quantities.found
         along: dict[Expression, Expression | float] = {found.time: 1.0}
         along |= dict(zip(found.coordinates, found.rates, strict=True))
@@ -106,7 +109,7 @@ class Prover:
         terms += [w * (found.constraint_rows[k] - found.rows[k]) for k, w in generator.items()]
         if with_rates:
             terms += [-(one.multiplier * one.rate) for one in found.constraints]
-        return self.is_zero(add_up(terms))
+        return add_up(terms)
 
     def of_motion(self, value: Expression, generator: Generator) -> bool:
         """Return whether a quantity is proven to be conserved, with displacements along the speeds of states."""
@@ -206,13 +209,24 @@ def is_proven_zero(value: Expression, angles: Collection[Expression] = ()) -> bo
     if value.is_zero:
         return True
     try:
-        expansion, inner = _expanded(value, angles)
-        row = _cleared(expansion, expansion.rows[0], inner)
-        for kind in ("sin", "cos"):
-            row = row and without_squares(expansion, row, kind, _TERMS)
-        return not row or not sum_of_waves(expansion, row, _TERMS)
+        return not normal_form(value, angles)[1]
     except TooLargeError:
         return False
+
+
+def normal_form(value: Expression, angles: Collection[Expression] = ()) -> tuple[Expansion, Polynomial]:
+    """Return an expression as a polynomial, times what it divides by: it is empty where the expression is zero.
+
+    Raises
+    ------
+    TooLargeError
+        If it would have too many terms.
+    """
+    expansion, inner = _expanded(value, angles)
+    row = _cleared(expansion, expansion.rows[0], inner)
+    for kind in ("sin", "cos"):
+        row = row and without_squares(expansion, row, kind, _TERMS)
+    return expansion, row and sum_of_waves(expansion, row, _TERMS)
 
 
 def _expanded(value: Expression, angles: Collection[Expression]) -> tuple[Expansion, dict[Expression, Polynomial]]:

@@ -48,6 +48,8 @@ class Motions:
         Total angular momentum about the origin, kg*m^2/s.
     moments
         ``sum m r`` along each axis, kg*m; empty where momenta are not those of masses alone.
+    spins
+        For each body that turns in space, its angular momentum about its own centre, in world axes.
     """
 
     axes: tuple[str, ...]
@@ -55,6 +57,7 @@ class Motions:
     turns: tuple[str, ...]
     angular_momentum: tuple[Expression, ...]
     moments: tuple[Expression, ...]
+    spins: Mapping[str, tuple[Expression, ...]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +103,8 @@ class Quantities:
         momentum = [graph.zero] * count
         spins = [graph.zero] * (3 if space.is_spatial else int(space.is_planar))
         kinematics = assembly.maximal.kinematics
+        names = {tuple(one.speeds): one.body for one in assembly.maximal.orientation_coordinates}
+        own_spins: dict[str, list[Expression]] = {}
         for one in forest.attachments:
             if len(one.speeds) == count:
                 own, r = [p[k] for k in one.speeds], self._in_world([whole.coordinates[k] for k in one.coordinates])
@@ -107,7 +112,7 @@ class Quantities:
                 spins = [a + b for a, b in zip(spins, _about_origin(r, own), strict=True)]
             if one.spin:
                 axes = kinematics.placements.axes[one.body]
-                turned = spin_in_world([p[k] for k in one.spin], axes)
+                turned = own_spins[names[tuple(one.spin)]] = list(spin_in_world([p[k] for k in one.spin], axes))
                 spins = [a + b for a, b in zip(spins, turned, strict=True)]
         for turn in forest.orientations:
             if turn.coordinate is not None and space.is_planar:
@@ -115,10 +120,12 @@ class Quantities:
         free = [one for one in forest.attachments if len(one.speeds) == count]
         places = [self._in_world([whole.coordinates[k] for k in one.coordinates]) for one in free]
         moments = _first_moments(whole, momentum, free, places, assembly.parameters)
-        every = self._in_generalized([*momentum, *spins, *moments])
+        flat = [value for turned in own_spins.values() for value in turned]
+        every = self._in_generalized([*momentum, *spins, *moments, *flat])
         turns = {"space": ("x", "y", "z"), "plane": ("",)}.get(space.name, ())
-        n, m = count, count + len(spins)
-        return Motions(space.axis_names, tuple(every[:n]), turns, tuple(every[n:m]), tuple(every[m:]))
+        n, m, k = count, count + len(spins), count + len(spins) + len(moments)
+        turned_of = {body: tuple(every[k + 3 * i : k + 3 * i + 3]) for i, body in enumerate(own_spins)}
+        return Motions(space.axis_names, tuple(every[:n]), turns, tuple(every[n:m]), tuple(every[m:k]), turned_of)
 
     @cached_property
     def center(self) -> tuple[FloatArray, float]:
@@ -250,7 +257,7 @@ def readable_basis(columns: FloatArray) -> FloatArray:
     Coordinate axes where they are in it; else orthonormal vectors, the first of them in row echelon form, each with its
     largest component positive.
     """
-    rows = _row_echelon(np.asarray(columns, dtype=float).T)
+    rows = row_echelon(np.asarray(columns, dtype=float).T)
     if not np.all(np.sum(rows != 0.0, axis=1) <= 1):
         made: list[FloatArray] = []
         for row in rows:
@@ -265,7 +272,8 @@ def readable_basis(columns: FloatArray) -> FloatArray:
     return np.asarray((rows * signs[:, None]).T)
 
 
-def _row_echelon(rows: FloatArray) -> FloatArray:
+def row_echelon(rows: FloatArray) -> FloatArray:
+    """Return rows of the same span, each with a one where the others have none, as far to the left as can be."""
     rows, row = rows.copy(), 0
     for column in range(rows.shape[1]):
         if row == len(rows):

@@ -16,13 +16,16 @@ from atwood.lazy_modules import sympy
 from atwood.mechanics.outputs.totals import add_up
 from atwood.model.values.units import parse_unit
 from atwood.theory.equations.formulas import EquationFormulas
-from atwood.theory.formulas.printers import objects
+from atwood.theory.formulas.printers import objects, text
 from atwood.theory.symmetry.find import Finding
 from atwood.theory.symmetry.proof import Prover
 from atwood.theory.symmetry.quantities import Quantities
 from atwood.theory.symmetry.states import KEPT, RandomStates, State
 
 _STATES = 16
+
+_LONGEST = 400
+"""Signs of what is left over of a symmetry that is none, beyond which it is not written."""
 
 
 def _readable(value: Any) -> Any:
@@ -110,8 +113,10 @@ def check_symmetry(symmetry: Symmetry, quantities: Quantities, prover: Prover, f
         raise UsageError(f"nothing could be checked at random states near its start: {drawn.reason}", where=scene)
     worst = max(states, key=lambda one: abs(float(one.rates[0])) / (float(one.terms[0]) or 1.0))
     if abs(float(worst.rates[0])) > KEPT * float(worst.terms[0]):
+        rest = text.formula(formulas.formula(prover.rest(value, generator), energy=True)) if prover.is_small else ""
+        left = f": {rest} is left over" if rest and len(rest) <= _LONGEST else ""
         raise UsageError(
-            f"it is no symmetry: L changes by more than df/dt, and p . delta q - f changes at {worst.rates[0]:.6g} a "
+            f"it is no symmetry: L changes by more than df/dt{left}; p . delta q - f changes at {worst.rates[0]:.6g} a "
             f"second (its terms at {worst.terms[0]:.3g}) at {_state_text(quantities, worst)}",
             where=f"{scene}: {symmetry.name}",
             advice="Look at the generator, its sign and factor, and at f.",
