@@ -2,15 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.expr import depends_on
+from atwood.expr import Expression, depends_on
+from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import find_observables, observer
 from atwood.simulation.dynamics.reactions import ReactionSolver
 from atwood.simulation.run.recorder import SegmentRecord
+
+
+def reads(assembly: Assembly, paths: Sequence[str], symbols: Sequence[Expression]) -> bool:
+    """Return whether a quantity depends on any of some symbols."""
+    return any(depends_on(one.value, symbols) for one in find_observables(assembly, paths))
+
+
+def quantities_at(
+    assembly: Assembly,
+    paths: tuple[str, ...],
+    state: tuple[FloatArray, FloatArray, FloatArray],
+    accelerations: Callable[[], FloatArray],
+    reactions: Callable[[], FloatArray],
+) -> FloatArray:
+    """Return quantities by path at many states, shape (paths, states); what none of them depends on is not found."""
+    t, q, u = state
+    symbols = [one.symbol for one in assembly.reactions]
+    a, forces = np.zeros_like(u), np.zeros((len(symbols), len(t)))
+    if reads(assembly, paths, symbols):
+        forces = reactions()
+    if u.size and reads(assembly, paths, assembly.own_equations.accelerations):
+        a = accelerations()
+    kernel = assembly.kernel(observer(assembly, paths), vectorized=True)
+    found: FloatArray = kernel(t[None, :], q, u, a, forces)[0]
+    return found
 
 
 class SegmentQuantities:
@@ -27,18 +54,9 @@ class SegmentQuantities:
 
     def values(self, paths: tuple[str, ...]) -> FloatArray:
         """Return quantities by path, shape (paths, samples)."""
-        segment, assembly = self.segment, self.segment.assembly
-        symbols = [one.symbol for one in assembly.reactions]
-        expressions = [one.value for one in find_observables(assembly, paths)]
-        reactions, accelerations = np.zeros((len(symbols), len(segment.time))), np.zeros_like(segment.speeds)
-        if any(depends_on(one, symbols) for one in expressions):
-            reactions, _ = self.reactions
-        if segment.speeds.size and any(depends_on(one, assembly.own_equations.accelerations) for one in expressions):
-            accelerations = self.accelerations()
-        kernel = assembly.kernel(observer(assembly, paths), vectorized=True)
-        state = segment.time[None, :], segment.coordinates, segment.speeds
-        found: FloatArray = kernel(*state, accelerations, reactions)[0]
-        return found
+        segment = self.segment
+        state = segment.time, segment.coordinates, segment.speeds
+        return quantities_at(segment.assembly, paths, state, self.accelerations, lambda: self.reactions[0])
 
     @cached_property
     def _solver(self) -> ReactionSolver:

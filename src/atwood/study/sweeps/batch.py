@@ -19,6 +19,7 @@ from atwood.forms.sides import has_sides
 from atwood.integrators.batch import Batch, BatchPlaces
 from atwood.integrators.methods import AUTO, METHODS
 from atwood.lazy_dataclasses import dataclass
+from atwood.result.segment_quantities import reads
 from atwood.simulation.events.modes import find_event_functions
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.curved_laws import find_curved
@@ -26,14 +27,11 @@ from atwood.study.sweeps.batch_values import ParameterRows, StartRows, read_star
 from atwood.study.sweeps.modes import find_mode
 from atwood.study.sweeps.motions import (
     Way,
-    absolute_tolerances,
-    are_stiff,
     find_way,
-    have_inertia,
+    make_ready,
     open_places,
-    time_scales,
 )
-from atwood.study.sweeps.readout import read_quantities, reads
+from atwood.study.sweeps.readout import read_quantities
 from atwood.study.sweeps.runs import Records, SweepRequest, shared_work
 from atwood.study.sweeps.waves import Waves
 
@@ -153,18 +151,9 @@ class _Batches:
 
     def _prepare(self, runs: NDArray[np.intp]) -> _Prepared:
         runs, (q, u), lengths, parameters = read_starts(self.starts, self.rows, runs)
-        assembly, options, motion = self.request.assembly, self.request.options, self.motion
-        begin = assembly.flat.t_start
-        t, span = np.full(len(runs), begin), options.t_end - begin
-        with np.errstate(all="ignore"):
-            time = time_scales(motion, t, q, u, lengths, parameters, span)
-            state, values, usable = motion.begin(begin, q, u, parameters, lengths, time)
-            usable &= np.isfinite(time) & have_inertia(motion, t, q, u, values, lengths)
-            tolerances = absolute_tolerances(assembly, lengths, time, options.relative_tolerance)[:, motion.columns()]
-        usable &= np.all(np.isfinite(tolerances), axis=1) & np.all(np.isfinite(state), axis=1)
-        usable[usable] &= ~are_stiff(motion, *_where(usable, t, state, values, tolerances, time), options)
-        kept = None if values is None else values[usable]
-        return _Prepared(runs[usable], state[usable], kept, tolerances[usable])
+        t, options = np.full(len(runs), self.request.assembly.flat.t_start), self.request.options
+        state, values, _, tolerances, good = make_ready(self.motion, t, q, u, parameters, lengths, options)
+        return _Prepared(runs[good], state[good], None if values is None else values[good], tolerances[good])
 
     # -- after the last step --------------------------------------------------------------------------------------
 
@@ -197,15 +186,3 @@ class _Batches:
         numbers = np.repeat(ready.runs[good], moments)
         found = read_quantities(self.motion, request.paths, (t, q, u), rows, numbers, self.rows.assembly)
         return found.reshape(len(request.paths), count, moments)
-
-
-def _where(
-    which: NDArray[np.bool_],
-    t: FloatArray,
-    state: FloatArray,
-    values: FloatArray | None,
-    tolerances: FloatArray,
-    time: FloatArray,
-) -> tuple[FloatArray, FloatArray, FloatArray | None, FloatArray, FloatArray]:
-    """Return the rows of some runs."""
-    return t[which], state[which], None if values is None else values[which], tolerances[which], time[which]

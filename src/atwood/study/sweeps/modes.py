@@ -25,7 +25,7 @@ from atwood.simulation.events.modes import MARGIN, EventProbe, EventRecord, marg
 from atwood.simulation.problem.explicit_scene import own_rates
 from atwood.simulation.problem.preparation import make_plan
 from atwood.simulation.run.choice import choose
-from atwood.study.sweeps.motions import OpenTree, task_of
+from atwood.study.sweeps.motions import Motion, task_of
 from atwood.study.sweeps.runs import SweepRequest
 
 
@@ -49,7 +49,7 @@ class SweepMode:
         Where the parameters of this mode stand among those of the sweep.
     """
 
-    motion: OpenTree
+    motion: Motion
     functions: tuple[EventFunction, ...]
     session: ExplicitSession
     rates: CompiledAccelerations
@@ -180,7 +180,7 @@ def find_mode(
     found, data = own_rates(assembly), probe.compiled(for_ida=False)
     if found is None or (functions and data is None):
         return None, "it calls functions in Python"
-    motion = OpenTree(assembly)
+    motion = Motion(assembly)
     task = task_of(motion, chosen, options, assembly.parameter_values, found[1], functions, data)
     session = chosen.open(replace(task, t=t, y=np.concatenate([q, u])))
     assert isinstance(session, ExplicitSession)

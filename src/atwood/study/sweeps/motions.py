@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,51 +37,12 @@ from atwood.simulation.run.choice import can_be_stiff, choose, find_stiff_rows
 from atwood.study.sweeps.runs import SweepRequest
 
 
-class Motion(Protocol):
-    """How states of a scene become those of a method, and back."""
-
-    @property
-    def assembly(self) -> Assembly:
-        """The scene."""
-        ...
-
-    @property
-    def program(self) -> AccelerationProgram:
-        """What is integrated."""
-        ...
-
-    def begin(
-        self, t: float, q: FloatArray, u: FloatArray, values: FloatArray | None, lengths: FloatArray, time: FloatArray
-    ) -> tuple[FloatArray, FloatArray | None, NDArray[np.bool_]]:
-        """Return what is integrated, the values of its parameters, and which runs can be made so."""
-        ...
-
-    def columns(self) -> list[int]:
-        """Return which coordinates and speeds are integrated, by their places in (q, u)."""
-        ...
-
-    def states(self, t: FloatArray, y: FloatArray, values: FloatArray | None) -> tuple[FloatArray, FloatArray]:
-        """Return coordinates and speeds, of shape (number, samples), from what was integrated, one row each."""
-        ...
-
-    def accelerations(self, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None) -> FloatArray:
-        """Return the accelerations of all speeds, shape (number, samples), at states of the same shape."""
-        ...
-
-    def masses(self, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None) -> FloatArray:
-        """Return the mass matrices of all speeds, shape (runs, number, number), at states of shape (number, runs)."""
-        ...
-
-    def open_directions(
-        self, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None
-    ) -> FloatArray | None:
-        """Return how all speeds move with integrated ones, shape (runs, number, few); None if they are all."""
-        ...
-
-
 @dataclass(frozen=True, eq=False)
-class OpenTree:
-    """All coordinates and speeds are integrated."""
+class Motion:
+    """How states of a scene become those of a method, and back: all coordinates and speeds are integrated.
+
+    Parameters are values by run or sample, one row each, or None where all have those of the scene.
+    """
 
     assembly: Assembly
 
@@ -94,40 +54,36 @@ class OpenTree:
         return found
 
     def begin(
-        self, t: float, q: FloatArray, u: FloatArray, values: FloatArray | None, lengths: FloatArray, time: FloatArray
+        self, q: FloatArray, u: FloatArray, values: FloatArray | None, lengths: FloatArray, time: FloatArray
     ) -> tuple[FloatArray, FloatArray | None, NDArray[np.bool_]]:
-        """Return coordinates and speeds."""
+        """Return what is integrated, the values of its parameters, and which runs can be made so."""
         return np.concatenate([q, u], axis=1), values, np.ones(len(q), dtype=bool)
 
     def columns(self) -> list[int]:
-        """Return all places in (q, u)."""
+        """Return which coordinates and speeds are integrated, by their places in (q, u)."""
         equations = self.assembly.reduced
         return list(range(len(equations.coordinates) + len(equations.speeds)))
 
     def states(self, t: FloatArray, y: FloatArray, values: FloatArray | None) -> tuple[FloatArray, FloatArray]:
-        """Return coordinates and speeds."""
+        """Return coordinates and speeds, of shape (number, samples), from what was integrated, one row each."""
         n = len(self.assembly.reduced.coordinates)
         return y[:, :n].T, y[:, n:].T
 
     def accelerations(self, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None) -> FloatArray:
-        """Return the accelerations."""
-        kernel = self.assembly.compiled(self.program.program, vectorized=True)
-        found: FloatArray = kernel.bind(_bound(self.assembly, values))(t[None, :], q, u)[-1]
+        """Return the accelerations of all speeds, shape (number, samples), at states of the same shape."""
+        kernel = with_rows(self.assembly, values).kernel(self.program.program, vectorized=True)
+        found: FloatArray = kernel(t[None, :], q, u)[-1]
         return found
-
-    def masses(self, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None) -> FloatArray:
-        """Return the mass matrices."""
-        return _masses(self.assembly, t, q, u, values)
 
     def open_directions(
         self, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None
     ) -> FloatArray | None:
-        """Return None: all directions are open."""
+        """Return how all speeds move with integrated ones, shape (runs, number, few); None if they are all."""
         return None
 
 
 @dataclass(frozen=True, eq=False)
-class ClosedLoops:
+class ClosedLoops(Motion):
     """The independent coordinates of loops that formulas solve are integrated; branches are further parameters.
 
     Attributes
@@ -140,7 +96,6 @@ class ClosedLoops:
         Numbers of the constraints, which are all independent.
     """
 
-    assembly: Assembly
     solved: Solved
     kept: NDArray[np.intp]
 
@@ -154,11 +109,11 @@ class ClosedLoops:
         return ManyBranches(self.solved.form, self.assembly)
 
     def begin(
-        self, t: float, q: FloatArray, u: FloatArray, values: FloatArray | None, lengths: FloatArray, time: FloatArray
+        self, q: FloatArray, u: FloatArray, values: FloatArray | None, lengths: FloatArray, time: FloatArray
     ) -> tuple[FloatArray, FloatArray | None, NDArray[np.bool_]]:
         """Return independent coordinates and speeds, and the branches of each run."""
         parameters = np.tile(self.assembly.parameter_values, (len(q), 1)) if values is None else values
-        found, usable = self._branches.values(t, q, u, parameters, lengths, time)
+        found, usable = self._branches.values(self.assembly.flat.t_start, q, u, parameters, lengths, time)
         return np.concatenate([q, u], axis=1)[:, self.columns()], found, usable
 
     def columns(self) -> list[int]:
@@ -173,14 +128,7 @@ class ClosedLoops:
 
     def accelerations(self, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None) -> FloatArray:
         """Return the accelerations of all speeds, from the balance of forces with the constraints."""
-        assembly = self.assembly
-        if values is not None:
-            assembly = assembly.with_rows(values[:, : len(assembly.parameters)].T)
-        return accelerations_at(assembly, "reduced", t, q, u, self.kept)
-
-    def masses(self, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None) -> FloatArray:
-        """Return the mass matrices of all speeds."""
-        return _masses(self.assembly, t, q, u, values)
+        return accelerations_at(with_rows(self.assembly, values), "reduced", t, q, u, self.kept)
 
     def open_directions(self, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None) -> FloatArray:
         """Return how all speeds move with the independent ones."""
@@ -229,7 +177,7 @@ def find_way(request: SweepRequest) -> tuple[Way | None, str]:
     if chosen.batch is None:
         is_closed = bool(plan.balance.constraints)
         return None, "no formulas solve its closed loops" if is_closed else f"the solver is {chosen.key!r}"
-    motion: Motion = OpenTree(assembly)
+    motion = Motion(assembly)
     if plan.balance.constraints:
         solved = solve_at(plan, start.time, q, u)
         if solved is None:
@@ -278,19 +226,48 @@ def task_of(
     return Task(settings, begin, np.zeros(problem.size), end=options.t_end, explicit=problem, series=series)
 
 
-def _bound(assembly: Assembly, values: FloatArray | None) -> FloatArray:
-    """Return the scene's parameters for kernels, one column for each state where they differ."""
-    return assembly.parameter_values if values is None else values[:, : len(assembly.parameters)].T
+def with_rows(assembly: Assembly, values: FloatArray | None) -> Assembly:
+    """Return a scene for kernels at many states, each with its own parameters where they differ."""
+    return assembly if values is None else assembly.with_rows(values[:, : len(assembly.parameters)].T)
 
 
-def _masses(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None) -> FloatArray:
-    program, bound = assembly.balance("reduced"), _bound(assembly, values)
+def _masses(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatArray:
+    """Return the mass matrices of all speeds, shape (runs, number, number), at states of shape (number, runs)."""
+    program = assembly.balance("reduced")
     if program.mass_product is not None:
-        return masses_at(assembly, t, q.T, u.T, bound)
-    entries = assembly.compiled(program.program, vectorized=True).bind(bound)(t[None, :], q, u)[0]
+        return masses_at(assembly, t, q.T, u.T, assembly.parameter_values)
+    entries = assembly.kernel(program.program, vectorized=True)(t[None, :], q, u)[0]
     found = np.zeros((len(t), program.speeds, program.speeds))
     found[:, program.mass_rows, program.mass_columns] = np.broadcast_to(entries.T, (len(t), entries.shape[0]))
     return found
+
+
+def make_ready(
+    motion: Motion,
+    t: FloatArray,
+    q: FloatArray,
+    u: FloatArray,
+    values: FloatArray | None,
+    lengths: FloatArray,
+    options: RunOptions,
+) -> tuple[FloatArray, FloatArray | None, FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Return what `make_plan` and `choose` find out about one run before its first step, for many.
+
+    That is what is integrated, the values of its parameters, in what time something happens, absolute tolerances, and
+    which of the runs can be made many at a time.
+    """
+    span = options.t_end - motion.assembly.flat.t_start
+    with np.errstate(all="ignore"):
+        time = time_scales(motion, t, q, u, lengths, values, span)
+        state, values, usable = motion.begin(q, u, values, lengths, time)
+        usable &= np.isfinite(time) & have_inertia(motion, t, q, u, values, lengths)
+        every = absolute_tolerances(motion.assembly, lengths, time, options.relative_tolerance)
+        tolerances = every[:, motion.columns()]
+        usable &= np.all(np.isfinite(tolerances), axis=1) & np.all(np.isfinite(state), axis=1)
+        own = None if values is None else values[usable]
+        some = t[usable], state[usable], own, tolerances[usable], time[usable]
+        usable[usable] &= ~are_stiff(motion, *some, options)
+    return state, values, time, tolerances, usable
 
 
 def time_scales(
@@ -326,7 +303,7 @@ def have_inertia(
     motion: Motion, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None, lengths: FloatArray
 ) -> NDArray[np.bool_]:
     """Return where nothing can move without inertia, by the measure of `make_plan`; see `time_scales`."""
-    mass = motion.masses(t, q.T, u.T, values)
+    mass = _masses(with_rows(motion.assembly, values), t, q.T, u.T)
     directions = motion.open_directions(t, q.T, u.T, values)
     if directions is None:
         sizes = motion_scales(motion.assembly.reduced, lengths)

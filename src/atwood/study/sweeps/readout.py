@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
-from atwood.expr import Expression, depends_on
 from atwood.forms.assembly import Assembly
-from atwood.forms.quantities import find_observables, observer
+from atwood.result.segment_quantities import quantities_at
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.reactions import ReactionSolver
-from atwood.study.sweeps.motions import Motion
-
-
-def reads(assembly: Assembly, paths: Sequence[str], symbols: Sequence[Expression]) -> bool:
-    """Return whether a quantity depends on any of some symbols."""
-    return any(depends_on(one.value, symbols) for one in find_observables(assembly, paths))
+from atwood.study.sweeps.motions import Motion, with_rows
 
 
 def read_quantities(
@@ -33,16 +27,15 @@ def read_quantities(
     assembly, (t, q, u) = motion.assembly, state
     if not len(t):
         return np.zeros((len(paths), 0))
-    values = assembly.parameter_values if rows is None else rows[:, : len(assembly.parameters)].T
+    many = with_rows(assembly, rows)
     q = kinematic_map_of(assembly, "reduced").normalized(q)
-    a, reactions = np.zeros_like(u), np.zeros((len(assembly.reactions), len(t)))
-    if reads(assembly, paths, list(assembly.reduced.accelerations)):
-        a = motion.accelerations(t, q, u, rows)
-    if reads(assembly, paths, [one.symbol for one in assembly.reactions]):
-        reactions = _reactions(assembly, (t, q, u), None if rows is None else values, numbers, own)
-    kernel = assembly.compiled(observer(assembly, paths), vectorized=True).bind(values)
-    found: FloatArray = kernel(t[None, :], q, u, a, reactions)[0]
-    return found
+    return quantities_at(
+        many,
+        paths,
+        (t, q, u),
+        lambda: motion.accelerations(t, q, u, rows),
+        lambda: _reactions(assembly, (t, q, u), None if rows is None else many.parameter_values, numbers, own),
+    )
 
 
 def _reactions(

@@ -25,7 +25,7 @@ from atwood.simulation.events.mode_change import enter_mode
 from atwood.simulation.events.modes import EventRecord
 from atwood.study.sweeps.batch_values import ParameterRows, StartRows, read_starts
 from atwood.study.sweeps.modes import SweepMode, find_mode
-from atwood.study.sweeps.motions import absolute_tolerances, are_stiff, have_inertia, time_scales
+from atwood.study.sweeps.motions import make_ready
 from atwood.study.sweeps.readout import read_quantities
 from atwood.study.sweeps.runs import Records, SweepRequest
 
@@ -142,16 +142,11 @@ class _Piece:
         q, u, lengths = y[:, :n], y[:, n:], self.lengths[rows]
         values = None if self.parameters is None else mode.arranged(self.parameters[rows])
         options = self.request.options
-        span = options.t_end - self.request.assembly.flat.t_start
+        *_, time, absolute, usable = make_ready(mode.motion, t, q, u, values, lengths, options)
         with np.errstate(all="ignore"):
-            time = time_scales(mode.motion, t, q, u, lengths, values, span)
-            absolute = absolute_tolerances(mode.assembly, lengths, time, options.relative_tolerance)
             shifts, watched = mode.shifts(t, q, u, values, lengths, time, options.relative_tolerance)
-            usable = watched & np.all(np.isfinite(absolute), axis=1)
-            usable &= have_inertia(mode.motion, t, q, u, values, lengths)
-            usable &= ~are_stiff(mode.motion, t, y, values, absolute, time, options)
         going: list[tuple[_State, EventFunction]] = []
-        for k in np.flatnonzero(usable).tolist():
+        for k in np.flatnonzero(usable & watched).tolist():
             event = self._stretch(mode, states[k], None if values is None else values[k], shifts[k], absolute[k])
             if event is not None:
                 going.append((states[k], event))
