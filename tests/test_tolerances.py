@@ -29,7 +29,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import to_maximal
 from atwood.integrators.ida import library as sundials_library
 from atwood.simulation.initialization.start import find_start
-from atwood.simulation.problem.preparation import make_plan
+from atwood.simulation.problem.preparation import make_problem
 from atwood.tolerances import INTERVALS, tolerances
 from atwood_library.scenes import SCENES, Bricard, FourBar, HeavyTop, RollingBall, SimplePendulum
 
@@ -48,7 +48,7 @@ def decisions(assembly: Assembly) -> tuple[Any, ...]:
         q, u = start.coordinates, start.speeds
         if assembly.form == "dae":
             q, u = (np.asarray(x, dtype=float) for x in assembly.kernel(to_maximal(assembly))([start.time], q, u))
-        plan = make_plan(assembly, start.time, q, u, start.length, assembly.flat.t_end - start.time)
+        plan = make_problem(assembly, start.time, q, u, start.length, assembly.flat.t_end - start.time)
         plan.check_held(start.time, q, u)
     except AtwoodError as error:
         return (type(error).__name__, error.where)

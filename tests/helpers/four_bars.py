@@ -12,7 +12,7 @@ from atwood import Frame, Result, Scene, simulate
 from atwood.pipeline import assemble
 from atwood.simulation.dynamics.reactions import ReactionSolver
 from atwood.simulation.initialization.start import find_start, own_state
-from atwood.simulation.problem.preparation import make_plan
+from atwood.simulation.problem.preparation import make_problem
 from atwood_library import Disc, Ground, Link, Pivot, RotaryDrive, Weld
 
 __all__ = [
@@ -166,7 +166,7 @@ def seen(scene: Scene, form: str) -> Seen:
     assembly = assemble(scene, form=form)
     start = find_start(assembly)
     q, u = own_state(assembly, start)
-    plan = make_plan(assembly, start.time, q, u, start.length, 1.0)
+    plan = make_problem(assembly, start.time, q, u, start.length, 1.0)
     at = np.array([start.time]), q[:, None], u[:, None]
     solver = ReactionSolver(assembly, start.time, q, u)
     values = dict(zip((one.path for one in assembly.reactions), solver.at(*at)[0][:, 0], strict=True))

@@ -15,8 +15,8 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import to_maximal
 from atwood.pipeline import assemble, simulate
 from atwood.simulation.initialization.start import Start, find_start
-from atwood.simulation.problem.preparation import make_plan, pack_state
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.preparation import make_problem, pack_state
+from atwood.simulation.problem.problem import SceneProblem
 
 FORMS = ("reduced", "dae")
 
@@ -83,7 +83,7 @@ class Prepared:
 
     assembly: Assembly
     start: Start
-    plan: Plan
+    plan: SceneProblem
     q: FloatArray
     u: FloatArray
 
@@ -99,7 +99,7 @@ def prepare(scene: Model, form: str, level: str = "ggl") -> Prepared:
     q, u = start.coordinates, start.speeds
     if form == "dae":
         q, u = (np.asarray(x, dtype=float) for x in assembly.kernel(to_maximal(assembly))([start.time], q, u))
-    plan = make_plan(assembly, start.time, q, u, start.length, assembly.flat.t_end - start.time)
+    plan = make_problem(assembly, start.time, q, u, start.length, assembly.flat.t_end - start.time)
     return Prepared(assembly, start, plan, q, u)
 
 

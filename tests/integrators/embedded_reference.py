@@ -131,7 +131,7 @@ class ReferenceStepper(Stepper):
         """Take no longer steps from now on than this, nor than the options allow."""
         self._longest = min(longest, self._options.max_step or inf)
 
-    def heed_stiffness(self) -> None:
+    def watch_stiffness(self) -> None:
         """Let `run` and `sample` come back with `Outcome.NOTICED` whenever the problem seems stiff."""
         self._heeds = True
 

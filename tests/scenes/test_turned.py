@@ -17,8 +17,8 @@ from atwood import Component, Frame, Scalar, Scene, StartError, connector, const
 from atwood.pipeline import assemble
 from atwood.simulation.dynamics.reactions import ReactionSolver
 from atwood.simulation.initialization.start import find_start, own_state
-from atwood.simulation.problem.preparation import make_plan
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.preparation import make_problem
+from atwood.simulation.problem.problem import SceneProblem
 from atwood_library import Ground, Link, Pivot, RigidBody, Rod, Spherical, Weld
 
 from ..helpers.four_bars import (
@@ -146,7 +146,7 @@ def test_a_place_near_by_where_a_law_has_no_value_says_nothing(form: str) -> Non
     scene.start.update({"hinge.angle": 0.5 * math.pi - 1e-3, "hinge.angular_velocity": 0.0})
     assembly = assemble(scene, form=form)
     start = find_start(assembly)
-    plan = make_plan(assembly, start.time, *own_state(assembly, start), start.length, 1.0)
+    plan = make_problem(assembly, start.time, *own_state(assembly, start), start.length, 1.0)
     assert len(plan.sizes) - plan.finding.rank == 1
 
 
@@ -232,7 +232,7 @@ def test_steps_do_not_shrink_where_what_is_kept_becomes_redundant(
     Others are kept from the start; and where they are not, many short steps are reason enough to look.
     """
     if not reviews:
-        monkeypatch.setattr(Plan, "keep_better", lambda *_: None)
+        monkeypatch.setattr(SceneProblem, "keep_better", lambda *_: None)
     found = simulate(make(Stand(1.360841402195895)), form="dae", rtol=1e-13, outputs=13, max_steps=200)
     assert found.status == "finished"
 
@@ -261,7 +261,7 @@ def test_starts_on_a_plate_that_is_turned_by_next_to_nothing_meet_their_speeds(a
     assembly = assemble(driven(Stand(angle)))
     start = find_start(assembly)
     q, u = own_state(assembly, start)
-    plan = make_plan(assembly, start.time, q, u, start.length, 1.0)
+    plan = make_problem(assembly, start.time, q, u, start.length, 1.0)
     assert max(plan.balance.misses(start.time, q, u, plan.sizes)) < 1e-12
 
 

@@ -15,7 +15,7 @@ from atwood.model.local.flatten import flatten
 from atwood.pipeline import assemble
 from atwood.simulation.dynamics.reactions import ReactionSolver
 from atwood.simulation.initialization.start import find_start, own_state
-from atwood.simulation.problem.preparation import make_plan
+from atwood.simulation.problem.preparation import make_problem
 from atwood_library import Ground, Link, Pivot, Weld
 from atwood_library.scenes import Bricard, FlyballGovernor, FourBarRow, SpatialSliderCrank, UniversalShaft
 
@@ -77,7 +77,7 @@ def seen(scene: Scene, form: str) -> Seen:
     assembly = assemble(scene, form=form)
     start = find_start(assembly)
     q, u = own_state(assembly, start)
-    finding = make_plan(assembly, start.time, q, u, start.length, 1.0).finding
+    finding = make_problem(assembly, start.time, q, u, start.length, 1.0).finding
     solver = ReactionSolver(assembly, start.time, q, u)
     values = solver.at(np.array([start.time]), q[:, None], u[:, None])[0][:, 0]
     parts: dict[str, list[float]] = {}

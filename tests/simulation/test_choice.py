@@ -27,7 +27,7 @@ from atwood.integrators.ida import library as sundials_library
 from atwood.pipeline import assemble
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.options import RunOptions
-from atwood.simulation.problem.preparation import make_plan
+from atwood.simulation.problem.preparation import make_problem
 from atwood.simulation.run.choice import ASKED, stiffness_of
 from atwood_library import Damper, Force, Ground, PointMass, Spring
 from atwood_library.scenes import SCENES
@@ -170,7 +170,7 @@ def test_the_ratio_of_stiffness_is_that_of_the_eigenvalues() -> None:
     assembly = assemble(elastic_pendulum(1e4, 3e3))
     start = find_start(assembly)
     q, u = start.coordinates, start.speeds
-    plan = make_plan(assembly, 0.0, q, u, start.length, 2.0)
+    plan = make_problem(assembly, 0.0, q, u, start.length, 2.0)
     found = stiffness_of(plan, RunOptions(t_end=10.0), 0.0, q, u)
     assert found is not None
     # l^2 + 3000 l + 10000 = 0 along the spring; the rest takes sqrt(length / g).
@@ -183,7 +183,7 @@ def test_without_dampers_nothing_is_stiff() -> None:
     assembly = assemble(SCENES["chain"]())
     start = find_start(assembly)
     q, u = start.coordinates, start.speeds
-    plan = make_plan(assembly, 0.0, q, u, start.length, 1.0)
+    plan = make_problem(assembly, 0.0, q, u, start.length, 1.0)
     assert stiffness_of(plan, RunOptions(t_end=1.0), 0.0, q, u) is None
 
 

@@ -18,7 +18,7 @@ from atwood.integrators.ida import library as sundials_library
 from atwood.simulation.initialization.start import find_start, own_state
 from atwood.simulation.problem import closed_loops
 from atwood.simulation.problem.closed_loops import Solved, solve_at
-from atwood.simulation.problem.preparation import make_plan
+from atwood.simulation.problem.preparation import make_problem
 from atwood_library import Ground, Link, Pivot
 from atwood_library.scenes import AndrewsSqueezer, Bricard, FourBar, FourBarRow, SliderCrank, Strandbeest
 
@@ -37,7 +37,7 @@ def solved(scene: Scene) -> Solved | None:
     assembly = assemble(scene)
     start = find_start(assembly)
     q, u = own_state(assembly, start)
-    return solve_at(make_plan(assembly, start.time, q, u, start.length, 1.0), start.time, q, u)
+    return solve_at(make_problem(assembly, start.time, q, u, start.length, 1.0), start.time, q, u)
 
 
 def by_formulas(result: Result) -> bool:
@@ -438,7 +438,7 @@ def test_branches_of_many_values_are_worked_out_together() -> None:
         assert not other.why_new
         start = find_start(other)
         q, u = own_state(other, start)
-        found = solve_at(make_plan(other, start.time, q, u, start.length, 1.0), start.time, q, u)
+        found = solve_at(make_problem(other, start.time, q, u, start.length, 1.0), start.time, q, u)
         assert found is not None
         single.append(found)
         values.append(other.parameter_values)

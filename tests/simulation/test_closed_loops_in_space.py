@@ -16,7 +16,7 @@ from atwood.arrays import FloatArray
 from atwood.integrators.ida import library as sundials_library
 from atwood.simulation.initialization.start import find_start, own_state
 from atwood.simulation.problem.closed_loops import solve_at
-from atwood.simulation.problem.preparation import make_plan
+from atwood.simulation.problem.preparation import make_problem
 from atwood.simulation.problem.projection import misses_of
 from atwood_library import Ground, Pivot, RigidBody, Slider, Spherical, Universal, Weld
 from atwood_library.scenes import SpatialSliderCrank, StewartPlatform
@@ -209,7 +209,7 @@ def test_random_assemblies_of_a_cross_and_a_ball_close(kind: str, seed: int) -> 
     assembly = assemble(KINDS[kind](seed, size))
     start = find_start(assembly)
     q, u = own_state(assembly, start)
-    plan = make_plan(assembly, start.time, q, u, start.length, 1.0)
+    plan = make_problem(assembly, start.time, q, u, start.length, 1.0)
     found = solve_at(plan, start.time, q, u)
     if found is None:  # it starts near a dead centre, or a cross that is folded
         return

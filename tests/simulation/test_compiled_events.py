@@ -12,7 +12,7 @@ from atwood.model.declare.laws import event
 from atwood.pipeline import assemble
 from atwood.simulation.events.modes import EventProbe
 from atwood.simulation.initialization.start import find_start
-from atwood.simulation.problem.preparation import make_plan
+from atwood.simulation.problem.preparation import make_problem
 from atwood_library import Ground, PointMass, Spring
 from atwood_library.scenes import SCENES
 
@@ -139,7 +139,7 @@ def test_compiled_values_are_those_of_python(make: Callable[[], Scene], form: st
     q, u = start.coordinates, start.speeds
     if form == "dae":
         q, u = (np.asarray(one) for one in kernel([start.time], q, u))
-    plan = make_plan(assembly, start.time, q, u, start.length, 1.0)
+    plan = make_problem(assembly, start.time, q, u, start.length, 1.0)
     probe = EventProbe(plan, start.time, q, u, 1e-8)
     found = probe.compiled(for_ida=True)
     assert found is not None

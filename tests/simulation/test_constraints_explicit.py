@@ -18,8 +18,8 @@ from atwood.integrators.methods.dormand_prince import TABLEAU
 from atwood.integrators.protocol import ExplicitProblem, SolverOptions
 from atwood.simulation.initialization.start import find_start, own_state
 from atwood.simulation.problem.explicit_scene import constrained_problem
-from atwood.simulation.problem.preparation import make_plan
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.preparation import make_problem
+from atwood.simulation.problem.problem import SceneProblem
 from atwood_library import PointMass
 from atwood_library.scenes import (
     BenchmarkBicycle,
@@ -43,17 +43,17 @@ from ..scenes.test_turned_mechanisms import BASES, stands_on
 from .test_not_compilable import Odd, Plain, looped
 
 
-def opened(scene: Scene, form: str) -> tuple[Plan, ExplicitProblem, FloatArray]:
+def opened(scene: Scene, form: str) -> tuple[SceneProblem, ExplicitProblem, FloatArray]:
     """Return a scene at its start, with its equations for an explicit method."""
     assembly = assemble(scene, form=form)  # type: ignore[arg-type]
     start = find_start(assembly)
     q, u = own_state(assembly, start)
-    plan = make_plan(assembly, start.time, q, u, start.length, 1.0)
+    plan = make_problem(assembly, start.time, q, u, start.length, 1.0)
     y = np.concatenate([q, u])
     return plan, constrained_problem(plan, start.time, y), y
 
 
-def absolute(plan: Plan, tolerance: float) -> FloatArray:
+def absolute(plan: SceneProblem, tolerance: float) -> FloatArray:
     """Return absolute tolerances of coordinates and speeds."""
     return tolerance * np.concatenate([plan.coordinate_sizes, plan.sizes / plan.scales.time])
 

@@ -18,7 +18,7 @@ from atwood.simulation.dynamics.kinematic_map import kinematic_map_of, reference
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.start import Start, find_start, own_state
 from atwood.simulation.problem.options import RunOptions
-from atwood.simulation.problem.preparation import make_plan, pack_state
+from atwood.simulation.problem.preparation import make_problem, pack_state
 from atwood.simulation.run.run import run
 from atwood_library import Ground, Link, Pivot, PointMass, Rod, Rope
 from atwood_library.scenes import SCENES, FourBar
@@ -80,7 +80,7 @@ def _plan_of(name: str):  # type: ignore[no-untyped-def]
     def make(form: str):  # type: ignore[no-untyped-def]
         assembly = with_directions(SCENES[name](), form)
         start = find_start(assembly)
-        return make_plan(assembly, start.time, *own_state(assembly, start), start.length, 1.0)
+        return make_problem(assembly, start.time, *own_state(assembly, start), start.length, 1.0)
 
     return make
 
@@ -214,7 +214,7 @@ def test_freedom_counts_speeds(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_consistent_rates_of_coordinates_are_packed() -> None:
     assembly, t, q, u = states("four-bar", "dae")
-    plan = make_plan(assembly, t, q, u, 1.0, 1.0)
+    plan = make_problem(assembly, t, q, u, 1.0, 1.0)
     y, yp = pack_state(plan, t, q, u)
     residual = assembly.kernel(plan.program.residual)([t], y, yp)[0]
     assert np.max(np.abs(residual)) < 1e-12

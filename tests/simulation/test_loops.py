@@ -14,7 +14,7 @@ from atwood.forms.residuals import null_space_program
 from atwood.integrators.ida import library as sundials_library
 from atwood.simulation.dynamics.redundancy import POOR, choose_dependent_coordinates, review_partitioning
 from atwood.simulation.problem.implicit_scene import choice_lists, null_space_shape
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.problem import SceneProblem
 from atwood_library.scenes import FourBar, SliderCrank
 
 from ..helpers.mechanisms import double_four_bar, pendulum_on_a_string, two_four_bars
@@ -136,9 +136,9 @@ def test_a_bob_that_goes_round_on_a_rope_changes_coordinates_four_times_a_turn()
 @needs_sundials
 def test_no_python_runs_between_outputs(monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[str] = []
-    kernels, review = Plan.kernels, Plan.review_partitioning
-    monkeypatch.setattr(Plan, "kernels", lambda self: calls.append("kernels") or kernels(self))
-    monkeypatch.setattr(Plan, "review_partitioning", lambda *given: calls.append("review") or review(*given))
+    kernels, review = SceneProblem.kernels, SceneProblem.review_partitioning
+    monkeypatch.setattr(SceneProblem, "kernels", lambda self: calls.append("kernels") or kernels(self))
+    monkeypatch.setattr(SceneProblem, "review_partitioning", lambda *given: calls.append("review") or review(*given))
     result = simulate(FourBar(), t_end=5.0, solver="ida", outputs=11)
     assert result.statistics.steps > 300
     assert calls == []

@@ -11,7 +11,7 @@ from atwood import Component, Frame, Point, Scalar, Scene, connector, constraint
 from atwood.pipeline import assemble
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.initialization.start import find_start, own_state
-from atwood.simulation.problem.preparation import make_plan
+from atwood.simulation.problem.preparation import make_problem
 from atwood_library import Cylindrical, Ground, Link, Pivot, PointMass, PointOnPlane, RigidBody, Rod, Weld
 from atwood_library.scenes import FourBar
 
@@ -35,7 +35,7 @@ class Balance(Component):
 def freedom(scene: Scene, form: str) -> int:
     assembly = assemble(scene, form=form)
     start = find_start(assembly)
-    plan = make_plan(assembly, start.time, *own_state(assembly, start), start.length, 1.0)
+    plan = make_problem(assembly, start.time, *own_state(assembly, start), start.length, 1.0)
     return len(plan.sizes) - plan.finding.rank
 
 
@@ -58,7 +58,7 @@ def test_errors_that_were_being_learned_when_ctrl_c_came_are_learned_again(monke
     assembly = assemble(FourBar(), form="dae")
     start = find_start(assembly)
     q, u = own_state(assembly, start)
-    plan = make_plan(assembly, start.time, q, u, start.length, 1.0)
+    plan = make_problem(assembly, start.time, q, u, start.length, 1.0)
     expected, errors = (balance_of(assemble(FourBar(), form="dae"), "dae").errors for _ in range(2))
 
     def interrupted(*_: object) -> None:

@@ -18,11 +18,11 @@ from atwood.integrators.event_location import ROUNDING
 from atwood.integrators.protocol import (
     Budget,
     ExplicitProblem,
-    Lookout,
     SolverOptions,
     State,
     Statistics,
     Status,
+    StepMonitor,
     StepResult,
 )
 from atwood.integrators.session import SteppingSession, copied
@@ -38,7 +38,7 @@ _STALLED = 50
 """So many steps in a row that do not move the time beyond rounding are a failure."""
 
 
-Leave = Callable[[float, FloatArray], bool]
+OnStiff = Callable[[float, FloatArray], bool]
 
 
 class ExplicitSession(SteppingSession):
@@ -57,7 +57,7 @@ class ExplicitSession(SteppingSession):
         Start values.
     budget
         Limits of the session.
-    leave
+    on_stiff
         Asked, with time and values, whenever stability has kept steps short for a while, whether to leave the rest to
         an implicit method: the run then ends there with `Status.STIFF`.
     end
@@ -72,23 +72,23 @@ class ExplicitSession(SteppingSession):
         t: float,
         y: FloatArray,
         budget: Budget | None = None,
-        leave: Leave | None = None,
+        on_stiff: OnStiff | None = None,
         end: float = inf,
     ) -> None:
         super().__init__(problem, options.horizon, budget)
         self._stepper = stepper
         events = problem.compiled_events
         self._notices = events is not None and stepper.watch(events)  # whether the stepper looks for events by itself
-        if leave is not None:
-            stepper.heed_stiffness()
+        if on_stiff is not None:
+            stepper.watch_stiffness()
         self._is_watched = False
         self._chunk = max(1, FIRST_CHUNK // problem.size)
-        self._begin(t, y, leave, end)
+        self._begin(t, y, on_stiff, end)
 
-    def _begin(self, t: float, y: FloatArray, leave: Leave | None, end: float) -> None:
+    def _begin(self, t: float, y: FloatArray, on_stiff: OnStiff | None, end: float) -> None:
         """Start a run that has cost nothing so far."""
         self._end = end
-        self._leave, self._judged, self._is_left = leave, 0, False
+        self._on_stiff, self._judged, self._is_left = on_stiff, 0, False
         self.reinitialize(t, y)
 
     def begin_again(
@@ -97,7 +97,7 @@ class ExplicitSession(SteppingSession):
         y: FloatArray,
         horizon: float,
         budget: Budget | None,
-        leave: Leave | None,
+        on_stiff: OnStiff | None,
         end: float,
         absolute: FloatArray | None = None,
     ) -> None:
@@ -108,11 +108,11 @@ class ExplicitSession(SteppingSession):
         """
         self._stepper.renew(horizon, absolute)
         self._begin_count(horizon, budget)
-        self._begin(t, y, leave, end)
+        self._begin(t, y, on_stiff, end)
 
-    def look_out(self, lookout: Lookout) -> bool:
+    def set_monitor(self, monitor: StepMonitor) -> bool:
         """Let the motion be looked at, and end with `Status.NOTICED` where something is seen; return whether it can."""
-        self._is_watched = self._stepper.look_out(lookout)
+        self._is_watched = self._stepper.set_monitor(monitor)
         return self._is_watched
 
     @property
@@ -196,7 +196,7 @@ class ExplicitSession(SteppingSession):
                 if outcome is Outcome.TOO_SMALL or self._sees:
                     break
 
-        stopped = self._taken(fill)
+        stopped = self._timed(fill)
         return filled, stopped
 
     def _fill(self, times: FloatArray, values: FloatArray, rates: FloatArray) -> tuple[int, Outcome]:
@@ -230,7 +230,7 @@ class ExplicitSession(SteppingSession):
         before = self._newest[0]
         self._newest = self._stepper.state()
         self._reached = min(self._newest[0], self._end)
-        self._sees = self._sees or (self._is_watched and self._stepper.has_seen())
+        self._sees = self._sees or (self._is_watched and self._stepper.has_noticed())
         if self._locator is None:
             self._searched = self._newest[0]
         elif self._notices and self._newest[0] > before and not self._locator.is_settling:
@@ -290,13 +290,13 @@ class ExplicitSession(SteppingSession):
     def _leaves(self) -> bool:
         """Tell whether the rest is to be left to an implicit method."""
         stiff = self._stepper.counts.stiff
-        if self._leave is not None and stiff > self._judged:
+        if self._on_stiff is not None and stiff > self._judged:
             self._judged = stiff
-            self._is_left = self._leave(*self._newest[:2])
+            self._is_left = self._on_stiff(*self._newest[:2])
         return self._is_left
 
     def _limit(self) -> StepResult | None:
         """Return the end of a run that is to be left to an implicit method, or has used up a limit."""
-        if self._leave is not None and self._leaves():
+        if self._on_stiff is not None and self._leaves():
             return self._stopped(Status.STIFF, "steps are kept short by stability alone")
         return super()._limit()

@@ -199,7 +199,7 @@ class Budget:
 
 
 class Status(Enum):
-    """Why an advance ended; `STIFF` where another method was asked to take over, `NOTICED` by a `Lookout`."""
+    """Why an advance ended; `STIFF` where another method was asked to take over, `NOTICED` by a `StepMonitor`."""
 
     REACHED = "reached"
     NOTICED = "noticed"
@@ -351,7 +351,7 @@ class NativeCallbacks:
 
 
 @dataclass(frozen=True, eq=False)
-class Lookout:
+class StepMonitor:
     """Compiled functions that look at a motion now and then, and say when somebody else should.
 
     Parameters

@@ -17,10 +17,10 @@ from atwood.integrators.protocol import (
     Budget,
     ExplicitProblem,
     ImplicitProblem,
-    Lookout,
     State,
     Statistics,
     Status,
+    StepMonitor,
     StepResult,
 )
 
@@ -87,7 +87,7 @@ class Session(ABC):
         """
         return np.empty((0, len(self._here[1])))
 
-    def look_out(self, lookout: Lookout) -> bool:
+    def set_monitor(self, monitor: StepMonitor) -> bool:
         """Let the motion be looked at, and end with `Status.NOTICED` where something is seen; return whether it can."""
         return False
 
@@ -136,9 +136,9 @@ class SteppingSession(Session):
         """Go on to exactly a time, or stop earlier at an event, a limit or a failure."""
         if not self._here[0] <= t_out < inf:
             raise UsageError(f"cannot advance from t = {self._here[0]:.9g} to t = {t_out:.9g}")
-        return self._taken(lambda: self._run(float(t_out)))
+        return self._timed(lambda: self._run(float(t_out)))
 
-    def _taken(self, go: Callable[[], _T]) -> _T | StepResult:
+    def _timed(self, go: Callable[[], _T]) -> _T | StepResult:
         """Return what a way on gives, or why it ended; it then goes on from the state that was handed out last."""
         began = time.perf_counter()
         self._opened = self._opened or began

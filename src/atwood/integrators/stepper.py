@@ -20,7 +20,7 @@ from atwood.codegen.llvm.build import Built, RoutineSource, build_code
 from atwood.codegen.llvm.module import CodeOptions
 from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Kind, Lanes, Operand, Record, Routine, Value
 from atwood.errors import KernelEvaluationError, UsageError
-from atwood.integrators.protocol import Lookout, State
+from atwood.integrators.protocol import State, StepMonitor
 from atwood.lazy_dataclasses import dataclass, names_of
 
 if TYPE_CHECKING:
@@ -106,15 +106,15 @@ class Stepper(ABC):
         """Return the time at the begin of the last step."""
         raise NotImplementedError
 
-    def heed_stiffness(self) -> None:
+    def watch_stiffness(self) -> None:
         """Come back with `Outcome.NOTICED` whenever the problem seems stiff, where that can be told."""
         return
 
-    def look_out(self, lookout: Lookout) -> bool:
+    def set_monitor(self, monitor: StepMonitor) -> bool:
         """Let the motion be looked at, and come back where something is seen; return whether it can."""
         return False
 
-    def has_seen(self) -> bool:
+    def has_noticed(self) -> bool:
         """Return whether something was seen since this was last asked."""
         return False
 

@@ -37,8 +37,8 @@ from atwood.simulation.initialization.mobility import Immobile, find_immobile
 from atwood.simulation.initialization.report import InitializationReport, report_initialization
 from atwood.simulation.initialization.start import Start, find_start, own_state, settle
 from atwood.simulation.problem.arguments import NAME, ORIENTATION
-from atwood.simulation.problem.preparation import make_plan
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.preparation import make_problem
+from atwood.simulation.problem.problem import SceneProblem
 from atwood.table import Shown, Table
 from atwood.tolerances import tolerances
 
@@ -270,13 +270,13 @@ def _on_surfaces(reduced: Assembly) -> tuple[str, ...]:
     return tuple(dict.fromkeys(f"{one.key[0]}.{one.key[1]}" for one in left))
 
 
-def _plan(assembly: Assembly, start: Start) -> Plan:
+def _plan(assembly: Assembly, start: Start) -> SceneProblem:
     span = max(assembly.flat.t_end - start.time, 1e-3)
     assembly, q, u = settle(assembly, start, assembly.other_mode)
-    return make_plan(assembly, start.time, q, u, start.length, span)
+    return make_problem(assembly, start.time, q, u, start.length, span)
 
 
-def _not_unique(assembly: Assembly, plan: Plan, start: Start) -> tuple[str, ...]:
+def _not_unique(assembly: Assembly, plan: SceneProblem, start: Start) -> tuple[str, ...]:
     """Return the reactions that a stress without any force from outside could change."""
     q, u = own_state(assembly, start)
     constraint_jacobian = scaled(to_array(plan.balance.at(start.time, q, np.zeros_like(u)).jacobian), plan.sizes)

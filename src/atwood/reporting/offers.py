@@ -26,7 +26,7 @@ from atwood.pipeline import assemble_flat
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.start import Start, find_start, own_state
-from atwood.simulation.problem.preparation import make_plan
+from atwood.simulation.problem.preparation import make_problem
 from atwood.theory.symmetry.dimension import Symmetry, find_symmetries
 
 _SAME = 1e-8
@@ -141,7 +141,7 @@ def _assemble_there(
         made = assemble_flat(moved, form=form, level=assembly.level or "ggl", modes=assembly.modes)
         begun = find_start(made)
         span = max(flat.t_end - begun.time, 1e-3)
-        program = make_plan(made, begun.time, *own_state(made, begun), begun.length, span).program
+        program = make_problem(made, begun.time, *own_state(made, begun), begun.length, span).program
         plans[form] = program.size, program.operations
     return assemble_flat(moved, modes=assembly.modes), plans
 

@@ -91,7 +91,7 @@ class SavedResult(Trajectories):
         """
         from atwood.model.compose.serialization import from_data
 
-        return from_data(self._held("source"), trust)
+        return from_data(self._from_metadata("source"), trust)
 
     def settings(self, **others: Any) -> dict[str, Any]:
         """Return what `simulate` was asked for, to run the scene again.
@@ -106,14 +106,14 @@ class SavedResult(Trajectories):
         UsageError
             If the file does not say, or a condition was a function of Python, which no file holds, and is not given.
         """
-        asked = {**self._held("asked").get("again", {}), **others}
+        asked = {**self._from_metadata("asked").get("again", {}), **others}
         for name in ("until", "record"):
             if name not in others and asked.get(name, ()) is None:
                 advice = f"Give settings({name}=...) the function, or None to run without."
                 raise UsageError(f"{name!r} was a function, which files do not hold", where=name, advice=advice)
         return asked
 
-    def _held(self, name: str) -> Any:
+    def _from_metadata(self, name: str) -> Any:
         if not isinstance(self.metadata.get(name), Mapping):
             why = self.metadata.get("no_source", "it is of an older version, or a CSV file alone")
             raise UsageError(f"the file does not say how to run it again: {why}", advice="Run the scene itself.")

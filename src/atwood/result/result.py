@@ -31,7 +31,7 @@ from atwood.simulation.initialization.mobility import Immobile, find_immobile
 from atwood.simulation.initialization.report import InitializationReport, report_initialization
 from atwood.simulation.initialization.start import Start, own_state
 from atwood.simulation.problem.options import how_solved
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.projection import misses_of
 from atwood.simulation.run.recorder import SegmentRecord
 from atwood.simulation.run.run_record import Run
@@ -121,7 +121,7 @@ class Result(Trajectories):
         return self.run.segments
 
     @property
-    def first_plan(self) -> Plan:
+    def first_plan(self) -> SceneProblem:
         """What the run was prepared with at the start."""
         return self._segments[0].plan
 

@@ -35,7 +35,7 @@ def iterated(monkeypatch: pytest.MonkeyPatch, assembly: Assembly) -> Start:
     """Return the start as it is found where something else is said."""
     with monkeypatch.context() as patched:
         patched.setattr(positions, "named_once", lambda *_: None)
-        patched.setattr(speeds, "_told", lambda *_: None)
+        patched.setattr(speeds, "_speeds_alone", lambda *_: None)
         return find_start(assembly)
 
 

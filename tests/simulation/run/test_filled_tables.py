@@ -73,7 +73,7 @@ def test_filled_tables_are_what_single_advances_give(name: str, chunk: int, monk
         patched.setattr(NativeSession, "read_on", lambda self, times, first, past: np.empty((0, self._problem.size)))
         expected = made(name)
     monkeypatch.setattr(native, "first_chunk", lambda size: chunk)
-    monkeypatch.setattr(native.Pace, "learn", lambda *_: None)
+    monkeypatch.setattr(native.Watchdog, "learn", lambda *_: None)
     same(made(name), expected)
 
 
@@ -93,8 +93,8 @@ def test_where_it_fails_what_came_before_is_kept(monkeypatch: pytest.MonkeyPatch
     """A table whose later rows are not finite ends where they begin."""
     fill = IdaMemory.fill
 
-    def broken(self: IdaMemory, lookout: Any) -> Any:
-        go = fill(self, lookout)
+    def broken(self: IdaMemory, step_monitor: Any) -> Any:
+        go = fill(self, step_monitor)
 
         def gone(times: Any, table: Any, filled: int, allowed: int) -> tuple[int, float, int]:
             flag, t, count = go(times, table, filled, allowed)
@@ -118,14 +118,14 @@ def test_what_machine_code_writes_to_lives_as_long_as_the_session(monkeypatch: p
     taken: list[weakref.ref[Any]] = []
     open_fill, address = IdaMemory.fill, ctypes.addressof
 
-    def watched(self: IdaMemory, lookout: Any) -> Any:
+    def watched(self: IdaMemory, step_monitor: Any) -> Any:
         def noted(one: Any) -> int:
             taken.append(weakref.ref(one))
             return address(one)
 
         with monkeypatch.context() as patch:
             patch.setattr(memory.ctypes, "addressof", noted)
-            go = open_fill(self, lookout)
+            go = open_fill(self, step_monitor)
         gc.collect()
         assert all(one() is not None for one in taken)
         return go

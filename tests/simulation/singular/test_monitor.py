@@ -12,7 +12,7 @@ import atwood
 from atwood import simulate
 from atwood.integrators.protocol import Status
 from atwood.simulation.singular import branches as ways, monitor as module
-from atwood.simulation.singular.branches import Look
+from atwood.simulation.singular.branches import Sample
 from atwood.simulation.singular.crossing import SingularCrossing
 from atwood.simulation.singular.monitor import SingularityMonitor, singularity_monitor_of
 from atwood_library.scenes import DoublePendulum, FourBar, FourBarRow
@@ -36,7 +36,7 @@ def given(away: list[float], step: float = 1.0, largest: float = 1.0) -> Singula
     )
     one.tolerance, one.seconds, one.agreed, one._whole = 1e-6, 0.0, [], 100.0
     one._n, one._m = 1, 1
-    one._looks = [Look(step * k, np.array([float(k), 1.0]), np.zeros(2)) for k in range(len(away))]
+    one._samples = [Sample(step * k, np.array([float(k), 1.0]), np.zeros(2)) for k in range(len(away))]
     one._away, one._judged, one._largest = list(away), -INF, largest
     one._compiled, one._is_behind, one._measures = None, False, None
     one.trouble = None
@@ -185,12 +185,12 @@ def test_a_solver_has_gone_along_if_its_states_behind_the_place_agree() -> None:
 
 def test_only_looks_behind_the_place_and_on_the_path_count() -> None:
     one = given([1.0] * 6)
-    one._looks[1] = Look(1.0, np.array([9.0, 9.0]), np.zeros(2))
-    one._looks[5] = Look(5.0, np.array([9.0, 9.0]), np.zeros(2))
+    one._samples[1] = Sample(1.0, np.array([9.0, 9.0]), np.zeros(2))
+    one._samples[5] = Sample(5.0, np.array([9.0, 9.0]), np.zeros(2))
     assert one._went_along(crossing(2.0, path()))
-    one._looks = one._looks[:3]  # the last is at the place itself
+    one._samples = one._samples[:3]  # the last is at the place itself
     assert not one._went_along(crossing(2.0, path()))
-    one._looks = [Look(2.15, np.array([9.0, 9.0]), np.zeros(2)), *given([1.0] * 4)._looks[3:]]
+    one._samples = [Sample(2.15, np.array([9.0, 9.0]), np.zeros(2)), *given([1.0] * 4)._samples[3:]]
     assert one._went_along(crossing(2.0, path()))  # within a tenth of the way from the place to the end
 
 
@@ -205,14 +205,14 @@ def test_the_last_six_looks_are_kept() -> None:
     for count, kept in ((3, 3), (6, 6), (7, 6), (20, 6)):
         one = given([float(k) for k in range(count)])
         one._forget()
-        assert len(one._looks) == len(one._away) == kept
+        assert len(one._samples) == len(one._away) == kept
         assert one._away[-1] == count - 1.0
 
 
 def test_looks_are_measured_once_and_the_largest_is_remembered() -> None:
     one = given([0.5, 0.4])
     one._largest = 0.6
-    one._looks += [Look(2.0 + k, np.array([float(k), 0.0]), np.zeros(2)) for k in range(3)]
+    one._samples += [Sample(2.0 + k, np.array([float(k), 0.0]), np.zeros(2)) for k in range(3)]
     seen: list[np.ndarray] = []
 
     def learn(t: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -233,9 +233,9 @@ def test_a_state_is_noted_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "stride_from", lambda plan, one, whole: 0.25)
     one = given([1.0] * 3)
     one.note(SimpleNamespace(t=2.0, y=np.zeros(2), yp=np.zeros(2)))
-    assert len(one._looks) == 3
+    assert len(one._samples) == 3
     one.note(SimpleNamespace(t=2.5, y=np.zeros(2), yp=np.zeros(2)))
-    assert len(one._looks) == 4
+    assert len(one._samples) == 4
     assert one.next == 2.75
 
 
@@ -291,7 +291,7 @@ def test_what_is_said_of_constraints_names_each_part_once() -> None:
     one = given([1.0])
     made = [SimpleNamespace(label=f"c{k}", key=(part, "pin", k)) for k, part in enumerate(("a", "a", "b"))]
     one.plan.assembly = SimpleNamespace(own_equations=SimpleNamespace(constraints=made))
-    assert one._said((2, 0, 1)) == (("c2", "c0", "c1"), ("b", "a"))
+    assert one._labels_of((2, 0, 1)) == (("c2", "c0", "c1"), ("b", "a"))
 
 
 def test_a_failure_is_explained_only_where_it_was_at_a_singular_position() -> None:

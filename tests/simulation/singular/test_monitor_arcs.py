@@ -11,7 +11,7 @@ import pytest
 from atwood.errors import SolveError
 from atwood.integrators.protocol import Status
 from atwood.simulation.singular import branches as module
-from atwood.simulation.singular.branches import Look
+from atwood.simulation.singular.branches import Sample
 from atwood.simulation.singular.monitor import SingularityMonitor
 
 from .test_monitor import Asked, crossing, given
@@ -20,7 +20,7 @@ from .test_monitor import Asked, crossing, given
 def moving(times: list[float], largest: float = 1.0) -> SingularityMonitor:
     """Return a monitor that has looked at x = t^2, whose speed is 2 t."""
     one = given([1.0] * len(times), largest=largest)
-    one._looks = [Look(t, np.array([t * t, 2.0 * t]), np.array([2.0 * t, 2.0])) for t in times]
+    one._samples = [Sample(t, np.array([t * t, 2.0 * t]), np.array([2.0 * t, 2.0])) for t in times]
     return one
 
 
@@ -235,7 +235,7 @@ def past(monkeypatch: pytest.MonkeyPatch, follows: bool) -> tuple[SingularityMon
     monkeypatch.setattr(module, "follow", follow)
     monkeypatch.setattr(module, "nearly_lost", lambda measure, near, q: int(q[0]))
     one = measured(moving([0.0, 1.0, 2.0]), 6.25)
-    one._said = lambda lost: ((f"c{lost[0]}",), ("part",))  # type: ignore[method-assign]
+    one._labels_of = lambda lost: ((f"c{lost[0]}",), ("part",))  # type: ignore[method-assign]
     return one, asked
 
 

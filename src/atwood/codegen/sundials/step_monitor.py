@@ -38,7 +38,7 @@ _LOOK = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, *[ctypes.c_void_p] * 3)
 
 
 @dataclass(frozen=True)
-class Pace:
+class LookRate:
     """When to look.
 
     Attributes
@@ -60,13 +60,13 @@ class Pace:
     worn: float
 
 
-class LookoutCode:
+class MonitorCode:
     """Functions that look at the motion of a mechanism, for any parameters and choice of conditions.
 
     Parameters
     ----------
     program
-        See `compile_lookout`.
+        See `compile_monitor`.
     shape, lists
         How many there are of each, and where the slopes are; see `slope_lists`.
     built
@@ -79,7 +79,7 @@ class LookoutCode:
         allowed, data)``: sends IDA on to a time from look to look, with the addresses of ``IDASolve`` and
         ``IDAGetNumSteps``. It returns `NOTICED`, or IDA's flag.
     fill
-        See `~atwood.integrators.protocol.Lookout`. It returns the same, or `PAUSED` or `UNREADABLE`.
+        See `~atwood.integrators.protocol.StepMonitor`. It returns the same, or `PAUSED` or `UNREADABLE`.
     look_address
         Address of the function that takes one look; see the same.
     """
@@ -91,7 +91,7 @@ class LookoutCode:
         self.look_address = built.code.addresses["look"]
         self.look = _LOOK(self.look_address)
 
-    def bind(self, parameter_values: ArrayLike, sizes: ArrayLike, kept: Sequence[int], pace: Pace) -> LookoutData:
+    def bind(self, parameter_values: ArrayLike, sizes: ArrayLike, kept: Sequence[int], rate: LookRate) -> MonitorData:
         """Return the data of one run; they must live as long as it goes on."""
         shape, program = self.shape, self.program
         derived, scratch = self.built.derive("held", program, parameter_values)
@@ -112,13 +112,13 @@ class LookoutCode:
             "best": np.zeros(1 + shape.coordinates),
             "state": np.zeros(len(STATE)),
         }
-        numbers = {"move": pace.move, "whole": pace.whole, "idle": pace.idle, "low": pace.low**2}
-        numbers["worn"] = pace.worn**2
+        numbers = {"move": rate.move, "whole": rate.whole, "idle": rate.idle, "low": rate.low**2}
+        numbers["worn"] = rate.worn**2
         arrays["state"][[AT[name] for name in numbers]] = list(numbers.values())
-        return LookoutData(self, arrays)
+        return MonitorData(self, arrays)
 
 
-class LookoutData:
+class MonitorData:
     """What was noted on the way of one run.
 
     Parameters
@@ -135,7 +135,7 @@ class LookoutData:
         set.
     """
 
-    def __init__(self, code: LookoutCode, arrays: dict[str, NDArray[Any]]) -> None:
+    def __init__(self, code: MonitorCode, arrays: dict[str, NDArray[Any]]) -> None:
         self.code, self._arrays = code, arrays
         self.rows: NDArray[np.float64] = arrays["rows"]
         self._state = arrays["state"]
@@ -198,7 +198,7 @@ class LookoutData:
         return float(self._arrays["best"][0]), self._arrays["best"][1:]
 
 
-def compile_lookout(program: Program, speeds: int, size: int, places: tuple[ArrayLike, ArrayLike]) -> LookoutCode:
+def compile_monitor(program: Program, speeds: int, size: int, places: tuple[ArrayLike, ArrayLike]) -> MonitorCode:
     """Compile what looks at a motion."""
     rows, columns = (np.asarray(one, dtype=np.int64).ravel().tolist() for one in places)
     inputs, outputs = [len(one.symbols) for one in program.inputs], [len(one.expressions) for one in program.outputs]
@@ -209,7 +209,7 @@ def compile_lookout(program: Program, speeds: int, size: int, places: tuple[Arra
     part = Part("held", program)
     routines = RoutineSource("codegen.sundials.step_monitor", (), (shape,))
     built = build_code([part], default_options([part]), exports=["look", "drive", "fill"], routines=routines)
-    return LookoutCode(program, shape, lists, built)
+    return MonitorCode(program, shape, lists, built)
 
 
 def slope_lists(conditions: int, places: Sequence[tuple[int, int]]) -> dict[str, NDArray[np.int64]]:
@@ -227,13 +227,13 @@ def slope_lists(conditions: int, places: Sequence[tuple[int, int]]) -> dict[str,
 
 
 NOTICED = 98
-"""The flag of `LookoutCode.drive` where somebody should look at what was noted; IDA has none of this number."""
+"""The flag of `MonitorCode.drive` where somebody should look at what was noted; IDA has none of this number."""
 
 _WORKED_ENOUGH = -1
 """IDA's own flag after as many steps as it was allowed to take."""
 
 PAUSED, UNREADABLE = 96, 97
-"""Flags of `LookoutCode.fill` beside those: enough steps were taken, and IDA has no value at a time."""
+"""Flags of `MonitorCode.fill` beside those: enough steps were taken, and IDA has no value at a time."""
 
 CAPACITY, CARRIED = 24, 6
 """So many looks are noted; of those among which nothing was low the last few are carried on."""

@@ -25,8 +25,8 @@ from atwood.integrators.embedded.tableau import Tableau
 from atwood.integrators.protocol import (
     CompiledRates,
     ExplicitProblem,
-    Lookout,
     SolverOptions,
+    StepMonitor,
     absolute_tolerances,
 )
 from atwood.integrators.stepper import (
@@ -51,7 +51,7 @@ FIELDS = fields_of(
         *("project", "project_data", "watch", "watch_data", "due", "guard", "guard_data"),
     ),
     ("t", "t_old", "h", "next", "stop", "relative", "longest", "horizon", "first", "looked", "likeness", "tried"),
-    ("size", "padded", "is_dense", "edgy", "calm", "event_count", "heeds", "seen", "looks"),
+    ("size", "padded", "is_dense", "edgy", "calm", "event_count", "watches_stiffness", "seen", "looks"),
 )
 
 
@@ -132,13 +132,13 @@ class CompiledStepper(NativeStepper):
         """Say which sign each event has; where it is zero, every step is noticed."""
         self._signs[:] = signs
 
-    def look_out(self, lookout: Lookout) -> bool:
+    def set_monitor(self, monitor: StepMonitor) -> bool:
         """Let the motion be looked at, and come back with `Outcome.NOTICED` where something is seen."""
-        self._keep = (self._keep, lookout)
-        self._set(watch=lookout.look, watch_data=lookout.data, due=lookout.due_at)
+        self._keep = (self._keep, monitor)
+        self._set(watch=monitor.look, watch_data=monitor.data, due=monitor.due_at)
         return True
 
-    def has_seen(self) -> bool:
+    def has_noticed(self) -> bool:
         """Return whether something was seen since this was last asked."""
         seen = self._count("seen")
         self._set(seen=0)
@@ -148,9 +148,9 @@ class CompiledStepper(NativeStepper):
         """Take no longer steps from now on than this, nor than the options allow."""
         self._set(longest=min(longest, self._options.max_step or inf))
 
-    def heed_stiffness(self) -> None:
+    def watch_stiffness(self) -> None:
         """Let `run` and `sample` come back with `Outcome.NOTICED` whenever the problem seems stiff."""
-        self._set(heeds=1)
+        self._set(watches_stiffness=1)
 
     def renew(self, horizon: float, absolute: FloatArray | None = None) -> None:
         """Count from zero again, for a run of another typical length, s, and perhaps with other tolerances."""

@@ -216,7 +216,7 @@ def _watched(pair: Tableau) -> Routine:
     return r
 
 
-def _held(pair: Tableau) -> Routine:
+def _project(pair: Tableau) -> Routine:
     """Take the values at the end of a step onto the constraints; 0, or another number where that fails.
 
     It comes before the last slope is taken, so that the next step begins with the slope of the state that is kept, and
@@ -344,7 +344,7 @@ def _run(pair: Tableau) -> Routine:
         with r.when(r.call("attempt", m.session) != 0):
             r.copy(end, begin, m.padded)
             r.give(_TOO_SMALL)
-        stiffens = (r.call("stability", m.session, m.h) != 0) & (m.heeds != 0)
+        stiffens = (r.call("stability", m.session, m.h) != 0) & (m.watches_stiffness != 0)
         r.copy(m.row("y_old"), m.row("y"), m.padded)
         r.copy(m.row("y"), m.row("trial"), m.padded)
         t_new = m.t
@@ -367,6 +367,6 @@ def write_routines(pair: Tableau) -> list[Routine]:
     They take the address of a session; see `atwood.integrators.embedded.stepper`.
     """
     ends = (_begin, _run, _sample)
-    inner = (_evaluate, _attempt, _error, _stability, _held, _guarded, _look, _watched)
+    inner = (_evaluate, _attempt, _error, _stability, _project, _guarded, _look, _watched)
     stages = [_stage(pair, stage) for stage in range(1, len(pair.nodes))]
     return [*(write(pair) for write in (*ends, *inner)), *stages, *write_dense_output(pair)]

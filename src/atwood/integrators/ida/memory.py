@@ -17,7 +17,7 @@ from atwood.errors import UsageError
 from atwood.integrators.ida.callbacks import JACOBIAN, Record
 from atwood.integrators.ida.library import SundialsLibrary
 from atwood.integrators.ida.linear_solvers import FixedSolver, SparseSolver
-from atwood.integrators.protocol import ChoosePivots, Lookout
+from atwood.integrators.protocol import ChoosePivots, StepMonitor
 from atwood.lazy_dataclasses import dataclass
 
 TO_TIME, ONE_STEP = 1, 2
@@ -150,7 +150,7 @@ class IdaMemory:
         library.SUNContext_ClearErrHandlers(parts.context)
         self.y, self._y = self.vector(np.zeros(size))
         self.yp, self._yp = self.vector(np.zeros(size))
-        parts.ida.value = self._made(library.IDACreate(parts.context), "IDACreate")
+        parts.ida.value = self._created(library.IDACreate(parts.context), "IDACreate")
         self._ida = parts.ida
         self._jacobian = 0
         self._time = c_double()
@@ -174,7 +174,7 @@ class IdaMemory:
     def vector(self, values: FloatArray) -> tuple[FloatArray, int]:
         """Return an array together with the vector that shares its memory."""
         vector = self.library.N_VMake_Serial(self.size, values.ctypes.data, self._parts.context)
-        self._parts.vectors.append(self._made(vector, "N_VMake_Serial"))
+        self._parts.vectors.append(self._created(vector, "N_VMake_Serial"))
         self._parts.keep.append(values)
         return values, vector
 
@@ -205,9 +205,9 @@ class IdaMemory:
             parts.sparse = sparse = SparseSolver(library, n, entries, self._y, parts.context)
             matrix, solver = sparse.matrix, sparse.solver
         else:
-            parts.matrix = matrix = self._made(library.SUNDenseMatrix(n, n, parts.context), "SUNDenseMatrix")
+            parts.matrix = matrix = self._created(library.SUNDenseMatrix(n, n, parts.context), "SUNDenseMatrix")
             made = library.SUNLinSol_Dense(self._y, matrix, parts.context)
-            parts.solver = solver = self._made(made, "SUNLinSol_Dense")
+            parts.solver = solver = self._created(made, "SUNLinSol_Dense")
         self._jacobian = jacobian
         self._use_solver(solver, matrix)
 
@@ -234,15 +234,15 @@ class IdaMemory:
         flag = self.library.IDASolve(self._ida, t_out, self._time_place, self._y, self._yp, task)
         return flag, self._time.value
 
-    def look_out(self, lookout: Lookout) -> Callable[[float, int], tuple[int, float]]:
+    def set_monitor(self, monitor: StepMonitor) -> Callable[[float, int], tuple[int, float]]:
         """Return what goes on to a time with at most so many steps, and looks at the motion on its way."""
         library, place = self.library, c_void_p()
         drive = ctypes.CFUNCTYPE(c_int, c_void_p, c_void_p, c_void_p, c_double, *[c_void_p] * 5, c_long, c_void_p)
-        call = drive(lookout.drive)
+        call = drive(monitor.drive)
         solve, steps = (ctypes.cast(getattr(library, name), c_void_p).value for name in ("IDASolve", "IDAGetNumSteps"))
         reached, y, yp = ctypes.addressof(self._time), self.y.ctypes.data, self.yp.ctypes.data
-        place.value = lookout.data
-        self.keep(lookout)
+        place.value = monitor.data
+        self.keep(monitor)
 
         def go(t_out: float, allowed: int) -> tuple[int, float]:
             flag = call(solve, steps, self._ida, t_out, reached, self._y, self._yp, y, yp, allowed, place)
@@ -250,7 +250,7 @@ class IdaMemory:
 
         return go
 
-    def fill(self, lookout: Lookout) -> Callable[[FloatArray, FloatArray, int, int], tuple[int, float, int]]:
+    def fill(self, monitor: StepMonitor) -> Callable[[FloatArray, FloatArray, int, int], tuple[int, float, int]]:
         """Return what goes on through times and fills the rows of a table after some that are filled already.
 
         It is given times, table, how many rows are filled, and how many steps to take at most; it returns a flag, the
@@ -258,14 +258,14 @@ class IdaMemory:
         """
         library, count, end = self.library, c_long(), c_double()
         call = ctypes.CFUNCTYPE(c_int, *[c_void_p] * 10, c_long, c_void_p, c_void_p, c_long, *[c_void_p] * 3)(
-            lookout.fill
+            monitor.fill
         )
         names = ("IDASolve", "IDAGetNumSteps", "IDAGetDky", "IDAGetCurrentTime")
         functions = tuple(ctypes.cast(getattr(library, name), c_void_p) for name in names)
         reached, y, yp = ctypes.addressof(self._time), self.y.ctypes.data, self.yp.ctypes.data
         places = reached, self._y, self._yp, y, yp
-        data, filled_at, end_at = c_void_p(lookout.data), ctypes.addressof(count), ctypes.addressof(end)
-        self.keep(lookout, count, end)  # machine code writes to them as long as the session lives
+        data, filled_at, end_at = c_void_p(monitor.data), ctypes.addressof(count), ctypes.addressof(end)
+        self.keep(monitor, count, end)  # machine code writes to them as long as the session lives
 
         def go(times: FloatArray, table: FloatArray, filled: int, allowed: int) -> tuple[int, float, int]:
             count.value = filled
@@ -339,7 +339,7 @@ class IdaMemory:
             last_step=numbers[1].value,
         )
 
-    def _made(self, pointer: int | None, what: str) -> int:
+    def _created(self, pointer: int | None, what: str) -> int:
         if not pointer:
             raise MemoryError(f"{what} failed")
         return pointer

@@ -27,15 +27,15 @@ from atwood.integrators.ida.memory import ONE_STEP, ROOT_RETURN, STOPPED_BY_WEIG
 from atwood.integrators.ida.setup import IdaTuning, prepare
 from atwood.integrators.ida.states import checked_state, is_finite
 from atwood.integrators.ida.sundae import REASONS, SHORTER, TOO_LONG
-from atwood.integrators.ida.watchdog import FIRST_CHUNK, Pace, first_chunk
+from atwood.integrators.ida.watchdog import FIRST_CHUNK, Watchdog, first_chunk
 from atwood.integrators.protocol import (
     Budget,
     ImplicitProblem,
-    Lookout,
     SolverOptions,
     State,
     Statistics,
     Status,
+    StepMonitor,
     StepResult,
     choose_linear_solver,
 )
@@ -107,7 +107,7 @@ class NativeSession(SteppingSession):
         self._due: Callable[[], float] = lambda: inf
         self._earlier = Statistics(error_test_failures=0, convergence_failures=0)
         self._pending: StepResult | None = None
-        self._pace = Pace(FIRST_CHUNK if self._record.calls_python else first_chunk(problem.size))
+        self._watchdog = Watchdog(FIRST_CHUNK if self._record.calls_python else first_chunk(problem.size))
         self._begin(state)
 
     def __enter__(self) -> NativeSession:
@@ -135,13 +135,13 @@ class NativeSession(SteppingSession):
             seconds=self._seconds,
         )
 
-    def look_out(self, lookout: Lookout) -> bool:
+    def set_monitor(self, monitor: StepMonitor) -> bool:
         """Let IDA look at the motion on its way; it cannot where single steps are taken."""
         if self._by_steps:
             return False
-        self._look_out, self._fill = self._memory.look_out(lookout), self._memory.fill(lookout)
+        self._look_out, self._fill = self._memory.set_monitor(monitor), self._memory.fill(monitor)
         self._goes_on = self._locator is None and not self._record.calls_python
-        self._noticed_flag, self._paused_flag, self._due = lookout.noticed, lookout.paused, lookout.due
+        self._noticed_flag, self._paused_flag, self._due = monitor.noticed, monitor.paused, monitor.due
         return True
 
     @property
@@ -205,7 +205,7 @@ class NativeSession(SteppingSession):
         self._root = None
         self._searched = state[0]
         self._looks_on = False  # whether IDA itself looks at what is left of its last step when it goes on
-        self._pace.mark, self._pace.lap = (state[0], 0), (state[0], 0, 0)
+        self._watchdog.mark, self._watchdog.lap = (state[0], 0), (state[0], 0, 0)
         self._stale = False
         self._pending = None  # what ended the last reading, for the next advance
         self._starts += 1
@@ -309,7 +309,7 @@ class NativeSession(SteppingSession):
         finally:
             spent = time.perf_counter() - began
             self._seconds += spent
-            self._pace.learn(spent, filled < len(times))
+            self._watchdog.learn(spent, filled < len(times))
 
     def _read(self, filled: int) -> None:
         """Take up that all that was filled has been read, the last of it from the last step."""
@@ -357,12 +357,12 @@ class NativeSession(SteppingSession):
         self._allow()
         began = time.perf_counter()
         flag, t = self._solve(t_out, TO_TIME)
-        self._pace.learn(time.perf_counter() - began, flag == TOO_MUCH_WORK)
+        self._watchdog.learn(time.perf_counter() - began, flag == TOO_MUCH_WORK)
         return self._passed(flag, t)
 
     def _allow(self) -> int:
         """Tell IDA how many steps it may take; return that."""
-        pace, allowed = self._pace, self._pace.chunk
+        pace, allowed = self._watchdog, self._watchdog.chunk
         if self.budget.max_steps is not None:
             allowed = min(allowed, self.budget.max_steps - self._count_steps())
         if allowed != pace.allowed:
@@ -408,7 +408,7 @@ class NativeSession(SteppingSession):
     def _go_on(self, t_out: float, task: int) -> tuple[int, float]:
         if self._look_out is None or task != TO_TIME:
             return self._memory.solve(t_out, task)
-        return self._look_out(t_out, self._pace.allowed)
+        return self._look_out(t_out, self._watchdog.allowed)
 
     def _noticed(self) -> bool:
         """Tell whether the functions of events only said that something may have happened within a step."""
@@ -441,16 +441,16 @@ class NativeSession(SteppingSession):
         if not finite:
             self._stale = True
             return self._stopped(Status.FAILED, "the solution is no longer finite")
-        if self._pace.stalls(t, self._memory.steps()):
+        if self._watchdog.stalls(t, self._memory.steps()):
             self._stale = True
             if self._native is not None:
                 explain(self._problem, self._record, self._ahead())
-            return self._stopped(Status.FAILED, "the steps became too small to move the time", self._pace.mark[0])
+            return self._stopped(Status.FAILED, "the steps became too small to move the time", self._watchdog.mark[0])
         return self._judge_lap(t)
 
     def _judge_lap(self, t: float) -> StepResult | None:
         """Return an answer if the run would not end; tell IDA how much steps must grow, where that changes."""
-        is_endless, growth = self._pace.judge_lap(t, self._memory.steps(), self._repeated, self._horizon)
+        is_endless, growth = self._watchdog.judge_lap(t, self._memory.steps(), self._repeated, self._horizon)
         if growth is not None:
             self._memory.call("IDASetEtaFixedStepBounds", 1.0, growth)
         if not is_endless:

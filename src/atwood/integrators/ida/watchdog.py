@@ -40,7 +40,7 @@ def first_chunk(size: int) -> int:
 
 
 @dataclass
-class Pace:
+class Watchdog:
     """How many steps IDA is left alone for, and whether they still move the time.
 
     Attributes

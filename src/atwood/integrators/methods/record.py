@@ -13,7 +13,7 @@ from atwood.lazy_dataclasses import dataclass
 if TYPE_CHECKING:
     from atwood.integrators.batch import BatchPlaces
     from atwood.integrators.embedded.tableau import Tableau
-    from atwood.integrators.explicit_session import ExplicitSession, Leave
+    from atwood.integrators.explicit_session import ExplicitSession, OnStiff
     from atwood.integrators.session import Session
     from atwood.integrators.symplectic.stepper import Hamiltonian
     from atwood.integrators.taylor.stepper import TaylorProblem
@@ -37,7 +37,7 @@ class Task:
         Limits.
     end
         The last time that will be asked for, s.
-    leave
+    on_stiff
         Asked whether to leave the rest to an implicit method; see `~atwood.integrators.explicit_session`.
     explicit
         The equations ``y' = f(t, y)``, with what is watched.
@@ -55,7 +55,7 @@ class Task:
     yp: FloatArray | None = None
     budget: Budget | None = None
     end: float = inf
-    leave: Leave | None = None
+    on_stiff: OnStiff | None = None
     explicit: ExplicitProblem | None = None
     series: Callable[[], TaylorProblem] | None = None
     hamiltonian: Callable[[], Hamiltonian] | None = None
@@ -157,7 +157,7 @@ def open_pair(task: Task, pair: Tableau) -> ExplicitSession:
 
     stepper = CompiledStepper(task.problem, task.settings, pair)
     return ExplicitSession(
-        task.problem, task.settings, stepper, task.t, task.y, task.budget, leave=task.leave, end=task.end
+        task.problem, task.settings, stepper, task.t, task.y, task.budget, on_stiff=task.on_stiff, end=task.end
     )
 
 

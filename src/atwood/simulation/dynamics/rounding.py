@@ -148,7 +148,7 @@ class RowErrors:
         self, t: float, q: FloatArray, scales: FloatArray, off: float
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return values, entries and rates, each in as many ways, with coordinates off by so many roundings."""
-        rough, count = self._assembly.shared.get(_ROUGH, self._made, self._program), len(self._laws)
+        rough, count = self._assembly.shared.get(_ROUGH, self._rough_program, self._program), len(self._laws)
         speeds = np.zeros(len(self._program.inputs[2].symbols))
         places = q[:, None] * roughly(len(q))
         steps = off * scales[:, None] * (roughly(len(scales), len(q)) - 1.0)
@@ -158,7 +158,7 @@ class RowErrors:
         slopes = count + len(self._rows)
         return found[:count], found[count:slopes], found[slopes:]
 
-    def _made(self) -> RoughProgram:
+    def _rough_program(self) -> RoughProgram:
         """Return the rough program."""
         by_name = {one.name: one.expressions for one in self._program.outputs}
         symbols = self._program.parameters, *(group.symbols for group in self._program.inputs)

@@ -25,7 +25,7 @@ from atwood.simulation.dynamics.orientation_coordinates import (
 from atwood.simulation.dynamics.reactions import ReactionSolver
 from atwood.simulation.events.sides import SIDE, side_functions
 from atwood.simulation.problem.conditions import Condition, condition_functions
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.problem import SceneProblem
 
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventCode, EventData
@@ -143,7 +143,7 @@ class EventProbe:
 
     def __init__(
         self,
-        plan: Plan,
+        plan: SceneProblem,
         t: float,
         q: FloatArray,
         u: FloatArray,

@@ -17,7 +17,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.sides import guards
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.outputs.event_functions import EventFunction
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.problem import SceneProblem
 
 SIDE = "side"
 """Target of the event that a relation of what moves changes."""
@@ -57,7 +57,7 @@ def plain_sides(assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> t
 
 
 def find_sides(
-    plan: Plan, t: float, q: FloatArray, u: FloatArray, before: Sequence[float], changed: Collection[int]
+    plan: SceneProblem, t: float, q: FloatArray, u: FloatArray, before: Sequence[float], changed: Collection[int]
 ) -> Found:
     """Return the values of the relations from a state on."""
     sides = plan.assembly.sides
@@ -87,7 +87,7 @@ def find_sides(
 
 
 def _ahead(
-    plan: Plan,
+    plan: SceneProblem,
     reader: _Reader,
     state: tuple[float, FloatArray, FloatArray],
     values: tuple[float, ...],
@@ -108,7 +108,7 @@ def _ahead(
     return tuple(found), [i for i in near if at_zero[i] and reader.kinds[i] != "floor"]
 
 
-def layers(plan: Plan, t: float, q: FloatArray, u: FloatArray, absolute: FloatArray) -> list[float]:
+def layers(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray, absolute: FloatArray) -> list[float]:
     """Return by how much each difference is off where a state is off by its absolute tolerances."""
     reader, n = _Reader(plan.assembly), len(q)
     values = plan.assembly.side_values

@@ -291,7 +291,7 @@ def _least_rates(assembly: Assembly, level: Level, rows: FloatArray, length: flo
     return rate * certain(np.zeros_like(sizes), sizes) + unseen
 
 
-def _told(
+def _speeds_alone(
     assembly: Assembly, equations: Equations, level: Level
 ) -> tuple[FloatArray, tuple[str, ...], tuple[str, ...]] | None:
     """Return what `solve_speeds` does where all that is said is of speeds themselves, and nothing twice; else None."""
@@ -326,7 +326,7 @@ def solve_speeds(
     """Return speeds that fulfil constraints and what is fixed; which nothing determines, and what repeats others."""
     u, is_direct = said(equations.speeds, [*level.guessed, *level.fixed], np.zeros(len(equations.speeds)))
     if not equations.constraints:
-        told = _told(assembly, equations, level)
+        told = _speeds_alone(assembly, equations, level)
         if told is not None:  # no iteration, no rank
             return told
     if level.guessed and not is_direct:

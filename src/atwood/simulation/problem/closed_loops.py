@@ -29,7 +29,7 @@ from atwood.forms.loops.assur_groups import Loops
 from atwood.forms.loops.closed_form import ClosedForm, Place, closed_form
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.projection import misses_of
 
 _NEAR = 0.1
@@ -135,7 +135,7 @@ class Solved:
 class _Choices:
     """What formulas can do for a mechanism with one choice of independent coordinates or another."""
 
-    def __init__(self, plan: Plan, t: float, q: FloatArray) -> None:
+    def __init__(self, plan: SceneProblem, t: float, q: FloatArray) -> None:
         assembly = plan.assembly
         self.equations = assembly.reduced
         self.loops = Loops(self.equations, _place(plan, t, q))
@@ -167,18 +167,18 @@ class _Choices:
 _CHOICES: Key[_Choices] = Key("choices of independent coordinates")
 
 
-def _choices(plan: Plan, t: float, q: FloatArray) -> _Choices:
+def _choices(plan: SceneProblem, t: float, q: FloatArray) -> _Choices:
     return plan.assembly.shared.get(_CHOICES, lambda: _Choices(plan, t, q), plan.finding.rank)
 
 
-def _place(plan: Plan, t: float, q: FloatArray) -> Place:
+def _place(plan: SceneProblem, t: float, q: FloatArray) -> Place:
     equations, assembly = plan.assembly.reduced, plan.assembly
     here = {equations.time: t, **dict(zip(equations.coordinates, map(float, q), strict=True))}
     values = dict(zip(assembly.parameters, map(float, assembly.parameter_values), strict=True))
     return Place(values, here, plan.scales.length)
 
 
-def can_be_solved(plan: Plan) -> bool:
+def can_be_solved(plan: SceneProblem) -> bool:
     """Return whether a scene is one of which loops are solved by formulas, if their form is right.
 
     Its constraints hold positions, its rates are speeds, and no law reads a multiplier.
@@ -198,14 +198,14 @@ def can_be_solved(plan: Plan) -> bool:
     )
 
 
-def _freedoms_besides(plan: Plan) -> int:
+def _freedoms_besides(plan: SceneProblem) -> int:
     """Return how many freedoms are not those of orientations, which formulas take as they are."""
     equations = plan.assembly.reduced
     turning = sum(len(one.speeds) for one in equations.orientation_coordinates)
     return len(equations.speeds) - plan.finding.rank - turning
 
 
-def solve_at(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> Solved | None:
+def solve_at(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> Solved | None:
     """Return the loops of a mechanism solved by formulas on the branch of a position, with the best choice there."""
     if not can_be_solved(plan):
         return None
@@ -222,7 +222,7 @@ class _Found:
 _SOLVED: Key[_Found] = Key("solved loops")
 
 
-def _solve_at(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> Solved | None:
+def _solve_at(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> Solved | None:
     assembly, choices = plan.assembly, _choices(plan, t, q)
     best: Solved | None = None
     for independent in choices.every:
@@ -238,7 +238,7 @@ def _solve_at(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> Solved | No
     return best
 
 
-def on_branch(plan: Plan, form: ClosedForm, t: float, q: FloatArray, u: FloatArray) -> Solved | None:
+def on_branch(plan: SceneProblem, form: ClosedForm, t: float, q: FloatArray, u: FloatArray) -> Solved | None:
     """Return a form on the branch of a position; None where it does not lead there, or a dead centre is near."""
     assembly, many = plan.assembly, ManyBranches(form, plan.assembly)
     values, found = many.branches(np.array([t]), q[None], assembly.parameter_values[None])
@@ -270,7 +270,7 @@ def _margins(solved: Solved, t: float, y: FloatArray) -> Sequence[float]:
     return found
 
 
-def _holds(plan: Plan, solved: Solved, t: float, y: FloatArray) -> bool:
+def _holds(plan: SceneProblem, solved: Solved, t: float, y: FloatArray) -> bool:
     """Return whether all constraints hold wherever formulas lead to near by, with these parameters."""
     n, sizes = len(solved.independent), plan.coordinate_sizes[solved.independent]
     states = []

@@ -22,7 +22,7 @@ from atwood.forms.constrained import ConstrainedProgram, constrained_program
 from atwood.forms.quantities import to_maximal
 from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
 from atwood.integrators.protocol import MET, STEPS, CompiledRates, ExplicitProblem, Values
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.problem import SceneProblem
 from atwood.topology.graph import connected_groups
 
 _EXTERNAL: Key[bool] = Key("whether accelerations call functions in Python")
@@ -118,7 +118,7 @@ _LEAST = 1e-9
 
 
 def constrained_problem(
-    plan: Plan,
+    plan: SceneProblem,
     t: float,
     y: FloatArray,
     events: Callable[[float, FloatArray, FloatArray], Values] | None = None,
@@ -145,7 +145,7 @@ def constrained_problem(
     )
 
 
-def _program(plan: Plan, t: float, y: FloatArray) -> ConstrainedProgram:
+def _program(plan: SceneProblem, t: float, y: FloatArray) -> ConstrainedProgram:
     assembly, kept = plan.assembly, plan.finding.kept
     light = assembly.kept.get(_LIGHT, lambda: _light_speeds(plan, t, y))
     rows = assembly.rows if assembly.form == "reduced" else assembly.maximal.rows
@@ -157,7 +157,7 @@ def _program(plan: Plan, t: float, y: FloatArray) -> ConstrainedProgram:
     return assembly.shared.get(_PROGRAM, make, assembly.form, kept, light)
 
 
-def _light_speeds(plan: Plan, t: float, y: FloatArray) -> tuple[int, ...]:
+def _light_speeds(plan: SceneProblem, t: float, y: FloatArray) -> tuple[int, ...]:
     """Return the speeds of what has no inertia of its own in each of its directions, whatever holds it.
 
     In generalized coordinates these are all as soon as there is such a body: any mass matrix may then be singular.
@@ -199,7 +199,7 @@ def _projected(nearer: BoundKernel, t: float, y: FloatArray, coordinates: int) -
 
 
 def _compiled_on_constraints(
-    plan: Plan, program: ConstrainedProgram, values: FloatArray
+    plan: SceneProblem, program: ConstrainedProgram, values: FloatArray
 ) -> Callable[[], CompiledRates] | None:
     """Return a factory of compiled rates and projections for sessions; None if not compilable."""
     if plan.not_compilable:

@@ -30,24 +30,28 @@ from atwood.simulation.dynamics.reactions import check_read_reactions
 from atwood.simulation.dynamics.redundancy import RankFinding, find_rank
 from atwood.simulation.dynamics.scales import coordinate_scales, find_scales, motion_scales, seen_from_afar
 from atwood.simulation.initialization.mobility import check_massless_directions
-from atwood.simulation.problem.problem import Plan, dependent_speeds_of, kept_rows
+from atwood.simulation.problem.problem import SceneProblem, dependent_speeds_of, kept_rows
 
-_PLAN: Key[Plan] = Key("plan")
+_PLAN: Key[SceneProblem] = Key("plan")
 
 
-def make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length: float, span: float) -> Plan:
+def make_problem(
+    assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length: float, span: float
+) -> SceneProblem:
     """Prepare a run from a consistent state in the coordinates of the form."""
     about = t, q.tobytes(), u.tobytes(), length, span
-    made = assembly.kept.get(_PLAN, lambda: _make_plan(assembly, t, q, u, length, span), *about)
+    made = assembly.kept.get(_PLAN, lambda: _make_problem(assembly, t, q, u, length, span), *about)
     if made.not_compilable:
         announce(assembly, made.not_compilable)
     return replace(made)  # its dependent coordinates change on the way
 
 
-def plan_of_run(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length: float, span: float) -> Plan:
-    """Return the plan of a mode, as `make_plan` does; if a law has no value there, it is named."""
+def problem_of_run(
+    assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length: float, span: float
+) -> SceneProblem:
+    """Return the plan of a mode, as `make_problem` does; if a law has no value there, it is named."""
     try:
-        return make_plan(assembly, t, q, u, length, span)
+        return make_problem(assembly, t, q, u, length, span)
     except UnsupportedError:
         raise
     except AtwoodError as error:
@@ -59,7 +63,9 @@ def plan_of_run(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, leng
         ) from error
 
 
-def _make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length: float, span: float) -> Plan:
+def _make_problem(
+    assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length: float, span: float
+) -> SceneProblem:
     equations = assembly.own_equations
     balance = balance_of(assembly, assembly.form)
     sizes, coordinate_sizes = motion_scales(equations, length), coordinate_scales(equations, length)
@@ -87,7 +93,7 @@ def _make_plan(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, lengt
     scales = find_scales(assembly, length, moving, accelerations, sizes, span)
     not_compilable = find_not_compilable(assembly, program.residual)
     parts = assembly, balance, finding, scales, sizes, coordinate_sizes, program, *dependent
-    return Plan(*parts, not_compilable=not_compilable, relative_share=share)
+    return SceneProblem(*parts, not_compilable=not_compilable, relative_share=share)
 
 
 def _singular_start(assembly: Assembly, finding: RankFinding) -> StartError:
@@ -102,7 +108,7 @@ def _singular_start(assembly: Assembly, finding: RankFinding) -> StartError:
     )
 
 
-def pack_state(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+def pack_state(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return consistent y and y' from a state that fulfils the constraints."""
     now = plan.balance.at(t, q, u)
     accelerations, multipliers = solve_balance(now, plan.kept, t)

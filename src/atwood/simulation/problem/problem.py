@@ -50,7 +50,7 @@ _LARGEST_COLUMNS = 20_000
 
 
 @dataclass
-class Plan:
+class SceneProblem:
     """What a run of one mode needs.
 
     Attributes
@@ -114,7 +114,7 @@ class Plan:
         """Whether outputs are projected onto the constraints; plain index 1 shows its drift instead."""
         return self.balance.constraints > 0 and self.program.level != "index1"
 
-    def in_piece(self, assembly: Assembly) -> Plan:
+    def in_piece(self, assembly: Assembly) -> SceneProblem:
         """Return the plan of the same scene with other relations of functions of time, after a time event."""
         balance = balance_of(assembly, assembly.form)
         return replace(self, assembly=assembly, balance=balance, _kernels=None, _seen=None, _null_space=None)
@@ -343,11 +343,11 @@ def _restored(
     switches: int,
     not_compilable: str,
     relative_share: float = 1.0,
-) -> Plan:
+) -> SceneProblem:
     """Return a plan from what a pickle has of it."""
     program = assembly.form_program(kept_rows(finding), dependent, dependent_speeds)
     parts = assembly, balance_of(assembly, assembly.form), finding, scales, sizes, coordinate_sizes, program
-    return Plan(*parts, dependent, dependent_speeds, switches, not_compilable, relative_share)
+    return SceneProblem(*parts, dependent, dependent_speeds, switches, not_compilable, relative_share)
 
 
 def _null_space_program(assembly: Assembly, kept: tuple[int, ...]) -> NullSpaceProgram:

@@ -18,7 +18,7 @@ from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.matrices import is_best_full
 from atwood.numerics.rank import trusted_sizes
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.problem import SceneProblem
 from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ class ConstraintsAt:
         return lambda right: dense(right[:, kept])
 
 
-def project_states(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> Projected:
+def project_states(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray) -> Projected:
     """Return the nearest states that fulfil the constraints on position and velocity."""
     chunk = _chunk(plan)
     parts = [
@@ -133,7 +133,7 @@ class ProjectedStates:
     hold: Callable[[FloatArray], FloatArray]
 
 
-def nearly_projected(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> ProjectedStates:
+def nearly_projected(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray) -> ProjectedStates:
     """Return states after one step of Newton's method towards the constraints on position and velocity.
 
     For iterations that come ever nearer to the constraints by themselves: what is missed is missed squared afterwards.
@@ -154,7 +154,7 @@ def nearly_projected(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) ->
     return ProjectedStates(q, hold(u), hold)
 
 
-def misses_of(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatArray:
+def misses_of(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatArray:
     """Return by how much states miss the constraints on position and velocity, shape (2, states)."""
     chunk = _chunk(plan)
     found = np.zeros((2, len(t)))
@@ -165,7 +165,7 @@ def misses_of(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatA
     return found
 
 
-def _chunk(plan: Plan) -> int:
+def _chunk(plan: SceneProblem) -> int:
     """Return how many states to work on at once."""
     program = plan.balance.program
     normal = _normal(plan)
@@ -173,7 +173,7 @@ def _chunk(plan: Plan) -> int:
     return max(1, _CHUNK // max(1, volume))
 
 
-def _normal(plan: Plan) -> Normal | None:
+def _normal(plan: SceneProblem) -> Normal | None:
     """Return the normal equations of the independent constraints by their entries; None where arrays are better."""
     program = plan.balance.program
     plain = plan.balance.kinematic_map.is_plain and len(program.holonomic) == program.constraints
@@ -202,7 +202,7 @@ def _largest(now: ConstraintsAt, speeds: FloatArray) -> FloatArray:
     return np.stack([_largest_entry(now.value), _largest_entry(now.rate(speeds))])
 
 
-def constraints_at(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> ConstraintsAt:
+def constraints_at(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray) -> ConstraintsAt:
     """Return the constraints at states, of shape (states,) and (number, states)."""
     p, count = plan.balance.program, len(t)
     program = p.constraints_alone
@@ -228,7 +228,7 @@ def constraints_at(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> C
     return ConstraintsAt(value.T / rows, full / rows[:, :, None], explicit_rate.T / rows, kept, None, rows)
 
 
-def _project(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray) -> Projected:
+def _project(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray) -> Projected:
     sizes = plan.sizes[:, None]
     kinematic_map, holding = plan.balance.kinematic_map, plan.balance.holding(list(plan.finding.kept))
     q, speeds = kinematic_map.normalized(q.copy()), (u / sizes).T
@@ -272,7 +272,7 @@ def _least_norm(jacobian: FloatArray) -> Callable[[FloatArray], FloatArray]:
     return solve
 
 
-def project_safely(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+def project_safely(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return one projected state that meets all constraints."""
     q, u = plan.balance.project(t, q, u, plan.sizes)
     plan.check_held(t, q, u)

@@ -32,7 +32,7 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.simulation.events.modes import find_event_functions
 from atwood.simulation.problem.explicit_scene import constrained_problem, explicit_problem, explicit_problem_of
 from atwood.simulation.problem.options import RunOptions
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.problem import SceneProblem
 
 if TYPE_CHECKING:
     from atwood.simulation.problem.closed_loops import Solved
@@ -113,7 +113,7 @@ def _missing_library() -> str:
     return "" if available() else why_not()
 
 
-def choose(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArray) -> Choice:
+def choose(plan: SceneProblem, options: RunOptions, t: float, q: FloatArray, u: FloatArray) -> Choice:
     """Return what solves one mode of a scene, and why."""
     if options.solver != AUTO:
         return Choice(t, options.solver, ASKED)
@@ -136,14 +136,14 @@ def choose(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArr
     return Choice(t, EXPLICIT.key, "its coordinates are independent, and the problem is not stiff")
 
 
-def solved_loops(plan: Plan, t: float, q: FloatArray, u: FloatArray) -> Solved | None:
+def solved_loops(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> Solved | None:
     """Return closed loops solved by formulas on the branch of a state; None where no formulas do."""
     from atwood.simulation.problem.closed_loops import solve_at  # few scenes have loops
 
     return solve_at(plan, t, q, u)
 
 
-def _choose_for_loops(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArray) -> Choice:
+def _choose_for_loops(plan: SceneProblem, options: RunOptions, t: float, q: FloatArray, u: FloatArray) -> Choice:
     """Return what solves a mechanism with closed loops: an explicit method where formulas solve these."""
     solved = solved_loops(plan, t, q, u)
     if solved is None:
@@ -161,7 +161,7 @@ def _choose_for_loops(plan: Plan, options: RunOptions, t: float, q: FloatArray, 
 
 
 def _choose_on_constraints(
-    plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArray, reason: str
+    plan: SceneProblem, options: RunOptions, t: float, q: FloatArray, u: FloatArray, reason: str
 ) -> Choice:
     """Return what solves a scene whose constraints stay: an explicit method with steps on them, unless it is stiff.
 
@@ -184,7 +184,7 @@ def _choose_on_constraints(
     return Choice(t, EXPLICIT.key, f"{reason}, on which steps end, and the problem is not stiff", True)
 
 
-def _has_closed_series(plan: Plan, options: RunOptions, solved: Solved) -> bool:
+def _has_closed_series(plan: SceneProblem, options: RunOptions, solved: Solved) -> bool:
     """Return whether accelerations with solved loops have Taylor series that pay: no event keeps them short."""
     watches = solved.form.loops.counted or options.conditions or find_event_functions(plan.assembly)
     if options.relative_tolerance > VERY_ACCURATE and (watches or not solved.is_clear):
@@ -192,7 +192,7 @@ def _has_closed_series(plan: Plan, options: RunOptions, solved: Solved) -> bool:
     return _can_be_recurrences(plan.assembly, solved)
 
 
-def dead_centre(plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArray) -> Choice:
+def dead_centre(plan: SceneProblem, options: RunOptions, t: float, q: FloatArray, u: FloatArray) -> Choice:
     """Return what goes on with the constraints in the middle of a run, where formulas for loops have no value near by.
 
     Arguments as of `choose`. It keeps them to the end: mechanisms pass such a place twice in each turn, and steps on
@@ -231,7 +231,7 @@ def _in_words(found: Stiffness) -> str:
 
 
 def stiffness_of(
-    plan: Plan, options: RunOptions, t: float, q: FloatArray, u: FloatArray, goes_on: bool = False
+    plan: SceneProblem, options: RunOptions, t: float, q: FloatArray, u: FloatArray, goes_on: bool = False
 ) -> Stiffness | None:
     """Return how stiff a scene is at a state; None if nothing in it can die away."""
     assembly = plan.assembly

@@ -15,7 +15,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, substitute
 from atwood.forms.caches import Key
-from atwood.integrators.explicit_session import Leave
+from atwood.integrators.explicit_session import OnStiff
 from atwood.integrators.methods import Method, Task
 from atwood.integrators.protocol import LOOSEST, Budget, ExplicitProblem, SolverOptions, Statistics, Status, StepResult
 from atwood.integrators.session import Session
@@ -56,9 +56,9 @@ class ClosedLoopSession(Session):
         Start values of all coordinates and speeds.
     solved
         The loops on the branch of the start.
-    leave
+    on_stiff
         See `~atwood.integrators.explicit_session.ExplicitSession`.
-    give_up
+    on_dead_centre
         Called with the time and the state where a dead centre of every choice comes near; the session then ends with
         `Status.STIFF`.
     """
@@ -72,10 +72,10 @@ class ClosedLoopSession(Session):
         t: float,
         y: FloatArray,
         solved: Solved,
-        leave: Leave | None,
-        give_up: Callable[[float, FloatArray], None] | None,
+        on_stiff: OnStiff | None,
+        on_dead_centre: Callable[[float, FloatArray], None] | None,
     ) -> None:
-        self._request, self._method, self._leave, self._give_up = request, method, leave, give_up
+        self._request, self._method, self._on_stiff, self._on_dead_centre = request, method, on_stiff, on_dead_centre
         self._before = Statistics(error_test_failures=0, convergence_failures=0)
         self._solved = solved
         self._count = len(request.probe.directions)
@@ -150,8 +150,8 @@ class ClosedLoopSession(Session):
         if dead:
             solved = self._better(result, y)
             if solved is None:
-                if self._give_up is not None:
-                    self._give_up(result.t, y)
+                if self._on_dead_centre is not None:
+                    self._on_dead_centre(result.t, y)
                 return replace(full, status=Status.STIFF, message="a dead centre is near")
             self._change(result.t, y, solved)
         elif own and self._reads_counts():
@@ -215,12 +215,12 @@ class ClosedLoopSession(Session):
         longest = np.inf if solved.is_clear else self._longest_step(solved, t, y)
         if self._before.steps and np.isfinite(longest):  # steps grow by themselves from one that is surely short
             settings = replace(settings, first_step=min(_FIRST * longest, settings.horizon))
-        given = self._leave
+        given = self._on_stiff
 
-        def leave(t: float, y: FloatArray) -> bool:
+        def on_stiff(t: float, y: FloatArray) -> bool:
             return given is not None and given(t, self._solved.state(t, y))
 
-        asked = None if given is None else leave
+        asked = None if given is None else on_stiff
         series, canonical = equations_of(request, problem, (t, y), solved)
         task = Task(
             settings,
@@ -228,7 +228,7 @@ class ClosedLoopSession(Session):
             y,
             budget=budget,
             end=request.end,
-            leave=asked,
+            on_stiff=asked,
             explicit=problem,
             series=series,
             hamiltonian=canonical,

@@ -13,7 +13,7 @@ from atwood.clock import TimeIsUp, more_time
 from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.projection import misses_of, project_safely, project_states
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class SegmentRecord:
         Whether it began at a time event, at which energy that comes or goes is work of inputs and drives.
     """
 
-    plan: Plan
+    plan: SceneProblem
     impact: bool
     time: FloatArray
     coordinates: FloatArray
@@ -98,7 +98,7 @@ class Recorder:
         The scene in its mode.
     """
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: SceneProblem) -> None:
         self.plan = plan
         self.singular_crossings: list[SingularCrossing] = []
         # What is done, and states that wait: changed together, so that an interruption loses and repeats nothing.

@@ -30,8 +30,8 @@ from atwood.simulation.initialization.mobility import check_prescribed, refuse_i
 from atwood.simulation.initialization.start import Start, settle
 from atwood.simulation.problem.arguments import check_span
 from atwood.simulation.problem.options import RunOptions, Samples, sample_times
-from atwood.simulation.problem.preparation import plan_of_run
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.preparation import problem_of_run
+from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.run.choice import Choice, check_solver, choose
 from atwood.simulation.run.recorder import Recorder, SegmentRecord
 from atwood.simulation.run.run_record import Outcome, Run, Segment, as_asked, run_out_of_time, shortest_mode
@@ -120,7 +120,7 @@ class _Walk:
         self.start, self.options, self._other = start, options, reassemble
         self.samples, self.again = samples, again
         self._schedules: dict[Shared, Schedule] = {}
-        self._plans: dict[tuple[tuple[float, ...], tuple[float, ...] | None], Plan] = {}
+        self._plans: dict[tuple[tuple[float, ...], tuple[float, ...] | None], SceneProblem] = {}
         self._kept, self._sides = KeptSession(), SidesOfRun(options)
         self.segments: list[SegmentRecord] = []
         self.events: list[EventRecord] = []
@@ -135,7 +135,7 @@ class _Walk:
         self.coordinate_switches: list[CoordinateSwitch] = []
         self.impact, self.show = False, bool(samples.shown[0])
         self._handed: tuple[int, ...] = ()
-        self.plan: Plan | None = None
+        self.plan: SceneProblem | None = None
         self.ended: EventRecord | None = None
         self.probe: EventProbe | None = None
         self.choice: Choice
@@ -173,20 +173,20 @@ class _Walk:
                     _, self.q, self.u, _ = recorder.last()
                     self.impact, chatter = False, 0
                     continue
-                return self._made(outcome.status, outcome.message, outcome)
+                return self._finished_run(outcome.status, outcome.message, outcome)
             target = outcome.event.target
             self._sides.change(outcome.sides if target == SIDE else (), is_short)
             if target not in (SIDE, COORDINATE_SWITCH):
                 self.events += (outcome.event, *outcome.together)
             if target == "stop":
-                return self._made("stopped", outcome.event.describe(), outcome)
+                return self._finished_run("stopped", outcome.event.describe(), outcome)
             if chatter > _CHATTER and target != SIDE:
                 endless = f"{outcome.event.part} changes its mode endlessly at t = {self.t:.9g}"
-                return self._made("failed", endless, outcome)
+                return self._finished_run("failed", endless, outcome)
             is_switch = target == COORDINATE_SWITCH
             self._switch_coordinates(outcome.event, recorder) if is_switch else self._enter(outcome, recorder)
             if self.t >= self.options.t_end and target != UPDATE:
-                return self._made("finished", "", outcome)
+                return self._finished_run("finished", "", outcome)
 
     def _segment(self) -> tuple[Recorder, Outcome]:
         """Run one stretch in the present mode, until the next time event at most."""
@@ -258,10 +258,10 @@ class _Walk:
         self.probe.follow(self._handed)
         return None
 
-    def _plan(self) -> Plan:
+    def _plan(self) -> SceneProblem:
         assembly = self._sides.in_pieces(self.assembly, self.t, self.q, self.u)
         span = self.options.t_end - self.start.time
-        return plan_of_run(assembly, self.t, self.q, self.u, self.start.length, span)
+        return problem_of_run(assembly, self.t, self.q, self.u, self.start.length, span)
 
     def _schedule(self, assembly: Assembly) -> Schedule:
         """Return the time events of a scene in one mode."""
@@ -356,7 +356,7 @@ class _Walk:
         if due := {i for one in (event, *outcome.together) for i in self.sampler.due_after(one.part, one.law)}:
             self._update(sorted(due))
 
-    def _made(self, status: str, message: str, outcome: Outcome) -> Run:
+    def _finished_run(self, status: str, message: str, outcome: Outcome) -> Run:
         """Return the run, or raise with it what made it fail."""
         if outcome.error is not None:
             message = outcome.error.message

@@ -24,7 +24,7 @@ from atwood.simulation.dynamics.orientation_coordinates import (
 from atwood.simulation.events.modes import EventProbe, EventRecord
 from atwood.simulation.initialization.start import Start
 from atwood.simulation.problem.options import RunOptions, Samples
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.run.choice import Choice, describe_choices
 from atwood.simulation.run.recorder import SegmentRecord
 from atwood.simulation.run.session import KeptSession
@@ -149,7 +149,7 @@ class Segment:
         The session of an explicit method that the run has opened before.
     """
 
-    plan: Plan
+    plan: SceneProblem
     probe: EventProbe
     options: RunOptions
     choice: Choice
@@ -205,7 +205,7 @@ class Outcome:
     sides: tuple[int, ...] = ()
 
 
-def shortest_mode(plan: Plan, options: RunOptions, began: float) -> float:
+def shortest_mode(plan: SceneProblem, options: RunOptions, began: float) -> float:
     """Return a time within which only errors, and margins of events, change a mode and change it back, s."""
     margin = min(20.0 * options.relative_tolerance, 1e-5) * plan.scales.time
     return max(1e-9 * (options.t_end - began), margin)

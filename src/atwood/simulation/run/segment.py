@@ -29,7 +29,7 @@ from atwood.simulation.dynamics.redundancy import RankFinding
 from atwood.simulation.events.modes import EventRecord, without_margin
 from atwood.simulation.events.sides import SIDE
 from atwood.simulation.problem.preparation import pack_state
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.projection import project_safely
 from atwood.simulation.run.choice import dead_centre, stiffness_of, turned_stiff
 from atwood.simulation.run.recorder import Recorder
@@ -108,7 +108,9 @@ def _first_state(segment: Segment, t: float, q: FloatArray, u: FloatArray) -> tu
     return _state_for(method, segment.plan, t, q, u)
 
 
-def _state_for(method: Method, plan: Plan, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _state_for(
+    method: Method, plan: SceneProblem, t: float, q: FloatArray, u: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Return a state for a method: with multipliers and rates for implicit ones alone."""
     return pack_state(plan, t, q, u) if method.is_implicit else (np.concatenate([q, u]), np.zeros(0))
 
@@ -283,10 +285,10 @@ class _Runner:
         )
         if choice.method.is_implicit:
             self.request, self.opened = request, StepResult(t, y, yp, Status.REACHED)
-        leave = self._is_stiff if options.solver == AUTO else None
+        on_stiff = self._is_stiff if options.solver == AUTO else None
         try:
             self.session = open_session(
-                request, choice.method, t, y, yp, leave, self._give_up, choice.keeps_constraints
+                request, choice.method, t, y, yp, on_stiff, self._on_dead_centre, choice.keeps_constraints
             )
         except StartError:
             if not choice.method.is_implicit:
@@ -304,7 +306,7 @@ class _Runner:
 
         monitor = singularity_monitor_of(segment.plan, segment.options.relative_tolerance, segment.end, session.here)
         self.monitor = monitor
-        if monitor is not None and not (monitor.lookout is not None and session.look_out(monitor.lookout)):
+        if monitor is not None and not (monitor.step_monitor is not None and session.set_monitor(monitor.step_monitor)):
             monitor.look_in_python()
 
     def _is_stiff(self, t: float, y: FloatArray) -> bool:
@@ -315,7 +317,7 @@ class _Runner:
         self.choices.append(turned_stiff(t, found))
         return True
 
-    def _give_up(self, t: float, y: FloatArray) -> None:
+    def _on_dead_centre(self, t: float, y: FloatArray) -> None:
         """Go on with constraints where every choice of formulas comes to a dead centre."""
         plan = self.segment.plan
         self.choices.append(dead_centre(plan, self.segment.options, t, *plan.program.split(y)))

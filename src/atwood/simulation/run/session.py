@@ -10,7 +10,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
-from atwood.integrators.explicit_session import ExplicitSession, Leave
+from atwood.integrators.explicit_session import ExplicitSession, OnStiff
 from atwood.integrators.ida.guarded_residual import GuardedResidual
 from atwood.integrators.methods import EXPLICIT, IDA, LEAST, Method, Task, advise
 from atwood.integrators.protocol import (
@@ -28,7 +28,7 @@ from atwood.simulation.dynamics.orientation_coordinates import longest_step
 from atwood.simulation.events.modes import EventProbe
 from atwood.simulation.problem.explicit_scene import constrained_problem, explicit_problem, own_rates
 from atwood.simulation.problem.options import RunOptions
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.step_guard import step_guard
 from atwood.simulation.run.choice import solved_loops
 
@@ -58,7 +58,7 @@ class SolverRequest:
         The session of an explicit method that the run has opened before.
     """
 
-    plan: Plan
+    plan: SceneProblem
     probe: EventProbe
     options: RunOptions
     end: float
@@ -99,8 +99,8 @@ def open_session(
     t: float,
     y: FloatArray,
     yp: FloatArray,
-    leave: Leave | None = None,
-    give_up: Callable[[float, FloatArray], None] | None = None,
+    on_stiff: OnStiff | None = None,
+    on_dead_centre: Callable[[float, FloatArray], None] | None = None,
     keeps_constraints: bool = False,
 ) -> Session:
     """Start a method."""
@@ -112,11 +112,11 @@ def open_session(
 
         solved = solved_loops(plan, t, *plan.program.split(y))
         if solved is not None:
-            return ClosedLoopSession(request, method, t, y, solved, leave, give_up)
+            return ClosedLoopSession(request, method, t, y, solved, on_stiff, on_dead_centre)
     if method.keeps_constraints and (plan.balance.constraints or plan.assembly.form == "dae"):
-        session = method.open(_constrained_task(request, method, t, y, leave))
+        session = method.open(_constrained_task(request, method, t, y, on_stiff))
     else:
-        session = _open_tree(request, method, t, y, leave)
+        session = _open_tree(request, method, t, y, on_stiff)
     session.limit_steps(longest_step(plan.assembly.own_equations, plan.program.split(y)[1]))
     return session
 
@@ -214,30 +214,30 @@ class KeptSession:
     opened_with: tuple[object, ...] = ()
 
     def begin_again(
-        self, request: SolverRequest, method: Method, t: float, y: FloatArray, leave: Leave | None
+        self, request: SolverRequest, method: Method, t: float, y: FloatArray, on_stiff: OnStiff | None
     ) -> ExplicitSession | None:
         """Return the session at the start of another segment; None where it was opened for something else."""
         session, code, rates = self.session, self.code, self.rates
         if session is None or code is None or rates is None or request.probe.event_functions:
             return None
         if not all(
-            one is other for one, other in zip(self.opened_with, _opened_with(request, method, leave), strict=True)
+            one is other for one, other in zip(self.opened_with, _opened_with(request, method, on_stiff), strict=True)
         ):
             return None
         code.fill(rates, request.plan.assembly.parameter_values)
-        session.begin_again(t, y, request.horizon(t), request.budget, leave, request.end)
+        session.begin_again(t, y, request.horizon(t), request.budget, on_stiff, request.end)
         return session
 
 
-def _opened_with(request: SolverRequest, method: Method, leave: Leave | None) -> tuple[object, ...]:
+def _opened_with(request: SolverRequest, method: Method, on_stiff: OnStiff | None) -> tuple[object, ...]:
     plan = request.plan
-    return method, plan.assembly.shared, plan.program, request.options, plan.scales, plan.sizes, leave is None
+    return method, plan.assembly.shared, plan.program, request.options, plan.scales, plan.sizes, on_stiff is None
 
 
-def _open_tree(request: SolverRequest, method: Method, t: float, y: FloatArray, leave: Leave | None) -> Session:
+def _open_tree(request: SolverRequest, method: Method, t: float, y: FloatArray, on_stiff: OnStiff | None) -> Session:
     """Start a method on independent coordinates, and keep its session if that can be begun again."""
     kept, plan = request.kept, request.plan
-    session = kept.begin_again(request, method, t, y, leave)
+    session = kept.begin_again(request, method, t, y, on_stiff)
     if session is not None:
         return session
     problem, assembly = _explicit_problem(request, method), plan.assembly
@@ -254,7 +254,7 @@ def _open_tree(request: SolverRequest, method: Method, t: float, y: FloatArray, 
         y,
         budget=request.budget,
         end=request.end,
-        leave=leave,
+        on_stiff=on_stiff,
         explicit=problem,
         series=series,
         hamiltonian=canonical,
@@ -263,7 +263,7 @@ def _open_tree(request: SolverRequest, method: Method, t: float, y: FloatArray, 
     if own is not None:
         assert isinstance(opened, ExplicitSession)
         kept.session, (kept.code, kept.rates) = opened, own
-        kept.opened_with = _opened_with(request, method, leave)
+        kept.opened_with = _opened_with(request, method, on_stiff)
     return opened
 
 
@@ -292,7 +292,9 @@ def equations_of(
     return series, canonical
 
 
-def _constrained_task(request: SolverRequest, method: Method, t: float, y: FloatArray, leave: Leave | None) -> Task:
+def _constrained_task(
+    request: SolverRequest, method: Method, t: float, y: FloatArray, on_stiff: OnStiff | None
+) -> Task:
     """Return a task with steps that end on the constraints."""
     plan, probe = request.plan, request.probe
     plan.keep_better(t, plan.program.split(y)[0])
@@ -301,7 +303,7 @@ def _constrained_task(request: SolverRequest, method: Method, t: float, y: Float
     absolute = np.asarray(settings.absolute_tolerances)[: len(y)]
     settings = replace(settings, absolute_tolerances=absolute)
     explicit = _watched(request, problem, method)
-    return Task(settings, t, y, budget=request.budget, end=request.end, leave=leave, explicit=explicit)
+    return Task(settings, t, y, budget=request.budget, end=request.end, on_stiff=on_stiff, explicit=explicit)
 
 
 def _explicit_problem(request: SolverRequest, method: Method) -> ExplicitProblem:

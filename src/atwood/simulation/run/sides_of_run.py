@@ -13,7 +13,7 @@ from atwood.integrators.methods import AUTO, METHODS
 from atwood.lazy_dataclasses import replace
 from atwood.simulation.events.sides import find_sides, layers, plain_sides
 from atwood.simulation.problem.options import RunOptions
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.run.recorder import SegmentRecord
 
 _ASIDE = 1e-12
@@ -57,14 +57,16 @@ class SidesOfRun:
         found = replace(found, side_values=tuple(handed.get(i, 0.0) for i in range(len(found.side_values))))
         return replace(found, side_values=plain_sides(found, t, q, u))
 
-    def like(self, assembly: Assembly, plan: Plan) -> Assembly:
+    def like(self, assembly: Assembly, plan: SceneProblem) -> Assembly:
         """Return a scene with the relations of what moves of a plan, which was made of it in another piece."""
         sides, values = plan.assembly.sides, plan.assembly.side_values
         if sides is None:
             return assembly
         return replace(assembly, shared=sides.shared, sides=sides, side_values=values)
 
-    def recorded(self, record: SegmentRecord, plan: Plan, assembly: Assembly, ends_at_switch: bool) -> SegmentRecord:
+    def recorded(
+        self, record: SegmentRecord, plan: SceneProblem, assembly: Assembly, ends_at_switch: bool
+    ) -> SegmentRecord:
         """Return what was recorded of a stretch with the laws as they are; on a switch, those of the stretch hold."""
         starts_at_switch, self._begins_at_switch = self._begins_at_switch, ends_at_switch
         if plan.assembly.sides is None:
@@ -86,7 +88,7 @@ class SidesOfRun:
             self._sways.clear()
         self._sways.update(self._changed)
 
-    def on(self, assembly: Assembly, plan: Plan, t: float, q: FloatArray, u: FloatArray) -> Plan | None:
+    def on(self, assembly: Assembly, plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> SceneProblem | None:
         """Return a plan with the values of the relations from a state on; None if it is to be made anew."""
         sides, before, changed = plan.assembly.sides, plan.assembly.side_values, self._changed
         if sides is None:

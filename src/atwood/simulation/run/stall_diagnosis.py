@@ -15,7 +15,7 @@ from atwood.lazy_dataclasses import replace
 from atwood.simulation.dynamics.scales import motion_names, motion_scales
 from atwood.simulation.events.sampling import remembering
 from atwood.simulation.problem.options import RunOptions
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.run.run_record import Run
 from atwood.simulation.run.session import SolverRequest, open_session
 
@@ -104,7 +104,7 @@ def failed(message: str, scene: str, has_moved: bool) -> SolveError:
     return SolveError(message, where=scene, advice=_LATER if has_moved else _AT_START)
 
 
-def explain_stuck(plan: Plan, failed: StepResult) -> SolveError | None:
+def explain_stuck(plan: SceneProblem, failed: StepResult) -> SolveError | None:
     """Return the error of a run that failed, with the motion that changes fastest there; None if nothing moves.
 
     Changes of speeds are compared in units of the scene's length, or one radian, so that metres and radians compare.

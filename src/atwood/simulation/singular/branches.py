@@ -13,9 +13,9 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, SolveError
 from atwood.forms.caches import Key
-from atwood.integrators.protocol import Lookout
+from atwood.integrators.protocol import StepMonitor
 from atwood.lazy_dataclasses import dataclass
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.projection import project_safely, project_states
 from atwood.simulation.singular.collocation import Arc, Path, find_arc, follow
 from atwood.simulation.singular.crossing import (
@@ -31,9 +31,9 @@ from atwood.simulation.singular.crossing import (
 )
 
 if TYPE_CHECKING:
-    from atwood.codegen.sundials.step_monitor import LookoutCode, LookoutData
+    from atwood.codegen.sundials.step_monitor import MonitorCode, MonitorData
 
-_LOOKOUT: Key[LookoutCode] = Key("machine code of the singularity monitor")
+_LOOKOUT: Key[MonitorCode] = Key("machine code of the singularity monitor")
 
 _MOVE = 0.3
 """Between two looks nothing moves by more of its size; an angle by so many radians."""
@@ -53,7 +53,7 @@ _LARGEST = 600
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class Sample:
     """A state on the way: time, unknowns and their rates."""
 
     t: float
@@ -61,7 +61,7 @@ class Look:
     yp: FloatArray
 
 
-def stride_from(plan: Plan, look: Look, whole: float) -> float:
+def stride_from(plan: SceneProblem, look: Sample, whole: float) -> float:
     """Return the time in which something moves as far as it may until the next look; never beyond the end."""
     speeds = slice(plan.program.coordinates, plan.program.coordinates + len(plan.sizes))
     speed, pull = (float(np.max(np.abs(one[speeds]) / plan.sizes)) for one in (look.y, look.yp))
@@ -80,7 +80,7 @@ def cubic(s: FloatArray, ends: tuple[FloatArray, FloatArray], slopes: tuple[Floa
     return found
 
 
-def going_on(plan: Plan, look: Look, times: FloatArray) -> FloatArray:
+def going_on(plan: SceneProblem, look: Sample, times: FloatArray) -> FloatArray:
     """Predict coordinates and speeds at times near a look from the accelerations there, shape (number, times)."""
     n, m = plan.program.coordinates, len(plan.sizes)
     later = np.asarray(times) - look.t
@@ -91,30 +91,32 @@ def going_on(plan: Plan, look: Look, times: FloatArray) -> FloatArray:
     return np.concatenate([moved, u])
 
 
-def compiled_looks(plan: Plan, whole: float, size: int) -> LookoutData | None:
+def compiled_monitor(plan: SceneProblem, whole: float, size: int) -> MonitorData | None:
     """Return what looks at a motion by itself, for one run; None where nothing can be compiled."""
     held, assembly = plan.balance.program, plan.assembly
     if plan.not_compilable or held.constraints > _LARGEST:
         return None
-    from atwood.codegen.sundials.step_monitor import Pace, compile_lookout
+    from atwood.codegen.sundials.step_monitor import LookRate, compile_monitor
 
     places = held.jacobian_rows, held.jacobian_columns
     code = assembly.shared.get(
         _LOOKOUT,
-        lambda: compile_lookout(held.constraints_alone, held.speeds, size, places),
+        lambda: compile_monitor(held.constraints_alone, held.speeds, size, places),
         assembly.form,
         size,
     )
-    pace = Pace(_MOVE, whole, _SHARE * whole, _LOW, _WORN if plan.finding.redundant else 0.0)
-    return code.bind(assembly.parameter_values, plan.sizes, plan.finding.kept, pace)
+    rate = LookRate(_MOVE, whole, _SHARE * whole, _LOW, _WORN if plan.finding.redundant else 0.0)
+    return code.bind(assembly.parameter_values, plan.sizes, plan.finding.kept, rate)
 
 
-def as_lookout(data: LookoutData) -> Lookout:
+def as_step_monitor(data: MonitorData) -> StepMonitor:
     """Return what a session is given to look with."""
     from atwood.codegen.sundials.step_monitor import NOTICED, PAUSED
 
     code = data.code
-    return Lookout(code.drive, code.fill, NOTICED, PAUSED, data.address, data.due, data.due_at, code.look_address, data)
+    return StepMonitor(
+        code.drive, code.fill, NOTICED, PAUSED, data.address, data.due, data.due_at, code.look_address, data
+    )
 
 
 _CLOSE = 0.05
@@ -144,7 +146,7 @@ _AGREES = 30.0
 """Times the tolerance: a solver whose states behind the place differ by less from the arc has gone the same way."""
 
 
-class WaysOver:
+class Branches:
     """The ways of a motion over singular positions, from the looks that were taken at it.
 
     Parameters
@@ -165,10 +167,10 @@ class WaysOver:
 
     trouble: tuple[float, int] | None
 
-    def __init__(self, plan: Plan, tolerance: float, whole: float) -> None:
+    def __init__(self, plan: SceneProblem, tolerance: float, whole: float) -> None:
         self.plan, self.tolerance, self._whole = plan, tolerance, whole
         self._n, self._m = plan.program.coordinates, len(plan.sizes)
-        self._looks: list[Look] = []
+        self._samples: list[Sample] = []
         self._largest = 0.0
         self._measures = RankMeasure(plan)
         self._is_behind = False
@@ -178,7 +180,7 @@ class WaysOver:
 
         Behind a crossing rounding can be too large for a solver at first; there the motion goes away from the place.
         """
-        first = self._looks[0]
+        first = self._samples[0]
         stride = stride_from(self.plan, first, np.inf)  # also beyond the end of a short run, where it is not looked at
         stride = stride if np.isfinite(stride) else self._whole
         begin = self._state(first)
@@ -208,7 +210,7 @@ class WaysOver:
         if path is None:
             return True
         behind = crossing.time + 0.1 * (path.end - crossing.time)
-        looks = [one for one in self._looks if behind < one.t <= path.end]
+        looks = [one for one in self._samples if behind < one.t <= path.end]
         if not looks:
             return False
         q, u, _ = path.at(np.array([one.t for one in looks]))
@@ -220,7 +222,7 @@ class WaysOver:
 
     def _rest(self, first: int, last: int) -> SingularCrossing | None:
         """Return that the motion between some looks comes to rest where it is singular; None if it does not."""
-        one, other = self._looks[first], self._looks[last]
+        one, other = self._samples[first], self._samples[last]
         times = np.linspace(one.t, other.t, 65)
         known = self._between(times) if first < last else None
         near = None if known is None else slowest(times, known[1], self.plan.sizes)
@@ -236,18 +238,18 @@ class WaysOver:
         if rest is None:
             return None
         lost = nearly_lost(self._measures, rest, arc.at(np.array([rest]))[0][:, 0])
-        return SingularCrossing(rest, 0, *self._said((lost,)), None)
+        return SingularCrossing(rest, 0, *self._labels_of((lost,)), None)
 
     @property
     def _fastest(self) -> float:
         """The largest speed at the looks that are kept, in units of the scene's sizes."""
         speeds = slice(self._n, self._n + self._m)
-        return max(float(np.max(np.abs(one.y[speeds]) / self.plan.sizes)) for one in self._looks)
+        return max(float(np.max(np.abs(one.y[speeds]) / self.plan.sizes)) for one in self._samples)
 
     def _closest(self, first: int, last: int) -> tuple[float, float] | None:
         """Return when the motion between some looks is closest to a singular position, and how close; if it is."""
         times, places = [], []
-        for one, other in zip(self._looks[first:last], self._looks[first + 1 : last + 1], strict=True):
+        for one, other in zip(self._samples[first:last], self._samples[first + 1 : last + 1], strict=True):
             h = other.t - one.t
             s = np.linspace(0.0, 1.0, _FINE)
             if first == 0:  # perhaps it starts quite near
@@ -279,7 +281,7 @@ class WaysOver:
             if found is not None:
                 return found
         begin = self._begin(near, 1.0)
-        if begin is None or begin[0] == self._looks[0].t:
+        if begin is None or begin[0] == self._samples[0].t:
             found = self._from_start(near)
             if found is not None:
                 return found
@@ -298,11 +300,11 @@ class WaysOver:
         if path is not None:
             times = np.concatenate([np.linspace(one.start, one.end, 5) for one in path.arcs])
             return SingularCrossing(float(times[np.argmin(measure.at(times, path.at(times)[0]))]), 0, (), (), path)
-        lost = nearly_lost(measure, near, min(self._looks, key=lambda one: abs(one.t - near)).y[: self._n])
+        lost = nearly_lost(measure, near, min(self._samples, key=lambda one: abs(one.t - near)).y[: self._n])
         if failed:
             self.trouble = near, lost
             return None
-        return SingularCrossing(near, 0, *self._said((lost,)), None)
+        return SingularCrossing(near, 0, *self._labels_of((lost,)), None)
 
     def explain(self, message: str) -> SolveError | None:
         """Return the error of a solver that failed at a singular position; None if it failed elsewhere."""
@@ -311,7 +313,7 @@ class WaysOver:
         t, lost = self.trouble
         return stuck_at(self.plan.assembly.own_equations.constraints[lost], t, message)
 
-    def _said(self, constraints: tuple[int, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    def _labels_of(self, constraints: tuple[int, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Return the labels of constraints, and the parts that they belong to."""
         every = [self.plan.assembly.own_equations.constraints[i] for i in constraints]
         return tuple(one.label for one in every), tuple(dict.fromkeys(one.key[0] for one in every))
@@ -319,13 +321,15 @@ class WaysOver:
     def _begin(self, near: float, reach: float) -> tuple[float, FloatArray, FloatArray] | None:
         """Return a state from which an arc may start."""
         speeds, sizes = slice(self._n, self._n + self._m), self.plan.sizes
-        moved = ((one, float(np.max(np.abs(one.y[speeds]) / sizes)) * (near - one.t)) for one in reversed(self._looks))
+        moved = (
+            (one, float(np.max(np.abs(one.y[speeds]) / sizes)) * (near - one.t)) for one in reversed(self._samples)
+        )
         one = next((one for one, move in moved if move >= reach * _REACH), None)
-        if one is None and self._looks[0].t < near:
-            one = self._looks[0]
+        if one is None and self._samples[0].t < near:
+            one = self._samples[0]
         return None if one is None else self._state(one)
 
-    def _state(self, one: Look) -> tuple[float, FloatArray, FloatArray] | None:
+    def _state(self, one: Sample) -> tuple[float, FloatArray, FloatArray] | None:
         """Return a state that fulfils the constraints; None if there is none."""
         q, u = one.y[: self._n], one.y[self._n : self._n + self._m]
         made = project_states(self.plan, np.array([one.t]), q[:, None], u[:, None])
@@ -363,7 +367,7 @@ class WaysOver:
 
     def _between(self, t: FloatArray) -> tuple[FloatArray, FloatArray] | None:
         """Return coordinates and speeds at times, from what the solver gave around them; None beyond that."""
-        looks = self._looks
+        looks = self._samples
         if len(looks) < 2 or not looks[0].t <= t[0]:
             return None
         if t[-1] > looks[-1].t + _BEYOND * (looks[-1].t - looks[-2].t):
@@ -385,5 +389,5 @@ class WaysOver:
         return (
             None
             if loss is None
-            else SingularCrossing(t, loss.rank, *self._said(loss.constraints), Path((*before, arc)), loss.gap)
+            else SingularCrossing(t, loss.rank, *self._labels_of(loss.constraints), Path((*before, arc)), loss.gap)
         )

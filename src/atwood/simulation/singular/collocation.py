@@ -19,7 +19,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.lazy_dataclasses import dataclass
 from atwood.simulation.dynamics.reactions import accelerations_at
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.projection import ProjectedStates, nearly_projected, project_safely, project_states
 
 States: TypeAlias = tuple[FloatArray, FloatArray]
@@ -108,7 +108,7 @@ class Path:
 
 
 def find_arc(
-    plan: Plan,
+    plan: SceneProblem,
     t: float,
     q: FloatArray,
     u: FloatArray,
@@ -143,7 +143,7 @@ _REACH = legendre.legvander(legendre.leggauss(_POINTS)[0], _POINTS)
 
 
 def _settle(
-    plan: Plan,
+    plan: SceneProblem,
     begin: tuple[float, FloatArray, FloatArray],
     end: float,
     times: FloatArray,
@@ -158,7 +158,7 @@ def _settle(
     last, sizes, balance = np.inf, [], plan.columns(plan.balance.program.program)
     places, speeds = guess
     for _ in range(_SWEEPS):
-        held = _held(plan, times, places, speeds, is_far)
+        held = _projected(plan, times, places, speeds, is_far)
         state = times, held.coordinates, held.speeds
         accelerations = accelerations_at(plan.assembly, plan.assembly.form, *state, kept, balance)
         turned = half * (integral @ accelerations.T)
@@ -183,7 +183,7 @@ def _settle(
     return None
 
 
-def _held(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray, is_far: bool) -> ProjectedStates:
+def _projected(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray, is_far: bool) -> ProjectedStates:
     """Return states near the constraints, or at first far from them, that are projected onto these."""
     if not plan.balance.constraints:
         return ProjectedStates(q, u, lambda speeds: speeds)
@@ -197,7 +197,7 @@ def _held(plan: Plan, t: FloatArray, q: FloatArray, u: FloatArray, is_far: bool)
     return ProjectedStates(q, u, lambda speeds: speeds)
 
 
-def _size(plan: Plan, q: FloatArray, u: FloatArray) -> float:
+def _size(plan: SceneProblem, q: FloatArray, u: FloatArray) -> float:
     """Return the size of a difference of states, relative to the scene's sizes."""
     places = np.max(np.abs(q) / plan.coordinate_sizes[:, None], initial=0.0)
     return float(max(places, np.max(np.abs(u) * plan.scales.time / plan.sizes[:, None], initial=0.0)))
@@ -214,7 +214,7 @@ _NOISE, _LOUDEST = 1e-13, 2e-7
 
 
 def follow(
-    plan: Plan,
+    plan: SceneProblem,
     state: tuple[float, FloatArray, FloatArray],
     end: float,
     tolerance: float,

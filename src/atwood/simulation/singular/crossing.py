@@ -29,7 +29,7 @@ from atwood.mechanics.dynamics.equations import Constraint
 from atwood.numerics.matrices import scaled, to_array
 from atwood.numerics.rank import decompose, lost_rank, rank, singular_values
 from atwood.simulation.events.modes import EventProbe
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.projection import ConstraintsAt, constraints_at
 from atwood.simulation.singular.collocation import Arc
 from atwood.tolerances import tolerances
@@ -125,7 +125,7 @@ def stuck_at(constraint: Constraint, t: float, message: str) -> SolveError:
     )
 
 
-def events_on(path: Path, plan: Plan, probe: EventProbe) -> Root | None:
+def events_on(path: Path, plan: SceneProblem, probe: EventProbe) -> Root | None:
     """Return the first event on a path; None if there is none."""
     if not probe.event_functions:
         return None
@@ -152,7 +152,7 @@ _LEAST = 1e-7
 """At tighter tolerances the same; rank is judged to be lost within 1e-5."""
 
 
-def is_slow(plan: Plan, arc: Arc, t: float, fastest: float, tolerance: float) -> bool:
+def is_slow(plan: SceneProblem, arc: Arc, t: float, fastest: float, tolerance: float) -> bool:
     """Return whether a motion has so little energy at a time that errors could have it turn back."""
     here, *ends = np.max(np.abs(arc.at(np.array([t, arc.start, arc.end]))[1]) / plan.sizes[:, None], axis=0).tolist()
     return bool(here**2 < max(_ENERGIES * tolerance, _LEAST) * max(fastest, *ends) ** 2)
@@ -170,7 +170,9 @@ def slowest(t: FloatArray, speeds: FloatArray, sizes: FloatArray) -> float | Non
     return float(t[least] + share * (t[1] - t[0]))
 
 
-def rests_at(plan: Plan, measure: RankMeasure, arc: Arc, far: float, fastest: float, tolerance: float) -> float | None:
+def rests_at(
+    plan: SceneProblem, measure: RankMeasure, arc: Arc, far: float, fastest: float, tolerance: float
+) -> float | None:
     """Return when an arc comes to rest so close to a singular position that errors decide what follows, or None."""
     times = np.linspace(arc.start, arc.end, 65)
     rest = slowest(times, arc.at(times)[1], plan.sizes)
@@ -222,7 +224,7 @@ class RankMeasure:
         The scene in its mode.
     """
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: SceneProblem) -> None:
         self.plan = plan
         self.rows = np.zeros(plan.balance.constraints)
 

@@ -13,9 +13,16 @@ import time
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.integrators.protocol import Lookout, Status, StepResult
-from atwood.simulation.problem.problem import Plan
-from atwood.simulation.singular.branches import Look, WaysOver, as_lookout, compiled_looks, going_on, stride_from
+from atwood.integrators.protocol import Status, StepMonitor, StepResult
+from atwood.simulation.problem.problem import SceneProblem
+from atwood.simulation.singular.branches import (
+    Branches,
+    Sample,
+    as_step_monitor,
+    compiled_monitor,
+    going_on,
+    stride_from,
+)
 from atwood.simulation.singular.crossing import SingularCrossing, zero_ahead
 from atwood.tolerances import tolerances
 
@@ -40,7 +47,7 @@ _AROUND = (-2.0, -1.0, 1.0, 2.0)
 
 
 def singularity_monitor_of(
-    plan: Plan, tolerance: float, end: float, step_result: StepResult
+    plan: SceneProblem, tolerance: float, end: float, step_result: StepResult
 ) -> SingularityMonitor | None:
     """Return what looks out for singular positions; None where there can be none: without loops.
 
@@ -51,7 +58,7 @@ def singularity_monitor_of(
     return SingularityMonitor(plan, tolerance, end, step_result)
 
 
-class SingularityMonitor(WaysOver):
+class SingularityMonitor(Branches):
     """Looks out for singular positions while a scene runs.
 
     When it looks depends on the motion alone, so that outputs change nothing. Where a session can do so it looks by
@@ -74,19 +81,19 @@ class SingularityMonitor(WaysOver):
         Time spent.
     agreed
         Crossings that the solver made by itself, and well; whoever takes them into a record empties the list.
-    lookout
+    step_monitor
         What a session may look with; None where nothing can be compiled.
     next
         When somebody should look next, s; infinite where a session does.
     """
 
-    def __init__(self, plan: Plan, tolerance: float, end: float, step_result: StepResult) -> None:
+    def __init__(self, plan: SceneProblem, tolerance: float, end: float, step_result: StepResult) -> None:
         super().__init__(plan, tolerance, end - step_result.t)
         self.seconds = 0.0
         self.agreed: list[SingularCrossing] = []
         self._away: list[float] = []
         self._judged = -np.inf
-        self._compiled = compiled_looks(plan, self._whole, len(step_result.y))
+        self._compiled = compiled_monitor(plan, self._whole, len(step_result.y))
         if self._compiled is not None:
             errors = plan.balance.errors.near(step_result.t, step_result.y[: self._n], plan.sizes)
             self._compiled.rows[:] = tolerances.TRUSTED * errors
@@ -96,12 +103,12 @@ class SingularityMonitor(WaysOver):
         self._begin_looks()
 
     @property
-    def lookout(self) -> Lookout | None:
+    def step_monitor(self) -> StepMonitor | None:
         """See the attributes."""
-        return None if self._compiled is None else as_lookout(self._compiled)
+        return None if self._compiled is None else as_step_monitor(self._compiled)
 
     def look_in_python(self) -> None:
-        """Look step by step, since the session cannot."""
+        """Sample step by step, since the session cannot."""
         if self._compiled is not None:
             self._compiled = None
             self._begin_looks()
@@ -112,7 +119,7 @@ class SingularityMonitor(WaysOver):
         self._begin_looks()
 
     def _begin_looks(self) -> None:
-        self._looks, self._away = [], []
+        self._samples, self._away = [], []
         self._judged = -np.inf
         self.trouble = None
         if self._compiled is None:
@@ -129,7 +136,7 @@ class SingularityMonitor(WaysOver):
     def _look_around(self) -> None:
         """See how independent constraints are around the start, which may be near a singular position itself."""
         assert self._compiled is not None
-        here = Look(self._start.t, self._start.y, self._start.yp)
+        here = Sample(self._start.t, self._start.y, self._start.yp)
         stride = stride_from(self.plan, here, np.inf)
         if not np.isfinite(stride):
             return
@@ -142,10 +149,10 @@ class SingularityMonitor(WaysOver):
 
     def note(self, step_result: StepResult) -> None:
         """Take up a state, and decide when to look again."""
-        if self._looks and step_result.t <= self._looks[-1].t:
+        if self._samples and step_result.t <= self._samples[-1].t:
             return
-        one = Look(step_result.t, step_result.y, step_result.yp)
-        self._looks.append(one)
+        one = Sample(step_result.t, step_result.y, step_result.yp)
+        self._samples.append(one)
         self.next = step_result.t + stride_from(self.plan, one, self._whole)
 
     def look(self, step_result: StepResult, between: bool, at_end: bool) -> SingularCrossing | None:
@@ -174,13 +181,13 @@ class SingularityMonitor(WaysOver):
         compiled = self._compiled
         if compiled is None:
             self.note(step_result)
-            return at_end or ended or len(self._looks) - len(self._away) >= _REVIEW
+            return at_end or ended or len(self._samples) - len(self._away) >= _REVIEW
         if at_end or ended:
             compiled.note(step_result.t, step_result.y, step_result.yp)
         compiled.settle()
         if not compiled.has_seen_low and not ended:
             return False
-        self._looks, self._away = [Look(*one) for one in compiled.take()], []
+        self._samples, self._away = [Sample(*one) for one in compiled.take()], []
         t, q = compiled.best
         self._largest = max(self._largest, float(self._measures.learn(np.array([t]), q[:, None])[0]))
         return True
@@ -190,7 +197,7 @@ class SingularityMonitor(WaysOver):
         if not self._starts_low:
             return None
         self._starts_low = False
-        self._looks = [Look(self._start.t, self._start.y, self._start.yp)]
+        self._samples = [Sample(self._start.t, self._start.y, self._start.yp)]
         self._away = []
         self._measure()
         return self._coming(self._start.t)
@@ -204,7 +211,7 @@ class SingularityMonitor(WaysOver):
 
         Solvers take ever shorter steps close to one, and a small error there can lead to another way to move.
         """
-        last = self._looks[-1]
+        last = self._samples[-1]
         stride = stride_from(self.plan, last, np.inf)
         if not (self._away[-1] > 0.0 and stride < np.inf):
             return None
@@ -218,7 +225,7 @@ class SingularityMonitor(WaysOver):
 
     def _ahead(self) -> SingularCrossing | None:
         """Return the singular position towards which the motion was going when a solver failed; None if to none."""
-        times, away = [one.t for one in self._looks], self._away
+        times, away = [one.t for one in self._samples], self._away
         for last in (len(away) - 1, len(away) - 2):
             if last < 1 or not 0.0 <= away[last] < away[last - 1]:
                 continue
@@ -230,7 +237,7 @@ class SingularityMonitor(WaysOver):
         return None
 
     def _measure(self) -> None:
-        if new := self._looks[len(self._away) :]:
+        if new := self._samples[len(self._away) :]:
             t = np.array([one.t for one in new])
             q = np.stack([one.y[: self._n] for one in new], axis=1)
             self._away += self._measures.learn(t, q).tolist()
@@ -238,14 +245,14 @@ class SingularityMonitor(WaysOver):
 
     def _forget(self) -> None:
         """Drop looks that are not needed any more."""
-        cut = len(self._looks) - 6
+        cut = len(self._samples) - 6
         if cut > 0:
-            del self._looks[:cut], self._away[:cut]
+            del self._samples[:cut], self._away[:cut]
 
     def _first_minimum(self, at_end: bool, failed: bool) -> SingularCrossing | None:
         away = self._away
         for i in range(len(away) if at_end else len(away) - 1):
-            t = self._looks[i].t
+            t = self._samples[i].t
             if t <= self._judged:
                 continue
             self._judged = t
@@ -275,7 +282,7 @@ class SingularityMonitor(WaysOver):
 
         Where the solver has leapt into another way to move, what comes behind says nothing about the place.
         """
-        away, times = self._away, [one.t for one in self._looks]
+        away, times = self._away, [one.t for one in self._samples]
         for last in (i, i - 1):
             if last >= 1 and away[last] < away[last - 1]:
                 step = times[last] - times[last - 1]

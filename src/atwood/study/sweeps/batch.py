@@ -1,6 +1,6 @@
 """Smooth scenes many runs at a time: starts, tolerances and quantities as arrays, steps in machine code.
 
-What a run does before its first step (`find_start`, `make_plan`, tolerances) is done here for all runs of a piece at
+What a run does before its first step (`find_start`, `make_problem`, tolerances) is done here for all runs of a piece at
 once. What needs more than that - a start that is no list of coordinates, a failure, a run that turns out stiff - is
 done as for a run by itself.
 """

@@ -183,8 +183,8 @@ class StartRows:
         columns = {axis.path: request.cases.column(k) for k, axis in enumerate(request.cases.axes) if axis.is_start}
         self._columns = columns
         positions, speeds = sort_targets(assembly, equations)
-        self._positions = self._said(positions, equations.coordinates)
-        self._speeds = self._said(speeds, equations.speeds)
+        self._positions = self._start_values(positions, equations.coordinates)
+        self._speeds = self._start_values(speeds, equations.speeds)
         fixed = [one.observable.value for one in positions.fixed]
         is_simple = len(self._positions) == len(positions.fixed) + len(positions.guessed) and len(set(fixed)) == len(
             fixed
@@ -202,8 +202,8 @@ class StartRows:
         self._conditions: tuple[_Conditions, _Conditions | None] | None = None
         if self.is_direct:
             has_loops = bool(equations.constraints)
-            places = self._found(equations, positions, False) if has_loops else None
-            self._conditions = self._found(equations, speeds, True), places
+            places = self._conditions_of(equations, positions, False) if has_loops else None
+            self._conditions = self._conditions_of(equations, speeds, True), places
         flat = assembly.flat
         self._lengths = [
             columns.get(path, value) - origin_part(assembly, assembly.start_observables[path])
@@ -211,13 +211,13 @@ class StartRows:
             if assembly.start_observables[path].unit == "m"
         ]
 
-    def _found(self, equations: Equations, level: Level, of_speeds: bool) -> _Conditions:
+    def _conditions_of(self, equations: Equations, level: Level, of_speeds: bool) -> _Conditions:
         """Return the conditions on places or on speeds, and what each is to be."""
         made = start_conditions(self._request.assembly, equations, level.fixed, True, of_speeds)
         held: list[FloatArray | float] = [0.0] * (made.shape[0] - len(level.fixed))
         return _Conditions(made, (*held, *(self._columns.get(one.path, one.value) for one in level.fixed)))
 
-    def _said(self, level: Level, unknowns: Sequence[Expression]) -> list[tuple[int, FloatArray | float]]:
+    def _start_values(self, level: Level, unknowns: Sequence[Expression]) -> list[tuple[int, FloatArray | float]]:
         """Return what is said of unknowns themselves: their numbers and values."""
         found: list[tuple[int, FloatArray | float]] = []
         for is_fixed, targets in ((False, level.guessed), (True, level.fixed)):

@@ -23,7 +23,7 @@ from atwood.simulation.dynamics.orientation_coordinates import COORDINATE_SWITCH
 from atwood.simulation.dynamics.scales import size_of, total_masses
 from atwood.simulation.events.modes import MARGIN, EventProbe, EventRecord, margins_at_start, without_margin
 from atwood.simulation.problem.explicit_scene import own_rates
-from atwood.simulation.problem.preparation import make_plan
+from atwood.simulation.problem.preparation import make_problem
 from atwood.simulation.run.choice import choose
 from atwood.study.sweeps.motions import Motion, task_of
 from atwood.study.sweeps.runs import SweepRequest
@@ -160,7 +160,7 @@ def find_mode(
         return None, "its laws compare what moves"
     t, q, u, length = at
     try:
-        plan = make_plan(assembly, t, q, u, length, options.t_end - base.flat.t_start)
+        plan = make_problem(assembly, t, q, u, length, options.t_end - base.flat.t_start)
         chosen = choose(plan, options, t, q, u).method
         probe = EventProbe(plan, t, q, u, options.relative_tolerance)
     except AtwoodError:

@@ -30,7 +30,7 @@ from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.closed_loops import ManyBranches, Solved, solve_at
 from atwood.simulation.problem.explicit_scene import compiled_rates, explicit_problem, explicit_problem_of
 from atwood.simulation.problem.options import RunOptions
-from atwood.simulation.problem.preparation import make_plan
+from atwood.simulation.problem.preparation import make_problem
 from atwood.simulation.problem.step_guard import step_guard
 from atwood.simulation.problem.taylor_scene import taylor_problem
 from atwood.simulation.run.choice import can_be_stiff, choose, find_stiff_rows
@@ -168,7 +168,7 @@ def find_way(request: SweepRequest) -> tuple[Way | None, str]:
     try:
         start = find_start(assembly)
         q, u = start.coordinates, start.speeds
-        plan = make_plan(assembly, start.time, q, u, start.length, options.t_end - start.time)
+        plan = make_problem(assembly, start.time, q, u, start.length, options.t_end - start.time)
         chosen = choose(plan, options, start.time, q, u).method
     except AtwoodError:
         return None, "the first run cannot start"
@@ -251,7 +251,7 @@ def make_ready(
     lengths: FloatArray,
     options: RunOptions,
 ) -> tuple[FloatArray, FloatArray | None, FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Return what `make_plan` and `choose` find out about one run before its first step, for many.
+    """Return what `make_problem` and `choose` find out about one run before its first step, for many.
 
     That is what is integrated, the values of its parameters, in what time something happens, absolute tolerances, and
     which of the runs can be made many at a time.
@@ -293,7 +293,7 @@ def time_scales(
 
 
 def absolute_tolerances(assembly: Assembly, lengths: FloatArray, time: FloatArray, relative: float) -> FloatArray:
-    """Return the absolute tolerances of coordinates and speeds of each run, as `Plan.tolerances` has them."""
+    """Return the absolute tolerances of coordinates and speeds of each run, as `SceneProblem.tolerances` has them."""
     share, equations = min(relative, LOOSEST), assembly.reduced
     sizes = coordinate_scales(equations, lengths), motion_scales(equations, lengths) / time[:, None]
     return np.concatenate([share * one for one in sizes], axis=1)
@@ -302,7 +302,7 @@ def absolute_tolerances(assembly: Assembly, lengths: FloatArray, time: FloatArra
 def have_inertia(
     motion: Motion, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None, lengths: FloatArray
 ) -> NDArray[np.bool_]:
-    """Return where nothing can move without inertia, by the measure of `make_plan`; see `time_scales`."""
+    """Return where nothing can move without inertia, by the measure of `make_problem`; see `time_scales`."""
     mass = _masses(with_rows(motion.assembly, values), t, q.T, u.T)
     directions = motion.open_directions(t, q.T, u.T, values)
     if directions is None:

@@ -25,7 +25,7 @@ from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.arguments import T_END, check_span
 from atwood.simulation.problem.explicit_scene import explicit_problem
 from atwood.simulation.problem.options import RunOptions
-from atwood.simulation.problem.preparation import make_plan
+from atwood.simulation.problem.preparation import make_problem
 from atwood.simulation.run.run import run
 from atwood.theory.action.integral import Action, action_of_run
 
@@ -291,7 +291,7 @@ class Shooter:
         self.place, self.begin, self.end, self.size = place, begin, end, len(place)
         self.names = tuple(one.name for one in assembly.own_equations.names)
         still = np.zeros(self.size)
-        plan = make_plan(assembly, begin, place, still, length, end - begin)
+        plan = make_problem(assembly, begin, place, still, length, end - begin)
         self.sizes, self.time = plan.coordinate_sizes, plan.scales.time
         both = np.concatenate([self.sizes, self.sizes / self.time])
         options = SolverOptions(_RELATIVE, _ABSOLUTE * both, horizon=end - begin)

@@ -12,7 +12,7 @@ from atwood.codegen.python.backend import BoundKernel
 from atwood.codegen.sundials.step_monitor import slope_lists
 from atwood.integrators.ida import library as sundials_library
 from atwood.numerics.matrices import to_array
-from atwood.simulation.singular.branches import Look
+from atwood.simulation.singular.branches import Sample
 from atwood.simulation.singular.monitor import SingularityMonitor
 from atwood_library.scenes import Bricard, FourBar, SliderCrank
 
@@ -73,17 +73,17 @@ def test_where_nothing_is_near_nothing_is_asked_in_python(
 def test_compiled_looks_are_those_of_python(
     form: str, guards: list[SingularityMonitor], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    noted: list[Look] = []
+    noted: list[Sample] = []
     note = SingularityMonitor.note
 
     def in_python(self: SingularityMonitor, step_result: Any) -> None:
         note(self, step_result)
-        noted.append(Look(step_result.t, step_result.y, step_result.yp))
+        noted.append(Sample(step_result.t, step_result.y, step_result.yp))
 
     compiled = simulate(fast_slider_crank(), form=form, t_end=0.1, solver="ida")
     looks = guards[0]._compiled.take()
     monkeypatch.setattr(SingularityMonitor, "note", in_python)
-    monkeypatch.setattr(SingularityMonitor, "lookout", property(lambda self: None))
+    monkeypatch.setattr(SingularityMonitor, "step_monitor", property(lambda self: None))
     plain = simulate(fast_slider_crank(), form=form, t_end=0.1, solver="ida")
     assert len(looks) > 5
     for (t, y, yp), one in zip(looks[:-1], noted, strict=False):
