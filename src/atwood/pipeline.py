@@ -129,7 +129,7 @@ def assemble_flat(
     line_signs: LineSigns | None = None,
 ) -> Assembly:
     """Assemble a scene that has been taken apart into leaves."""
-    check_orientation(orientation, form, flat.space)
+    check_orientation(orientation, form, flat.space.name)
     check_level(level, form)
     all_modes = modes_of(flat) | dict(modes or {})
     with stage("mechanism"):

@@ -10,7 +10,6 @@ from atwood.expr import Graph
 from atwood.model.local.bound import ParameterTable
 from atwood.model.local.flatten import flatten
 from atwood.model.local.laws import localize
-from atwood.model.values.space import make_space
 
 from .things import Bob
 
@@ -101,9 +100,9 @@ def make_spring_scene():
 
 
 def localized(scene):
-    graph, flat = Graph(), flatten(scene)
-    table = ParameterTable(graph)
-    return localize(flat, make_space("plane", flat.line_axis), graph.symbol("t"), table, {}, None), table
+    flat = flatten(scene)
+    table = ParameterTable(Graph(), flat.space)
+    return localize(flat, table, {}, None), table
 
 
 def test_a_component_of_twenty_lines():

@@ -175,7 +175,7 @@ def plain(flat: FlatScene) -> dict[str, Any]:
         return write_function(one, "") if callable(one) else one
 
     return {
-        "settings": (flat.space, flat.line_axis, flat.gravity, flat.t_start, flat.t_end),
+        "settings": (flat.space.name, [tuple(one) for one in flat.space.basis], flat.gravity, flat.t_start, flat.t_end),
         "parts": [
             (path, type(part.component), dict(part.values), {k: value(v) for k, v in part.signals.items()})
             for path, part in flat.parts.items()

@@ -314,17 +314,13 @@ def _size(trial: Trial, law: Law) -> float:
 def _localized(trial: Trial, mode: str) -> tuple[LocalPart, dict[Expression, float]]:
     """Return the part on its symbols, and numbers for them."""
     part = Part(trial.part.path, trial.component, trial.part.values, {n: v for n, (v, _) in trial.inputs.items()})
-    line = tuple(trial.space.line) if trial.space.line is not None else (1.0, 0.0, 0.0)
-    flat = FlatScene(
-        "check", trial.space.name, line, 0.0, (0.0, 0.0, -1.0), None, 0.0, 1.0, {part.path: part}, (), {}, {}, {}
-    )
-    graph = Graph()
-    time, table = graph.symbol("t"), ParameterTable(graph, space=trial.space.name)
+    flat = FlatScene("check", trial.space, 0.0, (0.0, 0.0, -1.0), None, 0.0, 1.0, {part.path: part}, (), {}, {}, {})
+    table = ParameterTable(Graph(), trial.space)
     carried: Any = {(part.path, name): body for name, body in trial.bodies.items()}
     line_signs = {(part.path, a, b): side for (a, b), side in trial.line_signs.items()}
     modes = {part.path: mode} if mode else {}
-    local = localize(flat, trial.space, time, table, modes, line_signs, carried)[part.path]
-    numbers: dict[Expression, float] = {**table.values, time: 0.0}
+    local = localize(flat, table, modes, line_signs, carried)[part.path]
+    numbers: dict[Expression, float] = {**table.values, table.time: 0.0}
     for name, one in local.connectors.items():
         pose = trial.poses[name]
         numbers.update(zip(one.position, map(float, trial.space.components(pose.position)), strict=True))

@@ -120,7 +120,7 @@ class Assembly:
     def __repr__(self) -> str:
         flat, mechanism = self.flat, self.mechanism
         form = f"{self.form} form" + (f" ({self.level})" if self.level else "")
-        where = {"line": "on a line", "plane": "in the plane", "space": "in space"}[flat.space]
+        where = {"line": "on a line", "plane": "in the plane", "space": "in space"}[flat.space.name]
         counts = f"{count_of(len(flat.parts), 'part')}, {count_of(len(mechanism.graph.joints), 'joint')}"
         return fitted(f"<Assembly of {flat.name}, {form}: a mechanism {where} of {counts}>")
 

@@ -171,7 +171,7 @@ def _changed_parts(flat: FlatScene, other: FlatScene) -> str:
             return f"{path} is another component"
     if (flat.connections, flat.links, flat.varied) != (other.connections, other.links, other.varied):
         return "it has other connections"
-    if (flat.space, flat.line_axis) != (other.space, other.line_axis):
+    if [tuple(one) for one in flat.space.basis] != [tuple(one) for one in other.space.basis]:
         return "it lives in another space"
     if flat.gravity_direction != other.gravity_direction or flat.gravity_potential != other.gravity_potential:
         return "gravity is another one"

@@ -29,7 +29,7 @@ from atwood.model.local.bound import ParameterTable
 from atwood.model.local.flatten import FlatScene
 from atwood.model.local.laws import localize
 from atwood.model.local.parts import LocalPart
-from atwood.model.values.space import Space, Vector, dot, make_space
+from atwood.model.values.space import Space, Vector, dot
 from atwood.topology.bodies import Bodies, find_bodies
 from atwood.topology.graph import MechanismGraph, build_graph
 
@@ -44,42 +44,30 @@ def read_mechanism(
     origin: Connector | Literal["near"] | None = "near",
 ) -> Mechanism:
     """Read the laws of all parts and find nodes, joints and bodies."""
-    ground = _lay_ground(flat)
-    space = ground.space
+    table, space = _empty_table(flat), flat.space
     check_names(flat.parts)
-    found = _read_laws(flat, modes, ground, known_line_signs)
+    found = _read_laws(flat, modes, table, known_line_signs)
     check_laws(flat.parts, space)
     line_signs = known_line_signs if space.is_line else None
     if space.is_line and not known_line_signs:  # lengths are signed by where their ends are, which bodies say
-        line_signs = _find_line_signs(flat, ground, found)
-        found = _read_laws(flat, modes, ground, line_signs)
+        line_signs = _find_line_signs(flat, table, found)
+        found = _read_laws(flat, modes, table, line_signs)
     carried: Mapping[tuple[str, str], Carried] | None = None
     if any(local.asks for local in found.locals_.values()):  # laws that read the inertia of the body they are on
         carried = inertia_asked_for(found.network, found.bodies, found.locals_, space)
-        found = _read_laws(flat, modes, ground, line_signs, carried)
-    gravity = make_gravity(ground.table, flat.gravity, flat.gravity_direction)
+        found = _read_laws(flat, modes, table, line_signs, carried)
+    gravity = make_gravity(table, flat.gravity, flat.gravity_direction)
     told = None if known_line_signs else line_signs
-    parts = ground.table, ground.time, space, gravity, *found, flat.links, told
-    mechanism = Mechanism(*parts, t_start=flat.t_start)
+    mechanism = Mechanism(table, gravity, *found, flat.links, told, t_start=flat.t_start)
     at = find_origin(mechanism) if origin == "near" else origin
     if at is not None:  # laws are read once more, since they read positions in the world
-        table = replace(ground.table, origin=origin_at(mechanism, at))
-        found = _read_laws(flat, modes, ground._replace(table=table), line_signs, carried)
-        parts = table, ground.time, space, gravity, *found, flat.links, told
-        mechanism = Mechanism(*parts, t_start=flat.t_start, origin=at)
+        table = replace(table, origin=origin_at(mechanism, at))
+        found = _read_laws(flat, modes, table, line_signs, carried)
+        mechanism = Mechanism(table, gravity, *found, flat.links, told, t_start=flat.t_start, origin=at)
     mechanism = decided_near(mechanism)
     check_closures(mechanism)
-    check_tensors(mechanism.locals_, ground.table.values, space)
+    check_tensors(mechanism.locals_, table.values, space)
     return hold_idle_spins(mechanism)
-
-
-class _Ground(NamedTuple):
-    """What laws are written with."""
-
-    time: Expression
-    space: Space
-    table: ParameterTable
-    relations: TimeRelations
 
 
 class _Reading(NamedTuple):
@@ -90,33 +78,33 @@ class _Reading(NamedTuple):
     bodies: Bodies
 
 
-def _lay_ground(flat: FlatScene) -> _Ground:
-    graph = Graph()
-    time = graph.symbol("t")
-    graph.relations = relations = TimeRelations(time)
-    space = make_space(flat.space, flat.line_axis)
-    return _Ground(time, space, ParameterTable(graph, space=space.name), relations)
+def _empty_table(flat: FlatScene) -> ParameterTable:
+    """Return a table without parameters, on a graph that notes relations of time."""
+    table = ParameterTable(Graph(), flat.space)
+    table.graph.relations = TimeRelations(table.time)
+    return table
 
 
 def _read_laws(
     flat: FlatScene,
     modes: Mapping[str, str],
-    ground: _Ground,
+    table: ParameterTable,
     line_signs: LineSigns | None = None,
     carried: Mapping[tuple[str, str], Carried] | None = None,
 ) -> _Reading:
     """Read all laws, with the signs of lengths and the inertia that they may ask for."""
-    with ground.relations.reading():
-        locals_ = localize(flat, ground.space, ground.time, ground.table, modes, line_signs, carried)
+    assert table.graph.relations is not None
+    with table.graph.relations.reading():
+        locals_ = localize(flat, table, modes, line_signs, carried)
     network = build_graph(flat, locals_)
     return _Reading(locals_, network, find_bodies(network, locals_))
 
 
-def _find_line_signs(flat: FlatScene, ground: _Ground, found: _Reading) -> LineSigns:
+def _find_line_signs(flat: FlatScene, table: ParameterTable, found: _Reading) -> LineSigns:
     """Return the signs of lengths on a line, as far as start values tell."""
     locals_, network, bodies = found
-    offsets = {body.index: body_offsets(body, ground.space)[0] for body in bodies.bodies}
-    return find_line_signs(flat, network, bodies, locals_, offsets, ground.table.values, ground.space)
+    offsets = {body.index: body_offsets(body, table.space)[0] for body in bodies.bodies}
+    return find_line_signs(flat, network, bodies, locals_, offsets, table.values, table.space)
 
 
 def find_line_signs(

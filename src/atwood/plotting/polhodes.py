@@ -103,7 +103,7 @@ def plot_polhodes(result: Result, body: str | None = None, file: str | os.PathLi
 def _principal(result: Result, body: str | None) -> tuple[str, FloatArray, FloatArray]:
     """Return a body's part, its principal axes as columns in the axes of the part's frame, and its moments."""
     where = result.assembly.flat.name
-    if result.assembly.flat.space != "space":
+    if result.assembly.flat.space.name != "space":
         raise UsageError("polhodes are of motions in space", where=where)
     lumps = [one for one in read_scene(result).lumps if np.any(one.tensor)]
     known = [one.part for one in lumps if f"{one.part}.spin.x" in result]

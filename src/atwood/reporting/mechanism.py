@@ -221,7 +221,7 @@ def report(scene: Model | Assembly, name: str | None = None, *, orientation: str
     idle = tuple(reduced.mechanism.bodies.bodies[index].name for index in reduced.mechanism.idle_spins)
     return MechanismReport(
         scene=given.flat.name,
-        space=given.flat.space,
+        space=given.flat.space.name,
         gravity=given.flat.gravity,
         degrees_of_freedom=len(reduced.reduced.speeds) - plans["reduced"].finding.rank,
         coordinates=tuple(names),

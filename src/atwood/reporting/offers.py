@@ -19,7 +19,7 @@ from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.kinematics.mechanism import world_position
 from atwood.mechanics.kinematics.orientation import node_axes, spin_in_world
 from atwood.model.local.flatten import FlatScene
-from atwood.model.values.space import Vector
+from atwood.model.values.space import Vector, make_space
 from atwood.numerics.matrices import scaled
 from atwood.numerics.rank import independent_rows
 from atwood.pipeline import assemble_flat
@@ -126,11 +126,10 @@ def _assemble_there(
 ) -> tuple[Assembly, dict[str, tuple[int, dict[str, int]]]]:
     """Return the scene in a plane or on a line, and of each form its states and operations."""
     flat = assembly.flat
-    axis = found.direction if found.space == "line" else np.array(flat.line_axis)
+    x, y, z = map(float, found.direction)
     there = replace(
         flat,
-        space=found.space,
-        line_axis=(float(axis[0]), float(axis[1]), float(axis[2])),
+        space=make_space(found.space, (x, y, z)),
         start={},
         guess=_carried(assembly, start) if found.space == "line" else {},
     )

@@ -72,10 +72,6 @@ class Mechanism:
     ----------
     table
         The parameters.
-    time
-        The symbol of time.
-    space
-        What the scene lives in.
     gravity
         Acceleration of free fall, m/s^2, a symbol or zero.
     locals_, graph, bodies
@@ -100,8 +96,6 @@ class Mechanism:
     """
 
     table: ParameterTable
-    time: Expression
-    space: Space
     gravity: Vector
     locals_: Mapping[str, LocalPart]
     graph: MechanismGraph
@@ -114,6 +108,16 @@ class Mechanism:
     t_start: float = 0.0
     idle_spins: Mapping[int, Vector] = field(default_factory=dict)
     origin: Connector | None = None
+
+    @property
+    def time(self) -> Expression:
+        """The symbol of time."""
+        return self.table.time
+
+    @property
+    def space(self) -> Space:
+        """What the scene lives in."""
+        return self.table.space
 
     def known_at_start(self) -> dict[Expression, float]:
         """Return the values of parameters, of discrete states, of time and of relations of it at the start of a run."""

@@ -24,7 +24,7 @@ from atwood.model.local.parts import (
     LocalPart,
     state_values,
 )
-from atwood.model.values.space import FIXED_AXES, Space, Vector, make_space, planar_axes
+from atwood.model.values.space import FIXED_AXES, Space, Vector, planar_axes
 
 
 @dataclass(frozen=True)
@@ -40,20 +40,18 @@ class BoundPart:
 def bind_part(
     part: Part,
     flat: FlatScene,
-    space: Space,
-    time: Expression,
     table: ParameterTable,
     line_signs: Mapping[tuple[str, str, str], float] | None,
     taken: Sequence[tuple[JointCoordinateUse, LocalPart]],
 ) -> BoundPart:
     """Return the symbols of a part, and the numbers of its parameters."""
-    graph, component = table.graph, part.component
+    graph, space, component = table.graph, table.space, part.component
     values = {name: read_parameter(part, spec, table) for name, spec in component.parameter_specs().items()}
     signal_symbols: dict[str, Expression] = {}
     for name, given in part.signals.items():
-        value = read_signal(part, name, given, flat, time, table, signal_symbols)
+        value = read_signal(part, name, given, flat, table, signal_symbols)
         is_varied = (part.path, name) in flat.varied
-        values[name] = value + read_variation(f"{part.path}.{name}", flat, time, table) if is_varied else value
+        values[name] = value + read_variation(f"{part.path}.{name}", flat, table) if is_varied else value
     values |= state_values(part, graph)
     connectors = {
         name: _local_connector(f"{part.path}.{name}", isinstance(one, Frame), space, graph)
@@ -67,7 +65,7 @@ def bind_part(
         None if line_signs is None else {(a, b): s for (path, a, b), s in line_signs.items() if path == part.path}
     )
     binding = Binding(
-        values=values, motions=motions, time=time, space=space.name, line=space.line, line_signs=own_line_signs
+        values=values, motions=motions, time=table.time, space=space.name, line=space.line, line_signs=own_line_signs
     )
     for one in joint_references:
         connectors.update(one.connectors)
@@ -118,17 +116,24 @@ class ParameterTable:
 
     Attributes
     ----------
-    graph, values, space
-        Where expressions live, the values of the parameters, and what the scene lives in.
+    graph, space
+        Where expressions live, and what the scene lives in.
+    values
+        The values of the parameters.
     origin
         Place in the world, along the free components of the space, from which positions are counted; empty for the
         world's own origin.
     """
 
     graph: Graph
+    space: Space
     values: dict[Expression, float] = field(default_factory=dict)
-    space: str = "plane"
     origin: tuple[Expression, ...] = ()
+
+    @property
+    def time(self) -> Expression:
+        """The symbol of time."""
+        return self.graph.symbol("t")
 
     def scalar(self, name: str, value: float, structural: bool = False) -> Scalar:
         """Return the symbol of a parameter, or the plain number if it shapes the program (exact zero, structural)."""
@@ -146,10 +151,10 @@ def read_parameter(part: Part, spec: ParameterSpec, table: ParameterTable) -> An
         return _with_symbols(value, name, table)
     if value is None or spec.integer or spec.choices or spec.text or spec.function_of or spec.array:
         return value
-    if spec.turning and table.space == "plane" and (value[0] != 0.0 or value[2] != 0.0):
+    if spec.turning and table.space.is_planar and (value[0] != 0.0 or value[2] != 0.0):
         advice = "Leave its x and z components zero: (0, -1, 0) turns counter-clockwise."
         raise ParameterError("in a plane things turn about its normal only", where=name, advice=advice)
-    if spec.direction and not spec.turning and table.space == "plane" and value[1] != 0.0:
+    if spec.direction and not spec.turning and table.space.is_planar and value[1] != 0.0:
         raise ParameterError("it points out of the plane", where=name, advice="Leave its y component zero.")
     if spec.size is None:
         return table.scalar(name, value, spec.structural)
@@ -168,7 +173,6 @@ def read_signal(
     name: str,
     given: Any,
     flat: FlatScene,
-    time: Expression,
     table: ParameterTable,
     signal_symbols: dict[str, Expression],
 ) -> Scalar:
@@ -177,14 +181,14 @@ def read_signal(
     if (part.path, name) in flat.links:
         source, observable = flat.links[part.path, name]
         if _is_source(flat.parts[source], flat):
-            return _source_value(flat.parts[source], observable, flat, time, table)
+            return _source_value(flat.parts[source], observable, flat, table)
         signal_symbols[name] = table.graph.symbol(f"{path}()")
         return signal_symbols[name]
     if not callable(given):
         return table.scalar(path, given)
     try:
         function = _with_symbols(given, path, table) if isinstance(given, Function) else given
-        return table.graph.convert(function(time))
+        return table.graph.convert(function(table.time))
     except (TypeError, AtwoodError) as error:
         raise DeclarationError(
             f"this function of time cannot be evaluated on an expression ({error})",
@@ -193,11 +197,11 @@ def read_signal(
         ) from error
 
 
-def read_variation(path: str, flat: FlatScene, time: Expression, table: ParameterTable) -> Scalar:
+def read_variation(path: str, flat: FlatScene, table: ParameterTable) -> Scalar:
     """Return the variation of an input; see `FlatScene.varied`."""
     value, rate, second = (table.graph.parameter(name) for name in variation_names(path))
     table.values.update(dict.fromkeys((value, rate, second), 0.0))
-    passed = time - flat.t_start
+    passed = table.time - flat.t_start
     return value + passed * (rate + 0.5 * (passed * second))
 
 
@@ -214,12 +218,12 @@ def _is_source(part: Part, flat: FlatScene) -> bool:
     return not own.connectors() and not moves and not is_linked
 
 
-def _source_value(source: Part, observable: str, flat: FlatScene, time: Expression, table: ParameterTable) -> Scalar:
+def _source_value(source: Part, observable: str, flat: FlatScene, table: ParameterTable) -> Scalar:
     """Return the output of a part that depends on time and parameters alone."""
     from atwood.model.local.laws import output_value  # few scenes have links
 
     values = {name: read_parameter(source, spec, table) for name, spec in source.component.parameter_specs().items()}
-    values |= {name: read_signal(source, name, given, flat, time, table, {}) for name, given in source.signals.items()}
+    values |= {name: read_signal(source, name, given, flat, table, {}) for name, given in source.signals.items()}
     values |= state_values(source, table.graph)
-    bound = bind(source.component, Binding(values=values, time=time))
-    return table.graph.convert(output_value(source, bound, observable, make_space(flat.space, flat.line_axis)))
+    bound = bind(source.component, Binding(values=values, time=table.time))
+    return table.graph.convert(output_value(source, bound, observable, table.space))

@@ -20,6 +20,7 @@ from atwood.model.declare.connectors import InputRef, OutputRef
 from atwood.model.declare.fields import LARGEST_ANGLE, FieldReference, too_large_an_angle
 from atwood.model.declare.function_values import Function
 from atwood.model.declare.parameter_expressions import ParameterExpression
+from atwood.model.values.space import Space, make_space
 from atwood.model.values.units import Unit, parse_quantity, parse_si_unit, parse_unit, split_quantity, unit_of
 
 
@@ -54,9 +55,7 @@ class FlatScene:
     name
         Name of the scene.
     space
-        ``"line"``, ``"plane"`` or ``"space"``.
-    line_axis
-        Unit vector of the line.
+        What it lives in: a line, a plane or space.
     gravity
         Acceleration of free fall, m/s^2.
     gravity_direction
@@ -82,8 +81,7 @@ class FlatScene:
     """
 
     name: str
-    space: str
-    line_axis: tuple[float, float, float]
+    space: Space
     gravity: float
     gravity_direction: tuple[float, float, float]
     gravity_potential: Function | None
@@ -118,8 +116,7 @@ def flatten(scene: Model, name: str | None = None) -> FlatScene:
     settings = scene if isinstance(scene, Scene) else Scene()
     return FlatScene(
         name=name or title(scene),
-        space=settings.space,
-        line_axis=_unit_vector(settings.line_axis),
+        space=make_space(settings.space, _unit_vector(settings.line_axis)),
         gravity=settings.gravity,
         gravity_direction=settings.gravity_direction,
         gravity_potential=settings.gravity_potential,

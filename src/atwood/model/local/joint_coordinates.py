@@ -157,8 +157,8 @@ def find_joint_coordinate_uses(flat: FlatScene) -> dict[str, tuple[JointCoordina
                 where=joint,
                 advice=suggestion(coordinate, laws) or f"Give it an @observable of the name {coordinate!r}.",
             )
-        if not laws[coordinate].holds_in(flat.space):
-            raise UnsupportedError(f"{WHERE[flat.space]} the joint {joint} has no {coordinate}", where=full)
+        if not laws[coordinate].holds_in(flat.space.name):
+            raise UnsupportedError(f"{WHERE[flat.space.name]} the joint {joint} has no {coordinate}", where=full)
         if joint in found:
             raise DeclarationError("a part that takes hold of joints cannot be one", where=joint)
         found[path].append(JointCoordinateUse(name, joint, coordinate))

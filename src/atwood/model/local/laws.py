@@ -55,8 +55,6 @@ from atwood.model.values.space import WHERE, Space, Vector
 
 def localize(
     flat: FlatScene,
-    space: Space,
-    time: Expression,
     table: ParameterTable,
     modes: Mapping[str, str],
     line_signs: Mapping[tuple[str, str, str], float] | None,
@@ -64,7 +62,7 @@ def localize(
 ) -> dict[str, LocalPart]:
     """Evaluate the laws of every part on its local symbols."""
     for path, part in flat.parts.items():
-        _check_space(path, part, space.name)
+        _check_space(path, part, table.space.name)
     used = find_joint_coordinate_uses(flat)
     counted: dict[str, set[str]] = {}
     for one in (one for several in used.values() for one in several):
@@ -73,7 +71,7 @@ def localize(
     for path in sorted(flat.parts, key=lambda path: path in used):  # joints before what takes hold of them
         taken = [(one, found[one.joint]) for one in used.get(path, ())]
         part, own = flat.parts[path], counted.get(path, ())
-        found[path] = _localize_part(part, flat, space, time, table, modes, line_signs, taken, own, carried or {})
+        found[path] = _localize_part(part, flat, table, modes, line_signs, taken, own, carried or {})
     return {path: found[path] for path in flat.parts}
 
 
@@ -116,8 +114,6 @@ class _Laws:
 def _localize_part(
     part: Part,
     flat: FlatScene,
-    space: Space,
-    time: Expression,
     table: ParameterTable,
     modes: Mapping[str, str],
     line_signs: Mapping[tuple[str, str, str], float] | None,
@@ -125,8 +121,8 @@ def _localize_part(
     counted: Collection[str],
     carried: Mapping[tuple[str, str], Carried],
 ) -> LocalPart:
-    graph, component = table.graph, part.component
-    symbols = bind_part(part, flat, space, time, table, line_signs, taken)
+    graph, space, component = table.graph, table.space, part.component
+    symbols = bind_part(part, flat, table, line_signs, taken)
     binding, connectors = symbols.binding, symbols.connectors
     bound = bind(component, binding)  # inertia and joints say what bodies there are, and may not ask what these have
     binding = _with_bodies(binding, part.path, carried, graph)
@@ -136,7 +132,7 @@ def _localize_part(
     potentials, switched = laws.scalars(acting, "potential"), laws.scalars(acting, "potential", only_in_modes=True)
     constraints = [one for law in laws.of("constraint") for one in _local_constraints(part, law, acting, graph)]
     inertias, lagrangians = laws.listed(bound, "inertia"), laws.scalars(acting, "lagrangian")
-    potentials += energies_in(flat.gravity_potential, inertias, time, graph)
+    potentials += energies_in(flat.gravity_potential, inertias, table.time, graph)
     check_lagrangians(part.path, lagrangians, own, linked)
     joints = tuple(_local_joint(part, law, bound, graph, connectors) for law in laws.of("joint"))
     coordinates = [symbol for joint in joints for symbol in joint.coordinates]
