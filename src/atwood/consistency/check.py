@@ -24,17 +24,13 @@ _sound: WeakKeyDictionary[type[Component], set[Hashable]] = WeakKeyDictionary()
 """For each class, in which spaces and with which choices no contradiction was found."""
 
 
-def check_names(parts: Mapping[str, Part]) -> None:
-    """Refuse parts with names in their declarations that name nothing."""
-    _refuse(parts, lambda part: "names", lambda part: wrong_names(part.component, part.path))
-
-
-def check_laws(parts: Mapping[str, Part], space: Space) -> None:
-    """Refuse parts whose laws contradict each other.
+def check_components(parts: Mapping[str, Part], space: Space) -> None:
+    """Refuse parts with names in their declarations that name nothing, or with laws that contradict each other.
 
     Joints are held against the constraints that they solve, observables against joint coordinates of their name and
     against their rates, at random states, in all modes.
     """
+    _refuse(parts, lambda part: "names", lambda part: wrong_names(part.component, part.path))
     _refuse(parts, lambda part: _shape_of(part, space), lambda part: contradictions(part, space))
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
-from atwood.consistency.check import check_laws, check_names
+from atwood.consistency.check import check_components
 from atwood.expr import Expression, Graph, evaluate
 from atwood.expr.core.relations import TimeRelations
 from atwood.lazy_dataclasses import replace
@@ -45,9 +45,8 @@ def read_mechanism(
 ) -> Mechanism:
     """Read the laws of all parts and find nodes, joints and bodies."""
     table, space = _empty_table(flat), flat.space
-    check_names(flat.parts)
+    check_components(flat.parts, space)
     found = _read_laws(flat, modes, table, known_line_signs)
-    check_laws(flat.parts, space)
     line_signs = known_line_signs if space.is_line else None
     if space.is_line and not known_line_signs:  # lengths are signed by where their ends are, which bodies say
         line_signs = _find_line_signs(flat, table, found)

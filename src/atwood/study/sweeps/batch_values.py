@@ -144,8 +144,8 @@ class ParameterRows:
             row[names.index("gravity")] = now
         elif now != flat.gravity:
             return False
-        kept = ("space", "t_start")
-        return all(getattr(scene, name, getattr(flat, name)) == getattr(flat, name) for name in kept)
+        before = flat.space.name, flat.t_start
+        return (getattr(scene, "space", before[0]), getattr(scene, "t_start", before[1])) == before
 
     def _assembly(self, run: int) -> Assembly | None:
         cases, assembly = self._request.cases, self._request.assembly
