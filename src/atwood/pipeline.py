@@ -28,11 +28,11 @@ from atwood.arguments import instance, number, optional, takes
 from atwood.clock import GRACE, Clock, TimeIsUp
 from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
-from atwood.forms.other_values import Source, with_constants_of_start
-from atwood.forms.reassembly import modes_of
+from atwood.forms.other_values import Source
+from atwood.forms.reassembly import assembled
 from atwood.forms.residuals import check_level
 from atwood.lazy_dataclasses import replace
-from atwood.mechanics.read import LineSigns, read_mechanism
+from atwood.mechanics.read import LineSigns
 from atwood.model.compose.composite import Model
 from atwood.model.local.flatten import FlatScene, flatten
 from atwood.progress import told
@@ -67,7 +67,7 @@ from atwood.simulation.run.run_record import Run, run_out_of_time
 from atwood.simulation.run.stall_diagnosis import raised_where_too_tight
 from atwood.stages import stage, watching
 from atwood.tolerances import tolerances
-from atwood.topology.orientation_coordinates import Orientation, check_orientation
+from atwood.topology.orientation_coordinates import check_orientation
 
 __all__ = ["Assembly", "assemble", "assemble_flat", "assembly_of", "simulate", "solve_as_asked"]
 
@@ -115,12 +115,12 @@ def assemble(
     """
     with stage("flatten"):
         flat, own = flatten(scene, name), scene.copy()
-    made = assemble_flat(flat, form=form, level=level, orientation=orientation)
-    return replace(made, source=Source(find_places, own))
+    return assemble_flat(flat, own, form=form, level=level, orientation=orientation)
 
 
 def assemble_flat(
     flat: FlatScene,
+    scene: Model | None = None,
     *,
     form: str = "reduced",
     level: str = "ggl",
@@ -128,17 +128,12 @@ def assemble_flat(
     modes: Mapping[str, str] | None = None,
     line_signs: LineSigns | None = None,
 ) -> Assembly:
-    """Assemble a scene that has been taken apart into leaves."""
+    """Assemble a scene that has been taken apart into leaves; `scene` is what its parameters are set in."""
     check_orientation(orientation, form, flat.space.name)
     check_level(level, form)
-    all_modes = modes_of(flat) | dict(modes or {})
-    with stage("mechanism"):
-        mechanism = read_mechanism(flat, all_modes, line_signs)
     chosen: Any = form  # its type says which there are
     level = level if form == "dae" else ""
-    source, orientation_coordinates = Source(find_places), Orientation(orientation)
-    made = Assembly(flat, mechanism, chosen, level, all_modes, source, orientation=orientation_coordinates)
-    return with_constants_of_start(made)
+    return assembled(Assembly, flat, Source(find_places, scene), chosen, level, orientation, modes, line_signs)
 
 
 def assembly_of(scene: Model | Assembly, name: str | None = None, **asked: str | None) -> Assembly:

@@ -15,6 +15,7 @@ from atwood.errors import UsageError
 from atwood.forms.caches import Key, Shared
 from atwood.forms.other_values import Source, moved_to, with_constants_of_start
 from atwood.lazy_dataclasses import replace
+from atwood.mechanics.kinematics.mechanism import Connector
 from atwood.mechanics.read import LineSigns, read_mechanism
 from atwood.model.local.flatten import FlatScene
 from atwood.stages import stage
@@ -39,20 +40,23 @@ def modes_of(flat: FlatScene) -> dict[str, str]:
     }
 
 
-def assembled_anew(
-    assembly: Assembly,
+def assembled(
+    kind: type[Assembly],
     flat: FlatScene,
+    source: Source | None,
+    form: FormName,
+    level: str,
+    orientation: str,
     modes: Mapping[str, str] | None = None,
     line_signs: LineSigns | None = None,
-    same_origin: bool = False,
+    **origin: Connector | None,
 ) -> Assembly:
-    """Return a scene assembled in the form and the coordinates of another, with equations of its own."""
+    """Assembly of a scene in one form, with equations of its own."""
     all_modes = modes_of(flat) | dict(modes or {})
     with stage("mechanism"):
-        origin = {"origin": assembly.mechanism.origin} if same_origin else {}
         mechanism = read_mechanism(flat, all_modes, line_signs, **origin)
-    fresh = {**_FRESH, "given_values": None, "shared": Shared(), "orientation": Orientation(assembly.orientation.kind)}
-    return with_constants_of_start(replace(assembly, flat=flat, mechanism=mechanism, modes=all_modes, **fresh))
+    made = kind(flat, mechanism, form, level, all_modes, source, orientation=Orientation(orientation))
+    return with_constants_of_start(made)
 
 
 def with_flat(assembly: Assembly, flat: FlatScene, source: Source | None = None) -> Assembly:
@@ -63,7 +67,12 @@ def with_flat(assembly: Assembly, flat: FlatScene, source: Source | None = None)
         return found
     if source is None:
         raise UsageError(f"its structure changes: {reason}", where=flat.name, advice="Assemble it anew.")
-    return replace(assembled_anew(replace(assembly, source=source), flat), why_new=reason)
+    return replace(assembled(type(assembly), flat, source, *_form_of(assembly)), why_new=reason)
+
+
+def _form_of(assembly: Assembly) -> tuple[FormName, str, str]:
+    """Form and level of an assembly, and the kind of its orientation coordinates."""
+    return assembly.form, assembly.level, assembly.orientation.kind
 
 
 def follow(assembly: Assembly, flat: FlatScene, source: Source | None = None) -> tuple[Assembly | None, str]:
@@ -86,7 +95,9 @@ def other_mode(
     coordinates = orientation or assembly.orientation
 
     def make() -> Assembly:
-        made = assembled_anew(assembly, assembly.flat, modes, line_signs, same_origin=True)
+        origin = assembly.mechanism.origin
+        form = _form_of(assembly)
+        made = assembled(type(assembly), assembly.flat, assembly.source, *form, modes, line_signs, origin=origin)
         return replace(made, shared=Shared(assembly.shared.family), orientation=coordinates)
 
     about = tuple(sorted(modes.items())), tuple(sorted(line_signs.items())), coordinates
@@ -180,7 +191,5 @@ def _restored(shared: Shared, made_from: _Recipe) -> Assembly:
 
 def _assembled(made_from: _Recipe) -> Assembly:
     kind, flat, source, form, level, orientation, modes, line_signs, *_ = made_from
-    mechanism = read_mechanism(flat, modes, line_signs)
-    first = kind(flat, mechanism, form, level, modes, source, orientation=Orientation(orientation.kind))
-    made = with_constants_of_start(first)
+    made = assembled(kind, flat, source, form, level, orientation.kind, modes, line_signs)
     return made if made.orientation == orientation else made.other_mode(modes, line_signs or {}, orientation)
