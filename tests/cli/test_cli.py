@@ -280,6 +280,26 @@ def test_bad_usage_is_exit_code_two(arguments: list[str]) -> None:
     assert run(*arguments).exit_code == 2
 
 
+@pytest.mark.parametrize(
+    ("arguments", "command", "said"),
+    [
+        (["run", "--json"], "main run", "Missing argument 'SCENE'"),
+        (["rnu", "--json"], "main", "No such command 'rnu'"),
+        (["--form", "dae", "--json", "run"], "main", "No such option"),
+        (["run", "x", "--json", "--form", "dea"], "main run", "'dea' is not one of"),
+        (["modes", "x", "--json", "--nothing"], "main modes", "No such option"),
+    ],
+)
+def test_bad_usage_is_json_too_where_that_is_asked_for(arguments: list[str], command: str, said: str) -> None:
+    done = run(*arguments)
+    error = json.loads(done.stdout)["error"]
+    assert done.exit_code == 2
+    assert said in error["message"]
+    assert error["where"] == command
+    assert error["advice"] == f"Try '{command} --help'."
+    assert said in done.stderr
+
+
 # -- list, info, compare -----------------------------------------------------------------------------------------------
 
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import click
 
-from atwood.cli.errors import FAILED
+from atwood.cli.errors import FAILED, usage_errors_as_json
 from atwood.errors import near_matches
 
 _COMMANDS = {
@@ -108,6 +108,16 @@ class _Commands(click.Group):
         from atwood.cli.theory import theory_command
 
         return theory_command(cmd_name, known[cmd_name].module, known[cmd_name].function)
+
+    def make_context(self, info_name: str | None, args: list[str], *more: Any, **extra: Any) -> click.Context:
+        """Read the options that stand before the command."""
+        with usage_errors_as_json(args):
+            return super().make_context(info_name, args, *more, **extra)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Call the command."""
+        with usage_errors_as_json(ctx.args):
+            return super().invoke(ctx)
 
     def main(self, *args: Any, **extra: Any) -> Any:
         """Run; standard output that is full, or closed, ends it with an exit code and no traceback."""

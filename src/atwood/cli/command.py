@@ -15,7 +15,7 @@ from typing import Any
 
 import click
 
-from atwood.arguments import TEXT, Kind, Refused, check
+from atwood.arguments import FILE, FLAG, TEXT, Kind, Refused, check
 from atwood.cli.errors import reporting_errors
 from atwood.cli.scenes import pairs
 from atwood.errors import UsageError
@@ -29,6 +29,9 @@ _COMMON = {
 }
 """Options of all commands that take a scene."""
 
+
+OUTPUT: Mapping[str, tuple[Kind, Any]] = {"plot": (FILE, None), "save": (FILE, None), "progress": (FLAG, True)}
+"""Options of all commands that make runs: a picture, a file of results, and a progress bar."""
 
 _OR_NONE = ", or None."
 """What an argument may be in Python alone."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from atwood.arguments import FILE, FLAG, number, optional, whole
-from atwood.cli.command import Request, command
+from atwood.cli.command import OUTPUT, Request, command
 from atwood.cli.output import print_json, progress_bar, warn, writer
 from atwood.cli.scenes import bundled_scenes, prepare
 from atwood.errors import AtwoodError, UsageError
@@ -151,12 +151,10 @@ def _within(
 
 _MORE = {
     "max_seconds": (optional(number("a number of seconds above 0", above=0.0)), None),
-    "plot": (FILE, None),
-    "save": (FILE, None),
+    **OUTPUT,
     "long": (replace(whole("a whole number of periods, 10 to 1,000,000", 10, 1_000_000), word="PERIODS"), None),
     "all": (FLAG, False),
     "html": (replace(FILE, word="DIRECTORY"), None),
-    "progress": (FLAG, True),
 }
 _NOT_ASKED = ("forms", "levels", "outputs", "max_seconds", "total_seconds", "name")
 COMMAND = command("compare", compare_scene, compare, is_required=False, leave=_NOT_ASKED, more=_MORE)

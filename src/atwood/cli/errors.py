@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import re
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, ParamSpec
 
 import click
@@ -33,10 +34,7 @@ def reporting_errors(function: Callable[P, Any]) -> Callable[P, None]:
                 function(*args, **kwargs)
         except AtwoodError as error:
             if kwargs.get("as_json"):
-                from atwood.cli.output import print_json
-
-                content = {"message": error.message, "where": error.where, "advice": error.advice}
-                print_json({"error": content})
+                _print_error(error.message, error.where, error.advice)
             click.echo(f"Error: {_one_line(str(error))}", err=True)
             context.exit(FAILED)
         except KeyboardInterrupt:
@@ -44,6 +42,25 @@ def reporting_errors(function: Callable[P, Any]) -> Callable[P, None]:
             context.exit(INTERRUPTED)
 
     return wrapped
+
+
+@contextlib.contextmanager
+def usage_errors_as_json(arguments: Sequence[str]) -> Iterator[None]:
+    """Write what is wrong with the arguments of a command as JSON too, if they ask for it."""
+    is_asked_for = "--json" in arguments
+    try:
+        yield
+    except click.UsageError as error:
+        if is_asked_for:
+            command = error.ctx.command_path if error.ctx is not None else "atwood"
+            _print_error(error.format_message(), command, f"Try '{command} --help'.")
+        raise
+
+
+def _print_error(message: str, where: str, advice: str) -> None:
+    from atwood.cli.output import print_json
+
+    print_json({"error": {"message": message, "where": where, "advice": advice}})
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:

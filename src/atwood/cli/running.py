@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from atwood.arguments import FILE, FLAG, TEXT, one_of
-from atwood.cli.command import Request, command
+from atwood.cli.command import OUTPUT, Request, command
 from atwood.cli.errors import INTERRUPTED
 from atwood.cli.output import print_json, progress_bar, warn
 from atwood.cli.scenes import check_applies, prepare
@@ -192,10 +192,8 @@ _MORE = {
     "conserved": (FLAG, False),
     "energy": (one_of(("total", "parts")), "total"),
     "timings": (FLAG, False),
-    "plot": (FILE, None),
+    **OUTPUT,
     "draw": (FILE, None),
     "view": (replace(TEXT, word="AZ,EL"), None),
-    "save": (FILE, None),
-    "progress": (FLAG, True),
 }
 COMMAND = command("run", run_scene, simulate, assemble, leave=("name", "samples"), more=_MORE)

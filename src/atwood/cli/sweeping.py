@@ -8,8 +8,7 @@ from typing import Any
 import click
 import numpy as np
 
-from atwood.arguments import FILE, FLAG
-from atwood.cli.command import Request, command
+from atwood.cli.command import OUTPUT, Request, command
 from atwood.cli.errors import INTERRUPTED
 from atwood.cli.output import print_json, progress_bar, warn, writer
 from atwood.cli.scenes import check_applies, pairs, prepare, warn_of_radians
@@ -135,6 +134,6 @@ COMMAND = command(
     sweep,
     assemble,
     leave=("name", "orientation"),
-    more={"plot": (FILE, None), "save": (FILE, None), "progress": (FLAG, True)},
+    more=OUTPUT,
     names={"start": "--vary-start"},
 )

@@ -66,6 +66,18 @@ def polish(axes: Axes, x_label: str = "", y_label: str = "") -> None:
     axes.set_ylabel(y_label, color=INK, fontsize=10)
 
 
+def headed(axes: Axes, text: str) -> None:
+    """Put a heading over axes, at their left end."""
+    axes.set_title(text, loc="left", fontsize=11, fontweight="bold", color=INK)
+
+
+def legend(axes: Axes, *entries: Any, beside: float | None = None, **style: Any) -> None:
+    """Put a legend where there is room in axes, or to their right, with its top at a height in units of theirs."""
+    if beside is not None:
+        style |= {"loc": "upper left", "bbox_to_anchor": (1.0, beside), "handlelength": 1.2}
+    axes.legend(*entries, **{"frameon": False, "fontsize": 9, "labelcolor": INK, **style})
+
+
 def with_unit(label: str, unit: str) -> str:
     """Return a label with its unit; without one where it is a plain number, or may be anything."""
     return label if unit in ("", "1", "any") else f"{label}, {unit}"

@@ -10,7 +10,7 @@ import numpy as np
 from atwood.arguments import FILE, TEXT, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError, suggestion
-from atwood.plotting.canvas import COLOURS, GREY, INK, finished, new_figure
+from atwood.plotting.canvas import COLOURS, GREY, INK, finished, headed, new_figure
 from atwood.plotting.scene3d.reading import read_scene
 from atwood.plotting.sphere import SEEN, draw_on_sphere, draw_sphere
 from atwood.result.result import Result
@@ -96,7 +96,7 @@ def plot_polhodes(result: Result, body: str | None = None, file: str | os.PathLi
     axes.set_xlim(-1.5, 1.5)
     axes.set_ylim(-1.35, 1.6)
     title = f"{result.assembly.flat.name}: angular momentum seen from {part}"
-    axes.set_title(title, loc="left", fontsize=11, fontweight="bold", color=INK)
+    headed(axes, title)
     return finished(figure, file)
 
 

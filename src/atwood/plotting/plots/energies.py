@@ -9,7 +9,7 @@ import numpy as np
 
 from atwood.arguments import FILE, instance, optional, takes
 from atwood.arrays import FloatArray
-from atwood.plotting.canvas import COLOURS, GREY, INK, finished, new_figure, polish
+from atwood.plotting.canvas import COLOURS, GREY, INK, finished, headed, legend, new_figure, polish
 from atwood.result.part_energy import PartEnergies, PartEnergy
 from atwood.result.result import Result
 
@@ -60,7 +60,7 @@ def plot_energies(result: Result | PartEnergies, file: str | os.PathLike[str] | 
     _draw_errors(errors, parts, {label.rpartition(",")[0]: colour for label, colour, _, _ in layers})
     errors.set_xlabel("time, s", color=INK, fontsize=10)
     title = result.assembly.flat.name if isinstance(result, Result) else "Energy by component"
-    stack.set_title(title, loc="left", fontsize=11, fontweight="bold", color=INK)
+    headed(stack, title)
     figure.align_ylabels([stack, errors])
     return finished(figure, file)
 
@@ -99,16 +99,7 @@ def _draw_stack(axes: Axes, parts: PartEnergies, layers: list[Layer]) -> None:
     axes.margins(x=0.0)
     axes.set_ylim(bottom=0.0)
     handles, labels = axes.get_legend_handles_labels()
-    axes.legend(
-        handles[::-1],
-        labels[::-1],
-        loc="upper left",
-        bbox_to_anchor=(1.0, 1.03),
-        frameon=False,
-        fontsize=9,
-        labelcolor=INK,
-        handlelength=1.2,
-    )
+    legend(axes, handles[::-1], labels[::-1], beside=1.03)
 
 
 def _given(parts: list[PartEnergy]) -> FloatArray:
@@ -132,13 +123,4 @@ def _draw_errors(axes: Axes, parts: PartEnergies, colours: dict[str, str]) -> No
     axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 2), useMathText=True)
     axes.yaxis.get_offset_text().set_fontsize(8)
     if largest:
-        axes.legend(
-            loc="upper left",
-            bbox_to_anchor=(1.0, 1.1),
-            frameon=False,
-            fontsize=9,
-            labelcolor=INK,
-            handlelength=1.2,
-            title="largest",
-            title_fontsize=8,
-        )
+        legend(axes, beside=1.1, title="largest", title_fontsize=8)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from atwood.arguments import FILE, TEXT, each as several, instance, number, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError, suggestion
-from atwood.plotting.canvas import COLOURS, GREY, INK, finished, new_figure, polish
+from atwood.plotting.canvas import COLOURS, GREY, INK, finished, headed, legend, new_figure, polish
 from atwood.theory.linear import EquilibriumBranches, LinearModel, RootLocus
 
 if TYPE_CHECKING:
@@ -86,8 +86,8 @@ def plot_bode(
     polish(above, "", "gain, dB of SI units")
     polish(below, "angular frequency, rad/s", "phase, deg")
     below.set_yticks(np.arange(-180.0, 181.0, 90.0))
-    above.legend(frameon=False, fontsize=9, labelcolor=INK)
-    above.set_title(f"{model.scene}: frequency response", loc="left", fontsize=11, fontweight="bold", color=INK)
+    legend(above)
+    headed(above, f"{model.scene}: frequency response")
     return finished(figure, file)
 
 
@@ -119,8 +119,8 @@ def plot_nyquist(
         axes.plot(own.real, -own.imag, color=colour, linewidth=1.0, linestyle=":")
     axes.plot([-1.0], [0.0], marker="+", color=INK, markersize=9, linestyle="none")
     polish(axes, "real part", "imaginary part")
-    axes.legend(frameon=False, fontsize=9, labelcolor=INK)
-    axes.set_title(f"{model.scene}: Nyquist diagram", loc="left", fontsize=11, fontweight="bold", color=INK)
+    legend(axes)
+    headed(axes, f"{model.scene}: Nyquist diagram")
     return finished(figure, file)
 
 
@@ -158,7 +158,7 @@ def plot_root_locus(locus: RootLocus, file: str | os.PathLike[str] | None = None
         (axes.axhline if axes is left else axes.axvline)(0.0, color=GREY, linewidth=0.9)
     polish(left, locus.path + (f" x {scale:g}" if scale != 1.0 else ""), "real part; imaginary part dashed, 1/s")
     polish(right, "real part, 1/s", "imaginary part, 1/s")
-    left.set_title(f"{locus.scene}: eigenvalues", loc="left", fontsize=11, fontweight="bold", color=INK)
+    headed(left, f"{locus.scene}: eigenvalues")
     return finished(figure, file)
 
 
@@ -214,9 +214,7 @@ def plot_branches(
             linestyle="none",
         )
     polish(axes, branches.path, path)
-    axes.set_title(
-        f"{branches.scene}: equilibria, stable with full lines", loc="left", fontsize=11, fontweight="bold", color=INK
-    )
+    headed(axes, f"{branches.scene}: equilibria, stable with full lines")
     return finished(figure, file)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from atwood.arguments import FILE, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
-from atwood.plotting.canvas import COLOURS, GREY, INK, finished, new_figure, polish, with_unit
+from atwood.plotting.canvas import COLOURS, GREY, INK, finished, headed, new_figure, polish, with_unit
 from atwood.theory.flow import PhasePortrait, PoincareSection
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def plot_phase_portrait(portrait: PhasePortrait, file: str | os.PathLike[str] | 
             axes.set_xticklabels(
                 [_HALF_TURNS[k].replace("pi", "\N{GREEK SMALL LETTER PI}") for k in range(low, high + 1)]
             )
-    axes.set_title(f"{portrait.scene}: phase portrait", loc="left", fontsize=11, fontweight="bold", color=INK)
+    headed(axes, f"{portrait.scene}: phase portrait")
     return finished(figure, file)
 
 
@@ -124,5 +124,5 @@ def plot_section(section: PoincareSection, file: str | os.PathLike[str] | None =
             x, y, color=COLOURS[k % len(COLOURS)], marker="o", markersize=2.6, linestyle="none", label=f"start {k}"
         )
     polish(axes, *(with_unit(path, section.units[path]) for path in paths[:2]))
-    axes.set_title(f"{section.scene}: {section.surface}", loc="left", fontsize=11, fontweight="bold", color=INK)
+    headed(axes, f"{section.scene}: {section.surface}")
     return finished(figure, file)

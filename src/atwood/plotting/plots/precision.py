@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from atwood.arguments import FILE, instance, optional, takes
-from atwood.plotting.canvas import COLOURS, GREY, INK, finished, new_figure, polish
+from atwood.plotting.canvas import COLOURS, GREY, INK, finished, headed, legend, new_figure, polish
 from atwood.study.comparison.found import Comparison, ComparisonRow
 
 if TYPE_CHECKING:
@@ -72,10 +72,8 @@ def plot_comparison(comparison: Comparison, file: str | os.PathLike[str] | None 
     if curves:
         values = [max(row.error or 0.0, 1e-16) for rows in curves.values() for row in rows]
         left.set_ylim(0.2 * min(values), 5.0 * max(values))
-        right.legend(frameon=False, fontsize=9, labelcolor=INK)
-    left.set_title(
-        f"{comparison.scene} to t = {comparison.t_end:g} s", loc="left", fontsize=11, fontweight="bold", color=INK
-    )
+        legend(right)
+    headed(left, f"{comparison.scene} to t = {comparison.t_end:g} s")
     return finished(figure, file)
 
 

@@ -10,7 +10,7 @@ from atwood.arguments import FILE, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import ResultError
 from atwood.model.declare.connectors import PATH, PATHS
-from atwood.plotting.canvas import COLOURS, GREY, INK, finished, new_figure, polish, with_unit
+from atwood.plotting.canvas import COLOURS, GREY, INK, finished, headed, legend, new_figure, polish, with_unit
 from atwood.result.files import SavedResult
 from atwood.result.result import Result
 
@@ -97,7 +97,7 @@ def plot(
     if shows_energy and isinstance(result, Result):
         _draw_energy(panels[count - 1], result)
     panels[-1].set_xlabel(label, color=INK, fontsize=10)
-    panels[0].set_title(_title(result), loc="left", fontsize=11, fontweight="bold", color=INK)
+    headed(panels[0], _title(result))
     figure.align_ylabels(list(panels))
     return finished(figure, file)
 
@@ -140,16 +140,7 @@ def _draw(axes: Axes, result: Result | SavedResult, paths: list[str], unit: str,
     for colour, path in zip(COLOURS, picked, strict=False):
         axes.plot(across, result.array(path), color=colour, linewidth=1.6, label=_without_ending(path, paths))
     title = f"{len(picked)} of {len(paths)}" if len(picked) < len(paths) else None
-    axes.legend(
-        loc="upper left",
-        bbox_to_anchor=(1.0, 1.03),
-        frameon=False,
-        fontsize=9,
-        labelcolor=INK,
-        handlelength=1.2,
-        title=title,
-        title_fontsize=8,
-    )
+    legend(axes, beside=1.03, title=title, title_fontsize=8)
 
 
 def _without_ending(path: str, paths: list[str]) -> str:

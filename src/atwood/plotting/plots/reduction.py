@@ -10,7 +10,7 @@ import numpy as np
 from atwood.arguments import FILE, TEXT, instance, optional, takes, whole
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError, suggestion
-from atwood.plotting.canvas import COLOURS, GREY, INK, finished, new_figure, polish, with_unit
+from atwood.plotting.canvas import COLOURS, GREY, INK, finished, headed, legend, new_figure, polish, with_unit
 from atwood.plotting.sphere import draw_on_sphere, draw_sphere
 from atwood.theory.reduction import ReducedMotion
 
@@ -57,8 +57,8 @@ def plot_effective_potential(motion: ReducedMotion, file: str | os.PathLike[str]
     axes.set_xlim(low, high)
     axes.set_ylim(bottom, top)
     polish(axes, with_unit(motion.coordinate, _unit(motion)), "energy, J")
-    axes.legend(frameon=False, fontsize=9, labelcolor=INK)
-    axes.set_title(f"{_scene(motion)}: {motion.kind}", loc="left", fontsize=11, fontweight="bold", color=INK)
+    legend(axes)
+    headed(axes, f"{_scene(motion)}: {motion.kind}")
     return finished(figure, file)
 
 

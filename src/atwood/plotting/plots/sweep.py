@@ -11,7 +11,7 @@ import numpy as np
 from atwood.arguments import FILE, instance, optional, takes
 from atwood.errors import UsageError
 from atwood.model.declare.connectors import PATHS
-from atwood.plotting.canvas import COLOURS, INK, finished, new_figure, polish, with_unit
+from atwood.plotting.canvas import COLOURS, INK, finished, headed, legend, new_figure, polish, with_unit
 from atwood.study.sweeps.result import Sweep
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def plot_sweep(sweep: Sweep, paths: Iterable[str] | None = None, file: str | os.
         else:
             _draw_curves(axes, sweep, path, numbers[0])
     title = f"{sweep.scene}, {len(sweep)} runs at t = {sweep.time[-1]:g} s"
-    panels[0, 0].set_title(title, loc="left", fontsize=11, fontweight="bold", color=INK)
+    headed(panels[0, 0], title)
     return finished(figure, file)
 
 
@@ -113,7 +113,7 @@ def _draw_curves(axes: Axes, sweep: Sweep, path: str, over: str) -> None:
     for k, curve in enumerate(curves):
         said = ", ".join(f"{one} = {_short(values[k])}" for one, values in zip(others, labels, strict=True))
         axes.plot(base[order], curve[order], color=COLOURS[k], linewidth=1.6, label=said)
-    axes.legend(frameon=False, fontsize=8, labelcolor=INK)
+    legend(axes, fontsize=8)
 
 
 def _short(value: object) -> str:
