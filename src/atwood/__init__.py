@@ -79,238 +79,158 @@ from atwood.model.values.rotation import FREE, Rotation, normals, turn
 from atwood.model.values.space import Vector, as_vector, cross, dot, norm
 
 if TYPE_CHECKING:
-    from atwood.checking import CheckReport, check
-    from atwood.expr.sympy_bridge import Formula, formula
-    from atwood.forms.assembly import Assembly
-    from atwood.model.compose.serialization import from_data, load_scene, save_scene, to_data
-    from atwood.pipeline import assemble, simulate
-    from atwood.plotting.drawing import animate, plot_mechanism, plot_mode
-    from atwood.plotting.plots.energies import plot_energies
-    from atwood.plotting.plots.linear import plot_bode, plot_branches, plot_nyquist, plot_root_locus
-    from atwood.plotting.plots.phase import plot_phase_portrait, plot_section
-    from atwood.plotting.plots.precision import plot_comparison
-    from atwood.plotting.plots.quantities import plot
-    from atwood.plotting.plots.reduction import plot_effective_potential, plot_top_path
-    from atwood.plotting.plots.sweep import plot_sweep
-    from atwood.plotting.polhodes import plot_polhodes
-    from atwood.reporting import MechanismReport, report
-    from atwood.result.files import SavedResult, load_result, save_result
-    from atwood.result.result import Result
-    from atwood.study.comparison.compare import compare
-    from atwood.study.comparison.found import Comparison, ComparisonRow
-    from atwood.study.comparison.long_runs import LongComparison, compare_long
-    from atwood.study.sweeps.files import load_sweep
-    from atwood.study.sweeps.result import Sweep
-    from atwood.study.sweeps.sweep import sweep
+    from atwood.checking import (
+        CheckReport as CheckReport,
+        check as check,
+    )
+    from atwood.expr.sympy_bridge import (
+        Formula as Formula,
+        formula as formula,
+    )
+    from atwood.forms.assembly import Assembly as Assembly
+    from atwood.model.compose.serialization import (
+        from_data as from_data,
+        load_scene as load_scene,
+        save_scene as save_scene,
+        to_data as to_data,
+    )
+    from atwood.pipeline import (
+        assemble as assemble,
+        simulate as simulate,
+    )
+    from atwood.plotting.drawing import (
+        animate as animate,
+        plot_mechanism as plot_mechanism,
+        plot_mode as plot_mode,
+    )
+    from atwood.plotting.plots.energies import plot_energies as plot_energies
+    from atwood.plotting.plots.linear import (
+        plot_bode as plot_bode,
+        plot_branches as plot_branches,
+        plot_nyquist as plot_nyquist,
+        plot_root_locus as plot_root_locus,
+    )
+    from atwood.plotting.plots.phase import (
+        plot_phase_portrait as plot_phase_portrait,
+        plot_section as plot_section,
+    )
+    from atwood.plotting.plots.precision import plot_comparison as plot_comparison
+    from atwood.plotting.plots.quantities import plot as plot
+    from atwood.plotting.plots.reduction import (
+        plot_effective_potential as plot_effective_potential,
+        plot_top_path as plot_top_path,
+    )
+    from atwood.plotting.plots.sweep import plot_sweep as plot_sweep
+    from atwood.plotting.polhodes import plot_polhodes as plot_polhodes
+    from atwood.reporting import (
+        MechanismReport as MechanismReport,
+        report as report,
+    )
+    from atwood.result.files import (
+        SavedResult as SavedResult,
+        load_result as load_result,
+        save_result as save_result,
+    )
+    from atwood.result.result import Result as Result
+    from atwood.study.comparison.compare import compare as compare
+    from atwood.study.comparison.found import (
+        Comparison as Comparison,
+        ComparisonRow as ComparisonRow,
+    )
+    from atwood.study.comparison.long_runs import (
+        LongComparison as LongComparison,
+        compare_long as compare_long,
+    )
+    from atwood.study.sweeps.files import load_sweep as load_sweep
+    from atwood.study.sweeps.result import Sweep as Sweep
+    from atwood.study.sweeps.sweep import sweep as sweep
     from atwood.theory.action import (
-        Action,
-        ActionAngle,
-        JoiningMotion,
-        SeparatedMotion,
-        Separation,
-        Variation,
-        action,
-        action_angle,
-        boundary_value_motions,
-        separation,
+        Action as Action,
+        ActionAngle as ActionAngle,
+        JoiningMotion as JoiningMotion,
+        SeparatedMotion as SeparatedMotion,
+        Separation as Separation,
+        Variation as Variation,
+        action as action,
+        action_angle as action_angle,
+        boundary_value_motions as boundary_value_motions,
+        separation as separation,
     )
-    from atwood.theory.dynamics import Dynamics, StartSolution, dynamics, solve_initial_values
-    from atwood.theory.equations import EquationsOfMotion, PartOfEquations, equations
+    from atwood.theory.dynamics import (
+        Dynamics as Dynamics,
+        StartSolution as StartSolution,
+        dynamics as dynamics,
+        solve_initial_values as solve_initial_values,
+    )
+    from atwood.theory.equations import (
+        EquationsOfMotion as EquationsOfMotion,
+        PartOfEquations as PartOfEquations,
+        equations as equations,
+    )
     from atwood.theory.flow import (
-        LyapunovExponents,
-        PhasePortrait,
-        PoincareSection,
-        RestPoint,
-        TangentFlow,
-        lyapunov_exponents,
-        phase_portrait,
-        poincare_section,
-        tangent_flow,
+        LyapunovExponents as LyapunovExponents,
+        PhasePortrait as PhasePortrait,
+        PoincareSection as PoincareSection,
+        RestPoint as RestPoint,
+        TangentFlow as TangentFlow,
+        lyapunov_exponents as lyapunov_exponents,
+        phase_portrait as phase_portrait,
+        poincare_section as poincare_section,
+        tangent_flow as tangent_flow,
     )
-    from atwood.theory.formulas.sheet import FormulaSheet, Statement
+    from atwood.theory.formulas.sheet import (
+        FormulaSheet as FormulaSheet,
+        Statement as Statement,
+    )
     from atwood.theory.hamiltonian import (
-        CanonicalTransformation,
-        Hamiltonian,
-        PointTransformation,
-        canonical_transformation,
-        fundamental_brackets,
-        generated_transformation,
-        hamiltonian,
-        point_transformation,
-        poisson_bracket,
-        poisson_brackets,
-        total_derivative,
+        CanonicalTransformation as CanonicalTransformation,
+        Hamiltonian as Hamiltonian,
+        PointTransformation as PointTransformation,
+        canonical_transformation as canonical_transformation,
+        fundamental_brackets as fundamental_brackets,
+        generated_transformation as generated_transformation,
+        hamiltonian as hamiltonian,
+        point_transformation as point_transformation,
+        poisson_bracket as poisson_bracket,
+        poisson_brackets as poisson_brackets,
+        total_derivative as total_derivative,
     )
     from atwood.theory.linear import (
-        BranchPoint,
-        Equilibria,
-        Equilibrium,
-        EquilibriumBranch,
-        EquilibriumBranches,
-        LinearModel,
-        NormalModes,
-        RootLocus,
-        Trim,
-        equilibria,
-        equilibrium_branches,
-        linearize,
-        normal_modes,
-        root_locus,
-        trim,
+        BranchPoint as BranchPoint,
+        Equilibria as Equilibria,
+        Equilibrium as Equilibrium,
+        EquilibriumBranch as EquilibriumBranch,
+        EquilibriumBranches as EquilibriumBranches,
+        LinearModel as LinearModel,
+        NormalModes as NormalModes,
+        RootLocus as RootLocus,
+        Trim as Trim,
+        equilibria as equilibria,
+        equilibrium_branches as equilibrium_branches,
+        linearize as linearize,
+        normal_modes as normal_modes,
+        root_locus as root_locus,
+        trim as trim,
     )
-    from atwood.theory.reduction import ReducedMotion, Routhian, reduced, routhian
-    from atwood.theory.rigid import inertia_tensor, rigid_body, rotation_kinematics
-    from atwood.theory.symmetry import Conserved, ConservedQuantity, Symmetry, conserved
+    from atwood.theory.reduction import (
+        ReducedMotion as ReducedMotion,
+        Routhian as Routhian,
+        reduced as reduced,
+        routhian as routhian,
+    )
+    from atwood.theory.rigid import (
+        inertia_tensor as inertia_tensor,
+        rigid_body as rigid_body,
+        rotation_kinematics as rotation_kinematics,
+    )
+    from atwood.theory.symmetry import (
+        Conserved as Conserved,
+        ConservedQuantity as ConservedQuantity,
+        Symmetry as Symmetry,
+        conserved as conserved,
+    )
 
     __version__: str
-
-__all__ = ["__version__"]
-
-# Scenes and models
-__all__ += [
-    "Model",
-    "Scene",
-    "connect",
-    "from_data",
-    "load_scene",
-    "save_scene",
-    "to_data",
-]
-
-# Runs and studies
-__all__ += [
-    "Assembly",
-    "Comparison",
-    "ComparisonRow",
-    "MechanismReport",
-    "Result",
-    "SavedResult",
-    "Sweep",
-    "assemble",
-    "compare",
-    "compare_long",
-    "load_result",
-    "load_sweep",
-    "report",
-    "save_result",
-    "simulate",
-    "sweep",
-]
-
-# Equations and what follows from them
-__all__ += [
-    "Action",
-    "ActionAngle",
-    "BranchPoint",
-    "CanonicalTransformation",
-    "Conserved",
-    "ConservedQuantity",
-    "Dynamics",
-    "EquationsOfMotion",
-    "Equilibria",
-    "Equilibrium",
-    "EquilibriumBranch",
-    "EquilibriumBranches",
-    "FormulaSheet",
-    "Hamiltonian",
-    "JoiningMotion",
-    "LinearModel",
-    "LongComparison",
-    "LyapunovExponents",
-    "NormalModes",
-    "PartOfEquations",
-    "PhasePortrait",
-    "PoincareSection",
-    "PointTransformation",
-    "ReducedMotion",
-    "RestPoint",
-    "RootLocus",
-    "Routhian",
-    "SeparatedMotion",
-    "Separation",
-    "StartSolution",
-    "Statement",
-    "Symmetry",
-    "TangentFlow",
-    "Trim",
-    "Variation",
-    "action",
-    "action_angle",
-    "boundary_value_motions",
-    "canonical_transformation",
-    "conserved",
-    "dynamics",
-    "equations",
-    "equilibria",
-    "equilibrium_branches",
-    "fundamental_brackets",
-    "generated_transformation",
-    "hamiltonian",
-    "inertia_tensor",
-    "linearize",
-    "lyapunov_exponents",
-    "normal_modes",
-    "phase_portrait",
-    "poincare_section",
-    "point_transformation",
-    "poisson_bracket",
-    "poisson_brackets",
-    "reduced",
-    "rigid_body",
-    "root_locus",
-    "rotation_kinematics",
-    "routhian",
-    "separation",
-    "solve_initial_values",
-    "tangent_flow",
-    "total_derivative",
-    "trim",
-]
-
-# Pictures
-__all__ += [
-    "animate",
-    "plot",
-    "plot_bode",
-    "plot_branches",
-    "plot_comparison",
-    "plot_effective_potential",
-    "plot_energies",
-    "plot_mechanism",
-    "plot_mode",
-    "plot_nyquist",
-    "plot_phase_portrait",
-    "plot_polhodes",
-    "plot_root_locus",
-    "plot_section",
-    "plot_sweep",
-    "plot_top_path",
-]
-
-# Components of one's own
-__all__ += [
-    "FREE", "BodyInertia", "CheckReport", "Component", "Connector", "CoordinateLoad", "Expression",
-    "ExternalFunction", "Formula", "Frame", "Groove", "Load", "Number", "Outline", "Placement", "Point", "PointInertia",
-    "Rotation", "Scalar", "Shaft", "Slide", "Triple", "Vector", "as_vector", "check", "connector", "constraint",
-    "cross", "derivative", "discrete_state", "dissipation", "dot", "event", "external", "force", "formula", "inertia",
-    "is_zero", "joint", "lagrangian", "norm", "normals", "observable", "parameter", "potential", "select", "signal",
-    "solve_linear", "state", "turn", "update",
-]  # fmt: skip
-
-# Errors
-__all__ += [
-    "AtwoodError",
-    "ConnectError",
-    "DeclarationError",
-    "KernelEvaluationError",
-    "ParameterError",
-    "ResultError",
-    "SolveError",
-    "StartError",
-    "TopologyError",
-    "UnsupportedError",
-    "UsageError",
-]
 
 _ROOMS = {
     "atwood.checking": ("CheckReport", "check"),
@@ -356,7 +276,37 @@ _ROOMS = {
     "atwood.theory.symmetry": ("Conserved", "ConservedQuantity", "Symmetry", "conserved"),
 }  # fmt: skip
 _LATER = {name: room for room, names in _ROOMS.items() for name in names}
-"""Names whose modules are imported when they are first used; each also stands in `__all__` and above."""
+"""Names whose modules are imported when they are first used; type checkers read them above."""
+
+__all__ = ["__version__", *_LATER]
+
+# Scenes and models
+__all__ += ["Model", "Scene", "connect"]
+
+# Components of one's own
+__all__ += [
+    "FREE", "BodyInertia", "Component", "Connector", "CoordinateLoad", "Expression",
+    "ExternalFunction", "Frame", "Groove", "Load", "Number", "Outline", "Placement", "Point", "PointInertia",
+    "Rotation", "Scalar", "Shaft", "Slide", "Triple", "Vector", "as_vector", "connector", "constraint",
+    "cross", "derivative", "discrete_state", "dissipation", "dot", "event", "external", "force", "inertia",
+    "is_zero", "joint", "lagrangian", "norm", "normals", "observable", "parameter", "potential", "select", "signal",
+    "solve_linear", "state", "turn", "update",
+]  # fmt: skip
+
+# Errors
+__all__ += [
+    "AtwoodError",
+    "ConnectError",
+    "DeclarationError",
+    "KernelEvaluationError",
+    "ParameterError",
+    "ResultError",
+    "SolveError",
+    "StartError",
+    "TopologyError",
+    "UnsupportedError",
+    "UsageError",
+]
 
 _RENAMED = {"motions_between": "boundary_value_motions", "solve_start": "solve_initial_values"}
 """Names that were others before; the earlier ones work, and warn."""
