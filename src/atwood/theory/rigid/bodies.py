@@ -62,7 +62,7 @@ class PrincipalBody:
 def principal_body(assembly: Assembly, body: str | None = None) -> PrincipalBody:
     """Return a rigid body of a scene, the only one if it is not named."""
     where, mechanism = assembly.flat.name, assembly.mechanism
-    if assembly.flat.space != "space":
+    if assembly.flat.space.name != "space":
         raise UsageError("principal axes are of bodies in space", where=where)
     frames = {
         path: one.frame.name
