@@ -14,6 +14,8 @@ from atwood import (
     StartError,
     assemble,
     connector,
+    dot,
+    minimum,
     potential,
     report,
     simulate,
@@ -23,6 +25,7 @@ from atwood import (
 from atwood_library import (
     Bar,
     Cylindrical,
+    Force,
     Ground,
     Link,
     Pivot,
@@ -115,13 +118,49 @@ def test_a_bar_about_itself(joint: Component, coordinate: str, form: str) -> Non
     assert result.energy.max_drift < 1e-7
 
 
-def test_what_acts_on_such_a_spin_is_refused_as_before() -> None:
+@pytest.mark.parametrize("value", [1.0, "sin(3*t)", "t^3"])
+def test_what_acts_on_such_a_spin_is_refused(value: float | str) -> None:
+    """A torque that was zero at the start only was overlooked, and the bar did not follow it."""
     scene = bar_on(Cylindrical(axis=(0.0, 0.0, 1.0)))
-    torque, part = Torque(value=1.0, axis=(0.0, 0.0, 1.0)), scene._children()["bar"]
+    torque, part = Torque(value=value, axis=(0.0, 0.0, 1.0)), scene._children()["bar"]
     scene.add("torque", torque)
     scene.connect(part.connectors()["frame"], torque.connectors()["frame"])
     with pytest.raises(StartError, match="without inertia"):
         simulate(scene, t_end=0.1)
+
+
+@pytest.mark.parametrize("direction", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])
+def test_a_force_whose_lever_turns_with_such_a_spin_is_refused(direction: tuple[float, float, float]) -> None:
+    """Along the bar it has no moment about it, but which way it bends the bar depends on how far this has turned."""
+    scene = bar_on(Spherical())
+    arm, force = scene.add("arm", Weld(displacement=(0.3, 0.0, 0.0))), Force(direction=direction, resolved_in="body")
+    scene.add("force", force)
+    force.value = 5.0
+    scene.connect(scene._children()["bar"].connectors()["frame"], arm.a)
+    scene.connect(arm.b, force.frame)
+    with pytest.raises(StartError, match="without inertia"):
+        simulate(scene, t_end=0.1)
+
+
+class FarStop(Component):
+    """A stop that is met after most of half a turn only."""
+
+    a: Frame = connector(Frame, "What stands.")
+    b: Frame = connector(Frame, "What it stops.")
+
+    @potential
+    def energy(self) -> Scalar:
+        """Return the energy."""
+        below = minimum(dot(self.a.axes[0], self.b.axes[0]) + 0.98, 0.0)
+        return 50.0 * below * below
+
+
+def test_a_stop_that_is_rarely_met_is_not_overlooked() -> None:
+    scene = bar_on(Cylindrical(axis=(0.0, 0.0, 1.0)))
+    stop = scene.add("stop", FarStop())
+    scene.connect(scene._children()["ground"].connectors()["frame"], stop.a)
+    scene.connect(scene._children()["bar"].connectors()["frame"], stop.b)
+    assert not assemble(scene).mechanism.idle_spins
 
 
 class Notch(Component):

@@ -37,7 +37,7 @@ from atwood.tolerances import tolerances
 _ASKED, NEEDED = 7, 4
 """At so many places coefficients are looked at, and at so many they must have values."""
 
-_SWITCHING = PIECEWISE_CONSTANT | {"absolute", "minimum", "maximum", "select", "external"}
+SWITCHING = PIECEWISE_CONSTANT | {"absolute", "minimum", "maximum", "select", "external"}
 
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 
@@ -79,7 +79,7 @@ def switches(expressions: Sequence[Expression]) -> bool:
     nodes = live(expressions)
     known = nodes[0].graph.relations if nodes else None
     relations = () if known is None else known.symbols
-    return any((node.operation in _SWITCHING or node in relations) and not node.is_parametric for node in nodes)
+    return any((node.operation in SWITCHING or node in relations) and not node.is_parametric for node in nodes)
 
 
 def pfaffian_forms(state: Movement | Equations, rates: Sequence[tuple[str, LocalConstraint, Expression]]) -> list[Form]:
