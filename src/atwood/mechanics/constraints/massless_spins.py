@@ -60,7 +60,7 @@ _Layout = tuple[dict[int, Vector], dict[int, NodeTurn]]
 """Offset and turn of each node of a body, in the axes of the body."""
 
 _How = tuple[int, int]
-"""How an axis is computed: the two columns of the inertia tensor that it is square to; or -1 and the node it leads to."""
+"""How an axis is computed: two columns of the inertia tensor, which it is square to; or -1 and the node it leads to."""
 
 
 def idle_speeds(derivation: Derivation, state: Movement) -> dict[Expression, Expression] | None:
