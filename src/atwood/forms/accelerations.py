@@ -179,7 +179,7 @@ def _by_mass_matrix(equations: Equations, rows: Sequence[Expression], numeric: b
     """Return the accelerations from ``M a + bias = 0``."""
     found = jacobian(list(rows), list(equations.accelerations))
     bias = substitute(list(rows), dict.fromkeys(equations.accelerations, 0.0))
-    full = {(r, c): e for r, c, e in zip(found.rows, found.columns, found.entries, strict=True)}
+    full = found.by_place
     entries = {place: entry for place, entry in full.items() if place[0] <= place[1]}
     if numeric or _is_full(entries, len(rows)):
         return "numeric", _solve_numerically(entries, [-b for b in bias])
@@ -391,7 +391,7 @@ class _Tree:
         """Solve ``here = there``, which is affine in what is wanted, in the sense of least squares."""
         slopes = jacobian(list(here), list(wanted))
         zero = self.graph.zero
-        entry = {(r, c): e for r, c, e in zip(slopes.rows, slopes.columns, slopes.entries, strict=True)}
+        entry = slopes.by_place
         rest = substitute(list(here), dict.fromkeys(wanted, 0.0))
         gaps = [t - r for t, r in zip(there, rest, strict=True)]
         k = len(wanted)

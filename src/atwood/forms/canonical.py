@@ -212,7 +212,7 @@ def _hamilton(found: _Terms, name: str, parameters: tuple[Expression, ...]) -> C
     p = [graph.symbol(f"P:{one.name}") for one in found.names]
     momenta = vjp([lagrangian], [graph.one], u)
     mass = jacobian(momenta, u)
-    entries = {(i, j): one for i, j, one in zip(mass.rows, mass.columns, mass.entries, strict=True)}
+    entries = mass.by_place
     entries = {place: one for place, one in entries.items() if place[0] <= place[1] and not one.is_zero}
     idle = [one.name for i, one in enumerate(found.velocity_names) if (i, i) not in entries]
     if idle:

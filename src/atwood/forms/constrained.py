@@ -92,7 +92,7 @@ def _accelerations(
     n, constraints = len(equations.speeds), equations.constraints
     at_rest = dict.fromkeys(equations.accelerations, 0.0)
     mass = jacobian(list(rows), list(equations.accelerations))
-    entries = {(r, c): e for r, c, e in zip(mass.rows, mass.columns, mass.entries, strict=True) if r <= c}
+    entries = {(r, c): e for r, c, e in mass.triples if r <= c}
     slopes = _slopes(equations, range(len(constraints)))
     bias = substitute(list(rows), at_rest)
     gamma = substitute([one.second for one in constraints], at_rest)
@@ -111,7 +111,7 @@ def _slopes(equations: Equations, rows: Sequence[int]) -> list[dict[int, Express
     chosen = [equations.constraints[k].rate for k in rows]
     found = jacobian(chosen, list(equations.speeds))
     slopes: list[dict[int, Expression]] = [{} for _ in rows]
-    for row, column, entry in zip(found.rows, found.columns, found.entries, strict=True):
+    for row, column, entry in found.triples:
         if not entry.is_zero:
             slopes[row][column] = entry
     return slopes
@@ -195,7 +195,7 @@ def _moved(equations: Equations, displacements: Sequence[Expression]) -> list[Ex
         return [q + d for q, d in zip(equations.coordinates, displacements, strict=True)]
     tangent = jacobian(list(equations.rates[: equations.placing]), list(equations.speeds))
     coordinates = list(equations.coordinates)
-    for row, column, entry in zip(tangent.rows, tangent.columns, tangent.entries, strict=True):
+    for row, column, entry in tangent.triples:
         coordinates[row] = coordinates[row] + entry * displacements[column]
     return coordinates
 

@@ -53,12 +53,10 @@ def _solve(equations: Equations, kept: Sequence[int]) -> list[Expression] | None
     mass = jacobian(list(equations.rows), list(equations.accelerations))
     constraint_jacobian = jacobian([one.rate for one in constraints], list(equations.speeds)) if m else None
     matrix = [[graph.zero] * (n + m) for _ in range(n + m)]
-    for row, column, entry in zip(mass.rows, mass.columns, mass.entries, strict=True):
+    for row, column, entry in mass.triples:
         matrix[row][column] = entry
     if constraint_jacobian is not None:
-        for row, column, entry in zip(
-            constraint_jacobian.rows, constraint_jacobian.columns, constraint_jacobian.entries, strict=True
-        ):
+        for row, column, entry in constraint_jacobian.triples:
             matrix[n + row][column] = entry
             matrix[column][n + row] = -entry
     sides = [*equations.rows, *(one.second for one in constraints)]

@@ -399,7 +399,7 @@ def _along_angles(made: Lagrangian) -> Lagrangian:
 
     def on_angles(values: Sequence[Expression]) -> tuple[Expression, ...]:
         total, there = [graph.zero] * len(velocities), moved(values)
-        for row, column, entry in zip(slopes.rows, slopes.columns, slopes.entries, strict=True):
+        for row, column, entry in slopes.triples:
             total[column] = total[column] + entry * there[row]
         return tuple(total)
 

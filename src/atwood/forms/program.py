@@ -149,7 +149,7 @@ def rows_along_speeds(equations: Equations) -> list[Expression]:
         rates = [symbols[i] for i in orientation.coordinates]
         speeds = [equations.speeds[i] for i in orientation.speeds]
         found = jacobian([equations.rates[i] for i in orientation.coordinates], speeds)
-        entries = list(zip(found.rows, found.columns, found.entries, strict=True))
+        entries = list(found.triples)
         if not orientation.is_homogeneous:
             misses = [rate - equations.rates[i] for i, rate in zip(orientation.coordinates, rates, strict=True)]
             rows |= {

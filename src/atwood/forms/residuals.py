@@ -80,12 +80,7 @@ def _project(
 ) -> list[Expression]:
     """Return ``r_i - G_i^T G_d^-T r_d``, solving separately for loops that share nothing."""
     constraint_jacobian = jacobian([one.rate for one in equations.constraints], list(equations.speeds))
-    entry = {
-        (r, c): e
-        for r, c, e in zip(
-            constraint_jacobian.rows, constraint_jacobian.columns, constraint_jacobian.entries, strict=True
-        )
-    }
+    entry = {(r, c): e for r, c, e in constraint_jacobian.triples}
     given = set(dependent)
     sharing = [(("constraint", r), ("speed", c)) for r, c in entry if c in given]
     members = [("constraint", r) for r in range(len(equations.constraints))]

@@ -8,7 +8,7 @@ What outgrows all numbers is differentiated by its logarithm, so that a quotient
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from atwood.errors import AtwoodError
@@ -36,6 +36,16 @@ class SparseMatrix(NamedTuple):
     rows: tuple[int, ...]
     columns: tuple[int, ...]
     entries: tuple[Expression, ...]
+
+    @property
+    def triples(self) -> Iterator[tuple[int, int, Expression]]:
+        """Row, column and entry of each place, in order."""
+        return zip(self.rows, self.columns, self.entries, strict=True)
+
+    @property
+    def by_place(self) -> dict[tuple[int, int], Expression]:
+        """The entries by row and column."""
+        return {(row, column): entry for row, column, entry in self.triples}
 
 
 def _square(a: Expression) -> Expression:
@@ -352,7 +362,7 @@ def jacobian_by_rows(outputs: Sequence[Expression], wrt: Sequence[Expression]) -
     n = len(wrt)
     values = [wrt[0].graph.zero] * (len(outputs) * n) if wrt else []
     found = jacobian(outputs, wrt)
-    for row, column, entry in zip(found.rows, found.columns, found.entries, strict=True):
+    for row, column, entry in found.triples:
         values[row * n + column] = entry
     return values
 

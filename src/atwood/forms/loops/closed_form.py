@@ -365,9 +365,7 @@ class _Moved:
         used = sorted({k for group in loops.groups for k in group.constraints})
         chosen = [equations.constraints[k] for k in used]
         found = jacobian([one.rate for one in chosen], list(equations.speeds))
-        self.slopes = {
-            (used[r], c): entry for r, c, entry in zip(found.rows, found.columns, found.entries, strict=True)
-        }
+        self.slopes = {(used[r], c): entry for r, c, entry in found.triples}
         rates = substitute([one.rate for one in chosen], dict.fromkeys(equations.speeds, 0.0))
         seconds = substitute([one.second for one in chosen], dict.fromkeys(equations.accelerations, 0.0))
         self.explicit = dict(zip(used, rates, strict=True))
@@ -449,7 +447,7 @@ def _accelerations(equations: Equations, rows: list[Expression], moved: _Moved) 
     found = jacobian(rows, list(equations.accelerations))
     right = substitute(rows, dict.fromkeys(equations.accelerations, 0.0))
     pushed: Matrix = {}
-    for r, c, entry in zip(found.rows, found.columns, found.entries, strict=True):
+    for r, c, entry in found.triples:
         for k in range(n):
             if (c, k) in moved.weights:
                 pushed[r, k] = pushed.get((r, k), graph.zero) + entry * moved.weights[c, k]

@@ -335,9 +335,7 @@ def integrable_together(mechanism: Mechanism, equations: Equations) -> bool | No
     fields = _fields(equations)
     forms = np.full((m, n + 1), graph.zero, dtype=object)
     velocity_jacobian = jacobian([one.rate for one in equations.constraints], list(equations.speeds))
-    for row, column, entry in zip(
-        velocity_jacobian.rows, velocity_jacobian.columns, velocity_jacobian.entries, strict=True
-    ):
+    for row, column, entry in velocity_jacobian.triples:
         forms[row, column] = entry
     forms[:, n] = substitute([one.rate for one in equations.constraints], still)
     # How forms and fields change along each field, one sweep each.

@@ -78,7 +78,7 @@ def known_multipliers(
     found = [solved[number[symbol]] for symbol in wanted]
     forces, values = list(stand_ins.values()), [bias[i] for i in stand_ins]
     slopes = jacobian(found, forces)
-    shares = {(r, c): e for r, c, e in zip(slopes.rows, slopes.columns, slopes.entries, strict=True)}
+    shares = slopes.by_place
     rest = substitute(found, dict.fromkeys(forces, graph.zero))
     try:
         found = _fixed_point(wanted, rest, shares, values)
@@ -117,8 +117,8 @@ class _System:
         self.masses, self.right = len(speeds), list(right)
         mass = jacobian(list(rows), list(accelerations))
         held = jacobian([one.rate for one in constraints], list(speeds))
-        self.mass = {(r, c): e for r, c, e in zip(mass.rows, mass.columns, mass.entries, strict=True)}
-        places = zip(held.rows, held.columns, held.entries, strict=True)
+        self.mass = mass.by_place
+        places = held.triples
         self.slopes = {(self.masses + r, c): e for r, c, e in places}
         self.diagonal: list[Expression] = []
 
@@ -208,7 +208,7 @@ def _fixed_point(
     """Return z with ``z = rest + shares w(z)``."""
     graph, count = rest[0].graph, len(unknowns)
     slopes = jacobian(list(forces), list(unknowns))
-    turns = {(r, c): e for r, c, e in zip(slopes.rows, slopes.columns, slopes.entries, strict=True)}
+    turns = slopes.by_place
     is_affine = not any(depends_on(entry, list(unknowns)) for entry in turns.values())
 
     def times(matrix: Mapping[tuple[int, int], Expression], vector: Sequence[Expression]) -> list[Expression]:

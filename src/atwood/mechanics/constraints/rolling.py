@@ -212,7 +212,7 @@ def _forms(mechanism: Mechanism, site: Site, state: Movement, rolling: OnVelocit
         velocities = local.velocities
         gradients = substitute(vjp([one.value], [one.value.graph.constant(1.0)], velocities), mapping)
         moved = jacobian([mapping.get(s, s) for s in velocities], list(state.speeds))
-        terms = tuple((c, gradients[r] * e) for r, c, e in zip(moved.rows, moved.columns, moved.entries, strict=True))
+        terms = tuple((c, gradients[r] * e) for r, c, e in moved.triples)
         forms.append(replace(form, terms=terms))
     return forms
 

@@ -295,7 +295,7 @@ class Dynamics:
         if is_too_long(e.rows, e.accelerations):
             return None
         found = jacobian(list(e.rows), list(e.accelerations))
-        known = {(r, c): x for r, c, x in zip(found.rows, found.columns, found.entries, strict=True)}
+        known = found.by_place
         return [known.get((max(i, j), min(i, j)), e.graph.zero) for i in range(n) for j in range(n)]
 
     @cached_property

@@ -458,7 +458,7 @@ def hamiltonian_formula(formulas: EquationFormulas, transform: LegendreTransform
     momenta = transform.momentum_expressions
     at_rest = substitute(list(momenta), still)
     mass = jacobian(list(momenta), list(transform.velocity_symbols))
-    entries = {(i, j): one for i, j, one in zip(mass.rows, mass.columns, mass.entries, strict=True) if not one.is_zero}
+    entries = {(i, j): one for i, j, one in mass.triples if not one.is_zero}
     free = [momentum_symbol(found, i) - at_rest[i] for i in range(transform.size)]
     terms: list[Term] = []
     for block in _blocks(transform.size, entries):
