@@ -60,7 +60,7 @@ def energy_forces(trial: Trial, law: Law) -> Wrench:
     """Return the forces of an energy: minus its differences along each way in which each connector can move."""
     found = []
     for name, pose in trial.poses.items():
-        for column in range(ways(trial, name)):
+        for column in range(trial.freedoms(name)):
             size = 1e-5 * (trial.length if column < len(trial.space.basis) else 1.0)
             ends = []
             for by in (size, -size):
@@ -69,12 +69,6 @@ def energy_forces(trial: Trial, law: Law) -> Wrench:
                 ends.append(numbers[0] if numbers else np.nan)  # what is no number is told by another test
             found.append((ends[1] - ends[0]) / (2.0 * size))
     return np.array(found)
-
-
-def ways(trial: Trial, name: str) -> int:
-    """Return in how many ways a connector can move."""
-    turns = {"line": 0, "plane": 1, "space": 3}[trial.space.name] if trial.is_frame(name) else 0
-    return len(trial.space.basis) + turns
 
 
 def load_forces(trial: Trial, law: Law) -> Wrench:
@@ -92,7 +86,7 @@ def load_forces(trial: Trial, law: Law) -> Wrench:
     for name in trial.poses:
         force, torque = totals.get(name, (Vector(), Vector()))
         components = [*trial.space.components(force)]
-        if ways(trial, name) > len(trial.space.basis):
+        if trial.freedoms(name) > len(trial.space.basis):
             components += trial.space.turn_components(torque)
         found += [float(one) for one in components]
     return np.array(found)
@@ -103,7 +97,7 @@ def _speeds(trial: Trial) -> Wrench:
     found: list[float] = []
     for name in trial.poses:
         found += [float(one) for one in trial.space.components(trial.velocities[name])]
-        if ways(trial, name) > len(trial.space.basis):
+        if trial.freedoms(name) > len(trial.space.basis):
             found += trial.space.turn_components(trial.angular_velocities[name])
     return np.array(found)
 
@@ -227,7 +221,7 @@ def _sum(trial: Trial, loads: Wrench) -> tuple[NDArray[np.float64], NDArray[np.f
         count = len(trial.space.basis)
         one = trial.space.vector(tuple(loads[at : at + count]))
         at += count
-        own = loads[at : at + ways(trial, name) - count]
+        own = loads[at : at + trial.freedoms(name) - count]
         at += len(own)
         angular_velocities = Vector(*own) if len(own) == 3 else Vector(0.0, -own[0], 0.0) if len(own) else Vector()
         force, torque = force + one, torque + cross(pose.position, one) + angular_velocities
@@ -342,7 +336,7 @@ def _forces(trial: Trial, local: LocalPart, value: Expression, numbers: dict[Exp
         torque = evaluate(torques, numbers)
         if len(torque) == 3:
             torque = [float(c) for c in from_axes(trial.poses[name].axes, Vector(*torque))]
-        found += torque[: ways(trial, name) - len(gradients)]
+        found += torque[: trial.freedoms(name) - len(gradients)]
     return np.array(found)
 
 

@@ -83,12 +83,6 @@ def _mover(law: Law) -> str:
     return str(law.options.a if law.options.b == "world" else law.options.b)
 
 
-def _freedoms(trial: Trial, name: str) -> int:
-    """Return in how many ways a connector can move."""
-    turns = len(trial.space.turn_axes) if trial.is_frame(name) else 0
-    return len(trial.space.basis) + turns
-
-
 def _slopes(
     trial: Trial, law: Law, solved: Sequence[Law], poses: Mapping[str, Pose], moving: Mapping[str, Motion]
 ) -> dict[str, np.ndarray]:
@@ -99,7 +93,7 @@ def _slopes(
     mover, directions = _mover(law), len(trial.space.basis)
     columns: dict[str, list[np.ndarray]] = {one.name: [] for one in solved}
     sizes: dict[str, np.ndarray] = {one.name: np.zeros(1) for one in solved}
-    for column in range(_freedoms(trial, mover)) if solved else ():
+    for column in range(trial.freedoms(mover)) if solved else ():
         by = 1e-4 * (trial.length if column < directions else 1.0)
         ends = [
             _values(trial, solved, {**poses, mover: nudged(poses[mover], column, way * by, trial.space)}, moving)
@@ -126,7 +120,7 @@ def _velocity_jacobian(
     assert velocity is not None
     assert spin is not None
     columns = []
-    for column in range(_freedoms(trial, mover)):
+    for column in range(trial.freedoms(mover)):
         ends = []
         for by in (0.5, -0.5):
             if column < len(space.basis):
@@ -186,7 +180,7 @@ def _wrong_freedom(
 ) -> Iterator[DeclarationError]:
     """Yield an error if the joint leaves fewer ways to move than the constraints that it solves."""
     mover = _mover(law)
-    freedoms = _freedoms(trial, mover)
+    freedoms = trial.freedoms(mover)
     left = _rank(_tangents(trial, law, poses))
     held = _rank(rows)
     if left + held >= freedoms:
@@ -226,7 +220,7 @@ def _tangents(trial: Trial, law: Law, poses: Mapping[str, Pose]) -> list[np.ndar
     placement = trial.placement(law, 0.0, poses, values)
     assert placement is not None
     if placement.rotation is None or placement.rotation is FREE:
-        for column in range(len(space.basis), _freedoms(trial, mover)):
+        for column in range(len(space.basis), trial.freedoms(mover)):
             turned = [{**poses, mover: nudged(poses[mover], column, s * 1e-4, space)} for s in (1.0, -1.0)]
             found.append(difference([placed(values, start) for start in turned]))
     return found

@@ -101,6 +101,10 @@ class Trial:
         """Return whether a connector has an orientation here."""
         return name in self.frames
 
+    def freedoms(self, name: str) -> int:
+        """Return in how many ways a connector can move."""
+        return len(self.space.basis) + (len(self.space.turn_axes) if self.is_frame(name) else 0)
+
     def at(self, t: float) -> dict[str, Pose]:
         """Return where connectors are at a time, each moving by itself."""
         found = {}

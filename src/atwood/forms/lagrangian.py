@@ -21,7 +21,7 @@ from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Constraint, Equations, balance_rows, inertia_forces
-from atwood.mechanics.dynamics.forces import Forces, in_joint_coordinates, local_map, part_forces
+from atwood.mechanics.dynamics.forces import Forces, in_joint_coordinates, part_forces, place_part
 from atwood.mechanics.kinematics.orientation import euler_spin
 from atwood.mechanics.outputs.observables import MOMENTUM, Observable
 from atwood.mechanics.outputs.totals import add_up, part_energies
@@ -185,7 +185,7 @@ def contribution(
     """Return what the part at `path` contributes, with what it reads from outputs of other parts in `signals`."""
     mechanism, graph = assembly.mechanism, equations.graph
     local, site, kinematics = mechanism.locals_[path], equations.site, equations.kinematics
-    mapping = {**local_map(site, local, kinematics), **signals}
+    part = place_part(site, local, kinematics, signals)
     linked = [*local.signal_symbols.values(), *local.stand_ins]
     # What follows the output of another part is no potential of the scene, and a Lagrangian is not T - V.
     plain = replace(local, potentials=_free_of(local.potentials, linked), lagrangians=())
@@ -194,11 +194,11 @@ def contribution(
     total = kinetic - potential
     given = in_joint_coordinates(local, kinematics, local.lagrangians)[0]
     if given:
-        total = total + add_up(substitute(given, mapping))
+        total = total + add_up(part.put(given))
         locals_ = {**mechanism.locals_, path: replace(plain, lagrangians=local.lagrangians)}
         kinetic, potential = part_energies(replace(mechanism, locals_=locals_), equations, path, signals)
     damping = in_joint_coordinates(local, kinematics, _free_of(local.dissipations, linked))[0]
-    rayleigh = add_up([graph.zero, *substitute(damping, mapping)]) if damping else graph.zero
+    rayleigh = add_up([graph.zero, *part.put(damping)]) if damping else graph.zero
     rest = replace(
         local,
         potentials=tuple(one for one in local.potentials if one not in plain.potentials),
@@ -206,7 +206,7 @@ def contribution(
         lagrangians=(),
     )
     found = Forces(graph)
-    part_forces(site, rest, kinematics, mapping, found)
+    part_forces(replace(part, local=rest), found)
     forces = [-row for row in balance_rows(kinematics, {}, found, equations.speeds)]
     if local.varying:
         thrust = _thrust(assembly, equations, path, signals)
@@ -265,7 +265,7 @@ def inertial_terms(equations: Equations, signals: Mapping[Expression, Expression
             still = _at_rest(local, kinematics.joint_rates)
             moving = tuple(value - rest for value, rest in zip(local.lagrangians, still, strict=True))
             one = replace(local, potentials=(), dissipations=(), loads=(), lagrangians=moving)
-            part_forces(site, one, kinematics, {**local_map(site, local, kinematics), **signals}, forces)
+            part_forces(replace(place_part(site, local, kinematics, signals), local=one), forces)
     return balance_rows(kinematics, at_centers, forces, equations.speeds)
 
 

@@ -20,8 +20,8 @@ from atwood.mechanics.constraints.read_multipliers import known_multipliers, wit
 from atwood.mechanics.constraints.rolling import Taken, integrated, take_up, without_idle_spins
 from atwood.mechanics.constraints.values import Values, constraint_values, find_constraints, levels, velocity_levels
 from atwood.mechanics.dynamics.augmented import difference
-from atwood.mechanics.dynamics.equations import Equations, force_rows, motion_rows, put_in_place
-from atwood.mechanics.dynamics.forces import Site, in_joint_coordinates, local_map
+from atwood.mechanics.dynamics.equations import Equations, force_rows, motion_rows
+from atwood.mechanics.dynamics.forces import Site, in_joint_coordinates, place_part
 from atwood.mechanics.dynamics.inertia import Masses, add_masses, check_masses
 from atwood.mechanics.kinematics.mechanism import (
     Derivation,
@@ -183,7 +183,7 @@ def _states(
     for local in mechanism.locals_.values():
         if local.states:
             rates, _ = in_joint_coordinates(local, kinematics, [one.rate for one in local.states])
-            placed = substitute(rates, {**local_map(site, local, kinematics), **signals})
+            placed = place_part(site, local, kinematics, signals).put(rates)
             found += (replace(one, rate=rate) for one, rate in zip(local.states, placed, strict=True))
     return tuple(found)
 
@@ -224,8 +224,7 @@ def _resolved(mechanism: Mechanism, site: Site, kinematics: Kinematics) -> dict[
         inputs = replace(local.binding, values={**local.binding.values, **local.signal_symbols})
         value = output_value(local.part, bind(local.part.component, inputs), observable, mechanism.space)
         (value,), _ = in_joint_coordinates(local, kinematics, [site.graph.convert(value)])
-        placed = put_in_place(value, local_map(site, local, kinematics))
-        raw[mechanism.locals_[path].signal_symbols[name]] = placed
+        (raw[mechanism.locals_[path].signal_symbols[name]],) = place_part(site, local, kinematics).put([value])
     return _in_turn(mechanism, raw)
 
 

@@ -29,8 +29,8 @@ from atwood.mechanics.constraints.pfaffian import (
     switches,
 )
 from atwood.mechanics.constraints.values import Values
-from atwood.mechanics.dynamics.equations import Integral, put_in_place
-from atwood.mechanics.dynamics.forces import Site, local_map
+from atwood.mechanics.dynamics.equations import Integral
+from atwood.mechanics.dynamics.forces import Site, place_part
 from atwood.mechanics.dynamics.inertia import Masses
 from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide, extent, from_start
 from atwood.mechanics.kinematics.motion import Motion, Movement
@@ -207,11 +207,11 @@ def _forms(mechanism: Mechanism, site: Site, state: Movement, rolling: OnVelocit
     forms = []
     for path, one in rolling:
         local = mechanism.locals_[path]
-        mapping = local_map(site, local, state.kinematics)
-        (form,) = pfaffian_forms(state, [(path, one, put_in_place(one.value, mapping))])
+        part = place_part(site, local, state.kinematics)
+        (form,) = pfaffian_forms(state, [(path, one, part.put([one.value])[0])])
         velocities = local.velocities
-        gradients = substitute(vjp([one.value], [one.value.graph.constant(1.0)], velocities), mapping)
-        moved = jacobian([mapping.get(s, s) for s in velocities], list(state.speeds))
+        gradients = part.put(vjp([one.value], [one.value.graph.constant(1.0)], velocities))
+        moved = jacobian([part.mapping.get(s, s) for s in velocities], list(state.speeds))
         terms = tuple((c, gradients[r] * e) for r, c, e in moved.triples)
         forms.append(replace(form, terms=terms))
     return forms

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from atwood.errors import UnsupportedError
-from atwood.expr import Expression, depends_on, jvp, live, substitute
-from atwood.lazy_dataclasses import dataclass
-from atwood.mechanics.dynamics.equations import Constraint, Integral, constraint_levels, put_in_place
+from atwood.expr import Expression, depends_on, jvp, live
+from atwood.lazy_dataclasses import dataclass, replace
+from atwood.mechanics.dynamics.equations import Constraint, Integral, constraint_levels
 from atwood.mechanics.dynamics.forces import (
+    PlacedPart,
     Site,
     in_body,
     in_coordinates,
@@ -16,15 +17,13 @@ from atwood.mechanics.dynamics.forces import (
     is_on_velocities,
     joint_gradients,
     local_gradients,
-    local_map,
-    rate_symbol,
+    place_part,
+    rates_of_symbols,
 )
 from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.mechanics.kinematics.motion import Movement
-from atwood.mechanics.kinematics.orientation import spin_in_world
 from atwood.mechanics.kinematics.positions import Kinematics, Placements
 from atwood.model.local.parts import LocalConstraint, LocalPart
-from atwood.model.values.space import Vector, cross
 from atwood.topology.spanning_forest import SpanningForest
 
 Values = list[tuple[str, LocalConstraint, Expression]]
@@ -90,8 +89,8 @@ def constraint_values(
 ) -> Values:
     """Return the value of each constraint in terms of coordinates."""
     still = Kinematics(placements, placements.positions, {}, {}, {}, {}, {})
-    maps = {path: local_map(site, mechanism.locals_[path], still) for path in {path for path, _ in left}}
-    return [(path, c, put_in_place(c.value, maps[path])) for path, c in left]
+    parts = {path: place_part(site, mechanism.locals_[path], still) for path in {path for path, _ in left}}
+    return [(path, c, parts[path].put([c.value])[0]) for path, c in left]
 
 
 def levels(
@@ -104,8 +103,10 @@ def levels(
     rates, seconds = constraint_levels([] if by_parts else placed, mechanism.time, *symbols)
     for number, ((path, one, multiplier), value) in enumerate(zip(chosen, placed, strict=True)):
         if by_parts:
-            rate = _rate_by_gradients(site, mechanism.locals_[path], one, state.kinematics, mechanism.time)
-            second = _differentiated_twice(site, mechanism.locals_[path], one, state.kinematics, mechanism.time)
+            part = place_part(site, mechanism.locals_[path], state.kinematics)
+            rate = _rate_by_gradients(part, one, mechanism.time)
+            along, _ = rates_of_symbols(part)
+            second = _differentiated(part, jvp([one.value], along)[0])
         else:
             rate, second = rates[number], seconds[number]
         key = (path, one.law.name, one.index)
@@ -126,9 +127,9 @@ def velocity_levels(
     for path, one, multiplier in chosen:
         local = mechanism.locals_[path]
         _check_affine(path, local, one)
-        mapping = {**local_map(site, local, state.kinematics), **signals}
-        rate = put_in_place(one.value, mapping)
-        second = _differentiated(site, local, one.value, state.kinematics, mechanism.time, signals)
+        part = place_part(site, local, state.kinematics, signals)
+        rate = part.put([one.value])[0]
+        second = _differentiated(part, one.value)
         key = (path, one.law.name, one.index)
         integral = integrals.get(key)
         value = None if integral is None else integral.value
@@ -147,80 +148,29 @@ def _check_affine(path: str, local: LocalPart, one: LocalConstraint) -> None:
         )
 
 
-def _rate_by_gradients(
-    site: Site, local: LocalPart, one: LocalConstraint, kinematics: Kinematics, time: Expression
-) -> Expression:
+def _rate_by_gradients(part: PlacedPart, one: LocalConstraint, time: Expression) -> Expression:
     """Return the rate of a constraint: the virtual power of its force for a multiplier of one, and what time adds."""
-    graph, mapping = site.graph, local_map(site, local, kinematics)
-    (total,) = substitute(jvp([one.value], {time: 1.0}), mapping)
-    for name, gradients, torques in local_gradients(local, one.value, graph.constant(1.0)):
-        node = site.node(local.part.path, name)
+    site, kinematics = part.site, part.kinematics
+    (total,) = part.put(jvp([one.value], {time: 1.0}))
+    for name, gradients, torques in local_gradients(part.local, one.value, site.graph.constant(1.0)):
+        node = site.node(part.local.part.path, name)
         body = site.bodies.body_of[node]
-        for gradient, v in zip(substitute(gradients, mapping), kinematics.velocities[node], strict=True):
+        for gradient, v in zip(part.put(gradients), kinematics.velocities[node], strict=True):
             total = total + gradient * v
         if torques and not all(gradient.is_zero for gradient in torques):
-            torque = in_body(site, node, substitute(torques, mapping))
+            torque = in_body(site, node, part.put(torques))
             for t, w in zip(torque, kinematics.angular_velocities[body], strict=True):
                 total = total + t * w
-    for symbol, gradient in joint_gradients(local, one.value):
-        total = total + substitute([gradient], mapping)[0] * kinematics.joint_rates[symbol]
+    for symbol, gradient in joint_gradients(part.local, one.value):
+        total = total + part.put([gradient])[0] * kinematics.joint_rates[symbol]
     return total
 
 
-def _differentiated_twice(
-    site: Site, local: LocalPart, one: LocalConstraint, kinematics: Kinematics, time: Expression
-) -> Expression:
-    (rate,) = jvp([one.value], _first_directions(local, time))
-    return _differentiated(site, local, rate, kinematics, time)
-
-
-def _first_directions(local: LocalPart, time: Expression) -> dict[Expression, Expression | float]:
-    """Return how the local symbols of positions and orientations go on in time."""
-    directions: dict[Expression, Expression | float] = {time: 1.0}
-    directions.update({symbol: rate_symbol(symbol) for symbol in local.formulas})
-    for symbols in local.connectors.values():
-        directions.update(zip(symbols.position, symbols.velocity, strict=True))
-        if symbols.angle is not None and symbols.angular_speed is not None:
-            directions[symbols.angle] = symbols.angular_speed
-        if symbols.axes is not None and symbols.angular_velocity is not None:
-            for axis in symbols.axes:
-                directions.update(zip(axis, cross(symbols.angular_velocity, axis), strict=True))
-    return directions
-
-
-def _differentiated(
-    site: Site,
-    local: LocalPart,
-    value: Expression,
-    kinematics: Kinematics,
-    time: Expression,
-    signals: Mapping[Expression, Expression] | None = None,
-) -> Expression:
+def _differentiated(part: PlacedPart, value: Expression) -> Expression:
     """Return the time derivative of an expression of local positions, orientations, velocities and states, in place."""
-    graph, path = site.graph, local.part.path
-    directions = _first_directions(local, time)
-    mapping = local_map(site, local, kinematics)
-    for symbol in local.formulas:
-        if symbol in kinematics.joint_accelerations:
-            changing = directions[rate_symbol(symbol)] = graph.symbol(f"{symbol.name}''")
-            mapping[changing] = kinematics.joint_accelerations[symbol]
-    for name, symbols in local.connectors.items():
-        node = site.node(path, name)
-        body = site.bodies.body_of[node]
-        for k, v in enumerate(symbols.velocity):
-            directions[v] = graph.symbol(f"{v.name}'")
-            mapping[graph.symbol(f"{v.name}'")] = kinematics.accelerations[node][k]
-        if symbols.spin and body in kinematics.angular_accelerations:
-            spin_rate: Sequence[Expression] = kinematics.angular_accelerations[body]
-            if len(symbols.spin) == 3:
-                turned: Vector = spin_in_world(spin_rate, kinematics.placements.axes[body])
-                spin_rate = [graph.convert(c) for c in turned]
-            for w, alpha in zip(symbols.spin, spin_rate, strict=True):
-                directions[w] = graph.symbol(f"{w.name}'")
-                mapping[graph.symbol(f"{w.name}'")] = alpha
-    if depends_on(value, [one.symbol for one in local.states]):
-        rates, _ = in_joint_coordinates(local, kinematics, [one.rate for one in local.states])
-        directions.update((one.symbol, rate) for one, rate in zip(local.states, rates, strict=True))
-        mapping.update(signals or {})
-    (rate,) = jvp([value], directions)
-    return put_in_place(rate, mapping)
+    along, placed = rates_of_symbols(part)
+    states = part.local.states
+    if depends_on(value, [one.symbol for one in states]):
+        rates, _ = in_joint_coordinates(part.local, part.kinematics, [one.rate for one in states])
+        along.update((one.symbol, rate) for one, rate in zip(states, rates, strict=True))
+    return replace(part, mapping={**part.mapping, **placed}).put(jvp([value], along))[0]

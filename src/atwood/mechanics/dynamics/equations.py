@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 
-from atwood.expr import Expression, Graph, Scalar, jvp, substitute, vjp
+from atwood.expr import Expression, Graph, Scalar, jvp, vjp
 from atwood.lazy_dataclasses import dataclass
-from atwood.mechanics.dynamics.forces import Forces, Site, constraint_forces, local_map, part_forces
+from atwood.mechanics.dynamics.forces import Forces, Site, constraint_forces, part_forces, place_part
 from atwood.mechanics.dynamics.inertia import Masses, tensor_of, turned_tensor
 from atwood.mechanics.kinematics.mechanism import Constant, Decision
 from atwood.mechanics.kinematics.orientation import inertial_torque, torque_components
@@ -279,7 +279,7 @@ def motion_rows(
     forces = Forces(site.graph)
     at_centers = inertia_forces(site, masses, kinematics, lifted, forces)
     for local in locals_.values():
-        part_forces(site, local, kinematics, {**local_map(site, local, kinematics), **signals}, forces)
+        part_forces(place_part(site, local, kinematics, signals), forces)
     return balance_rows(kinematics, at_centers, forces, speeds)
 
 
@@ -294,9 +294,7 @@ def force_rows(
     """Return, for each speed, the generalized force of constraints with the given multipliers."""
     forces = Forces(site.graph)
     for path, constraint, multiplier in chosen:
-        local = locals_[path]
-        mapping = {**local_map(site, local, kinematics), **signals}
-        constraint_forces(site, local, constraint.value, multiplier, mapping, forces)
+        constraint_forces(place_part(site, locals_[path], kinematics, signals), constraint.value, multiplier, forces)
     return [-row for row in balance_rows(kinematics, {}, forces, speeds)]
 
 
@@ -314,8 +312,3 @@ def constraint_levels(
         return [], []
     found = jvp(values, first)
     return found, jvp(found, {**first, **dict(zip(speeds, accelerations, strict=True))})
-
-
-def put_in_place(value: Expression, mapping: Mapping[Expression, Expression]) -> Expression:
-    """Return an expression of local symbols where the part is."""
-    return substitute([value], mapping)[0]

@@ -91,8 +91,24 @@ class Site:
         return self.bodies.body_of[self.node(path, connector)]
 
 
-def local_map(site: Site, local: LocalPart, kinematics: Kinematics) -> dict[Expression, Expression]:
-    """Return what the local symbols of a part stand for."""
+@dataclass(frozen=True, eq=False)
+class PlacedPart:
+    """A part in place: where it is, how it moves, and what its local symbols stand for."""
+
+    site: Site
+    local: LocalPart
+    kinematics: Kinematics
+    mapping: Mapping[Expression, Expression]
+
+    def put(self, values: Sequence[Expression]) -> list[Expression]:
+        """Return expressions of local symbols where the part is."""
+        return substitute(values, self.mapping)
+
+
+def place_part(
+    site: Site, local: LocalPart, kinematics: Kinematics, signals: Mapping[Expression, Expression] | None = None
+) -> PlacedPart:
+    """Return a part in place, with what its linked inputs stand for."""
     path = local.part.path
     found: dict[Expression, Expression] = {}
     for name, symbols in local.connectors.items():
@@ -117,7 +133,7 @@ def local_map(site: Site, local: LocalPart, kinematics: Kinematics) -> dict[Expr
             found[symbol] = kinematics.placements.joint_coordinates[symbol]
         if symbol in kinematics.joint_rates:
             found[rate_symbol(symbol)] = kinematics.joint_rates[symbol]
-    return found
+    return PlacedPart(site, local, kinematics, {**found, **(signals or {})})
 
 
 def rate_symbol(coordinate: Expression) -> Expression:
@@ -151,21 +167,20 @@ def in_coordinates(local: LocalPart, one: LocalConstraint, placements: Placement
     return one if value is one.value else replace(one, value=value)
 
 
-def part_forces(
-    site: Site, local: LocalPart, kinematics: Kinematics, mapping: Mapping[Expression, Expression], forces: Forces
-) -> None:
+def part_forces(part: PlacedPart, forces: Forces) -> None:
     """Add the forces of a part's potentials, Rayleigh functions, Lagrangians and loads."""
+    site, local, kinematics = part.site, part.local, part.kinematics
     if local.stand_ins:
         values, _ = in_joint_coordinates(local, kinematics, list(local.stand_ins.values()))
-        mapping = {**mapping, **dict(zip(local.stand_ins, substitute(values, mapping), strict=True))}
-    _add_gradient(site, local, kinematics, local.potentials, mapping, forces, of_velocities=False)
-    _add_gradient(site, local, kinematics, local.dissipations, mapping, forces, of_velocities=True)
+        part = replace(part, mapping={**part.mapping, **dict(zip(local.stand_ins, part.put(values), strict=True))})
+    _add_gradient(part, local.potentials, forces, of_velocities=False)
+    _add_gradient(part, local.dissipations, forces, of_velocities=True)
     if local.lagrangians:
-        _add_lagrangians(site, local, kinematics, mapping, forces)
+        _add_lagrangians(part, forces)
     path = local.part.path
     for load in local.loads:
         components = [site.graph.convert(c) for c in (*site.space.components(load.force), *load.torque)]
-        *force, x, y, z = substitute(in_joint_coordinates(local, kinematics, components)[0], mapping)
+        *force, x, y, z = part.put(in_joint_coordinates(local, kinematics, components)[0])
         forces.push(site.node(path, load.at.name), force)
         if any(not is_zero(c) for c in load.torque):
             body = site.body(path, load.at.name)
@@ -175,44 +190,37 @@ def part_forces(
             forces.twist(body, torque, site.node(path, load.at.name))
 
 
-def _add_gradient(
-    site: Site,
-    local: LocalPart,
-    kinematics: Kinematics,
-    given: Sequence[Expression],
-    mapping: Mapping[Expression, Expression],
-    forces: Forces,
-    of_velocities: bool,
-) -> None:
-    functions, hung = in_joint_coordinates(local, kinematics, given)
+def _add_gradient(part: PlacedPart, given: Sequence[Expression], forces: Forces, of_velocities: bool) -> None:
+    """Add minus the derivatives of functions."""
+    functions, hung = in_joint_coordinates(part.local, part.kinematics, given)
+    down = part.site.graph.constant(-1.0)
     for function in functions:
         for symbol in hung:
             moved = rate_symbol(symbol) if of_velocities else symbol
-            (gradient,) = vjp([function], [site.graph.constant(-1.0)], [moved])
+            (gradient,) = vjp([function], [down], [moved])
             if not gradient.is_zero:
-                forces.push_joint(symbol, substitute([gradient], mapping)[0])
-        for name, gradients, torques in local_gradients(local, function, site.graph.constant(-1.0), of_velocities):
-            _push_mapped(site, local, name, gradients, torques, mapping, forces)
+                forces.push_joint(symbol, part.put([gradient])[0])
+        for name, gradients, torques in local_gradients(part.local, function, down, of_velocities):
+            _push_mapped(part, name, gradients, torques, forces)
 
 
-def _add_lagrangians(
-    site: Site, local: LocalPart, kinematics: Kinematics, mapping: Mapping[Expression, Expression], forces: Forces
-) -> None:
+def _add_lagrangians(part: PlacedPart, forces: Forces) -> None:
     """Add the forces ``dL/dq - d/dt dL/dq'`` of Lagrangians.
 
     In space, where angular velocities are no rates of coordinates, the torque is ``tau + omega x p - p'``, in which tau
     is that of the derivatives by the axes and p the derivative by the angular velocity (the equations of Poincare).
     """
-    functions, hung = in_joint_coordinates(local, kinematics, local.lagrangians)
-    graph, one = site.graph, site.graph.constant(1.0)
-    along, placed = _rates_of_symbols(site, local, kinematics, hung)
-    there = {**mapping, **placed}
+    local = part.local
+    functions, hung = in_joint_coordinates(local, part.kinematics, local.lagrangians)
+    graph, one = part.site.graph, part.site.graph.constant(1.0)
+    along, placed = rates_of_symbols(part)
+    part = replace(part, mapping={**part.mapping, **placed})
     for function in functions:
         for symbol in hung:
             gradient, momentum = vjp([function], [one], [symbol, rate_symbol(symbol)])
             force = gradient - jvp([momentum], along)[0]
             if not force.is_zero:
-                forces.push_joint(symbol, substitute([force], there)[0])
+                forces.push_joint(symbol, part.put([force])[0])
         momenta = iter(vjp([function], [one], local.velocities))
         for name, gradients, torques in local_gradients(local, function, one):
             symbols = local.connectors[name]
@@ -223,13 +231,12 @@ def _add_lagrangians(
                 turned = cross(symbols.angular_velocity, Vector(*angular)) - Vector(*rates)
                 rates = [-one for one in _along(symbols.axes, [graph.convert(c) for c in turned])]
             torques = [s - r for s, r in zip(torques, rates, strict=True)]
-            _push_mapped(site, local, name, gradients, torques, there, forces)
+            _push_mapped(part, name, gradients, torques, forces)
 
 
-def _rates_of_symbols(
-    site: Site, local: LocalPart, kinematics: Kinematics, hung: Sequence[Expression]
-) -> tuple[dict[Expression, Expression | float], dict[Expression, Expression]]:
+def rates_of_symbols(part: PlacedPart) -> tuple[dict[Expression, Expression | float], dict[Expression, Expression]]:
     """Return the time derivative of each local symbol, with symbols for accelerations, and what these stand for."""
+    site, local, kinematics = part.site, part.local, part.kinematics
     graph, path = site.graph, local.part.path
     along: dict[Expression, Expression | float] = {graph.convert(local.binding.time): 1.0}
     placed: dict[Expression, Expression] = {}
@@ -249,10 +256,11 @@ def _rates_of_symbols(
         along.update(zip((*symbols.velocity, *symbols.spin), rates, strict=True))
         found = (*kinematics.accelerations[node], *spin_rates)
         placed.update((rate, graph.convert(value)) for rate, value in zip(rates, found, strict=False))
-    for symbol in hung:
-        rate, second = rate_symbol(symbol), graph.symbol(f"{symbol.name}''")
-        along[symbol], along[rate] = rate, second
-        placed[second] = kinematics.joint_accelerations[symbol]
+    for symbol in local.formulas:
+        if symbol in kinematics.joint_rates:
+            rate, second = rate_symbol(symbol), graph.symbol(f"{symbol.name}''")
+            along[symbol], along[rate] = rate, second
+            placed[second] = kinematics.joint_accelerations[symbol]
     return along, placed
 
 
@@ -290,19 +298,15 @@ def _along(axes: Axes, gradients: Sequence[Expression]) -> list[Expression]:
 
 
 def _push_mapped(
-    site: Site,
-    local: LocalPart,
-    name: str,
-    gradients: list[Expression],
-    torques: list[Expression],
-    mapping: Mapping[Expression, Expression],
-    forces: Forces,
+    part: PlacedPart, name: str, gradients: list[Expression], torques: list[Expression], forces: Forces
 ) -> None:
-    path, node = local.part.path, site.node(local.part.path, name)
+    """Add a force and a torque of local symbols at a connector."""
+    site, path = part.site, part.local.part.path
+    node = site.node(path, name)
     if not all(gradient.is_zero for gradient in gradients):
-        forces.push(node, substitute(gradients, mapping))
+        forces.push(node, part.put(gradients))
     if not all(gradient.is_zero for gradient in torques):
-        forces.twist(site.body(path, name), in_body(site, node, substitute(torques, mapping)), node)
+        forces.twist(site.body(path, name), in_body(site, node, part.put(torques)), node)
 
 
 def in_body(site: Site, node: int, torque: Sequence[Expression]) -> list[Scalar]:
@@ -311,25 +315,15 @@ def in_body(site: Site, node: int, torque: Sequence[Expression]) -> list[Scalar]
     return list(from_axes(turn, Vector(*torque))) if isinstance(turn, tuple) else list(torque)
 
 
-def constraint_forces(
-    site: Site,
-    local: LocalPart,
-    value: Expression,
-    multiplier: Expression,
-    mapping: Mapping[Expression, Expression],
-    forces: Forces,
-) -> None:
+def constraint_forces(part: PlacedPart, value: Expression, multiplier: Expression, forces: Forces) -> None:
     """Add the forces of a constraint: its multiplier times its derivatives (Goldstein, section 2.4)."""
     # The derivatives first, and then times the multiplier: so both sets of multipliers and the rate share them.
-    of_velocities = is_on_velocities(local, value)
-    for name, gradients, torques in local_gradients(local, value, site.graph.constant(1.0), of_velocities):
-        pushes, twists = (
-            [gradient * multiplier for gradient in gradients],
-            [gradient * multiplier for gradient in torques],
-        )
-        _push_mapped(site, local, name, pushes, twists, mapping, forces)
-    for symbol, gradient in joint_gradients(local, value):
-        forces.push_joint(symbol, substitute([gradient * multiplier], mapping)[0])
+    of_velocities = is_on_velocities(part.local, value)
+    for name, gradients, torques in local_gradients(part.local, value, part.site.graph.constant(1.0), of_velocities):
+        pushes, twists = ([gradient * multiplier for gradient in one] for one in (gradients, torques))
+        _push_mapped(part, name, pushes, twists, forces)
+    for symbol, gradient in joint_gradients(part.local, value):
+        forces.push_joint(symbol, part.put([gradient * multiplier])[0])
 
 
 def joint_gradients(local: LocalPart, value: Expression) -> list[tuple[Expression, Expression]]:

@@ -12,11 +12,11 @@ from typing import Any
 
 from atwood.display import count_of
 from atwood.errors import AtwoodError, MissingNameError
-from atwood.expr import Expression, Scalar, is_zero, jvp, live, substitute
+from atwood.expr import Expression, Scalar, is_zero, jvp, live
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.mechanics.dynamics.forces import in_joint_coordinates, local_map
+from atwood.mechanics.dynamics.forces import PlacedPart, in_joint_coordinates, place_part
 from atwood.mechanics.dynamics.inertia import CarriedInertia
 from atwood.mechanics.kinematics.mechanism import Mechanism, world_position
 from atwood.mechanics.kinematics.orientation import node_axes, spin_in_world
@@ -110,10 +110,10 @@ def make_binding(
     """Return what the laws of a part read when they may read everything."""
     path, site, kinematics, space = local.part.path, equations.site, equations.kinematics, mechanism.space
     motions = {}
-    mapping = local_map(site, local, kinematics) if local.borrowed else {}
+    part = place_part(site, local, kinematics) if local.borrowed else PlacedPart(site, local, kinematics, {})
     for name, one in local.part.component.connectors().items():
         if isinstance(one, JointCoordinate):
-            motions[name] = _joint_reference_in_place(equations, local, local.binding.motions.get(name), mapping)
+            motions[name] = _joint_reference_in_place(equations, part, local.binding.motions.get(name))
             continue
         node = site.node(path, name)
         body = site.bodies.body_of[node]
@@ -142,14 +142,12 @@ def make_binding(
     )
 
 
-def _joint_reference_in_place(
-    equations: Equations, local: LocalPart, joint_reference: Motion | None, mapping: Mapping[Expression, Expression]
-) -> Motion:
+def _joint_reference_in_place(equations: Equations, part: PlacedPart, joint_reference: Motion | None) -> Motion:
     """Return a joint coordinate that a part takes hold of, in terms of the state; nothing at the joint itself."""
     if joint_reference is None:
         return Motion()
     found = [joint_reference.value, *(() if joint_reference.rate is None else (joint_reference.rate,))]
-    value, *rates = substitute(in_joint_coordinates(local, equations.kinematics, found)[0], mapping)
+    value, *rates = part.put(in_joint_coordinates(part.local, part.kinematics, found)[0])
     if not rates:
         return Motion(value=value)
     course: dict[Expression, Expression | float] = {equations.time: 1.0}

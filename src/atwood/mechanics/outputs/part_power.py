@@ -11,11 +11,11 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import Literal
 
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, Scalar, depends_on, jvp, substitute
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, Scalar, depends_on, jvp
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.mechanics.dynamics.forces import Forces, in_joint_coordinates, local_map, part_forces
+from atwood.mechanics.dynamics.forces import Forces, PlacedPart, in_joint_coordinates, part_forces, place_part
 from atwood.mechanics.dynamics.inertia import tensor_of, turned_tensor
 from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.mechanics.kinematics.positions import body_point_of
@@ -68,22 +68,22 @@ def part_powers(
     multipliers = multipliers_by_part(equations)
     found: dict[Flow, Expression] = {}
     for path, local in mechanism.locals_.items():
-        mapping = {**local_map(equations.site, local, equations.kinematics), **signals}
+        part = place_part(equations.site, local, equations.kinematics, signals)
         laws, loaded, damped = _by_kind(local)
         total = Forces(equations.graph)
         add_inertia(mechanism, equations, path, total)
-        add_reactions(equations, local, multipliers, mapping, total)
+        add_reactions(part, multipliers, total)
         if of_impulses:
-            part_forces(equations.site, replace(laws, potentials=()), equations.kinematics, mapping, total)
+            part_forces(replace(part, local=replace(laws, potentials=())), total)
         else:
-            part_forces(equations.site, laws, equations.kinematics, mapping, total)
+            part_forces(replace(part, local=laws), total)
             for flow, some, sign in ((Flow("supplied", path), loaded, 1.0), (Flow("dissipated", path), damped, -1.0)):
                 alone = Forces(equations.graph)
-                part_forces(equations.site, some, equations.kinematics, mapping, alone)
+                part_forces(replace(part, local=some), alone)
                 for power in _given_at(equations, path, alone).values():
                     _add(found, flow, power * sign)
-                part_forces(equations.site, some, equations.kinematics, mapping, total)
-            _add(found, Flow("supplied", path), _explicit_rate(mechanism, equations, local, mapping, signals))
+                part_forces(replace(part, local=some), total)
+            _add(found, Flow("supplied", path), _explicit_rate(mechanism, equations, part, signals))
         for flow, power in _given_at(equations, path, total).items():
             _add(found, flow, -power)
     kept = {flow: value for flow, value in found.items() if not value.is_zero}
@@ -136,14 +136,10 @@ def _given_at(equations: Equations, path: str, forces: Forces) -> dict[Flow, Exp
 
 
 def _explicit_rate(
-    mechanism: Mechanism,
-    equations: Equations,
-    local: LocalPart,
-    mapping: Mapping[Expression, Expression],
-    signals: Mapping[Expression, Expression],
+    mechanism: Mechanism, equations: Equations, part: PlacedPart, signals: Mapping[Expression, Expression]
 ) -> Expression:
     """Return how fast the energy of a part changes while nothing moves, W: with time, linked inputs and states."""
-    graph, kinematics = equations.graph, equations.kinematics
+    graph, kinematics, local = equations.graph, equations.kinematics, part.local
     changing = [*local.potentials, *(-value for value in local.lagrangians)]
     space = mechanism.space.name
     changing += [graph.convert(inertial_energy(one, mechanism.gravity, space)) for one in local.varying]
@@ -160,7 +156,7 @@ def _explicit_rate(
         if symbol in signals and depends_on(graph.convert(sum(placed)), [symbol]):
             directions[symbol] = jvp([signals[symbol]], course)[0]
     for slope in jvp(placed, directions):
-        total = total + substitute([slope], mapping)[0]
+        total = total + part.put([slope])[0]
     return total
 
 
@@ -177,15 +173,14 @@ def applied_power(mechanism: Mechanism, equations: Equations) -> Expression:
     forces = Forces(graph)
     total = graph.constant(0.0)
     for local in mechanism.locals_.values():
-        mapping = {**local_map(equations.site, local, kinematics), **signals}
-        alone = replace(local, potentials=(), lagrangians=())
-        part_forces(equations.site, alone, kinematics, mapping, forces)
+        part = place_part(equations.site, local, kinematics, signals)
+        part_forces(replace(part, local=replace(local, potentials=(), lagrangians=())), forces)
         changing = [*local.potentials, *(-value for value in local.lagrangians)]
         space = mechanism.space.name
         changing += [graph.convert(inertial_energy(one, mechanism.gravity, space)) for one in local.varying]
         placed, _ = in_joint_coordinates(local, kinematics, changing)
         for slope in jvp(placed, {mechanism.time: 1.0}) if placed else ():
-            total = total + substitute([slope], mapping)[0]
+            total = total + part.put([slope])[0]
     for node, force in forces.on_nodes.items():
         for f, v in zip(force, kinematics.velocities[node], strict=True):
             total = total + f * v
@@ -203,9 +198,9 @@ def switched_energy(mechanism: Mechanism, equations: Equations) -> Expression:
     signals = resolve_signals(mechanism, equations.site, kinematics, equations.read)
     total = equations.graph.constant(0.0)
     for local in mechanism.locals_.values():
-        mapping = {**local_map(equations.site, local, kinematics), **signals}
+        part = place_part(equations.site, local, kinematics, signals)
         for value in in_joint_coordinates(local, kinematics, local.switched)[0]:
-            total = total + substitute([value], mapping)[0]
+            total = total + part.put([value])[0]
     return total
 
 

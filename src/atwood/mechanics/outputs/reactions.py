@@ -14,14 +14,14 @@ from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations, push_body
 from atwood.mechanics.dynamics.forces import (
     Forces,
+    PlacedPart,
     constraint_forces,
     in_coordinates,
-    local_map,
     part_forces,
+    place_part,
 )
 from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.mechanics.kinematics.orientation import spin_in_world
-from atwood.model.local.parts import LocalPart
 from atwood.model.values.space import Space, Vector, cross
 from atwood.topology.bodies import Body
 from atwood.topology.graph import Joint
@@ -79,9 +79,9 @@ def _all_forces(mechanism: Mechanism, equations: Equations) -> Forces:
     forces = Forces(equations.graph)
     multipliers = multipliers_by_part(equations)
     for path, local in mechanism.locals_.items():
-        mapping = {**local_map(site, local, kinematics), **signals}
-        part_forces(site, local, kinematics, mapping, forces)
-        add_reactions(equations, local, multipliers, mapping, forces)
+        part = place_part(site, local, kinematics, signals)
+        part_forces(part, forces)
+        add_reactions(part, multipliers, forces)
         add_inertia(mechanism, equations, path, forces)
     return forces
 
@@ -96,19 +96,15 @@ def multipliers_by_part(equations: Equations) -> dict[str, dict[tuple[str, int],
 
 
 def add_reactions(
-    equations: Equations,
-    local: LocalPart,
-    multipliers: Mapping[str, Mapping[tuple[str, int], Expression]],
-    mapping: Mapping[Expression, Expression],
-    forces: Forces,
+    part: PlacedPart, multipliers: Mapping[str, Mapping[tuple[str, int], Expression]], forces: Forces
 ) -> None:
     """Add the forces of a part's constraints."""
-    own = multipliers.get(local.part.path, {})
-    for constraint in local.constraints:
+    own = multipliers.get(part.local.part.path, {})
+    for constraint in part.local.constraints:
         multiplier = own.get((constraint.law.name, constraint.index))
         if multiplier is not None:
-            held = in_coordinates(local, constraint, equations.kinematics.placements)
-            constraint_forces(equations.site, local, held.value, multiplier, mapping, forces)
+            held = in_coordinates(part.local, constraint, part.kinematics.placements)
+            constraint_forces(part, held.value, multiplier, forces)
 
 
 def add_inertia(mechanism: Mechanism, equations: Equations, path: str, forces: Forces) -> None:

@@ -8,7 +8,7 @@ from atwood.expr import Expression, Scalar, jvp, substitute, vjp
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.mechanics.dynamics.forces import in_joint_coordinates, local_map, rate_symbol
+from atwood.mechanics.dynamics.forces import in_joint_coordinates, place_part, rate_symbol
 from atwood.mechanics.dynamics.inertia import tensor_of, turned_tensor
 from atwood.mechanics.kinematics.mechanism import Mechanism, world_position
 from atwood.mechanics.kinematics.orientation import NodeTurn
@@ -136,7 +136,7 @@ def part_energies(
     """Return kinetic and potential energy of one part, its weight included."""
     graph, local, kinematics = mechanism.table.graph, mechanism.locals_[path], equations.kinematics
     site, space = equations.site, mechanism.space
-    mapping = {**local_map(site, local, kinematics), **signals}
+    part = place_part(site, local, kinematics, signals)
     kinetic: Scalar = graph.constant(0.0)
     potential: Scalar = graph.constant(0.0)
     pull = space.components(mechanism.gravity)
@@ -161,15 +161,15 @@ def part_energies(
             potential = potential - body.mass * (g * (place[k] + arm.position[k]))
         kinetic = kinetic + _energy_of_turning(path, body, turn, kinematics.angular_velocities.get(index, ()))
     for value in in_joint_coordinates(local, kinematics, local.potentials)[0]:
-        potential = potential + substitute([value], mapping)[0]
+        potential = potential + part.put([value])[0]
     functions, hung = in_joint_coordinates(local, kinematics, local.lagrangians)
     for value in functions:
         rates = [*local.velocities, *(rate_symbol(symbol) for symbol in hung)]
         momenta = vjp([value], [graph.constant(1.0)], rates)
         still = substitute([value], dict.fromkeys(rates, graph.zero))[0]
         energy = sum((p * v for p, v in zip(momenta, rates, strict=True)), still - value)
-        kinetic = kinetic + substitute([energy], mapping)[0]
-        potential = potential - substitute([still], mapping)[0]
+        kinetic = kinetic + part.put([energy])[0]
+        potential = potential - part.put([still])[0]
     return graph.convert(kinetic), graph.convert(potential)
 
 

@@ -16,14 +16,14 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, SolveError
-from atwood.expr import Expression, OutputGroup, Program, evaluate, live, substitute, vjp
+from atwood.expr import Expression, OutputGroup, Program, evaluate, live, vjp
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.program import state_groups
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.mechanics.dynamics.forces import local_map
+from atwood.mechanics.dynamics.forces import place_part
 from atwood.model.declare.component import bind
 from atwood.model.declare.law_results import CoordinateLoad, Load
 from atwood.model.declare.laws import scalars
@@ -211,9 +211,9 @@ def _law_values(assembly: Assembly) -> tuple[list[_Quantity], Program]:
     expressions: list[Expression] = []
     known = {*assembly.parameters, *(s for group in state_groups(equations) for s in group.symbols)}
     for path, local in mechanism.locals_.items():
-        mapping = {**local_map(equations.site, local, equations.kinematics), **signals}
+        part = place_part(equations.site, local, equations.kinematics, signals)
         for words, values in _quantities(local, assembly.modes.get(path, "")):
-            placed = substitute(values, mapping)
+            placed = part.put(values)
             for value in placed:
                 if all(node in known for node in live([value]) if node.is_symbol):
                     quantities.append(_Quantity(path, words))

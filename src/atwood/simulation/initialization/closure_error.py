@@ -20,7 +20,7 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.constraints.knots import BALANCES
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.mechanics.dynamics.forces import local_map
+from atwood.mechanics.dynamics.forces import place_part
 from atwood.mechanics.kinematics.orientation import node_axes
 from atwood.model.local.parts import LocalConnector, LocalConstraint, LocalPart
 from atwood.model.values.rotation import as_rotation, compose
@@ -80,7 +80,7 @@ def find_closure_errors(
     found = []
     for path, constraints in rows.items():
         local = equations.locals_[path]
-        mapping = {**local_map(equations.site, local, equations.kinematics), **signals}
+        mapping = place_part(equations.site, local, equations.kinematics, signals).mapping
         wanted = _read(local, constraints, mapping)
         numbers = dict(zip(wanted, evaluate([mapping[s] for s in wanted], place), strict=True))
         known = {**table, equations.time: t, **numbers}
@@ -192,8 +192,7 @@ def _trace(equations: Equations, joint: Joint) -> Expression | None:
     coordinates = joint.local.coordinates
     if any(symbol not in local.formulas for symbol in coordinates):
         return None
-    mapping = local_map(site, local, kinematics)
-    values = substitute([local.formulas[symbol][0] for symbol in coordinates], mapping)
+    values = place_part(site, local, kinematics).put([local.formulas[symbol][0] for symbol in coordinates])
     inner = as_rotation(joint.local.placement.rotation).axes()
     bodies = [site.bodies.body_of[node] for node in (joint.a, joint.b)]
     if any(body not in kinematics.placements.axes for body in bodies):

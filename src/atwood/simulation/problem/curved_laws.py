@@ -24,7 +24,7 @@ from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.mechanics.dynamics.forces import in_joint_coordinates, local_map
+from atwood.mechanics.dynamics.forces import in_joint_coordinates, place_part
 from atwood.model.local.parts import LocalPart
 
 _CURVED: Key[tuple[Curved, ...]] = Key("functions that may change fast")
@@ -100,9 +100,10 @@ def _find(assembly: Assembly, equations: Equations, more: frozenset[str]) -> Ite
         places = [one.value for one in local.constraints]  # where a quotient with a root is a direction
         mine += [one for one in _curved_in(places, _ALWAYS - {"tan"} | {"div", "mul"}) if not _has_root(one.argument)]
         if mine:
-            mapping = {**local_map(equations.site, local, kinematics), **signals}
             both = [one.argument for one in mine] + [one.exponent or equations.graph.one for one in mine]
-            both = substitute(substitute(both, mapping), equations.read)  # how reactions are solved for is no law
+            both = substitute(
+                place_part(equations.site, local, kinematics, signals).put(both), equations.read
+            )  # how reactions are solved for is no law
             if assembly.sides is not None:
                 both = assembly.sides.taken_out(both)
             triples = zip(mine, both[: len(mine)], both[len(mine) :], strict=True)
