@@ -15,11 +15,14 @@ from atwood.late import dataclass
 Sympy: TypeAlias = Any
 """A sympy object."""
 
-_LONGEST = 400
+_LONGEST = 250
 """Equations of more operations are not factored: nobody would solve them by hand."""
 
 _MOST = 64
 """The largest number of solutions."""
+
+_EFFORT = 6_000
+"""So many operations of equations are factored in all."""
 
 
 class NoClosedFormError(Exception):
@@ -60,40 +63,114 @@ def solve_conditions(equations: Sequence[Sympy], unknowns: Sequence[Sympy]) -> l
     NoClosedFormError
         If there is an equation that no rule solves.
     """
+    import sympy
+
+    plain, roots = _without_roots(equations, unknowns)
+    search = _Search((*unknowns, *roots))
     found: list[Solution] = []
-    for one in _solutions(list(equations), {}, (), tuple(unknowns)):
-        if one not in found:
-            found.append(one)
-        if len(found) > _MOST:
-            raise NoClosedFormError
+    try:
+        for one in search.solutions(plain, {}, (), search.unknowns):
+            made = _of_unknowns(one, unknowns, roots)
+            if made is not None and made not in found and _is_regular(equations, made):
+                found.append(made)
+            if len(found) > _MOST:
+                raise NoClosedFormError
+    except sympy.PolynomialError:
+        raise NoClosedFormError from None
     return found
 
 
-def _solutions(
-    equations: Sequence[Sympy], known: Mapping[Sympy, Sympy], conditions: tuple[Sympy, ...], unknowns: tuple[Sympy, ...]
-) -> Iterator[Solution]:
-    """Yield the solutions of what is left, factor by factor."""
-    rest: list[list[Sympy]] = []
-    for equation in equations:
-        factors = factors_of(equation, unknowns)
-        if factors is None:
+def _without_roots(
+    equations: Sequence[Sympy], unknowns: Sequence[Sympy]
+) -> tuple[list[Sympy], dict[Sympy, Sympy]]:
+    """Return equations in which square roots are unknowns of their own, and what each is the root of."""
+    import sympy
+
+    roots: dict[Sympy, Sympy] = {}
+
+    def named(power: Sympy) -> Sympy:
+        base = sympy.factor(power.base)
+        root = next((one for one, inside in roots.items() if sympy.expand(inside - base) == 0), None)
+        if root is None:
+            root = sympy.Dummy("r", positive=True)
+            roots[root] = base
+        return root**power.exp.p
+
+    def is_root(value: Sympy) -> bool:
+        return bool(value.is_Pow and value.exp.is_Rational and value.exp.q == 2 and value.base.has(*unknowns))
+
+    plain = [one.replace(is_root, named) for one in equations]
+    return [*plain, *(root**2 - inside for root, inside in roots.items())], roots
+
+
+def _of_unknowns(one: Solution, unknowns: Sequence[Sympy], roots: Mapping[Sympy, Sympy]) -> Solution | None:
+    """Return a solution in the unknowns that were asked for, with the condition that roots are positive; None if not."""
+    import sympy
+
+    conditions = list(one.conditions)
+    for root in roots:
+        value = one.values.get(root)
+        if value is None:
             continue
-        if not factors:
-            return  # it holds nowhere
-        rest.append(factors)
-    if not rest:
-        yield Solution(dict(known), conditions, unknowns)
-        return
-    rest.sort(key=lambda factors: (_hardness(factors, unknowns), len(factors)))
-    first, others = rest[0], [_product(one) for one in rest[1:]]
-    for factor in first:
-        unknown, roots = _roots(factor, unknowns)
-        left = tuple(one for one in unknowns if one != unknown)
-        for value, condition in roots:
-            by = {k: _shorter(v.subs(unknown, value)) if v.has(unknown) else v for k, v in known.items()}
-            by[unknown] = value
-            more = conditions if condition is None else (*conditions, condition)
-            yield from _solutions([one.subs(unknown, value) for one in others], by, more, left)
+        if value.is_nonpositive:
+            return None
+        if not value.is_positive:
+            conditions.append(sympy.Gt(value, 0))
+    values = {key: value for key, value in one.values.items() if key in unknowns}
+    return Solution(values, tuple(conditions), tuple(key for key in one.free if key in unknowns))
+
+
+def _is_regular(equations: Sequence[Sympy], one: Solution) -> bool:
+    """Return whether nothing is divided by zero at a solution."""
+    import sympy
+
+    for equation in equations:
+        below = sympy.denom(sympy.together(equation)).subs(one.values)
+        if below.is_zero or sympy.expand(below) == 0:
+            return False
+    return True
+
+
+class _Search:
+    """Solves equations factor by factor, within a bound on what is factored."""
+
+    def __init__(self, unknowns: tuple[Sympy, ...]) -> None:
+        self.unknowns, self.effort = unknowns, _EFFORT
+
+    def solutions(
+        self,
+        equations: Sequence[Sympy],
+        known: Mapping[Sympy, Sympy],
+        conditions: tuple[Sympy, ...],
+        unknowns: tuple[Sympy, ...],
+    ) -> Iterator[Solution]:
+        """Yield the solutions of what is left."""
+        rest: list[list[Sympy]] = []
+        for equation in equations:
+            self.effort -= int(equation.count_ops())
+            if self.effort < 0:
+                raise NoClosedFormError
+            factors = factors_of(equation, unknowns)
+            if factors is None:
+                continue
+            if not factors:
+                return  # it holds nowhere
+            rest.append(factors)
+        if not rest:
+            yield Solution(dict(known), conditions, unknowns)
+            return
+        rest.sort(key=lambda factors: (_hardness(factors, unknowns), len(factors)))
+        first, others = rest[0], [_product(one) for one in rest[1:]]
+        for factor in first:
+            unknown, roots = _roots(factor, unknowns)
+            left = tuple(one for one in unknowns if one != unknown)
+            for value, condition in roots:
+                if value.is_nonpositive and unknown.is_positive:
+                    continue
+                by = {k: _shorter(v.subs(unknown, value)) if v.has(unknown) else v for k, v in known.items()}
+                by[unknown] = value
+                more = conditions if condition is None else (*conditions, condition)
+                yield from self.solutions([one.subs(unknown, value) for one in others], by, more, left)
 
 
 def _shorter(value: Sympy) -> Sympy:
