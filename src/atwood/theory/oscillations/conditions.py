@@ -10,19 +10,24 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, TypeAlias
 
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_modules import sympy
 
 Sympy: TypeAlias = Any
 """A sympy object."""
 
-_LONGEST = 250
-"""Equations of more operations are not factored: nobody would solve them by hand."""
+_LONGEST, _LONGEST_OF_SEVERAL = 250, 60
+"""Equations of more operations in one unknown, or in several, are not factored: nobody would solve them by hand."""
+
+_MOST_TERMS = 60
+"""Longer polynomials are not factored."""
 
 _MOST = 64
 """The largest number of solutions."""
 
-_EFFORT = 6_000
-"""So many operations of equations are factored in all."""
+_EFFORT, _TRIES = 6_000, 4
+"""So many operations of equations are factored in all; so many equations in several unknowns that are no products end
+the search."""
 
 
 class NoClosedFormError(Exception):
@@ -63,8 +68,6 @@ def solve_conditions(equations: Sequence[Sympy], unknowns: Sequence[Sympy]) -> l
     NoClosedFormError
         If there is an equation that no rule solves.
     """
-    import sympy
-
     plain, roots = _without_roots(equations, unknowns)
     search = _Search((*unknowns, *roots))
     found: list[Solution] = []
@@ -80,12 +83,8 @@ def solve_conditions(equations: Sequence[Sympy], unknowns: Sequence[Sympy]) -> l
     return found
 
 
-def _without_roots(
-    equations: Sequence[Sympy], unknowns: Sequence[Sympy]
-) -> tuple[list[Sympy], dict[Sympy, Sympy]]:
+def _without_roots(equations: Sequence[Sympy], unknowns: Sequence[Sympy]) -> tuple[list[Sympy], dict[Sympy, Sympy]]:
     """Return equations in which square roots are unknowns of their own, and what each is the root of."""
-    import sympy
-
     roots: dict[Sympy, Sympy] = {}
 
     def named(power: Sympy) -> Sympy:
@@ -105,8 +104,6 @@ def _without_roots(
 
 def _of_unknowns(one: Solution, unknowns: Sequence[Sympy], roots: Mapping[Sympy, Sympy]) -> Solution | None:
     """Return a solution in the unknowns that were asked for, with the condition that roots are positive; None if not."""
-    import sympy
-
     conditions = list(one.conditions)
     for root in roots:
         value = one.values.get(root)
@@ -122,8 +119,6 @@ def _of_unknowns(one: Solution, unknowns: Sequence[Sympy], roots: Mapping[Sympy,
 
 def _is_regular(equations: Sequence[Sympy], one: Solution) -> bool:
     """Return whether nothing is divided by zero at a solution."""
-    import sympy
-
     for equation in equations:
         below = sympy.denom(sympy.together(equation)).subs(one.values)
         if below.is_zero or sympy.expand(below) == 0:
@@ -145,32 +140,51 @@ class _Search:
         unknowns: tuple[Sympy, ...],
     ) -> Iterator[Solution]:
         """Yield the solutions of what is left."""
-        rest: list[list[Sympy]] = []
-        for equation in equations:
-            self.effort -= int(equation.count_ops())
-            if self.effort < 0:
-                raise NoClosedFormError
-            factors = factors_of(equation, unknowns)
-            if factors is None:
-                continue
-            if not factors:
-                return  # it holds nowhere
-            rest.append(factors)
-        if not rest:
+        found = self._solved(equations, unknowns)
+        if found is None:
             yield Solution(dict(known), conditions, unknowns)
             return
-        rest.sort(key=lambda factors: (_hardness(factors, unknowns), len(factors)))
-        first, others = rest[0], [_product(one) for one in rest[1:]]
-        for factor in first:
-            unknown, roots = _roots(factor, unknowns)
+        for unknown, value, condition, others in found:
+            if value.is_nonpositive and unknown.is_positive:
+                continue
+            by = {k: _shorter(v.subs(unknown, value)) if v.has(unknown) else v for k, v in known.items()}
+            by[unknown] = value
+            more = conditions if condition is None else (*conditions, condition)
             left = tuple(one for one in unknowns if one != unknown)
-            for value, condition in roots:
-                if value.is_nonpositive and unknown.is_positive:
-                    continue
-                by = {k: _shorter(v.subs(unknown, value)) if v.has(unknown) else v for k, v in known.items()}
-                by[unknown] = value
-                more = conditions if condition is None else (*conditions, condition)
-                yield from self.solutions([one.subs(unknown, value) for one in others], by, more, left)
+            yield from self.solutions([one.subs(unknown, value) for one in others], by, more, left)
+
+    def _solved(
+        self, equations: Sequence[Sympy], unknowns: tuple[Sympy, ...]
+    ) -> list[tuple[Sympy, Sympy, Sympy | None, list[Sympy]]] | None:
+        """Return what the equation that is solved most easily says: unknowns, values, conditions, and what is left.
+
+        None if all equations hold.
+        """
+        order = [(sum(one.has(x) for x in unknowns), int(one.count_ops()), i) for i, one in enumerate(equations)]
+        holding: set[int] = set()
+        tries = _TRIES
+        for inside, operations, i in sorted(order):
+            if operations > (_LONGEST if inside < 2 else _LONGEST_OF_SEVERAL):
+                continue
+            if inside > 1:
+                found = _linear(equations[i], [one for one in unknowns if equations[i].has(one)])
+                if found is not None:
+                    return [(*found, None, [one for j, one in enumerate(equations) if j not in {i, *holding}])]
+            self.effort -= operations * inside
+            tries -= inside > 1
+            if self.effort < 0 or tries < 0:
+                raise NoClosedFormError
+            factors = factors_of(equations[i], unknowns)
+            if factors is None:
+                holding.add(i)
+                continue
+            others = [one for j, one in enumerate(equations) if j not in {i, *holding}]
+            roots = [_roots(factor, unknowns) for factor in factors]
+            if all(one is not None for one in roots):
+                return [(unknown, *value, others) for unknown, values in roots for value in values]
+        if len(holding) < len(equations):
+            raise NoClosedFormError
+        return None
 
 
 def _shorter(value: Sympy) -> Sympy:
@@ -179,33 +193,30 @@ def _shorter(value: Sympy) -> Sympy:
     return value.factor() if value.is_rational_function(*symbols) else value
 
 
-def _product(factors: Sequence[Sympy]) -> Sympy:
-    import sympy
-
-    return sympy.Mul(*factors)
-
-
 def factors_of(equation: Sympy, unknowns: Sequence[Sympy]) -> list[Sympy] | None:
     """Return the factors of an equation that may be zero; None if it is zero whatever the unknowns are."""
-    import sympy
-
-    if equation.count_ops() > _LONGEST:
-        raise NoClosedFormError
-    above = sympy.numer(sympy.together(sympy.expand(sympy.expand_trig(equation))))
-    above = sympy.expand(above)
-    if above == 0 or _reduced(above, unknowns) == 0:
+    above = sympy.expand(sympy.numer(sympy.together(sympy.expand(sympy.expand_trig(equation)))))
+    if len(sympy.Add.make_args(above)) > _MOST_TERMS:
+        return [above]
+    forms = _forms(above, unknowns)
+    if any(form == 0 for form in forms):
         return None
-    found = []
-    for base, _ in sympy.factor_list(_reduced(above, unknowns))[1]:
-        if base.has(*unknowns) if unknowns else False:
-            found.append(base)
-    return found
+    found = max((_factors(form) for form in forms), key=lambda one: (len(one), -sum(x.count_ops() for x in one)))
+    return [one for one in found if one.has(*unknowns)] if unknowns else []
 
 
-def _reduced(value: Sympy, unknowns: Sequence[Sympy]) -> Sympy:
-    """Return a polynomial in sines and cosines with squares of one of the two alone, whichever has more factors."""
-    import sympy
+def _factors(form: Sympy) -> list[Sympy]:
+    """Return the factors of a polynomial; those of one whose parameters are numbers tell whether there are any."""
+    parameters = sorted((one for one in form.free_symbols if one.is_Symbol and not one.is_Dummy), key=str)
+    numbers = dict(zip(parameters, map(sympy.prime, range(5, 5 + len(parameters))), strict=True))
+    plain = sympy.factor_list(form.xreplace(numbers))[1]
+    if sum(times for _, times in plain) < 2:
+        return [form]
+    return [base for base, _ in sympy.factor_list(form)[1]]
 
+
+def _forms(value: Sympy, unknowns: Sequence[Sympy]) -> list[Sympy]:
+    """Return a polynomial in sines and cosines with squares of cosines alone, and of sines alone."""
     forms = []
     for first, second in ((sympy.sin, sympy.cos), (sympy.cos, sympy.sin)):
         form = value
@@ -214,46 +225,32 @@ def _reduced(value: Sympy, unknowns: Sequence[Sympy]) -> Sympy:
                 s, c = first(one), second(one)
                 form = sympy.rem(sympy.Poly(form, s), sympy.Poly(s**2 + c**2 - 1, s)).as_expr()
         forms.append(sympy.expand(form))
-    if any(form == 0 for form in forms):
-        return sympy.Integer(0)
-    factored = [sympy.factor(form) for form in forms]
-    best = max(range(2), key=lambda k: (len(sympy.Mul.make_args(factored[k])), -factored[k].count_ops()))
-    return forms[best]
+    return list(dict.fromkeys(forms))
 
 
-def _hardness(factors: Sequence[Sympy], unknowns: Sequence[Sympy]) -> tuple[int, int]:
-    """Return how far factors are from one unknown each, and their length."""
-    return (
-        max(sum(one.has(x) for x in unknowns) for one in factors),
-        max(int(one.count_ops()) for one in factors),
-    )
-
-
-def _roots(factor: Sympy, unknowns: Sequence[Sympy]) -> tuple[Sympy, list[tuple[Sympy, Sympy | None]]]:
+def _roots(
+    factor: Sympy, unknowns: Sequence[Sympy]
+) -> tuple[Sympy, list[tuple[Sympy, Sympy | None]]] | None:
     """Return an unknown for which a factor is solved, and its values with the conditions under which they exist."""
     inside = [one for one in unknowns if factor.has(one)]
-    for one in inside:
-        if len(inside) == 1:
-            found = _alone(factor, one)
-        else:
-            found = _linear(factor, one, inside)
-        if found is not None:
-            return one, found
-    raise NoClosedFormError
+    if len(inside) == 1:
+        found = _alone(factor, inside[0])
+        return None if found is None else (inside[0], found)
+    linear = _linear(factor, inside)
+    return None if linear is None else (linear[0], [(linear[1], None)])
 
 
-def _linear(factor: Sympy, unknown: Sympy, inside: Sequence[Sympy]) -> list[tuple[Sympy, Sympy | None]] | None:
-    """Return the value of an unknown that is linear with a coefficient without unknowns."""
-    slope = factor.diff(unknown)
-    if slope == 0 or slope.has(*inside):
-        return None
-    return [((-factor.subs(unknown, 0) / slope).cancel(), None)]
+def _linear(factor: Sympy, inside: Sequence[Sympy]) -> tuple[Sympy, Sympy] | None:
+    """Return an unknown that is linear with a coefficient without unknowns, and its value."""
+    for unknown in inside:
+        slope = factor.diff(unknown)
+        if slope != 0 and not slope.has(*inside):
+            return unknown, (-factor.subs(unknown, 0) / slope).cancel()
+    return None
 
 
 def _alone(factor: Sympy, unknown: Sympy) -> list[tuple[Sympy, Sympy | None]] | None:
     """Return the values of the only unknown of a factor."""
-    import sympy
-
     if factor.is_polynomial(unknown):
         return _of_polynomial(factor, unknown)
     s, c = sympy.Dummy("s", real=True), sympy.Dummy("c", real=True)
@@ -283,12 +280,8 @@ def _alone(factor: Sympy, unknown: Sympy) -> list[tuple[Sympy, Sympy | None]] | 
     return [(middle + arc, condition) for arc, condition in _arcs(sympy.acos, reach, None, lambda angle: -angle)]
 
 
-def _arcs(
-    inverse: Any, value: Sympy, condition: Sympy | None, other: Any
-) -> list[tuple[Sympy, Sympy | None]]:
+def _arcs(inverse: Any, value: Sympy, condition: Sympy | None, other: Any) -> list[tuple[Sympy, Sympy | None]]:
     """Return the two angles of a sine or cosine, and when there are any."""
-    import sympy
-
     if value.is_number:
         if not -1 <= value <= 1:
             return []
@@ -303,8 +296,6 @@ def _arcs(
 
 
 def _within_half_turn(angle: Sympy) -> Sympy:
-    import sympy
-
     while angle > sympy.pi:
         angle -= 2 * sympy.pi
     while angle <= -sympy.pi:
@@ -314,8 +305,6 @@ def _within_half_turn(angle: Sympy) -> Sympy:
 
 def _of_polynomial(factor: Sympy, unknown: Sympy) -> list[tuple[Sympy, Sympy | None]] | None:
     """Return the real roots of a polynomial of degree one or two, or of one of degree four that is even."""
-    import sympy
-
     poly = sympy.Poly(factor, unknown)
     degree, coefficients = poly.degree(), poly.all_coeffs()
     if degree == 1:
@@ -329,12 +318,8 @@ def _of_polynomial(factor: Sympy, unknown: Sympy) -> list[tuple[Sympy, Sympy | N
     return _of_quadratic(*coefficients) if degree == 2 else None
 
 
-def _of_quadratic(
-    a: Sympy, b: Sympy, c: Sympy, condition: Sympy | None = None
-) -> list[tuple[Sympy, Sympy | None]]:
+def _of_quadratic(a: Sympy, b: Sympy, c: Sympy, condition: Sympy | None = None) -> list[tuple[Sympy, Sympy | None]]:
     """Return the real roots of ``a x^2 + b x + c`` and when there are any."""
-    import sympy
-
     under = sympy.factor(b**2 - 4 * a * c)
     if under.is_negative:
         return []

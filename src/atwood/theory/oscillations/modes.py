@@ -6,17 +6,13 @@ With velocity terms, as of rotating frames, magnetic fields and damping, motions
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import cached_property
-from typing import Any
+from collections.abc import Mapping
 
-from atwood.errors import UnsupportedError, UsageError, suggestion
-from atwood.late import dataclass
-from atwood.table import Shown, Table, table
-from atwood.theory.formulas.objects import Sympy
+from atwood.lazy_dataclasses import dataclass
+from atwood.table import Shown
+from atwood.theory.formulas.printers import Sympy
 from atwood.theory.oscillations.conditions import Solution
-from atwood.theory.oscillations.rest import PlainEquations, as_condition
-from atwood.theory.oscillations.spectrum import eigenvalues
+from atwood.theory.oscillations.rest import PlainEquations
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,9 +7,10 @@ from typing import Any
 
 from atwood.errors import UnsupportedError
 from atwood.forms.assembly import Assembly
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_modules import sympy
 from atwood.theory.equations.equations import EquationsOfMotion, read_equations
-from atwood.theory.formulas.objects import Sympy, symbol_of
+from atwood.theory.formulas.printers import Sympy, objects
 from atwood.theory.oscillations.conditions import NoClosedFormError, Solution, solve_conditions
 
 
@@ -58,7 +59,7 @@ class PlainEquations:
         import sympy
 
         still = dict.fromkeys((*self.velocities, *self.accelerations), sympy.Integer(0))
-        return [one.subs(still) for one in values]
+        return [one.xreplace(still) for one in values]
 
     def conditions(self) -> list[Sympy]:
         """Return what is zero at rest: forces, and constraints."""
@@ -99,8 +100,6 @@ def plain_equations(assembly: Assembly) -> PlainEquations:
         If they depend on time, are too large to be read, hold constraints on velocities, or velocities that are not
         derivatives of coordinates.
     """
-    import sympy
-
     equations = read_equations(assembly)
     found, t = equations.expressions, sympy.Symbol("t")
     if not equations.is_readable:
@@ -123,7 +122,7 @@ def plain_equations(assembly: Assembly) -> PlainEquations:
         if symbol.value is not None:
             assumed = {"positive": True} if symbol.value > 0 else {"negative": True} if symbol.value < 0 else {}
             made = sympy.Symbol(symbol.name, real=True, **assumed)
-            by[symbol_of(symbol)], values[made] = made, symbol.value
+            by[objects.letter(symbol)], values[made] = made, symbol.value
     order = sorted(by, key=lambda one: -len(one.args) if isinstance(one, sympy.Derivative) else 0)
     derivatives = {one: by[one] for one in order if isinstance(one, sympy.Derivative)}
     others = {one: by[one] for one in order if one not in derivatives}
@@ -132,7 +131,9 @@ def plain_equations(assembly: Assembly) -> PlainEquations:
         for every in (equations.rows, equations.constraints)
     )
     if any(one.has(t) for one in (*rows, *constraints)):
-        raise _refused(equations, "its equations depend on time", "Rest belongs to scenes that keep still or turn evenly.")
+        raise _refused(
+            equations, "its equations depend on time", "Rest belongs to scenes that keep still or turn evenly."
+        )
     back = {plain: one for one, plain in by.items() if not isinstance(one, sympy.Derivative)}
     back |= {plain: sympy.Symbol(name) for plain, name in zip(q, names, strict=True)}
     return PlainEquations(equations, q, u, a, held, rows, constraints, back, values)
@@ -146,8 +147,6 @@ def positive_parts(value: Sympy) -> list[Sympy]:
     """Return the factors of an expression whose sign depends on the parameters, a sign in front of the first; [-1] if
     it is negative, [] if it is positive, [0] if it is zero.
     """
-    import sympy
-
     sign, found = 1, []
     whole = sympy.factor(sympy.together(value))
     for factor in sympy.Mul.make_args(whole):
@@ -167,8 +166,6 @@ def positive_parts(value: Sympy) -> list[Sympy]:
 
 def as_condition(value: Sympy) -> Any:
     """Return that an expression is positive, as a sympy relation, True or False."""
-    import sympy
-
     parts = positive_parts(value)
     if not parts:
         return sympy.true
@@ -177,8 +174,6 @@ def as_condition(value: Sympy) -> Any:
 
 def _balanced(value: Sympy) -> Any:
     """Return ``a - b > 0`` as ``a > b``."""
-    import sympy
-
     if value.is_number:
         return value
     terms = sympy.Add.make_args(sympy.expand(value))

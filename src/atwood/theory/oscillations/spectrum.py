@@ -14,7 +14,8 @@ from typing import Any, TypeAlias
 
 import networkx as nx
 
-from atwood.late import dataclass
+from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_modules import sympy
 
 Sympy: TypeAlias = Any
 """A sympy object."""
@@ -49,8 +50,6 @@ def eigenvalues(mass: Sympy, stiffness: Sympy, symbol: Sympy) -> list[Eigenvalue
     symbol
         Stands for lambda in polynomials.
     """
-    import sympy
-
     found: list[Eigenvalue] = []
     for basis in _blocks(mass, stiffness):
         m, k = (_expanded(basis.T * one * basis) for one in (mass, stiffness))
@@ -59,8 +58,11 @@ def eigenvalues(mass: Sympy, stiffness: Sympy, symbol: Sympy) -> list[Eigenvalue
     joined: list[Eigenvalue] = []
     for one in found:
         twin = next(
-            (i for i, other in enumerate(joined) if one.value is not None and other.value is not None
-             and sympy.cancel(one.value - other.value) == 0),
+            (
+                i
+                for i, other in enumerate(joined)
+                if one.value is not None and other.value is not None and sympy.cancel(one.value - other.value) == 0
+            ),
             None,
         )
         if twin is None:
@@ -79,8 +81,6 @@ def _expanded(matrix: Sympy) -> Sympy:
 
 def _blocks(mass: Sympy, stiffness: Sympy) -> Iterator[Sympy]:
     """Yield bases of spaces that both matrices leave apart, as columns."""
-    import sympy
-
     n = mass.shape[0]
     coupled = nx.Graph()
     coupled.add_nodes_from(range(n))
@@ -132,8 +132,6 @@ _MOST = 500
 
 def _halves(exchange: Sequence[int]) -> tuple[Sympy, Sympy]:
     """Return what is even and what is odd under an exchange, as columns."""
-    import sympy
-
     n = len(exchange)
     pairs = [(i, j) for i, j in enumerate(exchange) if i < j]
     fixed = [i for i, j in enumerate(exchange) if i == j]
@@ -151,8 +149,6 @@ def _halves(exchange: Sequence[int]) -> tuple[Sympy, Sympy]:
 
 def _of_block(mass: Sympy, stiffness: Sympy, symbol: Sympy) -> Iterator[Eigenvalue]:
     """Yield the eigenvalues of matrices that are not taken apart further."""
-    import sympy
-
     ends = chain_ends(mass, stiffness)
     if ends is not None:
         yield from _of_chain(mass, stiffness, ends, symbol)
@@ -173,8 +169,6 @@ def _of_quadratic(
     pencil: Sympy, symbol: Sympy, coefficients: Sequence[Sympy], factor: Sympy, times: int
 ) -> Iterator[Eigenvalue]:
     """Yield the two roots of ``a lambda^2 + b lambda + c``, the smaller first; vectors are rational in the root."""
-    import sympy
-
     a, b, c = (one.factor() for one in coefficients)
     square = (b**2 - 4 * a * c).factor()
     outside = sympy.sqrt(square)
@@ -197,8 +191,6 @@ def _of_quadratic(
 
 def _rationalized(value: Sympy, root: Sympy, square: Sympy) -> Sympy:
     """Return a rational function of a square root as ``p + q root``."""
-    import sympy
-
     above, below = (sympy.Poly(one, root) for one in sympy.fraction(sympy.together(value)))
     modulus = sympy.Poly(root**2 - square, root)
     (p, q), (s, t) = ((one.rem(modulus).nth(0), one.rem(modulus).nth(1)) for one in (above, below))
@@ -209,8 +201,6 @@ def _rationalized(value: Sympy, root: Sympy, square: Sympy) -> Sympy:
 
 def _vectors(singular: Sympy, times: int, reduced: Callable[[Sympy], Sympy] | None = None) -> tuple[Sympy, ...]:
     """Return the null space of ``K - lambda M``, the first entry that is not zero made one."""
-    import sympy
-
     reduce = reduced or (lambda one: one.cancel().factor())
     n = singular.shape[0]
     rows = [[reduce(one) for one in row] for row in singular.tolist()]
@@ -266,8 +256,6 @@ def chain_ends(mass: Sympy, stiffness: Sympy) -> tuple[int, int] | None:
 
 def _of_chain(mass: Sympy, stiffness: Sympy, ends: tuple[int, int], symbol: Sympy) -> Iterator[Eigenvalue]:
     """Yield the eigenvalues of a chain: ``(a + 2 b cos theta) / m`` with vectors that are sines or cosines."""
-    import sympy
-
     n = mass.shape[0]
     middle, coupling = stiffness[1, 1], stiffness[0, 1]
     flipped = ends[0] == 0 != ends[1]
@@ -287,8 +275,6 @@ def _of_chain(mass: Sympy, stiffness: Sympy, ends: tuple[int, int], symbol: Symp
 
 def _turn(k: int, n: int, first: int, last: int) -> Sympy:
     """Return the angle from one mass to the next in a mode of a chain, over pi."""
-    import sympy
-
     if first == last == 0:
         return sympy.Rational(k, n + 1)
     if first == last:
