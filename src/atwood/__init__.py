@@ -212,6 +212,10 @@ if TYPE_CHECKING:
         root_locus as root_locus,
         trim as trim,
     )
+    from atwood.theory.oscillations import (
+        SymbolicEquilibria as SymbolicEquilibria,
+        SymbolicEquilibrium as SymbolicEquilibrium,
+    )
     from atwood.theory.reduction import (
         ReducedMotion as ReducedMotion,
         Routhian as Routhian,
@@ -270,6 +274,7 @@ _ROOMS = {
         "LinearModel", "NormalModes",
         "RootLocus", "Trim", "equilibria", "equilibrium_branches", "linearize", "normal_modes", "root_locus", "trim",
     ),
+    "atwood.theory.oscillations": ("SymbolicEquilibria", "SymbolicEquilibrium"),
     "atwood.theory.reduction": ("ReducedMotion", "Routhian", "reduced", "routhian"),
     "atwood.theory.formulas.sheet": ("FormulaSheet", "Statement"),
     "atwood.theory.rigid": ("inertia_tensor", "rigid_body", "rotation_kinematics"),

@@ -48,10 +48,11 @@ _MOST_PICTURES = 12
 def theory_command(name: str, module: str, function: str) -> click.Command:
     """Return the command of a function of theory: its arguments are options, and its scene is the argument."""
     found = getattr(importlib.import_module(module), function)
-    of = found.__annotations__["return"]
-    made = vars(importlib.import_module(module)).get(of)
-    more: dict[str, tuple[Kind, Any]] = {one: (FLAG, False) for one in _WRITTEN if hasattr(made, one)}
-    more |= {"plot": (FILE, None)} if of in _PICTURES else {}
+    of = found.__annotations__["return"].split(" | ")
+    made = [vars(importlib.import_module(module)).get(one) for one in of]
+    written = [one for one in _WRITTEN if any(hasattr(kind, one) for kind in made)]
+    more: dict[str, tuple[Kind, Any]] = dict.fromkeys(written, (FLAG, False))
+    more |= {"plot": (FILE, None)} if _PICTURES.keys() & set(of) else {}
     special, own = _SPECIAL.get(name, (None, {}))
 
     def run(request: Request) -> None:
@@ -67,7 +68,7 @@ def theory_command(name: str, module: str, function: str) -> click.Command:
 
     run.__doc__ = inspect.cleandoc((special or found).__doc__ or "").partition("\n\nParameters\n")[0]
     told = [*([special] if special else []), _show, found]
-    names = {"plot": "--bode"} if of == "LinearModel" else {}
+    names = {"plot": "--bode"} if of == ["LinearModel"] else {}
     return command(name, run, *told, more=more | own, names=names)
 
 
@@ -114,11 +115,14 @@ def _equilibria(function: Callable[..., Any], scene: Assembly, asked: dict[str, 
         if request.plot is not None:
             raise UsageError("there is nothing to draw", where="--plot", advice="Give --along PATH=FROM:TO too.")
         return _called(function, scene, asked)
+    if request.symbolic:
+        raise UsageError("--along is of numbers", advice="Leave out --symbolic, or --along.")
     ((path, text),) = pairs([request.along], "--along")
     low, high = range_of(text)
     if isinstance(low, str) or isinstance(high, str):
         raise UsageError(f"{text!r} is no range", where=path, advice="Write --along PATH=FROM:TO, SI units.")
-    return equilibrium_branches(scene, path, (low, high), **asked)
+    region = {"region": asked["region"]} if "region" in asked else {}
+    return equilibrium_branches(scene, path, (low, high), **region)
 
 
 def _modes(function: Callable[..., Any], scene: Assembly, asked: dict[str, Any], request: Request) -> Any:
@@ -146,7 +150,11 @@ _SPECIAL: dict[str, tuple[Callable[..., Any], dict[str, tuple[Kind, Any]]]] = {
 def _show(value: Any, command: str, scene: str, written: str, picture: Path | None) -> None:
     """Write what was found to standard output, and draw it."""
     several = value if isinstance(value, (list, tuple)) and not isinstance(value, Shown) else [value]
+    if written not in ("", "as_json") and not hasattr(value, written):
+        raise UsageError(f"numbers are not written so: --{written} is of formulas", advice="Give --symbolic too.")
     if picture is not None:
+        if type(several[0]).__name__ not in _PICTURES:
+            raise UsageError("formulas are not drawn", where="--plot", advice="Leave out --symbolic.")
         _draw(several[0], picture)
     if written == "as_json":
         print_json(_data(value, command, scene))

@@ -28,7 +28,7 @@ from atwood.pipeline import SCENE, assemble
 from atwood.ranges import range_of
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.table import Shown, Table, table
-from atwood.theory.linear.equilibria import REGION, equilibria
+from atwood.theory.linear.equilibria import REGION, numeric_equilibria
 from atwood.theory.linear.normal_modes import modes_of, values_text
 from atwood.theory.linear.operating_point import OperatingPoint, find_operating_point, moved_to, values_at
 from atwood.theory.linear.rest import difference, slopes_at
@@ -177,7 +177,7 @@ def equilibrium_branches(
     for share in _SEEDS:
         p = span[0] + share * (span[1] - span[0])
         try:
-            found = equilibria(family.assembly(p), region=region)
+            found = numeric_equilibria(family.assembly(p), region=region)
         except UsageError as error:
             problem_error = error
             continue

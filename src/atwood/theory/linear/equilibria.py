@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field
-from typing import Any
+from typing import Any, Literal, overload
 
 import numpy as np
 
-from atwood.arguments import BY_PATH, optional, takes
+from atwood.arguments import BY_PATH, FLAG, optional, takes
 from atwood.arrays import FloatArray
 from atwood.display import count_of, data_of
 from atwood.errors import AtwoodError, ParameterError, UsageError, suggestion
@@ -18,13 +18,15 @@ from atwood.lazy_modules import scipy
 from atwood.mechanics.kinematics.mechanism import extent
 from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
-from atwood.pipeline import SCENE
+from atwood.pipeline import SCENE, assembly_of
 from atwood.ranges import range_of
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.table import Shown, Table, table
+from atwood.theory.formulas.notation import SYMBOLS
 from atwood.theory.linear.normal_modes import NormalModes, modes_of, values_text
 from atwood.theory.linear.operating_point import OperatingPoint, find_operating_point, moved_to, values_at
 from atwood.theory.linear.rest import Degenerate, Rest, RestSearch, difference, follow_null_space, wrapped
+from atwood.theory.oscillations.equilibria import SymbolicEquilibria, symbolic_equilibria
 
 _STARTS = 32
 """For each independent coordinate, so many starts of Newton's method, spread evenly over the region."""
@@ -116,9 +118,27 @@ class Equilibria(Shown, list[Equilibrium]):
 REGION = optional(replace(BY_PATH, word="PATH=FROM:TO", typed=range_of))
 
 
-@takes(scene=SCENE, region=REGION)
-def equilibria(scene: Model | Assembly, *, region: Mapping[str, Any] | None = None) -> Equilibria:
-    """Find the states of rest of a scene in a region.
+@overload
+def equilibria(
+    scene: Model | Assembly, *, region: Mapping[str, Any] | None = ..., symbolic: Literal[False] = ...
+) -> Equilibria: ...
+
+
+@overload
+def equilibria(
+    scene: Model | Assembly, *, symbolic: Literal[True], symbols: Mapping[str, str] | None = ...
+) -> SymbolicEquilibria: ...
+
+
+@takes(scene=SCENE, region=REGION, symbolic=FLAG, symbols=SYMBOLS)
+def equilibria(
+    scene: Model | Assembly,
+    *,
+    region: Mapping[str, Any] | None = None,
+    symbolic: bool = False,
+    symbols: Mapping[str, str] | None = None,
+) -> Equilibria | SymbolicEquilibria:
+    """Find the states of rest of a scene in a region, or as formulas.
 
     Newton's method is started at places spread evenly over the region, so that nothing is proven: of equilibria that
     lie very close to each other one can be missed. States that differ along a direction in which nothing changes (a
@@ -132,19 +152,37 @@ def equilibria(scene: Model | Assembly, *, region: Mapping[str, Any] | None = No
     region
         For coordinates by path the least and the largest value: ``{"rod.angle": ("-90 deg", "90 deg")}``. All angles,
         and lengths up to twice the scene's extent, if not given.
+    symbolic
+        Whether to solve V' = 0 in closed form: each state as a formula of the parameters, with the range of these in
+        which it exists and in which it is stable. An assembly says in which form, and in which angles.
+    symbols
+        See `equations`: letters of formulas by path. Two parameters that have one letter are equal.
 
     Returns
     -------
-    Equilibria
-        A list, in the order of its coordinates.
+    Equilibria, SymbolicEquilibria
+        A list, in the order of its coordinates; of formulas if ``symbolic``.
 
     Raises
     ------
     UsageError
         If there is none in the region, or the scene stays nowhere at rest since it depends on time.
+    UnsupportedError
+        If ``symbolic``, and there is no closed form that one would find by hand.
     ParameterError
         If the region names no coordinate.
     """
+    if symbolic:
+        if region is not None:
+            raise UsageError("`symbolic` finds all states of rest", where="equilibria", advice="Leave out the region.")
+        return symbolic_equilibria(assembly_of(scene, form=None, orientation=None), symbols)
+    if symbols is not None:
+        raise UsageError("numbers have no letters", where="equilibria", advice="Give symbolic=True.")
+    return numeric_equilibria(scene, region)
+
+
+def numeric_equilibria(scene: Model | Assembly, region: Mapping[str, Any] | None = None) -> Equilibria:
+    """Return the states of rest of a scene in a region, found by Newton's method."""
     point = find_operating_point(scene, {}, ())
     point = replace(point, scene=point.scene.sized(_length(point)))
     bounds = _bounds(point, region or {})

@@ -7,8 +7,8 @@ as ``A cos + B sin + C``, or as a polynomial of degree two in one of sine and co
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, TypeAlias
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple, TypeAlias
 
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
@@ -22,12 +22,15 @@ _LONGEST, _LONGEST_OF_SEVERAL = 250, 60
 _MOST_TERMS = 60
 """Longer polynomials are not factored."""
 
-_MOST = 64
+_MOST = 32
 """The largest number of solutions."""
 
 _EFFORT, _TRIES = 6_000, 4
 """So many operations of equations are factored in all; so many equations in several unknowns that are no products end
 the search."""
+
+
+_NO_RULE = "none of them, or of their factors, is solved for one unknown"
 
 
 class NoClosedFormError(Exception):
@@ -46,11 +49,14 @@ class Solution:
         What parameters must fulfil for it to exist; sympy relations.
     free
         Unknowns that may have any value.
+    positive
+        Values of square roots.
     """
 
     values: Mapping[Sympy, Sympy]
     conditions: tuple[Sympy, ...] = ()
     free: tuple[Sympy, ...] = ()
+    positive: tuple[Sympy, ...] = ()
 
 
 def solve_conditions(equations: Sequence[Sympy], unknowns: Sequence[Sympy]) -> list[Solution]:
@@ -77,9 +83,9 @@ def solve_conditions(equations: Sequence[Sympy], unknowns: Sequence[Sympy]) -> l
             if made is not None and made not in found and _is_regular(equations, made):
                 found.append(made)
             if len(found) > _MOST:
-                raise NoClosedFormError
+                raise NoClosedFormError(f"there are more than {_MOST} of them")
     except sympy.PolynomialError:
-        raise NoClosedFormError from None
+        raise NoClosedFormError(_NO_RULE) from None
     return found
 
 
@@ -103,18 +109,16 @@ def _without_roots(equations: Sequence[Sympy], unknowns: Sequence[Sympy]) -> tup
 
 
 def _of_unknowns(one: Solution, unknowns: Sequence[Sympy], roots: Mapping[Sympy, Sympy]) -> Solution | None:
-    """Return a solution in the unknowns that were asked for, with the condition that roots are positive; None if not."""
+    """Return a solution in the unknowns asked for, with the condition that roots are positive; None if they are not."""
     conditions = list(one.conditions)
-    for root in roots:
-        value = one.values.get(root)
-        if value is None:
-            continue
+    positive = [one.values[root] for root in roots if root in one.values]
+    for value in positive:
         if value.is_nonpositive:
             return None
-        if not value.is_positive:
-            conditions.append(sympy.Gt(value, 0))
+        conditions.append(is_positive(value))
     values = {key: value for key, value in one.values.items() if key in unknowns}
-    return Solution(values, tuple(conditions), tuple(key for key in one.free if key in unknowns))
+    kept = (condition for condition in conditions if condition != True)  # noqa: E712 - a truth value of sympy
+    return Solution(values, tuple(kept), tuple(key for key in one.free if key in unknowns), tuple(positive))
 
 
 def _is_regular(equations: Sequence[Sympy], one: Solution) -> bool:
@@ -126,11 +130,21 @@ def _is_regular(equations: Sequence[Sympy], one: Solution) -> bool:
     return True
 
 
+class _Branch(NamedTuple):
+    """A way in which an equation holds: an unknown with its value, if that exists, and other equations."""
+
+    unknown: Sympy | None
+    value: Sympy
+    condition: Sympy | None = None
+    others: tuple[Sympy, ...] = ()
+
+
 class _Search:
     """Solves equations factor by factor, within a bound on what is factored."""
 
     def __init__(self, unknowns: tuple[Sympy, ...]) -> None:
         self.unknowns, self.effort = unknowns, _EFFORT
+        self.factored: dict[Sympy, list[Sympy] | None] = {}
 
     def solutions(
         self,
@@ -140,51 +154,70 @@ class _Search:
         unknowns: tuple[Sympy, ...],
     ) -> Iterator[Solution]:
         """Yield the solutions of what is left."""
-        found = self._solved(equations, unknowns)
-        if found is None:
+        branches = self._branches(equations, unknowns)
+        if branches is None:
             yield Solution(dict(known), conditions, unknowns)
             return
-        for unknown, value, condition, others in found:
+        for unknown, value, condition, others in branches:
+            if unknown is None:
+                yield from self.solutions(others, known, conditions, unknowns)
+                continue
             if value.is_nonpositive and unknown.is_positive:
                 continue
             by = {k: _shorter(v.subs(unknown, value)) if v.has(unknown) else v for k, v in known.items()}
+            left = [one.subs(unknown, value) for one in others]
+            if any(one.has(sympy.zoo, sympy.nan) for one in (*by.values(), *left)):
+                continue  # what was divided by is zero here: that is a branch of its own
             by[unknown] = value
             more = conditions if condition is None else (*conditions, condition)
-            left = tuple(one for one in unknowns if one != unknown)
-            yield from self.solutions([one.subs(unknown, value) for one in others], by, more, left)
+            yield from self.solutions(left, by, more, tuple(one for one in unknowns if one != unknown))
 
-    def _solved(
-        self, equations: Sequence[Sympy], unknowns: tuple[Sympy, ...]
-    ) -> list[tuple[Sympy, Sympy, Sympy | None, list[Sympy]]] | None:
-        """Return what the equation that is solved most easily says: unknowns, values, conditions, and what is left.
-
-        None if all equations hold.
-        """
+    def _branches(self, equations: Sequence[Sympy], unknowns: tuple[Sympy, ...]) -> list[_Branch] | None:
+        """Return how the equation holds that is solved most easily, each with what is left; None if all hold."""
         order = [(sum(one.has(x) for x in unknowns), int(one.count_ops()), i) for i, one in enumerate(equations)]
         holding: set[int] = set()
-        tries = _TRIES
+        factored: dict[int, list[Sympy]] = {}
+
+        def without(i: int) -> tuple[Sympy, ...]:
+            return tuple(one for j, one in enumerate(equations) if j not in {i, *holding})
+
         for inside, operations, i in sorted(order):
             if operations > (_LONGEST if inside < 2 else _LONGEST_OF_SEVERAL):
                 continue
             if inside > 1:
                 found = _linear(equations[i], [one for one in unknowns if equations[i].has(one)])
                 if found is not None:
-                    return [(*found, None, [one for j, one in enumerate(equations) if j not in {i, *holding}])]
-            self.effort -= operations * inside
-            tries -= inside > 1
-            if self.effort < 0 or tries < 0:
-                raise NoClosedFormError
-            factors = factors_of(equations[i], unknowns)
+                    return [found._replace(others=without(i))]
+            if equations[i] not in self.factored:
+                self.effort -= operations * inside
+                if self.effort < 0 or len(factored) >= _TRIES:
+                    break
+                self.factored[equations[i]] = factors_of(equations[i], unknowns)
+            factors = self.factored[equations[i]]
             if factors is None:
                 holding.add(i)
                 continue
-            others = [one for j, one in enumerate(equations) if j not in {i, *holding}]
-            roots = [_roots(factor, unknowns) for factor in factors]
-            if all(one is not None for one in roots):
-                return [(unknown, *value, others) for unknown, values in roots for value in values]
+            roots = _every(_roots(factor, unknowns) for factor in factors)
+            if roots is not None:
+                return [one._replace(others=without(i)) for one in roots]
+            factored[i] = factors
+        for i, factors in factored.items():
+            roots = _every(_roots(factor, unknowns) or _divided(factor, unknowns) for factor in factors)
+            if roots is not None:
+                return [one._replace(others=(*one.others, *without(i))) for one in roots]
         if len(holding) < len(equations):
-            raise NoClosedFormError
+            raise NoClosedFormError(_NO_RULE)
         return None
+
+
+def _every(branches: Iterable[list[_Branch] | None]) -> list[_Branch] | None:
+    """Return branches of all factors; None if one has none."""
+    found: list[_Branch] = []
+    for one in branches:
+        if one is None:
+            return None
+        found += one
+    return found
 
 
 def _shorter(value: Sympy) -> Sympy:
@@ -228,24 +261,32 @@ def _forms(value: Sympy, unknowns: Sequence[Sympy]) -> list[Sympy]:
     return list(dict.fromkeys(forms))
 
 
-def _roots(
-    factor: Sympy, unknowns: Sequence[Sympy]
-) -> tuple[Sympy, list[tuple[Sympy, Sympy | None]]] | None:
-    """Return an unknown for which a factor is solved, and its values with the conditions under which they exist."""
+def _roots(factor: Sympy, unknowns: Sequence[Sympy]) -> list[_Branch] | None:
+    """Return the values of an unknown for which a factor is solved; None if there is none."""
     inside = [one for one in unknowns if factor.has(one)]
     if len(inside) == 1:
         found = _alone(factor, inside[0])
-        return None if found is None else (inside[0], found)
+        return None if found is None else [_Branch(inside[0], *one) for one in found]
     linear = _linear(factor, inside)
-    return None if linear is None else (linear[0], [(linear[1], None)])
+    return None if linear is None else [linear]
 
 
-def _linear(factor: Sympy, inside: Sequence[Sympy]) -> tuple[Sympy, Sympy] | None:
+def _linear(factor: Sympy, inside: Sequence[Sympy]) -> _Branch | None:
     """Return an unknown that is linear with a coefficient without unknowns, and its value."""
     for unknown in inside:
         slope = factor.diff(unknown)
         if slope != 0 and not slope.has(*inside):
-            return unknown, (-factor.subs(unknown, 0) / slope).cancel()
+            return _Branch(unknown, (-factor.subs(unknown, 0) / slope).cancel())
+    return None
+
+
+def _divided(factor: Sympy, unknowns: Sequence[Sympy]) -> list[_Branch] | None:
+    """Return the value of an unknown that is linear, and the other way: that its coefficient and the rest are zero."""
+    for unknown in unknowns[::-1]:
+        slope = factor.diff(unknown)
+        if slope != 0 and not slope.has(unknown):
+            rest = factor.subs(unknown, 0)
+            return [_Branch(unknown, (-rest / slope).cancel()), _Branch(None, sympy.nan, None, (slope, rest))]
     return None
 
 
@@ -329,3 +370,31 @@ def _of_quadratic(a: Sympy, b: Sympy, c: Sympy, condition: Sympy | None = None) 
     root = sympy.sqrt(under)
     values = [sympy.factor((-b + sign * root) / (2 * a)) for sign in (1, -1)]
     return [(value, condition) for value in dict.fromkeys(values)]
+
+
+def is_positive(value: Sympy) -> Sympy:
+    """Return that an expression is positive, as a relation of sympy, true or false."""
+    value = sympy.sympify(value)
+    if value.is_positive or sympy.expand(value).is_positive:
+        return sympy.true
+    negative, found = False, []
+    for factor in sympy.Mul.make_args(sympy.factor(sympy.together(value))):
+        base, exponent = factor.as_base_exp()
+        if factor.is_zero:
+            return sympy.false
+        if factor.is_negative:
+            negative = not negative
+        elif not (factor.is_positive or sympy.expand(factor).is_positive):
+            found.append(base if exponent.is_odd else factor)
+    if not found:
+        return sympy.false if negative else sympy.true
+    return _balanced(sympy.Mul(-1 if negative else 1, *found))
+
+
+def _balanced(value: Sympy) -> Sympy:
+    """Return ``a - b > 0`` as ``a > b``."""
+    is_turned = value.is_Mul and len(value.args) == 2 and value.args[0] == -1
+    terms = sympy.Add.make_args(value.expand() if is_turned else value)
+    left = sympy.Add(*(one for one in terms if not one.could_extract_minus_sign()))
+    right = sympy.Add(*(-one for one in terms if one.could_extract_minus_sign()))
+    return sympy.Gt(left, right)

@@ -9,10 +9,7 @@ E-Notes 5, 2005); else the factors of the characteristic polynomial of degree on
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from itertools import combinations
 from typing import Any, TypeAlias
-
-import networkx as nx
 
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
@@ -41,30 +38,15 @@ class Eigenvalue:
 
 
 def eigenvalues(mass: Sympy, stiffness: Sympy, symbol: Sympy) -> list[Eigenvalue]:
-    """Return the eigenvalues of ``K v = lambda M v``, M and K symmetric.
-
-    Parameters
-    ----------
-    mass, stiffness
-        Square matrices of sympy.
-    symbol
-        Stands for lambda in polynomials.
-    """
+    """Return the eigenvalues of ``K v = lambda M v``; ``symbol`` stands for lambda in polynomials."""
     found: list[Eigenvalue] = []
-    for basis in _blocks(mass, stiffness):
-        m, k = (_expanded(basis.T * one * basis) for one in (mass, stiffness))
+    for basis in blocks((mass, stiffness)):
+        m, k = (on_block(one, basis) for one in (mass, stiffness))
         for one in _of_block(m, k, symbol):
             found.append(Eigenvalue(one.value, tuple(basis * vector for vector in one.vectors), one.polynomial))
     joined: list[Eigenvalue] = []
     for one in found:
-        twin = next(
-            (
-                i
-                for i, other in enumerate(joined)
-                if one.value is not None and other.value is not None and sympy.cancel(one.value - other.value) == 0
-            ),
-            None,
-        )
+        twin = None if one.value is None else _place_of(one.value, joined)
         if twin is None:
             joined.append(one)
         else:
@@ -72,62 +54,83 @@ def eigenvalues(mass: Sympy, stiffness: Sympy, symbol: Sympy) -> list[Eigenvalue
     return joined
 
 
-def _expanded(matrix: Sympy) -> Sympy:
-    return matrix.applyfunc(lambda one: one.cancel().factor() if one.is_Add else one)
+def _place_of(value: Sympy, among: Sequence[Eigenvalue]) -> int | None:
+    every = [other.value for other in among]
+    return next((i for i, other in enumerate(every) if other is not None and short(value - other) == 0), None)
 
 
-# -- what is apart: components, even and odd under an exchange -----------------------------------------------------------
+def short(value: Sympy) -> Sympy:
+    """Return an expression as one fraction of factors."""
+    return value.cancel().factor() if value.is_Add or value.is_Mul else value
 
 
-def _blocks(mass: Sympy, stiffness: Sympy) -> Iterator[Sympy]:
-    """Yield bases of spaces that both matrices leave apart, as columns."""
-    n = mass.shape[0]
-    coupled = nx.Graph()
-    coupled.add_nodes_from(range(n))
-    coupled.add_edges_from((i, j) for i, j in combinations(range(n), 2) if mass[i, j] != 0 or stiffness[i, j] != 0)
-    for component in nx.connected_components(coupled):
-        own = sorted(component)
+def on_block(matrix: Sympy, basis: Sympy) -> Sympy:
+    """Return a matrix on the columns of a basis."""
+    return (basis.T * matrix * basis).applyfunc(short)
+
+
+# -- what is apart: components, even and odd under an exchange ---------------------------------------------------------
+
+
+def blocks(matrices: Sequence[Sympy]) -> Iterator[Sympy]:
+    """Yield bases of spaces that all matrices leave apart, as columns."""
+    n = matrices[0].shape[0]
+    for own in _components(matrices):
         basis = sympy.zeros(n, len(own))
         for column, row in enumerate(own):
             basis[row, column] = 1
-        m, k = mass.extract(own, own), stiffness.extract(own, own)
-        if chain_ends(m, k) is not None:
-            yield basis
-            continue
-        exchange = _exchange(m, k)
+        inner = [one.extract(own, own) for one in matrices]
+        exchange = None if len(inner) == 2 and chain_ends(*inner) is not None else _exchange(inner)
         if exchange is None:
             yield basis
             continue
         for half in _halves(exchange):
-            for inner in _blocks(_expanded(half.T * m * half), _expanded(half.T * k * half)):
-                yield basis * half * inner
+            for part in blocks([on_block(one, half) for one in inner]):
+                yield basis * half * part
 
 
-def _exchange(mass: Sympy, stiffness: Sympy) -> list[int] | None:
-    """Return an exchange of coordinates in pairs that leaves both matrices as they are; where each one goes."""
-    n = mass.shape[0]
-    colored = nx.complete_graph(n)
-    for i in range(n):
-        colored.nodes[i]["entry"] = (mass[i, i], stiffness[i, i])
-    for i, j in combinations(range(n), 2):
-        colored.edges[i, j]["entry"] = (mass[i, j], stiffness[i, j])
+def _components(matrices: Sequence[Sympy]) -> list[list[int]]:
+    """Return the coordinates in groups that are not coupled to each other."""
+    left, found = list(range(matrices[0].shape[0])), []
+    while left:
+        group = [left.pop(0)]
+        for i in group:
+            met = [j for j in left if any(one[i, j] != 0 or one[j, i] != 0 for one in matrices)]
+            group += met
+            left = [j for j in left if j not in met]
+        found.append(sorted(group))
+    return found
 
-    def same(a: dict[str, Any], b: dict[str, Any]) -> bool:
-        return bool(a["entry"] == b["entry"])
 
-    mirror = list(range(n))[::-1]
-    candidates = nx.isomorphism.GraphMatcher(colored, colored, same, same).isomorphisms_iter()
-    for goes in ({i: mirror[i] for i in range(n)}, *(one for one, _ in zip(candidates, range(_MOST), strict=False))):
-        is_pairs = all(goes[goes[i]] == i for i in goes) and any(goes[i] != i for i in goes)
-        if is_pairs and all(
-            one[i, j] == one[goes[i], goes[j]] for one in (mass, stiffness) for i in range(n) for j in range(i + 1)
-        ):
-            return [goes[i] for i in range(n)]
-    return None
+def _exchange(matrices: Sequence[Sympy]) -> list[int] | None:
+    """Return an exchange of coordinates in pairs that leaves all matrices as they are; where each one goes."""
+    n = matrices[0].shape[0]
+    steps = 0
+
+    def fits(goes: dict[int, int]) -> bool:
+        return all(one[i, j] == one[goes[i], goes[j]] for one in matrices for i in goes for j in goes)
+
+    def search(goes: dict[int, int]) -> dict[int, int] | None:
+        nonlocal steps
+        steps += 1
+        open_ones = [i for i in range(n) if i not in goes]
+        if not open_ones or steps > _MOST:
+            return goes if not open_ones and any(i != j for i, j in goes.items()) else None
+        first = open_ones[0]
+        for other in open_ones[::-1]:  # the farthest first: most are mirrored
+            more = {**goes, first: other, other: first}
+            if fits(more):
+                found = search(more)
+                if found is not None:
+                    return found
+        return None
+
+    found = search({}) if n > 1 else None
+    return None if found is None else [found[i] for i in range(n)]
 
 
 _MOST = 500
-"""So many symmetries are looked at for one that is its own inverse."""
+"""So many exchanges are tried, whole or in part."""
 
 
 def _halves(exchange: Sequence[int]) -> tuple[Sympy, Sympy]:
@@ -144,7 +147,7 @@ def _halves(exchange: Sequence[int]) -> tuple[Sympy, Sympy]:
     return even, odd
 
 
-# -- one block -----------------------------------------------------------------------------------------------------------
+# -- one block ---------------------------------------------------------------------------------------------------------
 
 
 def _of_block(mass: Sympy, stiffness: Sympy, symbol: Sympy) -> Iterator[Eigenvalue]:
@@ -153,15 +156,19 @@ def _of_block(mass: Sympy, stiffness: Sympy, symbol: Sympy) -> Iterator[Eigenval
     if ends is not None:
         yield from _of_chain(mass, stiffness, ends, symbol)
         return
-    pencil = stiffness - symbol * mass
+    yield from _of_pencil(stiffness - symbol * mass, symbol)
+
+
+def _of_pencil(pencil: Sympy, symbol: Sympy) -> Iterator[Eigenvalue]:
+    """Yield the values at which a matrix is singular, by the factors of its determinant."""
     for factor, times in sympy.factor_list(pencil.det(method="berkowitz"), symbol)[1]:
         coefficients = sympy.Poly(factor, symbol).all_coeffs()
         if len(coefficients) > 3:
             yield Eigenvalue(None, (), factor)
         elif len(coefficients) == 2:
-            value = (-coefficients[1] / coefficients[0]).cancel().factor()
+            value = short(-coefficients[1] / coefficients[0])
             yield Eigenvalue(value, _vectors(pencil.subs(symbol, value), times), factor)
-        else:
+        elif len(coefficients) == 3:
             yield from _of_quadratic(pencil, symbol, coefficients, factor, times)
 
 
@@ -169,24 +176,20 @@ def _of_quadratic(
     pencil: Sympy, symbol: Sympy, coefficients: Sequence[Sympy], factor: Sympy, times: int
 ) -> Iterator[Eigenvalue]:
     """Yield the two roots of ``a lambda^2 + b lambda + c``, the smaller first; vectors are rational in the root."""
-    a, b, c = (one.factor() for one in coefficients)
+    a, b, c = map(sympy.factor, coefficients)
     square = (b**2 - 4 * a * c).factor()
-    outside = sympy.sqrt(square)
-    root = sympy.Dummy("root")
-    if not outside.has(sympy.Pow) or outside.is_rational_function():
-        values = [((-b + sign * outside) / (2 * a)).cancel().factor() for sign in (-1, 1)]
-        yield from (Eigenvalue(one, _vectors(pencil.subs(symbol, one), times), factor) for one in values)
-        return
+    outside, root = sympy.sqrt(square), sympy.Dummy("root")
 
     def reduced(value: Sympy) -> Sympy:
-        return _rationalized(value, root, square)
+        return _rationalized(value, root, square) if value.has(root) else short(value)
 
-    sign = -1 if a.could_extract_minus_sign() or a.is_negative else 1
     found = _vectors(pencil.subs(symbol, (-b + root) / (2 * a)), times, reduced)
-    for one in (-sign * outside, sign * outside):
-        value = (-b + one) / (2 * a)
-        short = value.cancel() if outside.is_number or len(square.free_symbols) < 2 else value
-        yield Eigenvalue(short, tuple(vector.subs(root, one) for vector in found), factor)
+    middle, reach = short(-b / (2 * a)), short(outside / (2 * a))
+    sign = 1 if reach.could_extract_minus_sign() else -1
+    for one in (sign, -sign):
+        value = sympy.factor_terms(middle + one * reach)
+        vectors = (v.applyfunc(lambda x, one=one: sympy.factor_terms(x.subs(root, one * outside))) for v in found)
+        yield Eigenvalue(value, tuple(vectors), factor)
 
 
 def _rationalized(value: Sympy, root: Sympy, square: Sympy) -> Sympy:
@@ -199,33 +202,40 @@ def _rationalized(value: Sympy, root: Sympy, square: Sympy) -> Sympy:
     return first.cancel().factor() + second.cancel().factor() * root
 
 
-def _vectors(singular: Sympy, times: int, reduced: Callable[[Sympy], Sympy] | None = None) -> tuple[Sympy, ...]:
-    """Return the null space of ``K - lambda M``, the first entry that is not zero made one."""
-    reduce = reduced or (lambda one: one.cancel().factor())
-    n = singular.shape[0]
-    rows = [[reduce(one) for one in row] for row in singular.tolist()]
+def _vectors(singular: Sympy, times: int, reduce: Callable[[Sympy], Sympy] = short) -> tuple[Sympy, ...]:
+    """Return so many vectors that a matrix takes to zero, the first entry that is not zero made one."""
+    found, _ = null_space(singular, times, reduce)
+    vectors = (found[:, k] for k in range(found.shape[1]))
+    return tuple((v / next(one for one in v if one != 0)).applyfunc(reduce) for v in vectors)
+
+
+def null_space(
+    matrix: Sympy, times: int | None = None, reduce: Callable[[Sympy], Sympy] = short
+) -> tuple[Sympy, tuple[int, ...]]:
+    """Return what a matrix takes to zero as columns, and the rows in which these are a unit matrix."""
+    count, n = matrix.shape
+    rows = [[reduce(one) for one in row] for row in matrix.tolist()]
     pivots: list[int] = []
     for column in range(n):
-        place = next((i for i in range(len(pivots), n) if rows[i][column] != 0), None)
-        if place is None or len(pivots) == n - times:
+        place = next((i for i in range(len(pivots), count) if rows[i][column] != 0), None)
+        if place is None or (times is not None and len(pivots) == n - times):
             continue
         rows[len(pivots)], rows[place] = rows[place], rows[len(pivots)]
         chosen = rows[len(pivots)] = [reduce(one / rows[len(pivots)][column]) for one in rows[len(pivots)]]
-        for i in range(n):
+        for i in range(count):
             if i != len(pivots) and rows[i][column] != 0:
                 rows[i] = [reduce(x - rows[i][column] * y) for x, y in zip(rows[i], chosen, strict=True)]
         pivots.append(column)
-    found = []
-    for free in (one for one in range(n) if one not in pivots):
-        entries = [sympy.Integer(int(i == free)) for i in range(n)]
+    free = tuple(one for one in range(n) if one not in pivots)
+    found = sympy.zeros(n, len(free))
+    for k, one in enumerate(free):
+        found[one, k] = 1
         for row, column in enumerate(pivots):
-            entries[column] = -rows[row][free]
-        first = next(one for one in entries if one != 0)
-        found.append(sympy.Matrix([reduce(one / first) for one in entries]))
-    return tuple(found)
+            found[column, k] = -rows[row][one]
+    return found, free
 
 
-# -- chains --------------------------------------------------------------------------------------------------------------
+# -- chains ------------------------------------------------------------------------------------------------------------
 
 
 def chain_ends(mass: Sympy, stiffness: Sympy) -> tuple[int, int] | None:

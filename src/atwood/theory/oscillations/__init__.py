@@ -1,0 +1,5 @@
+"""States of rest and small oscillations as formulas, with their stability as inequalities between parameters."""
+
+from atwood.theory.oscillations.equilibria import SymbolicEquilibria, SymbolicEquilibrium
+
+__all__ = ["SymbolicEquilibria", "SymbolicEquilibrium"]

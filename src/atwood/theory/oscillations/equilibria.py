@@ -1,0 +1,173 @@
+"""States of rest of a scene in symbols: V' = 0 solved in closed form, where each exists, and where it is stable."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from atwood.errors import UnsupportedError, UsageError
+from atwood.forms.assembly import Assembly
+from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_modules import sympy
+from atwood.table import Shown, Table, table
+from atwood.theory.formulas.printers import Sympy, latex, text
+from atwood.theory.formulas.sheet import node_of
+from atwood.theory.oscillations.conditions import NoClosedFormError, Solution, solve_conditions
+from atwood.theory.oscillations.rest import PlainEquations, expand, is_singular, plain_equations
+from atwood.theory.oscillations.stability import stability_of
+
+
+def text_of(value: Sympy) -> str:
+    """Return an expression as plain text."""
+    return text.formula(node_of(value))
+
+
+def latex_of(value: Sympy) -> str:
+    """Return an expression in LaTeX."""
+    return latex.formula(node_of(value))
+
+
+@dataclass(frozen=True, eq=False)
+class SymbolicEquilibrium:
+    """A state of rest as formulas of the parameters, which have the sign of their value.
+
+    Attributes
+    ----------
+    values
+        Coordinates by path, as expressions of sympy in the symbols of `equations`; a coordinate that may be anything is
+        its own symbol.
+    exists
+        Where in the parameters it exists: a relation of sympy, or true.
+    stable
+        Where in the parameters no small deviation grows: a relation of sympy, true, or false; None if that is not
+        decided to first order.
+    free
+        Paths of the coordinates that may be anything.
+    numbers
+        Coordinates with the values of the scene, m or rad; empty if the state does not exist with these.
+    stability
+        With the values of the scene: ``"stable"``, ``"unstable"``, ``"undecided"``, or ``"does not exist"``.
+    """
+
+    values: Mapping[str, Sympy]
+    exists: Sympy
+    stable: Sympy | None
+    free: tuple[str, ...]
+    numbers: Mapping[str, float]
+    stability: str
+
+    def to_data(self) -> dict[str, Any]:
+        """Return it as plain data, formulas in the words of Python."""
+        return {
+            "values": {path: str(value) for path, value in self.values.items()},
+            "exists": str(self.exists),
+            "stable": None if self.stable is None else str(self.stable),
+            "free": list(self.free),
+            "numbers": dict(self.numbers),
+            "stability": self.stability,
+        }
+
+
+class SymbolicEquilibria(Shown, list[SymbolicEquilibrium]):
+    """The states of rest of a scene as formulas."""
+
+    def __init__(self, found: Iterable[SymbolicEquilibrium], plain: PlainEquations) -> None:
+        super().__init__(found)
+        self.scene, self._plain = plain.name, plain
+
+    def to_data(self) -> list[dict[str, Any]]:
+        """Return them as plain data, for JSON."""
+        return [one.to_data() for one in self]
+
+    def latex(self) -> str:
+        """Return them as an aligned block of LaTeX, a line for each."""
+        rows = []
+        for one in self:
+            state = r",\ ".join(latex_of(sympy.Eq(left, right, evaluate=False)) for left, right in self._state(one))
+            rows.append(rf"{state} &\quad {_where(one.exists, 0)} &\quad {_where(one.stable, 1)}")
+        return "\\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}"
+
+    def tables(self) -> tuple[Table, ...]:
+        """Return each state, where it exists and where it is stable, and what it is with the values of the scene."""
+        rows = []
+        for one in self:
+            state = ", ".join(f"{text_of(left)} = {text_of(right)}" for left, right in self._state(one))
+            anything = "".join(f", any {text_of(self._plain.letter(path))}" for path in one.free)
+            rows.append((state + anything, _said(one.exists), _said(one.stable), one.stability))
+        title = f"{self.scene}: {len(self)} state{'s' if len(self) != 1 else ''} of rest in closed form"
+        headings = ("state", "exists where", "stable where", "with these values")
+        return (table(headings, rows, title, [_SIGNS]),)
+
+    def _state(self, one: SymbolicEquilibrium) -> list[tuple[Sympy, Sympy]]:
+        return [(self._plain.letter(path), value) for path, value in one.values.items() if path not in one.free]
+
+    __str__ = Shown.as_text
+
+
+_SIGNS = "Parameters have the sign that they have in the scene; stable: no small deviation grows."
+
+
+def _said(condition: Sympy | None) -> str:
+    if condition is None:
+        return "not decided to first order"
+    words = {sympy.true: "always", sympy.false: "never"}
+    return words.get(condition) or " and ".join(text_of(one) for one in sympy.And.make_args(condition))
+
+
+def _where(condition: Sympy | None, number: int) -> str:
+    if condition is None or condition in (sympy.true, sympy.false):
+        words = ("", "") if condition is None else ("", "stable") if condition == True else ("", "unstable")  # noqa: E712
+        return rf"\text{{{words[number]}}}" if words[number] else ""
+    said = r",\ ".join(latex_of(one) for one in sympy.And.make_args(condition))
+    return rf"\text{{{('exists for', 'stable for')[number]} }} {said}"
+
+
+def find_symbolic(
+    plain: PlainEquations,
+) -> list[tuple[Solution, SymbolicEquilibrium]]:
+    """Return the states of rest with what is said of them."""
+    found = []
+    for solution in _solutions(plain):
+        if is_singular(plain, solution, of_pole=True):
+            continue
+        exists = sympy.And(*solution.conditions)
+        is_pole = is_singular(plain, solution)
+        stable = None if is_pole else stability_of(expand(plain, solution))
+        found.append((solution, _described(plain, solution, exists, stable)))
+    if not found:
+        raise UsageError("it stays nowhere at rest", where=plain.name, advice="Look for a steady motion, with `trim`.")
+    return found
+
+
+def _solutions(plain: PlainEquations) -> list[Solution]:
+    try:
+        return solve_conditions(plain.conditions, (*plain.coordinates, *plain.multipliers))
+    except NoClosedFormError as problem:
+        raise UnsupportedError(
+            f"its conditions of rest have no closed form that one would find by hand: {problem}",
+            where=plain.name,
+            advice="Without `symbolic` states of rest are found in numbers.",
+        ) from None
+
+
+def _described(plain: PlainEquations, solution: Solution, exists: Sympy, stable: Sympy | None) -> SymbolicEquilibrium:
+    paths = dict(zip(plain.coordinates, plain.paths, strict=True))
+    free = tuple(paths[one] for one in solution.free if one in paths)
+    numbers: dict[str, float] = {}
+    known = {q: value for q, value in solution.values.items() if q in paths and not value.has(*plain.coordinates)}
+    if plain.holds(exists):
+        numbers = {paths[q]: plain.place(q, value) for q, value in known.items()}
+    if not numbers and not free:
+        stability = "does not exist"
+    else:
+        stability = "undecided" if stable is None else "stable" if plain.holds(stable) else "unstable"
+    values = {path: plain.told(solution.values.get(q, q)) for q, path in paths.items()}
+    return SymbolicEquilibrium(
+        values, plain.told(exists), None if stable is None else plain.told(stable), free, numbers, stability
+    )
+
+
+def symbolic_equilibria(assembly: Assembly, symbols: Mapping[str, str] | None = None) -> SymbolicEquilibria:
+    """Return the states of rest of a scene as formulas."""
+    plain = plain_equations(assembly, symbols)
+    return SymbolicEquilibria((one for _, one in find_symbolic(plain)), plain)
