@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from atwood import Scene
 from atwood_library import (
     Damper,
@@ -32,7 +34,7 @@ def chain(
     ends += [masses[k].flange for k in range(count)]
     if not free_end:
         ends.append(scene.add("right", Ground(position=(1.0 * (count + 1), 0.0, 0.0))).frame)
-    for k, (a, b) in enumerate(zip(ends, ends[1:], strict=False)):
+    for k, (a, b) in enumerate(pairwise(ends)):
         spring = scene.add(f"spring{k + 1}", Spring(stiffness=stiffness, natural_length=1.0))
         scene.connect(a, spring.a)
         scene.connect(spring.b, b)

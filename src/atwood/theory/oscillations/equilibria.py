@@ -132,11 +132,23 @@ def find_symbolic(
             continue
         exists = sympy.And(*solution.conditions)
         is_pole = is_singular(plain, solution)
-        stable = None if is_pole else stability_of(expand(plain, solution))
+        stable = None if is_pole else _where_it_exists(stability_of(expand(plain, solution)), exists)
         found.append((solution, _described(plain, solution, exists, stable)))
     if not found:
         raise UsageError("it stays nowhere at rest", where=plain.name, advice="Look for a steady motion, with `trim`.")
     return found
+
+
+def _where_it_exists(stable: Sympy | None, exists: Sympy) -> Sympy | None:
+    """Return a condition without what the existence of a state says already."""
+    if stable is None or stable in (sympy.true, sympy.false):
+        return stable
+    known = [one for one in sympy.And.make_args(exists) if one.is_Relational]
+    strict = {(one.gts, one.lts) for one in known if one.is_Relational and one.func in (sympy.Gt, sympy.Lt)}
+    parts = sympy.And.make_args(stable)
+    if {(one.lts, one.gts) for one in parts} & {(one.gts, one.lts) for one in known}:
+        return sympy.false
+    return sympy.And(*(one for one in parts if (one.gts, one.lts) not in strict))
 
 
 def _solutions(plain: PlainEquations) -> list[Solution]:

@@ -12,6 +12,7 @@ from atwood.errors import UnsupportedError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
+from atwood.numerics.rank import rank
 from atwood.theory.equations.equations import EquationsOfMotion, read_equations
 from atwood.theory.formulas.printers import Sympy, objects
 from atwood.theory.oscillations.conditions import Solution
@@ -189,8 +190,8 @@ def _signed(value: Sympy, positive: Sequence[Sympy]) -> Sympy:
     """Return an expression in which the magnitude of what is positive, or of its opposite, is that itself."""
 
     def said(inside: Sympy) -> Sympy:
-        found = next((one for one in positive if (inside / one).cancel().is_number), None)
-        return abs(inside) if found is None else found * abs((inside / found).cancel())
+        shares = ((one, (inside / one).cancel()) for one in positive)
+        return next((one * abs(share) for one, share in shares if share.is_positive or share.is_negative), abs(inside))
 
     return value.replace(sympy.Abs, said) if positive else value
 
@@ -224,4 +225,5 @@ def _rank(plain: PlainEquations, there: Mapping[Sympy, Sympy], kept: Sequence[in
             matrix[i, n + j] = matrix[n + j, i] = plain.number(one.diff(plain.coordinates[k]).subs(there))
     size: FloatArray = np.sqrt(np.abs(matrix).max(axis=1, initial=0.0))
     size[size == 0.0] = 1.0
-    return int(np.linalg.matrix_rank(matrix / np.outer(size, size), tol=1e-9))
+    scaled = matrix / np.outer(size, size)
+    return rank(np.block([[scaled.real, -scaled.imag], [scaled.imag, scaled.real]]), 1e-9)
