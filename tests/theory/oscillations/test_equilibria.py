@@ -195,8 +195,8 @@ def test_letters_and_regions_belong_to_one_kind_each() -> None:
 
 def test_they_are_written_as_a_table_in_latex_and_as_data() -> None:
     found = atwood.equilibria(RotatingHoopDriven(), symbolic=True)
-    assert "g ≤ Ω² r" in str(found)
-    assert r"\theta = \arccos\left(-\frac{g}{\Omega^{2} r}\right)" in found.latex()
+    assert "g ≤ a ω²" in str(found)
+    assert r"\theta = \arccos\left(-\frac{g}{a \omega^{2}}\right)" in found.latex()
     data = found.to_data()
     assert [one["stability"] for one in data] == ["unstable", "unstable", "stable", "stable"]
-    assert data[2]["values"] == {"hoop.angle": "acos(-g/(Omega**2*r))"}
+    assert data[2]["values"] == {"hoop.angle": "acos(-g/(a*omega**2))"}
