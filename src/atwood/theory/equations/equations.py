@@ -283,7 +283,8 @@ class EquationsOfMotion(EquationFormulas):
         if not self.is_readable:
             said = self.structure.sentence.replace("_", r"\_")
             return rf"\text{{{said}}}"
-        return page.as_latex(equation_lines(self))
+        lines = equation_lines(self)
+        return page.as_latex([*lines, *page.shared_lines((one.formula for one in lines), self.book.shared)])
 
     def markdown(self) -> str:
         """Return a page with symbols, energies, momenta, equations and matrices, formulas between dollar signs."""

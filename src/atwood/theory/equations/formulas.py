@@ -14,7 +14,7 @@ from itertools import combinations
 from typing import Any, Literal, TypeAlias
 
 from atwood.errors import UnsupportedError
-from atwood.expr import Expression, SparseMatrix, count_operations, substitute
+from atwood.expr import Expression, SparseMatrix, count_operations, depends_on, substitute, vjp
 from atwood.expr.core import algebra
 from atwood.expr.core.relations import Relation
 from atwood.expr.simplify.polynomial import TooLargeError
@@ -24,8 +24,8 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
 from atwood.theory.equations.pages import Structure, structure_of
 from atwood.theory.formulas.book import Book
-from atwood.theory.formulas.notation import Notation
-from atwood.theory.formulas.tree import Name, Sum, Symbol
+from atwood.theory.formulas.notation import Notation, momentum_symbol, with_momenta
+from atwood.theory.formulas.tree import Name, Sum, Symbol, cost
 
 _READABLE_COORDINATES, _READABLE_OPERATIONS = 12, 2_500
 """Beyond either nobody reads equations: their structure is shown."""
@@ -173,6 +173,27 @@ class EquationFormulas:
             rates=self.formulas(found.rates),
         )
 
+    @cached_property
+    def momenta_shown(self) -> tuple[Sum, ...]:
+        """The momenta as a page shows them: in terms of each other where that is shorter, as ``p_psi`` in ``p_phi``."""
+        found, shown = self.expressions, list(self.written.momenta)
+        if not self.is_readable or found.has_angular_velocities or found.is_restricted:
+            return tuple(shown)
+        other = EquationFormulas(self.assembly, found, with_momenta(self.notation, found), self.parameters)
+        values, changed = self._plain(found.momenta), set[int]()
+        for j, (rate, value) in enumerate(zip(found.velocities, values, strict=True)):
+            slope = vjp([value], [found.graph.one], [rate])[0]
+            if j in changed or not slope.is_parametric or slope.is_zero or len(shown[j].terms) < _SUM:
+                continue
+            given = (momentum_symbol(found, j) - substitute([value], {rate: 0.0})[0]) / slope
+            for i, one in enumerate(values):
+                if i != j and depends_on(one, [rate]):
+                    made = other.formula(substitute([one], {rate: given})[0])
+                    if cost(made) < cost(shown[i]):
+                        shown[i] = made
+                        changed |= {i, j}
+        return tuple(shown)
+
     @property
     def residuals(self) -> tuple[Expression, ...]:
         """The equations of motion as expressions, forces of constraints included."""
@@ -196,6 +217,10 @@ class EquationFormulas:
         """The constraint Jacobian as formulas."""
         found = self.expressions
         return self._matrix(found.constraint_jacobian, (len(found.constraints), len(found.velocities)))
+
+
+_SUM = 2
+"""A momentum of fewer terms is no shorter than what it stands for."""
 
 
 @dataclass(frozen=True)

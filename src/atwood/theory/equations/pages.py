@@ -40,7 +40,7 @@ def sections_of(eq: EquationsOfMotion) -> list[Section]:
     written, found, notation = eq.written, eq.expressions, eq.notation
     sections = [_energies(eq)]
     own = [notation.velocities[u][0] for u in found.velocities]
-    for title, letter, formulas in (("Momenta", "p", written.momenta), ("Generalized forces", "Q", written.forces)):
+    for title, letter, formulas in (("Momenta", "p", eq.momenta_shown), ("Generalized forces", "Q", written.forces)):
         lines = [
             Line((f"{letter}_{{{latex.letter(symbol)}}}", f"{letter}_{text.letter(symbol)}"), one)
             for symbol, one in zip(own, formulas, strict=True)
@@ -67,7 +67,7 @@ def sections_of(eq: EquationsOfMotion) -> list[Section]:
     if eq.book.shared:
         names = [Line((latex.formula(name), text.formula(name)), value) for name, value in eq.book.shared]
         sections.append(Section("Shared terms", tuple(names)))
-    return page.with_names(sections, [one.name for one in notation.legend])
+    return page.with_names(sections, notation.legend)
 
 
 def _energies(eq: EquationsOfMotion) -> Section:
@@ -139,6 +139,10 @@ def html_of(eq: EquationsOfMotion) -> str:
     shown = [Section("Energies", tuple(lines)), Section("Equations of motion", tuple(rows))]
     if eq.written.constraints:
         shown.append(Section("Constraints", tuple(equation_lines(eq)[len(rows) :])))
+    used = page.shared_lines(
+        (one for section in shown for line in section.lines for one in page.formulas_of(line)), eq.book.shared
+    )
+    shown += [Section("Shared terms", used)] if used else []
     return page.as_html(f"{eq.name} ({eq.form} form)", shown)
 
 
@@ -315,12 +319,8 @@ def _listing(eq: EquationsOfMotion) -> list[str]:
 def _function(eq: EquationsOfMotion, name: str, arguments: str, said: str, formulas: Sequence[Sum]) -> str:
     _check(eq, formulas)
     found, notation = eq.expressions, eq.notation
-    definitions, wanted = dict(eq.book.shared), {one.symbol for one in names_in(formulas)}
-    needed: list[str] = []
-    for shared, value in reversed(list(definitions.items())):
-        if shared.symbol in wanted:
-            wanted |= {one.symbol for one in names_in([value])}
-            needed.insert(0, f"    {code.formula(shared)} = {code.formula(value)}")
+    shared = page.shared_in(formulas, eq.book.shared)
+    needed = [f"    {code.formula(name)} = {code.formula(value)}" for name, value in shared]
     lines = [f"def {name}({arguments}):", f'    """{said}"""']
     lines += _unpacked([code.letter(notation.symbols[one]) for one in found.coordinates], "q")
     if "u" in arguments:

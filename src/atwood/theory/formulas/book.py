@@ -25,7 +25,7 @@ from atwood.expr.simplify.polynomial import (
     TooLargeError,
     expand,
 )
-from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.theory.formulas.forms import (
     LIMIT,
     Owners,
@@ -124,7 +124,7 @@ class Book:
         try:
             for square, base, factor in squares:
                 stand_in = base.graph.symbol(f"base {base.index}")
-                self._known[stand_in.index] = in_brackets(self.write(base).terms)
+                self._known[stand_in.index] = _with_leading_plus(in_brackets(self.write(base).terms))
                 by[square] = stand_in * stand_in if factor is None else factor * (stand_in * stand_in)
             return self._best(substitute(list(values), by), shares, grouped)
         except TooLargeError:
@@ -172,12 +172,14 @@ class Book:
     # -- from polynomials -----------------------------------------------------------------------------------------
 
     def _terms(self, expansion: Expansion, polynomial: Polynomial, owners: Owners, grouped: bool) -> Iterator[Term]:
-        together: dict[tuple[tuple[Monomial, float], ...], list[tuple[Monomial, float]]] = {}
+        together: dict[object, dict[object, list[tuple[Monomial, float]]]] = {}
         for monomial in polynomial:
             shape, lead = shape_of(polynomial[monomial])
-            together.setdefault(shape, []).append((monomial, lead))
+            below = tuple(one for one in monomial if expansion.atoms[one[0]].kind == "inverse")
+            key = () if grouped else below or monomial
+            together.setdefault(shape, {}).setdefault(key, []).append((monomial, lead))
         found: list[Term] = []
-        for monomials in together.values():
+        for monomials in (one for several in together.values() for one in several.values()):
             if monomials[0][0] == ONE and len(monomials) == 1:
                 found += self._still(expansion, polynomial[ONE], owners)
                 continue
@@ -186,7 +188,7 @@ class Book:
                 who = owners.of(monomial, polynomial[monomial])
                 factors = [*self._atoms(expansion, monomial)]
                 made.append((product(Fraction(1), factors, who), lead, polynomial[monomial]))
-            if not grouped or len(made) == 1 or made[0][2].keys() == {ONE}:
+            if len(made) == 1 or (grouped and made[0][2].keys() == {ONE}):
                 for one, _, coefficient in made:
                     number, constants = self._coefficient(expansion, coefficient)
                     found.append(in_order(product(number * one.number, [*constants, *one.factors], one.owners)))
@@ -194,8 +196,10 @@ class Book:
             number, constants = self._coefficient(expansion, made[0][2])
             inner = [one.times(as_fraction(lead / made[0][1])) for one, lead, _ in made]
             who = tuple(dict.fromkeys(owner for one, _, _ in made for owner in one.owners))
+            shared = [] if grouped else [one for one in inner[0].factors if one[1] < 0 and _all_have(inner, one)]
+            inner = [replace(one, factors=tuple(f for f in one.factors if f not in shared)) for one in inner]
             both = in_brackets(map(in_order, inner))
-            found.append(in_order(product(number, [*constants, (both, Fraction(1))], who)))
+            found.append(in_order(product(number, [*constants, (both, Fraction(1)), *shared], who)))
         yield from sorted(found, key=place_of_term)
 
     def _still(self, expansion: Expansion, coefficient: Coefficient, owners: Owners) -> list[Term]:
@@ -333,3 +337,12 @@ class Book:
 
     def _integer(self, value: int) -> Node:
         return Sum((Term(Fraction(value)),)) if value else Sum(())
+
+
+def _all_have(terms: Sequence[Term], factor: Factor) -> bool:
+    return all(factor in term.factors for term in terms)
+
+
+def _with_leading_plus(base: Sum) -> Sum:
+    """Return what is squared with the sign in which its first term is added."""
+    return base if base.terms[0].number > 0 else Sum(tuple(term.times(Fraction(-1)) for term in base.terms))

@@ -186,6 +186,27 @@ def notation_of(assembly: Assembly, found: Lagrangian, symbols: Mapping[str, str
     return Notation(symbols_of, velocities, tuple(symbols_of[one.expression] for one in wanted), merged)
 
 
+def momentum_symbol(found: Lagrangian, number: int) -> Expression:
+    """Return the symbol of the momentum of a coordinate, by its number."""
+    return found.graph.symbol(f"p:{found.names[number].name}")
+
+
+def with_momenta(notation: Notation, found: Lagrangian) -> Notation:
+    """Return a notation that has a letter p for the momentum of each coordinate."""
+    symbols, added = dict(notation.symbols), []
+    for number, (q, name) in enumerate(zip(found.coordinates, found.names, strict=True)):
+        own = symbols[q]
+        meaning = f"Momentum of {name.name}."
+        unit = "kg*m^2/s" if own.unit == "rad" else f"kg*m^2/(s*{own.unit})" if own.unit != "m" else "kg*m/s"
+        below = (own.letter, *own.subscripts)
+        made = Symbol("p", below, f"p:{name.name}", unit, meaning, None, "momentum", own.order)
+        symbols[momentum_symbol(found, number)] = made
+        added.append(made)
+    moving = [one for one in notation.legend if one.kind == "coordinate"]
+    others = [one for one in notation.legend if one.kind != "coordinate"]
+    return replace(notation, symbols=symbols, legend=(*moving, *added, *others))
+
+
 def _check_paths(assembly: Assembly, found: Lagrangian, said: Mapping[str, str]) -> None:
     """Refuse letters for what a scene does not have; what has none in one form may have one in the other."""
     known = {one.name for one in (*found.names, *found.velocity_names)} | {one.label for one in found.constraints}

@@ -5,12 +5,12 @@ from __future__ import annotations
 import unicodedata
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from fractions import Fraction
 from html import escape
 
-from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.theory.formulas.printers import latex, text
-from atwood.theory.formulas.tree import Call, Name, Node, Sum, Symbol, Term, replaced
+from atwood.theory.formulas.quantities import distances_in, moments_in, with_quantities
+from atwood.theory.formulas.tree import Call, Name, Node, Sum, Symbol, Term, alone, names_in, replaced
 
 _WIDTH = 88
 """Columns of a line of formulas, as plain text."""
@@ -66,9 +66,34 @@ def width(written: str) -> int:
 # -- names for brackets ---------------------------------------------------------------------------------------------
 
 
-def with_names(sections: Sequence[Section], taken: Iterable[str]) -> list[Section]:
+def with_names(sections: Sequence[Section], legend: Sequence[Symbol]) -> list[Section]:
+    """Return sections with names for what has one in mechanics, and for brackets that stand often in long formulas."""
+    formulas = [one for section in sections for line in section.lines for one in formulas_of(line)]
+    distances = distances_in(formulas, legend)
+    taken = {one.name for one in legend}
+    moments = {one: name for one, name in moments_in(formulas).items() if name.symbol.name not in taken}
+    where = {
+        name: Line((f"{latex.formula(name)}^2", f"{text.formula(name)}²"), one) for name, one in distances.values()
+    }
+    where |= {name: Line((latex.formula(name), text.formula(name)), one) for one, name in moments.items()}
+    if where:
+        named = [replace(one, lines=tuple(_with(line, distances, moments) for line in one.lines)) for one in sections]
+        sections = [*named, Section("Distances and moments of inertia", tuple(where.values()))]
+    return _with_short_names(sections, taken)
+
+
+def _with(line: Line | Matrix, distances: Mapping[Sum, tuple[Name, Sum]], moments: Mapping[Sum, Name]) -> Line | Matrix:
+    def made(one: Sum) -> Sum:
+        return alone(with_quantities(one, distances, moments))
+
+    if isinstance(line, Line):
+        return Line(line.left, made(line.formula), line.right)
+    return Matrix(line.left, tuple(tuple(map(made, row)) for row in line.entries))
+
+
+def _with_short_names(sections: Sequence[Section], taken: Iterable[str]) -> list[Section]:
     """Return sections in which brackets that stand often have names, if formulas would not fit; and what these are."""
-    formulas = [one for section in sections for line in section.lines for one in _formulas(line)]
+    formulas = [one for section in sections for line in section.lines for one in formulas_of(line)]
     if not any(width(text.formula(one)) > _LONG * _WIDTH for one in formulas):
         return list(sections)
     counts = Counter(bracket for one in formulas for bracket in _brackets(one))
@@ -91,7 +116,8 @@ def with_names(sections: Sequence[Section], taken: Iterable[str]) -> list[Sectio
     return [*shorter, Section("Abbreviations", tuple(where), "What stands in brackets several times has a name.")]
 
 
-def _formulas(line: Line | Matrix) -> list[Sum]:
+def formulas_of(line: Line | Matrix) -> list[Sum]:
+    """Return the formulas in a line."""
     return [line.formula] if isinstance(line, Line) else [one for row in line.entries for one in row]
 
 
@@ -109,12 +135,23 @@ def _brackets(node: Node) -> Iterable[Sum]:
 
 def _renamed(line: Line | Matrix, names: Mapping[Node, Node]) -> Line | Matrix:
     if isinstance(line, Line):
-        return Line(line.left, _sum(replaced(line.formula, names)), line.right)
-    return Matrix(line.left, tuple(tuple(_sum(replaced(one, names)) for one in row) for row in line.entries))
+        return Line(line.left, alone(replaced(line.formula, names)), line.right)
+    return Matrix(line.left, tuple(tuple(alone(replaced(one, names)) for one in row) for row in line.entries))
 
 
-def _sum(node: Node) -> Sum:
-    return node if isinstance(node, Sum) else Sum((Term(Fraction(1), ((node, Fraction(1)),)),))
+def shared_in(formulas: Iterable[Node], shared: Sequence[tuple[Name, Sum]]) -> list[tuple[Name, Sum]]:
+    """Return those names that a book gave to what formulas share that occur in some, each after what it needs."""
+    wanted, needed = set(names_in(formulas)), list[tuple[Name, Sum]]()
+    for name, value in reversed(shared):
+        if name in wanted:
+            wanted |= set(names_in([value]))
+            needed.insert(0, (name, value))
+    return needed
+
+
+def shared_lines(formulas: Iterable[Node], shared: Sequence[tuple[Name, Sum]]) -> tuple[Line, ...]:
+    """Return what these names stand for, a line each."""
+    return tuple(Line((latex.formula(name), text.formula(name)), one) for name, one in shared_in(formulas, shared))
 
 
 # -- lines ------------------------------------------------------------------------------------------------------------

@@ -121,6 +121,8 @@ class _Text(_Lines):
     def letter(self, symbol: Symbol, dots: int = 0) -> str:
         if symbol.kind == "momentum":  # it has the letter of its coordinate below
             return f"p_{self.letter(Symbol(symbol.subscripts[0], symbol.subscripts[1:]))}"
+        if symbol.kind == "distance":
+            return f"|{' - '.join(self.letter(Symbol(symbol.letter, (end,))) for end in symbol.subscripts)}|"
         base = self._LETTERS.get(symbol.letter, symbol.letter) + self._DOTS[dots]
         if all(one.isdigit() for one in symbol.subscripts):
             return base + "".join(symbol.subscripts).translate(self._BELOW)
@@ -173,6 +175,9 @@ class _Latex(_Lines):
     def letter(self, symbol: Symbol, dots: int = 0) -> str:
         if symbol.kind == "momentum":  # it has the letter of its coordinate below
             return f"p_{{{self.letter(Symbol(symbol.subscripts[0], symbol.subscripts[1:]))}}}"
+        if symbol.kind == "distance":
+            ends = r" - ".join(rf"\mathbf{{{symbol.letter}}}_{{\mathrm{{{end}}}}}" for end in symbol.subscripts)
+            return rf"\left|{ends}\right|"
         base = symbol.letter
         if base in GREEK:
             base = f"\\{base}"

@@ -19,7 +19,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.lagrangian import Lagrangian, lagrangian_of
 from atwood.forms.quantities import known_program
-from atwood.lazy_dataclasses import dataclass, replace
+from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
@@ -29,7 +29,7 @@ from atwood.theory.dynamics.functions import Numbers
 from atwood.theory.equations.equations import PARAMETERS
 from atwood.theory.equations.formulas import EquationFormulas, Parameters
 from atwood.theory.formulas import page
-from atwood.theory.formulas.notation import SYMBOLS, Notation, notation_of
+from atwood.theory.formulas.notation import SYMBOLS, momentum_symbol, notation_of, with_momenta
 from atwood.theory.formulas.page import Line, Section
 from atwood.theory.formulas.printers import Sympy, latex, objects, text
 from atwood.theory.formulas.tree import Sum, Symbol, Term, cost, in_brackets, in_order, names_in, product
@@ -313,13 +313,16 @@ class Hamiltonian:
             Section("Hamiltonian", (Line(("H", "H"), self.formula),), self.sentence),
             Section("Momenta", lines),
         ]
-        return page.with_names(said, [one.name for one in self.formulas.notation.legend])
+        used = page.shared_lines((self.formula, *self._definitions), self.formulas.book.shared)
+        said += [Section("Shared terms", used)] if used else []
+        return page.with_names(said, self.formulas.notation.legend)
 
     def latex(self) -> str:
         """Return H in LaTeX."""
         if self._written is None:
             return rf"\text{{{self._too_long}}}".replace("_", r"\_")
-        return page.as_latex([Line(("H", "H"), self.formula)])
+        shared = page.shared_lines([self.formula], self.formulas.book.shared)
+        return page.as_latex([Line(("H", "H"), self.formula), *shared])
 
     def markdown(self) -> str:
         """Return a page with H, the momenta and what stands for what, formulas between dollar signs."""
@@ -424,27 +427,6 @@ def hamiltonian(
 
 _LARGEST_BLOCK = 3
 """Mass matrices are inverted in symbols block by block, where no block has more rows."""
-
-
-def momentum_symbol(found: Lagrangian, number: int) -> Expression:
-    """Return the symbol of the momentum of a coordinate, by its number."""
-    return found.graph.symbol(f"p:{found.names[number].name}")
-
-
-def with_momenta(notation: Notation, found: Lagrangian) -> Notation:
-    """Return a notation that has a letter p for the momentum of each coordinate."""
-    symbols, added = dict(notation.symbols), []
-    for number, (q, name) in enumerate(zip(found.coordinates, found.names, strict=True)):
-        own = symbols[q]
-        meaning = f"Momentum of {name.name}."
-        unit = "kg*m^2/s" if own.unit == "rad" else f"kg*m^2/(s*{own.unit})" if own.unit != "m" else "kg*m/s"
-        below = (own.letter, *own.subscripts)
-        made = Symbol("p", below, f"p:{name.name}", unit, meaning, None, "momentum", own.order)
-        symbols[momentum_symbol(found, number)] = made
-        added.append(made)
-    moving = [one for one in notation.legend if one.kind == "coordinate"]
-    others = [one for one in notation.legend if one.kind != "coordinate"]
-    return replace(notation, symbols=symbols, legend=(*moving, *added, *others))
 
 
 def hamiltonian_formula(formulas: EquationFormulas, transform: LegendreTransform) -> Sum | None:

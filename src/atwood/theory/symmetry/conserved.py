@@ -29,6 +29,7 @@ from atwood.simulation.run.recorder import SegmentRecord
 from atwood.table import Shown, Table, table
 from atwood.theory.equations.formulas import EquationFormulas
 from atwood.theory.formulas.notation import SYMBOLS, notation_of
+from atwood.theory.formulas.page import Line, shared_lines
 from atwood.theory.formulas.printers import Sympy, latex, objects, text
 from atwood.theory.formulas.tree import Sum
 from atwood.theory.symmetry.find import Finding, find_conserved
@@ -113,13 +114,21 @@ class ConservedQuantity:
     def _written(self) -> Sum:
         return self.formulas.formula(self.finding.value, energy=True)
 
+    @property
+    def _shared(self) -> tuple[Line, ...]:
+        return shared_lines([self._written], self.formulas.book.shared)
+
     def latex(self) -> str:
         """Return the quantity in LaTeX."""
-        return latex.formula(self._written)
+        told = [f"{one.left[0]} = {latex.formula(one.formula)}" for one in self._shared]
+        return r", \quad ".join([latex.formula(self._written), *told])
 
     def text(self) -> str:
         """Return the quantity in plain text, for a terminal; empty where nobody would read it."""
-        return text.formula(self._written) if self.formulas.is_readable else ""
+        if not self.formulas.is_readable:
+            return ""
+        told = [f"{one.left[1]} = {text.formula(one.formula)}" for one in self._shared]
+        return ", ".join([text.formula(self._written), *told])
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
