@@ -183,10 +183,14 @@ if TYPE_CHECKING:
         Statement as Statement,
     )
     from atwood.theory.hamiltonian import (
+        Algebra as Algebra,
         CanonicalTransformation as CanonicalTransformation,
+        Flow as Flow,
         Hamiltonian as Hamiltonian,
         PointTransformation as PointTransformation,
+        bracket_algebra as bracket_algebra,
         canonical_transformation as canonical_transformation,
+        flow_of as flow_of,
         fundamental_brackets as fundamental_brackets,
         generated_transformation as generated_transformation,
         hamiltonian as hamiltonian,
@@ -258,8 +262,9 @@ _ROOMS = {
         "action", "action_angle", "boundary_value_motions", "separation",
     ),
     "atwood.theory.hamiltonian": (
-        "CanonicalTransformation", "Hamiltonian", "PointTransformation",
-        "canonical_transformation", "fundamental_brackets", "generated_transformation", "hamiltonian",
+        "Algebra", "CanonicalTransformation", "Flow", "Hamiltonian", "PointTransformation",
+        "bracket_algebra", "canonical_transformation", "flow_of", "fundamental_brackets",
+        "generated_transformation", "hamiltonian",
         "point_transformation", "poisson_bracket", "poisson_brackets", "total_derivative",
     ),
     "atwood.theory.dynamics": ("Dynamics", "StartSolution", "dynamics", "solve_initial_values"),

@@ -1,5 +1,6 @@
 """Hamiltonian mechanics: the Legendre transform, Poisson brackets, canonical and point transformations."""
 
+from atwood.theory.hamiltonian.flow import Algebra, Flow, bracket_algebra, flow_of
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian
 from atwood.theory.hamiltonian.point_transformations import PointTransformation, point_transformation
 from atwood.theory.hamiltonian.transformations import (
@@ -13,10 +14,14 @@ from atwood.theory.hamiltonian.transformations import (
 )
 
 __all__ = [
+    "Algebra",
     "CanonicalTransformation",
+    "Flow",
     "Hamiltonian",
     "PointTransformation",
+    "bracket_algebra",
     "canonical_transformation",
+    "flow_of",
     "fundamental_brackets",
     "generated_transformation",
     "hamiltonian",

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 from atwood.arguments import Kind, Refused, each, instance, optional
-from atwood.errors import AtwoodError, UsageError
+from atwood.errors import AtwoodError, UsageError, suggestion
 from atwood.expr import Expression, Graph, sqrt
 from atwood.expr.simplify.polynomial import TooLargeError
 from atwood.expr.sympy_bridge import from_sympy
@@ -38,11 +38,14 @@ class PhaseSpace:
         The symbols that stand for them.
     given
         What they were: functions of t, or symbols.
+    parameters
+        The symbols of a scene's parameters; None where any symbol may be one.
     """
 
     coordinates: tuple[Sympy, ...]
     momenta: tuple[Sympy, ...]
     given: tuple[Sympy, ...]
+    parameters: tuple[Sympy, ...] | None = None
 
     def read(self, value: Sympy, new: Sequence[Sympy] = ()) -> Sympy:
         """Return an expression on the plain symbols; a symbol with the name of one of the given stands for it."""
@@ -56,6 +59,21 @@ class PhaseSpace:
                 f"{sorted(map(str, stray))[0]} is neither a coordinate nor a momentum",
                 where=str(value)[:80],
                 advice=f"Write it in {names}, parameters and t.",
+            )
+        return found
+
+    def declared(self, value: Sympy, constants: Sequence[Sympy] = ()) -> Sympy:
+        """Return an expression on the plain symbols; refuse a symbol that is no parameter and was not declared."""
+        found = self.read(value)
+        if self.parameters is None:
+            return found
+        known = {*self._own, *self.parameters, *constants, sympy.Symbol("t")}
+        for name in sorted(map(str, found.free_symbols - known)):
+            near = suggestion(name, [_plain(one) for one in (*self.given, *self.parameters)])
+            raise UsageError(
+                f"{name} is neither a coordinate nor a momentum nor a parameter of the scene",
+                where=str(value)[:80],
+                advice=near or f"Take {', '.join(map(_plain, self.given))}, or declare it: constants=[{name!r}].",
             )
         return found
 
@@ -83,7 +101,8 @@ def phase_space_of(given: Hamiltonian | tuple[Sequence[Sympy], Sequence[Sympy]])
             raise UsageError(f"{one} is no coordinate and no momentum", where="phase space", advice=advice)
     own = [sympy.Symbol(_plain(one)) if one.is_Symbol else sympy.Dummy(_plain(one)) for one in (*q, *p)]
     n = len(q)
-    return PhaseSpace(tuple(own[:n]), tuple(own[n:]), (*q, *p))
+    parameters = None if isinstance(given, (tuple, list)) else tuple(map(objects.letter, given.formulas.legend))
+    return PhaseSpace(tuple(own[:n]), tuple(own[n:]), (*q, *p), parameters)
 
 
 def _plain(one: Sympy) -> str:
@@ -219,8 +238,65 @@ def _relative_size(value: Sympy) -> float:
         found = [one.xreplace(point).evalf(_DIGITS) for one in terms]
         size = max(map(abs, found), default=0)
         if size:
-            worst = max(worst, float(abs(sum(found)) / size))
+            ratio = sympy.N(abs(sum(found)) / size)
+            worst = max(worst, float(ratio) if ratio.is_Float or ratio.is_Rational else float("inf"))  # nan, zoo
     return worst
+
+
+def on_branch(value: Sympy, sign: int = 1, arcs: bool = True) -> Sympy:
+    """Return an expression on the branch where all its symbols are positive, as a formula that goes on from there.
+
+    Roots are those of factors, arcs of sines and cosines become arcs of tangents, which hold in all quadrants that a
+    path leads to (unless `arcs` is false), and a root of the square of a sine or cosine is this times the sign.
+    """
+    if value.has(sympy.Integral):
+        return value
+    positive = {one: sympy.Dummy(one.name, positive=True) for one in value.free_symbols}
+    back = {own: one for one, own in positive.items()}
+    made = value.xreplace(positive)
+    if arcs:
+        made = made.replace(sympy.asin, lambda x: sympy.atan(x / sympy.sqrt(1 - x**2)))
+        made = made.replace(sympy.acos, lambda x: sympy.atan(sympy.sqrt(1 - x**2) / x))
+        made = made.replace(sympy.acot, lambda x: sympy.atan(1 / x))
+        made = made.replace(sympy.cot, lambda x: sympy.cos(x) / sympy.sin(x))
+    for _ in range(_ROUNDS):
+        before, made = made, made.replace(_is_root, _split_root).replace(sympy.Abs, lambda x: sign * x)
+        made = made.replace(
+            lambda one: one.func is sympy.atan, lambda one: sympy.atan(_with_roots_cancelled(one.args[0]))
+        )
+        if made == before:
+            break
+    # Roots of single symbols are symbols, so that at most one root is left in most formulas.
+    single = [one.base for one in made.atoms(sympy.Pow) if _is_root(one) and one.base.is_Symbol]
+    roots = {one: sympy.Dummy(one.name, positive=True) for one in single}
+    made = _with_roots_cancelled(made.xreplace({one: root**2 for one, root in roots.items()}))
+    return short(made.xreplace({root: sympy.sqrt(one) for one, root in roots.items()}).xreplace(back))
+
+
+_ROUNDS = 4
+"""So often roots that stand inside each other are looked into."""
+
+
+def _is_root(one: Sympy) -> bool:
+    return bool(one.is_Pow and one.exp.is_Rational and one.exp.q == 2)
+
+
+def _split_root(power: Sympy) -> Sympy:
+    """Return a root as the product of the roots of its factors."""
+    above, below = (sympy.factor(_squares(one)) for one in sympy.fraction(sympy.together(power.base)))
+    return above**power.exp / below**power.exp
+
+
+def _squares(value: Sympy) -> Sympy:
+    """Return a sum in which one less the square of a sine or cosine is that of the other."""
+    for wave in value.atoms(sympy.sin, sympy.cos):
+        [x] = wave.args
+        other = sympy.cos(x) if wave.func is sympy.sin else sympy.sin(x)
+        if value.has(other):
+            value = sympy.expand(sympy.expand(value).subs(sympy.sin(x) ** 2, 1 - sympy.cos(x) ** 2))
+        elif value.is_polynomial(wave) and sympy.rem(value, 1 - wave**2, wave) == 0:
+            value = sympy.quo(value, 1 - wave**2, wave) * other**2
+    return value
 
 
 def short(value: Sympy) -> Sympy:

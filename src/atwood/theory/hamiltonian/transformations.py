@@ -29,6 +29,7 @@ from atwood.theory.hamiltonian.phase_space import (
     PhaseSpace,
     Sympy,
     Verdict,
+    on_branch,
     phase_space_of,
     short,
     vanishes,
@@ -50,8 +51,8 @@ class CanonicalTransformation:
         Symbols of the new ones.
     new_coordinates, new_momenta
         What they are in terms of the old and of time.
-    inverse
-        What the old ones are in terms of the new; empty where that is not known.
+    solved
+        What the old ones, on the plain symbols of `space`, are in terms of the new; empty where that is not known.
     old_hamiltonian
         H on the plain symbols of `space`; None where only coordinates and momenta were given.
     added
@@ -63,9 +64,88 @@ class CanonicalTransformation:
     momenta: tuple[Sympy, ...]
     new_coordinates: tuple[Sympy, ...]
     new_momenta: tuple[Sympy, ...]
-    inverse: Mapping[Sympy, Sympy]
+    solved: Mapping[Sympy, Sympy]
     old_hamiltonian: Sympy | None
     added: Sympy | None
+
+    @property
+    def inverse(self) -> dict[Sympy, Sympy]:
+        """What the old coordinates and momenta are in terms of the new; empty where that is not known."""
+        return {self.space.shown(one): value for one, value in self.solved.items()}
+
+    def inverted(self) -> CanonicalTransformation:
+        """Return the transformation from the new coordinates and momenta to the old ones.
+
+        Raises
+        ------
+        UnsupportedError
+            If the old coordinates and momenta are not known in terms of the new ones.
+        """
+        self._refuse_without_inverse()
+        n, own = len(self.coordinates), (*self.space.coordinates, *self.space.momenta)
+        names = {one: sympy.Symbol(one.name) for one in own}
+        values = [self.solved[one].xreplace(names) for one in own]
+        new = [self.space.read(one).xreplace(names) for one in (*self.new_coordinates, *self.new_momenta)]
+        back = dict(zip((*self.coordinates, *self.momenta), new, strict=True))
+        letters = tuple(names[one] for one in own)
+        space = PhaseSpace(self.coordinates, self.momenta, (*self.coordinates, *self.momenta))
+        added = None if self.added is None else short(-self.added.xreplace(back))
+        old = None if self.old_hamiltonian is None else self.hamiltonian
+        return CanonicalTransformation(
+            space, letters[:n], letters[n:], tuple(values[:n]), tuple(values[n:]), back, old, added
+        )
+
+    def then(self, other: CanonicalTransformation) -> CanonicalTransformation:
+        """Return this transformation and after it another, which begins with the new coordinates and momenta of this.
+
+        Parameters
+        ----------
+        other
+            The transformation that follows.
+
+        Raises
+        ------
+        UsageError
+            If the other does not begin where this ends.
+        """
+        names = tuple(map(str, (*self.coordinates, *self.momenta)))
+        begun = (*other.space.coordinates, *other.space.momenta)
+        if tuple(map(str, begun)) != names:
+            raise UsageError(
+                f"the second transformation begins with {', '.join(map(str, begun))}",
+                where="canonical transformation",
+                advice=f"Give one that begins with {', '.join(names)}, in this order.",
+            )
+        middle = [self.space.read(one) for one in (*self.new_coordinates, *self.new_momenta)]
+        where = dict(zip(begun, middle, strict=True))
+        values = [
+            self.space.shown(short(other.space.read(one).xreplace(where)))
+            for one in (*other.new_coordinates, *other.new_momenta)
+        ]
+        n, solved, added = len(self.coordinates), {}, None
+        if self.solved and other.solved:
+            on = dict(zip((*self.coordinates, *self.momenta), (other.solved[one] for one in begun), strict=True))
+            solved = {one: short(value.xreplace(on)) for one, value in self.solved.items()}
+            if self.added is not None and other.added is not None:
+                added = short(self.added.xreplace(on) + other.added)
+        return CanonicalTransformation(
+            self.space,
+            other.coordinates,
+            other.momenta,
+            tuple(values[:n]),
+            tuple(values[n:]),
+            solved,
+            self.old_hamiltonian,
+            added,
+        )
+
+    def _refuse_without_inverse(self) -> None:
+        if not self.solved:
+            raise UnsupportedError(
+                "the old coordinates and momenta are not known in terms of the new ones",
+                where="canonical transformation",
+                advice="Give `inverse`.",
+            )
 
     @cached_property
     def matrix(self) -> Sympy:
@@ -109,13 +189,13 @@ class CanonicalTransformation:
                 "away from Omega",
                 where="canonical transformation",
             )
-        if not self.inverse or self.added is None:
+        if not self.solved or self.added is None:
             raise UnsupportedError(
                 "the old coordinates and momenta are not known in terms of the new ones, or dF/dt is not",
                 where="canonical transformation",
                 advice="Give `inverse`, or a generating function.",
             )
-        return short(self.old_hamiltonian.xreplace(dict(self.inverse)) + self.added)
+        return short(self.old_hamiltonian.xreplace(dict(self.solved)) + self.added)
 
     def __repr__(self) -> str:
         told = "canonical" if self.is_canonical else "not canonical"
@@ -221,11 +301,16 @@ def generated_transformation(
     first, second = ("p", 1) if used[0] == "q" else ("q", -1), ("P", -1) if used[1] == "Q" else ("Q", 1)
     new = [*new_q, *new_p]
     given = [
-        {y: _without_arcs(sign * f.diff(x)) for x, y in zip(variables[by], variables[name], strict=True)}
+        {
+            y: _without_arcs(sign * f.diff(x), (*space.coordinates, *space.momenta, *new))
+            for x, y in zip(variables[by], variables[name], strict=True)
+        }
         for by, name, sign in ((used[0], *first), (used[1], *second))
     ]
-    forward = _in_turn(given[0], variables[used[1]], given[1])
-    inverse = _in_turn(given[1], variables[used[0]], given[0])
+    ways = (_in_turn(given[0], variables[used[1]], given[1], sign) for sign in (1, -1))
+    forward = next((one for one in ways if one and _agree({**given[0], **given[1]}, one)), {})
+    back = (_in_turn(given[1], variables[used[0]], given[0], sign) for sign in (1, -1) if forward)
+    inverse = next((one for one in back if one and _agree(one, forward)), {})
     if not forward:
         raise UsageError(
             "it leaves new coordinates or momenta undetermined, or has no solution that is found",
@@ -278,7 +363,7 @@ _UNSOLVED = (ArithmeticError, AttributeError, LookupError, NotImplementedError, 
 
 
 def _in_turn(
-    given: Mapping[Sympy, Sympy], unknowns: Sequence[Sympy], explicit: Mapping[Sympy, Sympy]
+    given: Mapping[Sympy, Sympy], unknowns: Sequence[Sympy], explicit: Mapping[Sympy, Sympy], sign: int
 ) -> dict[Sympy, Sympy]:
     """Return a solution for some unknowns, and what follows from these; empty where none is found.
 
@@ -287,22 +372,24 @@ def _in_turn(
     solved = _solved([one - value for one, value in given.items()], unknowns)
     if not solved:
         return {}
-    others = {one: short(value.xreplace(solved)) for one, value in explicit.items()}
+    solved = {one: on_branch(value, sign) for one, value in solved.items()}
+    others = {one: on_branch(value.xreplace(solved), sign) for one, value in explicit.items()}
     return {**solved, **others}
 
 
-def _without_arcs(value: Sympy) -> Sympy:
-    """Return an expression with roots of fractions as fractions of roots, so that what arcs leave behind cancels."""
+def _without_arcs(value: Sympy, variables: Sequence[Sympy]) -> Sympy:
+    """Return an expression without the roots that derivatives of arcs leave behind, which cancel."""
+    roots = [one for one in value.atoms(sympy.Pow) if not one.exp.is_Integer and one.base.has(*variables)]
+    return on_branch(value, arcs=False) if roots or value.has(sympy.asin, sympy.acos) else value
 
-    def split(power: Sympy) -> Sympy:
-        above, below = sympy.fraction(sympy.together(power.base))
-        return above**power.exp / below**power.exp
 
-    def is_root(one: Sympy) -> bool:
-        return bool(one.is_Pow and one.exp.is_Rational and one.exp.q == 2)
-
-    made = value.replace(is_root, split)
-    return value if made == value or value.has(sympy.Integral) else short(made)
+def _agree(given: Mapping[Sympy, Sympy], forward: Mapping[Sympy, Sympy]) -> bool:
+    """Return whether equations hold where the old variables are some positive numbers and the new what they lead to."""
+    symbols = set().union(*(one.free_symbols for one in (*forward.values(), *given.values())), given) - set(forward)
+    point = {one: sympy.Rational(7 + 3 * k, 11 + 7 * k) for k, one in enumerate(sorted(symbols, key=str))}
+    there = point | {one: value.xreplace(point).evalf(30) for one, value in forward.items()}
+    off = [(there[one] - value.xreplace(there)).evalf(30) for one, value in given.items()]
+    return all(one.is_number and one.is_finite and abs(one) < 1e-20 for one in off)
 
 
 def _is_real(values: Iterable[Sympy]) -> bool:
@@ -340,8 +427,14 @@ def _added(values: Sequence[Sympy], new: Sequence[Sympy], inverse: Mapping[Sympy
 
 
 @command("bracket")
-@takes(f=EXPRESSION, g=EXPRESSION, hamiltonian=PHASE_SPACE)
-def poisson_bracket(f: Any, g: Any, hamiltonian: Hamiltonian | tuple[Sequence[Sympy], Sequence[Sympy]]) -> Sympy:
+@takes(f=EXPRESSION, g=EXPRESSION, hamiltonian=PHASE_SPACE, constants=SYMBOLS)
+def poisson_bracket(
+    f: Any,
+    g: Any,
+    hamiltonian: Hamiltonian | tuple[Sequence[Sympy], Sequence[Sympy]],
+    *,
+    constants: Sequence[Any] = (),
+) -> Sympy:
     """Return the Poisson bracket ``{f, g} = sum df/dq dg/dp - df/dp dg/dq``.
 
     Parameters
@@ -351,6 +444,8 @@ def poisson_bracket(f: Any, g: Any, hamiltonian: Hamiltonian | tuple[Sequence[Sy
         them: ``"theta"`` is the coordinate theta(t).
     hamiltonian
         What `atwood.hamiltonian` returns, or a pair: coordinates and momenta.
+    constants
+        Further symbols that stand for numbers, beside the parameters of the scene; beside a pair any other symbol does.
 
     Returns
     -------
@@ -363,13 +458,16 @@ def poisson_bracket(f: Any, g: Any, hamiltonian: Hamiltonian | tuple[Sequence[Sy
         If a function holds what is neither coordinate nor momentum, parameter nor time.
     """
     space = phase_space_of(hamiltonian)
-    return space.shown(short(bracket(space.read(f), space.read(g), space)))
+    return space.shown(short(bracket(space.declared(f, constants), space.declared(g, constants), space)))
 
 
 @command("brackets")
-@takes(functions=EXPRESSIONS, hamiltonian=PHASE_SPACE)
+@takes(functions=EXPRESSIONS, hamiltonian=PHASE_SPACE, constants=SYMBOLS)
 def poisson_brackets(
-    functions: Sequence[Any], hamiltonian: Hamiltonian | tuple[Sequence[Sympy], Sequence[Sympy]]
+    functions: Sequence[Any],
+    hamiltonian: Hamiltonian | tuple[Sequence[Sympy], Sequence[Sympy]],
+    *,
+    constants: Sequence[Any] = (),
 ) -> Sympy:
     """Return the matrix of the Poisson brackets of several functions with each other.
 
@@ -377,11 +475,11 @@ def poisson_brackets(
     ----------
     functions
         The functions, such as the components of angular momentum.
-    hamiltonian
+    hamiltonian, constants
         See `poisson_bracket`.
     """
     space = phase_space_of(hamiltonian)
-    read = [space.read(one) for one in functions]
+    read = [space.declared(one, constants) for one in functions]
     return sympy.ImmutableMatrix(
         len(read), len(read), [space.shown(short(bracket(f, g, space))) for f in read for g in read]
     )
@@ -419,7 +517,7 @@ def total_derivative(f: Any, hamiltonian: Hamiltonian) -> Sympy:
         The Hamiltonian; forces that do not follow from it are not in it.
     """
     space = phase_space_of(hamiltonian)
-    read = space.read(f)
+    read = space.declared(f)
     found = bracket(read, space.read(hamiltonian.expression), space) + read.diff(sympy.Symbol("t"))
     return space.shown(short(found))
 
