@@ -41,7 +41,7 @@ _CLOSED = 16
 
 
 @dataclass(frozen=True, eq=False)
-class Flow:
+class Flow(Shown):
     """The flow of a function on phase space: a canonical transformation for each s.
 
     Attributes
@@ -63,6 +63,16 @@ class Flow:
     parameter: Sympy
     order: int | None
     values: tuple[Sympy, ...]
+
+    def tables(self) -> tuple[Table, ...]:
+        """Return where coordinates and momenta go."""
+        pairs = zip(self.space.given, (*self.coordinates, *self.momenta), strict=True)
+        return (table(("", "~"), [(str(old), str(new)) for old, new in pairs], repr(self)[1:-1]),)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        pairs = zip(self.space.given, (*self.coordinates, *self.momenta), strict=True)
+        return {"order": self.order, "leads_to": {str(old): str(new) for old, new in pairs}}
 
     @property
     def coordinates(self) -> tuple[Sympy, ...]:
@@ -366,12 +376,12 @@ def _conserved(h: Hamiltonian) -> tuple[list[Sympy], list[Sympy]]:
     """Return names of all that a scene conserves, and what it is in terms of coordinates and momenta."""
     t = sympy.Symbol("t")
     velocities = {q.diff(t): rate for q, rate in zip(h.coordinates, h.equations[0], strict=True)}
-    found = conserved(h.assembly)
+    found, h_space = conserved(h.assembly), phase_space_of(h)
     names = [
         sympy.Symbol(one.name.partition(":")[0].replace(".", "_") + f"_{k}" * (":" in one.name))
         for k, one in enumerate(found)
     ]
-    return names, [one.expression.xreplace(velocities) for one in found]
+    return names, [h_space.shown(short(h_space.read(one.expression.xreplace(velocities)))) for one in found]
 
 
 def _multiple(value: Sympy, basis: Mapping[Sympy, Sympy], space: PhaseSpace) -> Sympy | None:

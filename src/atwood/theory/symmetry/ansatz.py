@@ -181,7 +181,7 @@ class _Ansatz:
 
         def still_second() -> list[Part]:
             pairs = [*combinations(range(len(q)), 2), *((k, k) for k in range(len(q)))]
-            squares = [self._momentum(pair, b) for b in (one, *q) for pair in pairs]
+            squares = [self._momentum(pair, b) for pair in pairs for b in (one, *q)]
             return [*functions([one]), *linear([one]), self._energy(one), *squares]
 
         yield "first", still_first
