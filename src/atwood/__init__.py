@@ -121,7 +121,10 @@ if TYPE_CHECKING:
         plot_top_path as plot_top_path,
     )
     from atwood.plotting.plots.sweep import plot_sweep as plot_sweep
-    from atwood.plotting.polhodes import plot_polhodes as plot_polhodes
+    from atwood.plotting.polhodes import (
+        plot_free_rotation as plot_free_rotation,
+        plot_polhodes as plot_polhodes,
+    )
     from atwood.reporting import (
         MechanismReport as MechanismReport,
         report as report,
@@ -227,9 +230,16 @@ if TYPE_CHECKING:
         routhian as routhian,
     )
     from atwood.theory.rigid import (
+        FreeRotation as FreeRotation,
+        SymmetricTop as SymmetricTop,
+        foucault_formulas as foucault_formulas,
+        free_body as free_body,
+        free_rotation as free_rotation,
         inertia_tensor as inertia_tensor,
         rigid_body as rigid_body,
         rotation_kinematics as rotation_kinematics,
+        symmetric_top as symmetric_top,
+        top_formulas as top_formulas,
     )
     from atwood.theory.symmetry import (
         Conserved as Conserved,
@@ -251,7 +261,7 @@ _ROOMS = {
     "atwood.plotting.plots.linear": ("plot_bode", "plot_branches", "plot_nyquist", "plot_root_locus"),
     "atwood.plotting.plots.reduction": ("plot_effective_potential", "plot_top_path"),
     "atwood.plotting.plots.phase": ("plot_phase_portrait", "plot_section"),
-    "atwood.plotting.polhodes": ("plot_polhodes",),
+    "atwood.plotting.polhodes": ("plot_free_rotation", "plot_polhodes"),
     "atwood.reporting": ("MechanismReport", "report"),
     "atwood.result.files": ("SavedResult", "load_result", "save_result"),
     "atwood.result.result": ("Result",),
@@ -282,7 +292,10 @@ _ROOMS = {
     "atwood.theory.oscillations": ("SymbolicEquilibria", "SymbolicEquilibrium"),
     "atwood.theory.reduction": ("ReducedMotion", "Routhian", "reduced", "routhian"),
     "atwood.theory.formulas.sheet": ("FormulaSheet", "Statement"),
-    "atwood.theory.rigid": ("inertia_tensor", "rigid_body", "rotation_kinematics"),
+    "atwood.theory.rigid": (
+        "FreeRotation", "SymmetricTop", "foucault_formulas", "free_body", "free_rotation", "inertia_tensor",
+        "rigid_body", "rotation_kinematics", "symmetric_top", "top_formulas",
+    ),
     "atwood.theory.symmetry": ("Conserved", "ConservedQuantity", "Symmetry", "conserved"),
 }  # fmt: skip
 _LATER = {name: room for room, names in _ROOMS.items() for name in names}

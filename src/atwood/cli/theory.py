@@ -33,6 +33,7 @@ _WRITTEN = ("latex", "markdown", "python")
 
 _PICTURES = {
     "EquilibriumBranches": "plot_branches",
+    "FreeRotation": "plot_free_rotation",
     "LinearModel": "plot_bode",
     "NormalModes": "plot_mode",
     "PhasePortrait": "plot_phase_portrait",

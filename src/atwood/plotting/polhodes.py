@@ -9,13 +9,15 @@ import numpy as np
 
 from atwood.arguments import FILE, TEXT, instance, optional, takes
 from atwood.arrays import FloatArray
-from atwood.errors import UsageError, suggestion
+from atwood.errors import UsageError
 from atwood.plotting.canvas import COLOURS, GREY, INK, finished, headed, new_figure
-from atwood.plotting.scene3d.reading import read_scene
 from atwood.plotting.sphere import SEEN, draw_on_sphere, draw_sphere
 from atwood.result.result import Result
+from atwood.theory.rigid import FreeRotation
+from atwood.theory.rigid.bodies import principal_body
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -100,29 +102,64 @@ def plot_polhodes(result: Result, body: str | None = None, file: str | os.PathLi
     return finished(figure, file)
 
 
+@takes(rotation=instance("a FreeRotation, as free_rotation returns it", FreeRotation), file=optional(FILE))
+def plot_free_rotation(rotation: FreeRotation, file: str | os.PathLike[str] | None = None) -> Figure:
+    """Draw the polhode on the ellipsoid of inertia, and the herpolhode in the plane that it rolls on (Poinsot).
+
+    Parameters
+    ----------
+    rotation
+        What `atwood.free_rotation` gave.
+    file
+        Where to save the picture.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+    """
+    fastest = float(np.linalg.norm(rotation.spin))
+    span = rotation.period if 0.0 < rotation.period < np.inf else 20.0 / fastest
+    times = rotation.t_start + np.linspace(0.0, 3.0 * span, 2401)
+    figure = new_figure(10.0, 5.0)
+    left, right = figure.subplots(1, 2)
+    size = 1.0 / np.sqrt(rotation.moments)
+    around = np.linspace(0.0, 2.0 * np.pi, 300)
+    for k in range(3):
+        section = np.insert(np.stack([np.cos(around), np.sin(around)]), k, 0.0, axis=0) * size[:, None]
+        _on_ellipsoid(left, section, rotation.moments, GREY, 0.9)
+        end = 1.25 * size[k] * SEEN[:2, k]
+        left.text(float(end[0]), float(end[1]), f"{k + 1}", color=INK, fontsize=9)
+    shadow = np.linalg.cholesky((SEEN[:2] * size**2) @ SEEN[:2].T) @ np.stack([np.cos(around), np.sin(around)])
+    left.plot(*shadow, color=GREY, linewidth=1.2)
+    polhode_ = rotation.at(times) / np.sqrt(2.0 * rotation.energy)
+    _on_ellipsoid(left, polhode_, rotation.moments, COLOURS[0], 2.2)
+    left.set_title("ellipsoid of inertia and polhode", loc="left", fontsize=10, color=INK)
+    rho, chi = rotation.herpolhode(times)
+    right.plot(rho * np.cos(chi), rho * np.sin(chi), color=COLOURS[0], linewidth=1.4)
+    for radius in (np.min(rho), np.max(rho)):
+        right.plot(radius * np.cos(around), radius * np.sin(around), color=GREY, linewidth=0.9)
+    right.set_title("herpolhode, rad/s", loc="left", fontsize=10, color=INK)
+    for axes in (left, right):
+        axes.set_aspect("equal")
+        axes.set_axis_off()
+    figure.suptitle(f"{rotation.name}: {rotation.kind}", x=0.02, ha="left", fontsize=11, fontweight="bold", color=INK)
+    return finished(figure, file)
+
+
+def _on_ellipsoid(axes: Axes, curve: FloatArray, moments: FloatArray, colour: str, width: float) -> None:
+    """Draw a curve on the ellipsoid of inertia, faint where it is behind."""
+    x, y = SEEN[:2] @ curve
+    front = SEEN[2] @ (moments[:, None] * curve) >= 0.0
+    for shown, alpha in ((front, 1.0), (~front, 0.25)):
+        axes.plot(np.where(shown, x, np.nan), np.where(shown, y, np.nan), color=colour, linewidth=width, alpha=alpha)
+
+
 def _principal(result: Result, body: str | None) -> tuple[str, FloatArray, FloatArray]:
     """Return a body's part, its principal axes as columns in the axes of the part's frame, and its moments."""
-    where = result.assembly.flat.name
-    if result.assembly.flat.space.name != "space":
-        raise UsageError("polhodes are of motions in space", where=where)
-    lumps = [one for one in read_scene(result).lumps if np.any(one.tensor)]
-    known = [one.part for one in lumps if f"{one.part}.spin.x" in result]
-    if body is None and len(known) != 1:
-        raise UsageError(
-            f"it has {len(known)} rigid bodies", where=where, advice=f"Name one with body=: {', '.join(known[:6])}."
-        )
-    part = known[0] if body is None else body
-    if part not in known:
-        raise UsageError("there is no such rigid body", where=part, advice=suggestion(part, known))
-    own = next(one for one in lumps if one.part == part)
-    fixed = [one for one in lumps if one.body == own.body]
-    mass = sum(one.mass for one in fixed)
-    center = sum((one.mass * one.center for one in fixed), np.zeros(3)) / mass
-    tensor = np.zeros((3, 3))
-    for one in fixed:
-        away = one.center - center
-        tensor += one.tensor + one.mass * (away @ away * np.eye(3) - np.outer(away, away))
-    moments, vectors = np.linalg.eigh(own.axes.T @ tensor @ own.axes)
+    own = principal_body(result.assembly, body)
+    order = np.argsort(own.moments)
+    part, moments, vectors = own.part, own.moments[order], own.axes[:, order]
     if np.min(np.diff(moments)) <= _EQUAL * moments[-1] or moments[0] <= _EQUAL * moments[-1]:
         raise UsageError(
             "two of its moments of inertia are equal, or one is zero: its axis goes round at an even rate",

@@ -119,7 +119,7 @@ def test_only_bodies_without_torque_are_free(form: str) -> None:
 
 
 def test_what_is_refused() -> None:
-    with pytest.raises(UsageError, match="bodies in space"):
+    with pytest.raises(UsageError, match="of motions in space"):
         rigid_body(DoublePendulum())
     with pytest.raises(UsageError, match="topp: there is no such rigid body"):
         rigid_body(LagrangeTop(), "topp")

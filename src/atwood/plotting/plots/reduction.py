@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from atwood.arguments import FILE, TEXT, instance, optional, takes, whole
+from atwood.arguments import FILE, TEXT, each, either, instance, optional, takes, whole
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError, suggestion
 from atwood.plotting.canvas import COLOURS, GREY, INK, finished, headed, legend, new_figure, polish, with_unit
@@ -95,9 +96,12 @@ def _heights(motion: ReducedMotion, potential: FloatArray) -> tuple[float, float
     return motion.energy + 1.2 * depth, motion.energy - 1.4 * depth
 
 
-@takes(motion=_MOTION, azimuth=optional(TEXT), periods=optional(whole("a number of periods", 1)), file=optional(FILE))
+_MOTIONS = either(_MOTION, each(_MOTION, "several of them", 1, single=False))
+
+
+@takes(motion=_MOTIONS, azimuth=optional(TEXT), periods=optional(whole("a number of periods", 1)), file=optional(FILE))
 def plot_top_path(
-    motion: ReducedMotion,
+    motion: ReducedMotion | Sequence[ReducedMotion],
     azimuth: str | None = None,
     periods: int | None = None,
     file: str | os.PathLike[str] | None = None,
@@ -109,7 +113,8 @@ def plot_top_path(
     Parameters
     ----------
     motion
-        What `atwood.reduced` gave of a top, or of what else has a polar angle for its coordinate.
+        What `atwood.reduced` gave of a top, or of what else has a polar angle for its coordinate; several, such as the
+        four motions of a top, stand below each other.
     azimuth
         Path of the angle about the vertical; the first ignorable coordinate if not given.
     periods
@@ -127,6 +132,17 @@ def plot_top_path(
     UsageError
         If there is no such angle, or the polar angle does not come back.
     """
+    motions = [motion] if isinstance(motion, ReducedMotion) else list(motion)
+    figure = new_figure(10.0, 4.8 if len(motions) == 1 else 3.8 * len(motions))
+    for axes, one in zip(figure.subplots(len(motions), 2, squeeze=False), motions, strict=True):
+        _draw_top(axes[0], axes[1], one, azimuth, periods)
+    names = ", ".join(dict.fromkeys(map(_scene, motions)))
+    figure.suptitle(names, x=0.02, ha="left", fontsize=11, fontweight="bold", color=INK)
+    return finished(figure, file)
+
+
+def _draw_top(left: Axes, right: Axes, motion: ReducedMotion, azimuth: str | None, periods: int | None) -> None:
+    """Draw F(u) and the path of the axis of one motion."""
     known = motion.ignorable
     if not known:
         raise UsageError(
@@ -141,8 +157,6 @@ def plot_top_path(
     count = periods or (max(1, min(60, round(2.0 * np.pi / advance))) if advance else 1)
     found = motion.at(motion.t_start + np.linspace(0.0, count * motion.period, 200 * min(count, 30)))
     theta, phi = found[motion.coordinate], found[path]
-    figure = new_figure(10.0, 4.8)
-    left, right = figure.subplots(1, 2)
     _draw_f(left, motion)
     draw_sphere(right)
     around = np.linspace(0.0, 2.0 * np.pi, 300)
@@ -150,13 +164,11 @@ def plot_top_path(
         draw_on_sphere(right, _direction(np.full_like(around, end), around), GREY, 1.0)
     draw_on_sphere(right, _direction(theta, phi), COLOURS[0], 1.8)
     right.set_title(f"path of the axis, {count} periods", loc="left", fontsize=10, color=INK)
-    figure.suptitle(_scene(motion), x=0.02, ha="left", fontsize=11, fontweight="bold", color=INK)
-    return finished(figure, file)
 
 
 def _draw_f(axes: Axes, motion: ReducedMotion) -> None:
     low, high = sorted(float(np.cos(end)) for end in motion.turning_points)
-    width = max(high - low, 1e-3)
+    width = 0.1 if motion.kind == "rest" else max(high - low, 1e-3)
     u = np.linspace(max(-1.0, low - 0.8 * width), min(1.0, high + 0.8 * width), _POINTS)[1:-1]
     now = motion.radial.at(np.arccos(u))
     f = (1.0 - u**2) * 2.0 * (motion.energy - now.potential) / now.inertia
@@ -168,7 +180,8 @@ def _draw_f(axes: Axes, motion: ReducedMotion) -> None:
             f"{root:.4g}", (root, 0.0), (0, 8), textcoords="offset points", ha="center", fontsize=9, color=INK
         )
     inside = (u >= low) & (u <= high)
-    largest = float(np.max(f[inside], initial=0.0)) or 1.0
+    largest = float(np.max(f[inside], initial=0.0)) if motion.kind != "rest" else float(np.max(np.abs(f)))
+    largest = largest or 1.0
     axes.set_ylim(-1.2 * largest, 1.4 * largest)
     polish(axes, "u = cos \N{GREEK SMALL LETTER THETA}", "F(u), 1/s\N{SUPERSCRIPT TWO}")
 

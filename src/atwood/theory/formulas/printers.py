@@ -104,7 +104,7 @@ class _Text(_Lines):
     """Plain text, with the letters, dots and small figures of Unicode."""
 
     zero, times = "0", " "
-    relations = _relations("≤", "∧", "∨") | {"equal": "{0} = {1}"}
+    relations = _relations("≤", "∧", "∨") | {"equal": "{0} = {1}", "greater": "{0} > {1}"}
     forms = relations | {
         "select": "({1} if {0} else {2})",
         "logical_not": "¬({0})",
@@ -157,7 +157,7 @@ class _Latex(_Lines):
     """LaTeX, for use between dollar signs."""
 
     zero, times = "0", " "
-    relations = _relations(r"\le", r"\wedge", r"\vee") | {"equal": "{0} = {1}"}
+    relations = _relations(r"\le", r"\wedge", r"\vee") | {"equal": "{0} = {1}", "greater": "{0} > {1}"}
     forms = relations | {
         "select": r"\begin{{cases}} {1} & {0} \\ {2} & \text{{else}} \end{{cases}}",
         "logical_not": r"\neg \left({0}\right)",

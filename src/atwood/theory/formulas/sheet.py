@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from typing import Any
@@ -32,7 +33,7 @@ _UNITS = {"m": "kg", "M": "kg", "I": "kg*m^2", "J": "kg*m^2", "g": "m/s^2"}
 """Units of letters, by which textbooks order factors: what stands for masses comes first."""
 
 _FUNCTIONS = {"StrictLessThan": "less", "LessThan": "less_equal", "Abs": "absolute", "And": "logical_and"}
-_FUNCTIONS |= {"Or": "logical_or", "Equality": "equal", "Integral": "integral"}
+_FUNCTIONS |= {"Or": "logical_or", "Equality": "equal", "StrictGreaterThan": "greater", "Integral": "integral"}
 
 
 def node_of(value: Sympy) -> Node:
@@ -53,8 +54,6 @@ def node_of(value: Sympy) -> Node:
         return in_brackets(map(_term_of, value.args))
     if value.is_Mul or (value.is_Pow and value.exp.is_Rational):
         return Sum((_term_of(value),))
-    if isinstance(value, sympy.GreaterThan | sympy.StrictGreaterThan):
-        value = value.reversed
     name = value.func.__name__
     arguments = [part for one in value.args for part in (one if isinstance(one, sympy.Tuple) else (one,))]
     return Call("pow" if value.is_Pow else _FUNCTIONS.get(name, name), tuple(map(node_of, arguments)))
@@ -102,6 +101,28 @@ class Statement:
     left: Sympy | None = None
 
 
+def statements_of(lines: str) -> list[Statement]:
+    """Return formulas that are written a line each: name, meaning, left side and formula with strokes between.
+
+    What moves is written as x(t), its derivative as x', the components of a vector with semicolons between.
+    """
+    rows = [[one.strip() for one in line.split("|")] for line in lines.splitlines() if line]
+    return [Statement(name, told, _read(value), _read(left) if left else None) for name, told, left, value in rows]
+
+
+def _read(written: str) -> Sympy:
+    if ";" in written:
+        return sympy.Matrix([_read(one) for one in written.split(";")])
+    if " = " in written:
+        return sympy.Eq(*map(_read, written.split(" = ")))
+    written = re.sub(r"([A-Za-z]\w*)'", r"Derivative(\1(t), t)", written)
+    called = set(re.findall(r"([A-Za-z]\w*)\(", written))
+    known = {name: sympy.Symbol(name) for name in re.findall(r"[A-Za-z]\w*", written)}
+    return sympy.sympify(
+        written, {**known, **{name: getattr(sympy, name, None) or sympy.Function(name) for name in called}}
+    )
+
+
 class FormulaSheet(Mapping[str, Sympy]):
     """Formulas by name, each an expression, a matrix or a relation of sympy; what moves is a function of `t`.
 
@@ -123,6 +144,9 @@ class FormulaSheet(Mapping[str, Sympy]):
 
     def __iter__(self) -> Any:
         return (one.name for one in self.statements)
+
+    def __contains__(self, name: object) -> bool:
+        return name in [one.name for one in self.statements]
 
     def __getitem__(self, name: str) -> Sympy:
         for one in self.statements:

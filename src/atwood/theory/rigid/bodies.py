@@ -13,17 +13,18 @@ from atwood.expr import OutputGroup, Program, evaluate
 from atwood.forms.assembly import Assembly
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import observer
-from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import sympy
 from atwood.mechanics.dynamics.inertia import CarriedInertia
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of
+from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
 from atwood.solids.properties import MassProperties
 from atwood.theory.dynamics.dynamics import dynamics
 from atwood.theory.formulas.notation import SYMBOLS
 from atwood.theory.formulas.printers import Sympy
-from atwood.theory.formulas.sheet import FormulaSheet, Statement
+from atwood.theory.formulas.sheet import FormulaSheet, Statement, statements_of
 from atwood.theory.rigid.angles import SEQUENCES, rotation_kinematics
 
 _STILL = 1e-5
@@ -63,7 +64,7 @@ def principal_body(assembly: Assembly, body: str | None = None) -> PrincipalBody
     """Return a rigid body of a scene, the only one if it is not named."""
     where, mechanism = assembly.flat.name, assembly.mechanism
     if assembly.flat.space.name != "space":
-        raise UsageError("principal axes are of bodies in space", where=where)
+        raise UsageError("principal axes are of motions in space", where=where)
     frames = {
         path: one.frame.name
         for path, local in mechanism.locals_.items()
@@ -89,7 +90,7 @@ def principal_body(assembly: Assembly, body: str | None = None) -> PrincipalBody
         order.append(max((i for i in range(3) if i not in order), key=lambda i: abs(float(axes[k, i]))))
     axes = axes[:, order] * np.where(np.diag(axes[:, order]) < 0.0, -1.0, 1.0)
     axes[:, 2] *= np.sign(np.linalg.det(axes))
-    q, u = dynamics(assembly).start()
+    q, u = _start(assembly)
     spin = axes.T @ _vector(assembly, f"{part}.spin", find_start(assembly).time, q, u)
     return PrincipalBody(part, float(found[0]), found[1:4], moments[order], axes, spin)
 
@@ -97,7 +98,7 @@ def principal_body(assembly: Assembly, body: str | None = None) -> PrincipalBody
 def check_free(assembly: Assembly, part: str) -> None:
     """Refuse a body that a torque about its centre of mass acts on, at its start or as it turns otherwise there."""
     found, t, rng = dynamics(assembly), find_start(assembly).time, np.random.default_rng(5)
-    q, start = found.start()
+    q, start = _start(assembly)
     rates = OutputGroup("rates", found.equations.rates)
     program = Program(f"{part} rates", state_groups(found.equations), assembly.parameters, (rates,))
     others = () if found.equations.constraints else rng.normal(size=(2, len(start)))
@@ -114,6 +115,14 @@ def check_free(assembly: Assembly, part: str) -> None:
                 where=f"{assembly.flat.name}: {part}",
                 advice="For a top on its tip there is `symmetric_top`.",
             )
+
+
+def _start(assembly: Assembly) -> tuple[FloatArray, FloatArray]:
+    """Return coordinates and speeds of the form of an assembly at the start."""
+    if assembly.form != "reduced":
+        return dynamics(assembly).start()
+    start = find_start(assembly)
+    return from_regular(assembly, start.coordinates), start.speeds
 
 
 def _vector(assembly: Assembly, path: str, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
@@ -158,46 +167,22 @@ def rigid_body(
     """
     own = None if scene is None else principal_body(assembly_of(scene), body)
     symmetric = symmetric or (own is not None and bool(abs(own.moments[0] - own.moments[1]) <= 1e-9 * max(own.moments)))
-    t, w, torque = sympy.Symbol("t"), spin_functions(), sympy.symbols("N_1:4")
-    letters = moment_letters(symmetric)
+    t, letters = sympy.Symbol("t"), sympy.symbols("I_1 I_1 I_3" if symmetric else "I_1 I_2 I_3")
     spins = list(rotation_kinematics(angles)["omega_body"])
     rates = [sympy.Function(name)(t).diff(t) for name in ("phi", "theta", "psi")]
     if symmetric and angles.endswith("z"):  # along axes that do not turn with the body about the third
-        held = {one: sympy.Dummy() for one in rates}
-        still = {sympy.Function("psi")(t): sympy.Integer(0)}
-        spins = [one.xreplace(held).xreplace(still).xreplace({v: k for k, v in held.items()}) for one in spins]
-    in_angles = kinetic(letters, spins)
+        held = {one: sympy.Dummy() for one in rates} | {sympy.Function("psi")(t): sympy.Integer(0)}
+        spins = [one.xreplace(held).xreplace({held[rate]: rate for rate in rates}) for one in spins]
     derived = [sympy.Add(*(i * w * w.diff(one) for i, w in zip(letters, spins, strict=True))) for one in rates]
-    i1, i2, i3 = letters
-    x, y, z = (sympy.Function(name)(t) for name in "xyz")
-    m, place = sympy.Symbol("m"), sympy.Matrix([x, y, z])
-    internal = sympy.Matrix(sympy.symbols("L_Sx L_Sy L_Sz"))
-    euler = sympy.Matrix([(i2 - i3) * w[1] * w[2], (i3 - i1) * w[2] * w[0], (i1 - i2) * w[0] * w[1]])
-    momenta = sympy.Matrix([sympy.Symbol(f"p_{name}") for name in ("phi", "theta", "psi")])
-    own_axes = "along the principal axes"
+    momenta = sympy.Matrix(sympy.symbols("p_phi p_theta p_psi"))
+    by = dict(zip(sympy.symbols("I_1:4"), letters, strict=True))
     found = [
-        Statement("T", "Energy of turning about the centre of mass", kinetic(letters, w), sympy.Symbol("T_S")),
-        Statement(
-            "L", f"Angular momentum about it, {own_axes}", _each(letters, w), sympy.Matrix(sympy.symbols("L_1:4"))
-        ),
-        Statement(
-            "euler", "Euler's equations", euler + sympy.Matrix(torque), _each(letters, [one.diff(t) for one in w])
-        ),
-        Statement("T_angles", f"Energy of turning in angles {angles}", in_angles, sympy.Symbol("T_S")),
+        *statements_of(_BODY),
+        Statement("T_angles", f"Energy of turning in angles {angles}", _kinetic(letters, spins), sympy.Symbol("T_S")),
         Statement("momenta", "Momenta of the angles", sympy.Matrix(derived), momenta),
-        Statement(
-            "energy",
-            "Energy of the whole motion: of its centre of mass, and about it",
-            m * sum(one.diff(t) ** 2 for one in place) / 2 + sympy.Symbol("T_S"),
-            sympy.Symbol("T"),
-        ),
-        Statement(
-            "total",
-            "Angular momentum of the whole motion: orbital, and internal",
-            m * place.cross(place.diff(t)) + internal,
-            sympy.Matrix(sympy.symbols("L_x L_y L_z")),
-        ),
+        *statements_of(_WHOLE),
     ]
+    found = [replace(one, value=one.value.xreplace(by), left=one.left and one.left.xreplace(by)) for one in found]
     values = (
         {} if own is None else {"m": own.mass, **dict(zip(map(str, letters), map(float, own.moments), strict=True))}
     )
@@ -205,24 +190,21 @@ def rigid_body(
     return FormulaSheet(title, found, values).in_letters(symbols)
 
 
-def moment_letters(symmetric: bool = False) -> tuple[Sympy, Sympy, Sympy]:
-    """Return the letters of the principal moments; of a symmetric body the first two are one."""
-    one, two, three = sympy.symbols("I_1:4")
-    return one, one if symmetric else two, three
+_BODY = """
+T | Energy of turning about the centre of mass | T_S | (I_1*omega_1(t)**2 + I_2*omega_2(t)**2 + I_3*omega_3(t)**2)/2
+L | Angular momentum about it, along the principal axes | L_1; L_2; L_3 | I_1*omega_1(t); I_2*omega_2(t); I_3*omega_3(t)
+euler | Euler's equations | I_1*omega_1'; I_2*omega_2'; I_3*omega_3' | (I_2 - I_3)*omega_2(t)*omega_3(t) + N_1; (I_3 - I_1)*omega_3(t)*omega_1(t) + N_2; (I_1 - I_2)*omega_1(t)*omega_2(t) + N_3
+"""  # noqa: E501
+
+_WHOLE = """
+energy | Energy of the whole motion: of its centre of mass, and about it | T | m*(x'**2 + y'**2 + z'**2)/2 + T_S
+total | Angular momentum of the whole: orbital, and internal | L_x; L_y; L_z | m*(y(t)*z' - z(t)*y') + L_Sx; m*(z(t)*x' - x(t)*z') + L_Sy; m*(x(t)*y' - y(t)*x') + L_Sz
+"""  # noqa: E501
 
 
-def spin_functions() -> list[Sympy]:
-    """Return the angular velocity along the principal axes, as functions of t."""
-    return [sympy.Function(f"omega_{k}")(sympy.Symbol("t")) for k in (1, 2, 3)]
-
-
-def kinetic(moments: Sequence[Sympy], spins: Sequence[Sympy]) -> Sympy:
+def _kinetic(moments: Sequence[Sympy], spins: Sequence[Sympy]) -> Sympy:
     """Return the energy of turning, with what goes with one moment in one bracket."""
     squares: dict[Sympy, Sympy] = {}
     for moment, spin in zip(moments, spins, strict=True):
         squares[moment] = squares.get(moment, sympy.Integer(0)) + spin**2
     return sympy.Add(*(moment * square / 2 for moment, square in squares.items()))
-
-
-def _each(moments: Sequence[Sympy], values: Sequence[Sympy]) -> Sympy:
-    return sympy.Matrix([moment * one for moment, one in zip(moments, values, strict=True)])

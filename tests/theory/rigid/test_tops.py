@@ -1,0 +1,114 @@
+"""The heavy symmetric top in letters and of a scene: its cubic, its four motions, steady precession, sleeping."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import sympy
+
+import atwood
+from atwood import SymmetricTop, UnsupportedError, symmetric_top, top_formulas
+from atwood_library.scenes import Gyroscope, HeavyTop, LagrangeTop
+
+T = sympy.Symbol("t")
+I1, I3, E, P, S, M, G, H, U = sympy.symbols("I_1 I_3 E p_phi p_psi m g l u")
+THETA = sympy.Function("theta")(T)
+
+
+def test_the_cubic_follows_from_the_energy() -> None:
+    sheet = top_formulas()
+    rate = sympy.solve(sheet["energy"] - E, THETA.diff(T) ** 2)[0]
+    found = (sympy.sin(THETA) ** 2 * rate).subs(sympy.sin(THETA), sympy.sqrt(1 - U**2)).subs(sympy.cos(THETA), U)
+    assert sympy.simplify(found - sheet["F"]) == 0
+    assert sympy.degree(sympy.expand(sheet["F"]), U) == 3
+
+
+def test_momenta_are_those_of_the_lagrangian() -> None:
+    sheet, book = top_formulas(), atwood.rigid_body(symmetric=True)
+    momenta = book["momenta"]
+    assert sympy.expand(sheet["p_psi"] - momenta[2]) == 0
+    assert sympy.expand(sheet["p_phi"].subs(S, sheet["p_psi"]) - momenta[0]) == 0
+    phi, psi = sympy.Function("phi")(T).diff(T), sympy.Function("psi")(T).diff(T)
+    rates = {phi: sheet["phi"], psi: sheet["psi"]}
+    for momentum, letter in ((sheet["p_phi"], P), (sheet["p_psi"], S)):
+        assert sympy.simplify(momentum.subs(rates) - letter) == 0
+
+
+def test_steady_precession_and_small_deviations() -> None:
+    sheet, angle = top_formulas(), sympy.Symbol("theta")
+    potential = (P - S * sympy.cos(angle)) ** 2 / (2 * I1 * sympy.sin(angle) ** 2) + M * G * H * sympy.cos(angle)
+    slope = potential.diff(angle)
+    both = sheet["steady"].subs(U, sympy.cos(angle))
+    expected = (both.lhs - both.rhs) / (I1 * sympy.sin(angle) ** 3)
+    assert sympy.simplify(sympy.trigsimp(slope - expected)) == 0
+    values = {I1: sympy.Rational(1, 40), S: sympy.Rational(1, 2), M: 1, G: sympy.Rational(981, 100)}
+    values |= {H: sympy.Rational(1, 10), U: sympy.Rational(3, 5)}
+    for name in ("slow", "fast"):
+        rate = sheet[name].subs(values)
+        momentum = I1 * rate * (1 - U**2) + S * U
+        kept = {P: momentum.subs(values)}
+        assert abs(sympy.N((both.lhs - both.rhs).subs(sympy.cos(angle), U).subs(kept).subs(values), 50)) < 1e-45
+        curved = (potential.diff(angle, 2) / I1).subs(kept).subs(values).subs(angle, sympy.acos(sympy.Rational(3, 5)))
+        square = sheet["nutation"].subs(sympy.Symbol("Omega"), rate).subs(values)
+        assert abs(sympy.N(curved - square, 50)) < sympy.Float("1e-42", 50)
+
+
+def test_the_sleeping_top() -> None:
+    """Of the linear equations of its tip in the plane: z'' - i p_psi/I_1 z' - m g l/I_1 z = 0."""
+    sheet, z = top_formulas(), sympy.Symbol("z")
+    polynomial = z**2 - S / I1 * z + M * G * H / I1
+    for one in sheet["sleeping_frequencies"]:
+        assert sympy.simplify(polynomial.subs(z, one)) == 0
+    growing = S / (2 * I1) + sympy.I * sheet["sleeping_growth"]
+    assert sympy.simplify(polynomial.subs(z, growing)) == 0
+    scene = LagrangeTop(inclination=0.01)
+    top = symmetric_top(scene)
+    values = {I1: top.across, M: top.weight, G: 1, H: 1}
+    least = float(sympy.sqrt(sheet["sleeping"].rhs.subs(values)))
+    for share, stable in ((1.1, True), (0.9, False)):
+        scene = LagrangeTop(inclination=0.01, spin=share * least / top.along)
+        result = atwood.simulate(scene, t_end=2.0, rtol=1e-10)
+        assert symmetric_top(scene).is_stable_upright is stable
+        assert bool(np.max(result["top.theta"]) < 0.05) is stable
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+@pytest.mark.parametrize("motion", ["cusps", "loops", "waves", "steady"])
+def test_the_four_motions_of_a_scene(motion: str, form: str) -> None:
+    scene = LagrangeTop(motion=motion)
+    top = symmetric_top(scene)
+    assert top.kind == motion
+    result = atwood.simulate(scene, form=form, t_end=1.0, rtol=1e-10, outputs=401)
+    u, rate = np.cos(result["top.theta"]), -np.sin(result["top.theta"]) * result["top.theta_rate"]
+    assert rate**2 == pytest.approx(top.f(u), abs=1e-6)
+    assert np.min(u) >= top.roots[0] - 1e-6
+    assert np.max(u) <= top.roots[1] + 1e-6
+    numbers = {sympy.Symbol(k): v for k, v in top.formulas.numbers.items()} | {M: top.weight, G: 1, H: 1}
+    cubic = sympy.Poly(top.formulas["F"].subs(numbers), U)
+    assert [float(one) for one in cubic.all_coeffs()] == pytest.approx(np.poly(top.roots) * float(cubic.LC()), rel=1e-6)
+    steady = {**numbers, U: top.steady}
+    both = top.formulas["steady"]
+    assert float(both.lhs.subs(steady)) == pytest.approx(float(both.rhs.subs(steady)), abs=1e-12)
+    if motion == "steady":
+        assert top.steady == pytest.approx(np.cos(scene.inclination), abs=1e-8)
+        assert float(top.formulas["slow"].subs(steady)) == pytest.approx(scene.steady_precession(), rel=1e-6)
+
+
+def test_from_its_constants() -> None:
+    top = SymmetricTop(across=0.025, along=0.01, weight=0.981, p_phi=0.43, p_psi=0.5, energy=13.36)
+    assert top.roots == pytest.approx(np.sort(top.roots))
+    assert top.f(top.roots) == pytest.approx(0.0, abs=1e-9)
+    assert -1.0 < top.roots[0] < top.steady < top.roots[1] < 1.0 < top.roots[2]
+
+
+def test_the_four_in_one_figure() -> None:
+    motions = [atwood.reduced(LagrangeTop(motion=one)) for one in ("loops", "cusps", "waves", "steady")]
+    figure = atwood.plot_top_path(motions)
+    assert len(figure.axes) == 8
+    plt.close(figure)
+
+
+def test_what_is_no_top() -> None:
+    with pytest.raises(UnsupportedError, match=r"it is no top on a fixed tip: it has inner_bearing\.angle"):
+        symmetric_top(Gyroscope())
+    with pytest.raises(UnsupportedError, match="not reduced to one coordinate"):
+        symmetric_top(HeavyTop())
