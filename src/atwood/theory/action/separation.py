@@ -13,18 +13,24 @@ import numpy as np
 
 from atwood.arguments import BY_PATH, check, instance, optional, takes
 from atwood.arrays import FloatArray
-from atwood.errors import UnsupportedError, UsageError, suggestion
+from atwood.errors import AtwoodError, UnsupportedError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import mpmath, sympy
 from atwood.model.compose.composite import Model
 from atwood.theory.action.action_angle import Level, level_through
+from atwood.theory.action.complete_integral import CompleteIntegral, complete_integral
+from atwood.theory.formulas.notation import SYMBOLS
 from atwood.theory.formulas.printers import Sympy
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian
 from atwood.theory.hamiltonian.phase_space import EXPRESSION
+from atwood.theory.hamiltonian.point_transformations import PointTransformation, point_transformation_of, start_in
 
 _SHORT = 150
 """Up to so many operations H in other coordinates is tidied up to be read."""
+
+_PLAIN = 40
+"""Up to so many operations it is said what is left over where it does not separate."""
 
 _LONG = 10**6
 """A fraction with a larger denominator is a decimal number, known to 16 digits."""
@@ -97,6 +103,8 @@ class Separation:
         Whether all conditions hold at random states, with 40 digits.
     worst
         The two coordinates whose condition holds least, and by which share of its terms it is missed.
+    source, places
+        H in the scene's coordinates, and what these are in terms of those of the separation, by path.
     """
 
     name: str
@@ -106,6 +114,8 @@ class Separation:
     values: Mapping[Sympy, float]
     separates: bool
     worst: tuple[str, str, float]
+    source: Hamiltonian
+    places: Mapping[str, Sympy]
 
     @property
     def sentence(self) -> str:
@@ -119,7 +129,66 @@ class Separation:
                 f"{DIGITS} digits."
             )
         one, other, miss = self.worst
-        return f"{self.name} does not separate in {names}: the condition of {one} and {other} is missed by {miss:.2g}."
+        told = f"the condition of {one} and {other} is missed by {miss:.2g}"
+        if self.expression.count_ops() < _PLAIN:
+            try:
+                _ = self.complete
+            except AtwoodError as error:
+                left = error.message.rpartition(": ")[2]
+                told = f"{left}; {told}" if "left over" in left else told
+        return f"{self.name} does not separate in {names}: {told}."
+
+    @cached_property
+    def complete(self) -> CompleteIntegral:
+        """W and S as sums, the constants of the separation, and the motion that follows from them.
+
+        Raises
+        ------
+        UnsupportedError
+            If the equation does not separate, which names the term that is left over.
+        """
+        if set(self.places.values()) == set(self.coordinates):
+            state = dict(zip(self.places.values(), self.source.start()[0], strict=True))
+            letters = dict(zip(self.coordinates, self.momenta, strict=True))
+            state |= {letters[q]: p for q, p in zip(self.places.values(), self.source.start()[1], strict=True)}
+            return complete_integral(self.expression, [*letters.items()], self.values, state, self.name)
+        given = point_transformation_of(self.source, self.places, self.coordinates)
+        t, *starts = start_in(given)
+        state = dict(zip((*given.coordinates, *given.velocities), np.concatenate(starts), strict=True))
+        known = {**self.values, **state, sympy.Symbol("t"): t}
+        state |= {p: one.xreplace(known) for p, one in zip(given.momenta, given.definitions, strict=True)}
+        pairs = [*zip(given.coordinates, given.momenta, strict=True)]
+        return complete_integral(given.hamiltonian, pairs, self.values, state, self.name)
+
+    @property
+    def constants(self) -> dict[Sympy, Sympy]:
+        """What each constant of the separation is in terms of coordinates and momenta."""
+        return dict(self.complete.constants)
+
+    @property
+    def characteristic_function(self) -> Sympy:
+        """Hamilton's characteristic function W, as a sum."""
+        return self.complete.characteristic
+
+    @property
+    def principal_function(self) -> Sympy:
+        """Hamilton's principal function ``S = W - E t``."""
+        return self.complete.principal
+
+    @property
+    def betas(self) -> dict[Sympy, Sympy]:
+        """What stays the same on a motion besides the constants: ``dS/dalpha``, by constant."""
+        return self.complete.betas
+
+    @property
+    def motions(self) -> dict[Sympy, Sympy]:
+        """Coordinates as functions of time since a turning point, where they follow from betas."""
+        return self.complete.motion
+
+    @property
+    def actions(self) -> dict[Sympy, Sympy]:
+        """Action variables in terms of the constants, by coordinate, where they are residues."""
+        return self.complete.actions
 
     def motion(
         self, coordinate: str, q: Sequence[float], p: Sequence[float], turn: float | None = None
@@ -214,24 +283,35 @@ class Separation:
 
 
 @takes(
-    scene=instance("a scene, an assembly of one, or a Hamiltonian", Model, Assembly, Hamiltonian),
+    scene=instance(
+        "a scene, an assembly of one, a Hamiltonian, or what `point_transformation` returns",
+        *(Model, Assembly, Hamiltonian, PointTransformation),
+    ),
     coordinates=optional(BY_PATH),
+    symbols=SYMBOLS,
 )
-def separation(scene: Model | Assembly | Hamiltonian, coordinates: Mapping[str, Any] | None = None) -> Separation:
+def separation(
+    scene: Model | Assembly | Hamiltonian | PointTransformation,
+    coordinates: Mapping[str, Any] | None = None,
+    *,
+    symbols: Mapping[str, str] | None = None,
+) -> Separation:
     """Return whether the equation of Hamilton and Jacobi of a scene separates in given coordinates.
 
     Parameters
     ----------
     scene
-        The scene, or its Hamiltonian.
+        The scene, or its Hamiltonian; or the scene in the coordinates that are asked about.
     coordinates
         The scene's coordinates, by their paths, as text or sympy expressions of others, which are those that are asked
         about: ``{"body.position.x": "r*cos(phi)", "body.position.z": "r*sin(phi)"}``. If not given, the scene's own.
+    symbols
+        See `atwood.equations`.
 
     Returns
     -------
     Separation
-        The answer; where it is yes, turning points and action variables of each coordinate.
+        The answer; where it is yes, W and S as sums, their constants, and the motion of each coordinate.
 
     Raises
     ------
@@ -240,7 +320,10 @@ def separation(scene: Model | Assembly | Hamiltonian, coordinates: Mapping[str, 
     UnsupportedError
         If the scene has no Hamiltonian, none that is short enough to be written down, or one that depends on time.
     """
-    h = scene if isinstance(scene, Hamiltonian) else hamiltonian(scene)
+    if isinstance(scene, PointTransformation):
+        coordinates = dict(zip(scene.source.paths, scene.old.values(), strict=True))
+        scene = scene.source
+    h = scene if isinstance(scene, Hamiltonian) else hamiltonian(scene, symbols=symbols)
     if h.depends_on_time:
         raise UnsupportedError("H depends on time", where=h.name)
     old = dict(zip(h.paths, zip(h.coordinates, h.momenta, strict=True), strict=True))
@@ -259,17 +342,21 @@ def separation(scene: Model | Assembly | Hamiltonian, coordinates: Mapping[str, 
         )
     momenta = tuple(sympy.Symbol(f"p_{one}") for one in new)
     # Decimal numbers are symbols, so that it is seen what their last digits make of a condition.
+    given = places
     numbers = {one: sympy.Dummy() for whole in (*places.values(), h.expression) for one in _decimals(whole)}
     places = {path: one.xreplace(numbers) for path, one in places.items()}
-    along = _old_momenta([[places[path].diff(one) for path in old] for one in new], momenta)
-    by = {q: places[path] for path, (q, _) in old.items()}
-    by |= {p: along[k] for k, (_, p) in enumerate(old.values())}
-    made = h.expression.xreplace(numbers).xreplace(by)
-    made = _tidied(made) if coordinates is not None and made.count_ops() < _SHORT else made
+    if coordinates is not None and not numbers:
+        made = point_transformation_of(h, places, new).hamiltonian
+    else:
+        along = _old_momenta([[places[path].diff(one) for path in old] for one in new], momenta)
+        by = {q: places[path] for path, (q, _) in old.items()}
+        by |= {p: along[k] for k, (_, p) in enumerate(old.values())}
+        made = h.expression.xreplace(numbers).xreplace(by)
+        made = _tidied(made) if coordinates is not None and made.count_ops() < _SHORT else made
     back = {symbol: one for one, symbol in numbers.items()}
     worst = worst_condition(made, new, momenta, {**h.values, **back}, h.name)
     made = made.xreplace(back)
-    return Separation(h.name, new, momenta, made, h.values, worst[2] <= ZERO, worst)
+    return Separation(h.name, new, momenta, made, h.values, worst[2] <= ZERO, worst, h, given)
 
 
 def _decimals(value: Sympy) -> list[Sympy]:

@@ -12,12 +12,17 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from atwood.arguments import BY_PATH, check, command, instance, takes
-from atwood.errors import UnsupportedError, UsageError, suggestion
+from atwood.arrays import FloatArray
+from atwood.errors import StartError, UnsupportedError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
-from atwood.lazy_modules import sympy
+from atwood.lazy_modules import scipy, sympy
 from atwood.model.compose.composite import Model
+from atwood.simulation.dynamics.orientation_coordinates import from_regular
+from atwood.simulation.initialization.start import find_start
 from atwood.theory.equations.equations import EquationsOfMotion
 from atwood.theory.formulas.notation import SYMBOLS as LETTERS
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian
@@ -157,15 +162,19 @@ def point_transformation(
         told = f"{missing[0]} is not given" if missing else f"{n} new coordinates are needed"
         advice = f"Give {', '.join(paths)}, each in terms of {n} new ones that are all different."
         raise UsageError(f"the coordinates are not all transformed: {told}", where=h.name, advice=advice)
-    values = [old[path] for path in paths]
     if isinstance(scene, PointTransformation):
+        values = [old[path] for path in paths]
         before = dict(zip(scene.coordinates, values, strict=True))
         whole = {x: one.xreplace(before) for x, one in scene.old.items()}
         return _moved(h, scene.lagrangian, scene.coordinates, scene.velocities, values, new, whole)
+    return point_transformation_of(h, old, new)
+
+
+def point_transformation_of(h: Hamiltonian, old: Mapping[str, Sympy], new: tuple[Sympy, ...]) -> PointTransformation:
+    """Return a scene in new coordinates, from its Hamiltonian in the old ones."""
     if not h.is_short:
-        raise UnsupportedError(
-            "its Hamiltonian would fill a page", where=h.name, advice="Use the scene's own coordinates."
-        )
+        raise UnsupportedError("its Hamiltonian would fill a page", where=h.name, advice="It is there in numbers.")
+    values = [old[path] for path in h.paths]
     eq = EquationsOfMotion(h.assembly, h.formulas.expressions, h.formulas.notation)
     whole = dict(zip(h.coordinates, values, strict=True))
     return _moved(h, eq.lagrangian, eq.coordinates, eq.velocities, values, new, whole)
@@ -197,7 +206,7 @@ def _moved(
     inverse, determinant = _inverted(inertia, known)
     if determinant == 0:
         raise UsageError(
-            "the new coordinates do not determine the old ones: they depend on each other",
+            "the new coordinates do not determine the old ones: their Jacobian is zero",
             where=h.name,
             advice="Give as many independent coordinates as the scene has.",
         )
@@ -256,3 +265,53 @@ def _factors(determinant: Sympy, new: Sequence[Sympy]) -> tuple[Sympy, ...]:
     """Return the factors of a determinant of a mass matrix that depend on coordinates."""
     found = (one.as_base_exp()[0] for one in sympy.Mul.make_args(sympy.factor(determinant)))
     return tuple(-one if is_positive(-one, ()) else one for one in found if one.has(*new))
+
+
+_TRIALS = 60
+"""Starts of Newton's method for the new coordinates."""
+
+
+def refuse_letters(given: PointTransformation) -> None:
+    """Refuse what has letters that are neither coordinates nor parameters of the scene."""
+    held = {*given.coordinates, *given.velocities, *given.source.values, sympy.Symbol("t")}
+    stray = sorted(map(str, given.lagrangian.free_symbols - held))
+    if stray:
+        raise UnsupportedError(
+            f"{', '.join(stray)} in its coordinates have no value",
+            where=given.source.name,
+            advice="Transform with numbers in their places.",
+        )
+
+
+def start_in(given: PointTransformation) -> tuple[float, FloatArray, FloatArray]:
+    """Return time, new coordinates and their derivatives where a scene starts."""
+    h = given.source
+    refuse_letters(given)
+    start = find_start(h.assembly)
+    q = from_regular(h.assembly, start.coordinates)
+    v = h.velocities_at(q, h.start()[1], start.time)
+    t = sympy.Symbol("t")
+    old = [one.xreplace(h.values) for one in given.old.values()]
+    by_new = [[one.diff(x) for x in given.coordinates] for one in old]
+    symbols = (*given.coordinates, t)
+    place, slope, explicit = (
+        sympy.lambdify(symbols, what, "numpy") for what in (old, by_new, [one.diff(t) for one in old])
+    )
+
+    positive = [one for one in given.coordinates if one.is_positive]
+    signs = sympy.lambdify(symbols, [one.xreplace(h.values) for one in (*positive, *given.positive)], "numpy")
+
+    def missing(x: Any) -> FloatArray:
+        return np.asarray(place(*x, start.time), dtype=float) - q
+
+    random = np.random.default_rng(11)
+    for trial in range(_TRIALS):
+        guess = start.length * random.uniform(0.1, 2.0, len(q)) if trial else np.abs(q) + 0.1 * start.length
+        with np.errstate(all="ignore"):
+            found = scipy.optimize.least_squares(missing, guess, xtol=3e-16, ftol=3e-16, gtol=3e-16)
+        is_met = np.max(np.abs(found.fun)) <= 1e-13 * (np.max(np.abs(q)) + start.length)
+        if is_met and min(signs(*found.x, start.time), default=1.0) > 0.0:
+            matrix = np.array(slope(*found.x, start.time), dtype=float)
+            own = np.asarray(explicit(*found.x, start.time), dtype=float)
+            return start.time, found.x, np.linalg.solve(matrix, v - own)
+    raise StartError("its start is at no values of the new coordinates that are found", where=h.name)

@@ -21,9 +21,18 @@ def tidied(value: Sympy, positive: Iterable[Sympy] = ()) -> Sympy:
     value = sympy.sympify(value)
     known = frozenset(positive)
     value = value.replace(_is_root, lambda e: _root(tidied(e.base, known), 2 * e.exp, known))
-    if not value.has(sympy.sin, sympy.cos, sympy.sinh, sympy.cosh, sympy.Pow):
+    if not value.has(*_waves(), sympy.Pow):
         return value
-    return min((value, *(one for by_cosines in (True, False) for one in written_by(value, by_cosines))), key=_length)
+    return min((value, *(one for way in _ways(value) for one in written_by(value, way))), key=_length)
+
+
+def _waves() -> tuple[Sympy, ...]:
+    return sympy.sin, sympy.cos, sympy.sinh, sympy.cosh
+
+
+def _ways(value: Sympy) -> tuple[bool, ...]:
+    """Return whether to write by cosines: both ways, where there are such."""
+    return (True, False) if value.has(*_waves()) else (True,)
 
 
 def written_by(value: Sympy, by_cosines: bool) -> tuple[Sympy, ...]:
@@ -78,7 +87,8 @@ def _root(base: Sympy, power: Sympy, positive: frozenset[Sympy]) -> Sympy:
     """Return a power of the square root of an expression, the squares in it taken out."""
     if base.count_ops() > _LONG:
         return sympy.sqrt(base) ** power
-    made = [_taken_out(one, power, positive) for by_cosines in (True, False) for one in written_by(base, by_cosines)]
+    every = {one for way in _ways(base) for one in written_by(base, way)}
+    made = [_taken_out(one, power, positive) for one in sorted(every, key=str)]
     return min((sympy.sqrt(base) ** power, *made), key=_length)
 
 

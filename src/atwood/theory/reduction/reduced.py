@@ -22,7 +22,7 @@ from atwood.model.compose.composite import Model
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
 from atwood.theory.formulas.notation import SYMBOLS
-from atwood.theory.hamiltonian.point_transformations import PointTransformation
+from atwood.theory.hamiltonian.point_transformations import PointTransformation, start_in
 from atwood.theory.reduction.quadrature import Path, find_path
 from atwood.theory.reduction.routhian import (
     Radial,
@@ -30,7 +30,6 @@ from atwood.theory.reduction.routhian import (
     ignorable_of,
     parts_of,
     routhian_of,
-    start_in,
     transformed_parts,
 )
 from atwood.theory.symmetry.quantities import Quantities

@@ -13,22 +13,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from atwood.arguments import PATHS, TEXT, optional, takes
 from atwood.arrays import FloatArray
-from atwood.errors import StartError, UnsupportedError, UsageError, suggestion
+from atwood.errors import UnsupportedError, UsageError, suggestion
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian_by_rows, jvp, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian, lagrangian_of
 from atwood.lazy_dataclasses import dataclass
-from atwood.lazy_modules import scipy, sympy
+from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of
-from atwood.simulation.dynamics.orientation_coordinates import from_regular
-from atwood.simulation.initialization.start import find_start
 from atwood.theory.equations.formulas import EquationFormulas
 from atwood.theory.formulas.notation import SYMBOLS, notation_of
 from atwood.theory.formulas.printers import objects
@@ -352,10 +350,6 @@ def _solved(matrices: FloatArray, right: FloatArray) -> FloatArray:
         return found
 
 
-_TRIALS = 60
-"""Starts of Newton's method for the new coordinates."""
-
-
 def transformed_parts(given: PointTransformation, along: int) -> PartsAt:
     """Return what gives the parts of a Lagrangian in new coordinates at places; see `parts_of`."""
     name = given.source.name
@@ -380,49 +374,3 @@ def transformed_parts(given: PointTransformation, along: int) -> PartsAt:
         return Parts(*made[0], *made[1])
 
     return at
-
-
-def refuse_letters(given: PointTransformation) -> None:
-    """Refuse what has letters that are neither coordinates nor parameters of the scene."""
-    held = {*given.coordinates, *given.velocities, *given.source.values, sympy.Symbol("t")}
-    stray = sorted(map(str, given.lagrangian.free_symbols - held))
-    if stray:
-        raise UnsupportedError(
-            f"{', '.join(stray)} in its coordinates have no value",
-            where=given.source.name,
-            advice="Transform with numbers in their places.",
-        )
-
-
-def start_in(given: PointTransformation) -> tuple[float, FloatArray, FloatArray]:
-    """Return time, new coordinates and their derivatives where a scene starts."""
-    h = given.source
-    refuse_letters(given)
-    start = find_start(h.assembly)
-    q = from_regular(h.assembly, start.coordinates)
-    v = h.velocities_at(q, h.start()[1], start.time)
-    t = sympy.Symbol("t")
-    old = [one.xreplace(h.values) for one in given.old.values()]
-    by_new = [[one.diff(x) for x in given.coordinates] for one in old]
-    symbols = (*given.coordinates, t)
-    place, slope, explicit = (
-        sympy.lambdify(symbols, what, "numpy") for what in (old, by_new, [one.diff(t) for one in old])
-    )
-
-    positive = [one for one in given.coordinates if one.is_positive]
-    signs = sympy.lambdify(symbols, [one.xreplace(h.values) for one in (*positive, *given.positive)], "numpy")
-
-    def missing(x: Any) -> FloatArray:
-        return np.asarray(place(*x, start.time), dtype=float) - q
-
-    random = np.random.default_rng(11)
-    for trial in range(_TRIALS):
-        guess = start.length * random.uniform(0.1, 2.0, len(q)) if trial else np.abs(q) + 0.1 * start.length
-        with np.errstate(all="ignore"):
-            found = scipy.optimize.least_squares(missing, guess, xtol=3e-16, ftol=3e-16, gtol=3e-16)
-        is_met = np.max(np.abs(found.fun)) <= 1e-13 * (np.max(np.abs(q)) + start.length)
-        if is_met and min(signs(*found.x, start.time), default=1.0) > 0.0:
-            matrix = np.array(slope(*found.x, start.time), dtype=float)
-            own = np.asarray(explicit(*found.x, start.time), dtype=float)
-            return start.time, found.x, np.linalg.solve(matrix, v - own)
-    raise StartError("its start is at no values of the new coordinates that are found", where=h.name)
