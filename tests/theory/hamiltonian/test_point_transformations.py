@@ -123,6 +123,19 @@ def found_with(scene: Scene, rate: float) -> PointTransformation:
     return point_transformation(scene, old, [r, phi])
 
 
+def test_accelerations_in_a_frame_that_turns_unevenly() -> None:
+    """``X'' = 2 w Z' + w^2 X + w' Z``: Coriolis, centrifugal and Euler's (Goldstein, section 4.10)."""
+    scene = Scene(gravity=0.0)
+    scene.add("body", PointMass(mass=1.3))
+    a, angle = sympy.Symbol("a"), w * t + sympy.Symbol("a") * t**2 / 2
+    c, s = sympy.cos(angle), sympy.sin(angle)
+    found = point_transformation(scene, {"body.position.x": X * c - Z * s, "body.position.z": X * s + Z * c}, [X, Z])
+    rate, (vx, vz) = w + a * t, found.velocities
+    first, second = found.accelerations.values()
+    assert same(first, 2 * rate * vz + rate**2 * X + a * Z)
+    assert same(second, -2 * rate * vx + rate**2 * Z - a * X)
+
+
 def test_a_frame_that_accelerates() -> None:
     """``L = m (X' + a t)^2/2``: the momentum is that seen from outside, and K has ``-a t P``."""
     scene = Scene(gravity=0.0, space="line")

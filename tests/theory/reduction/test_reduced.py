@@ -18,7 +18,7 @@ from atwood import (
     routhian,
     simulate,
 )
-from atwood_library import Ground, PairPotential, Pivot, PointMass, Slider
+from atwood_library import Ground, PairPotential, Pivot, PointMass, Potential, Slider
 from atwood_library.scenes import SCENES
 
 
@@ -181,6 +181,61 @@ def test_kepler_in_polar_coordinates_and_two_bodies_in_relative_ones() -> None:
     assert found.expression.has(r)
     with pytest.raises(UnsupportedError, match="not ignorable"):
         reduced(point_transformation(scene, {"body.position.x": r + phi, "body.position.z": phi}, [r, phi]))
+
+
+POLAR = {"body.position.x": "r*cos(phi)", "body.position.z": "r*sin(phi)"}
+
+
+@pytest.mark.parametrize(("e", "strength"), [(0.6, 0.9), (1.5, 0.9), (1.7, -0.8)])
+def test_the_conics_of_kepler_as_formulas(e: float, strength: float) -> None:
+    """``r = p/(1 + e cos)``, ``p = L^2/(m k)``, ``e^2 = 1 + 2 E L^2/(m k^2)`` (Goldstein, section 3.7)."""
+    scene = SCENES["kepler"](eccentricity=e, strength=strength, mass=1.3, semi_major_axis=1.2)
+    found, eq = reduced(scene, old=POLAR), equations(scene)
+    m, L, E, phi, start = eq.symbol("body.mass"), *sympy.symbols("p_phi E phi phi_0")
+    k = -sympy.Mul(*(eq.symbol(f"force.{one}") for one in ("charge_a", "charge_b", "coulomb_constant")))
+    values = {one: sympy.Float(value, 60) for one, value in found.formulas.values.items()}
+    values |= {phi: sympy.Float(0.3, 60), start: sympy.Float(0)}
+    side = 1 if strength > 0.0 else -1
+    latus, eccentricity = side * L**2 / (m * k), sympy.sqrt(1 + 2 * E * L**2 / (m * k**2))
+    expected = {"semi_latus_rectum": latus, "eccentricity": eccentricity, "semi_major_axis": abs(k / (2 * E))}
+    for name, book in expected.items():
+        assert abs((found.elements[name] - book).xreplace(values).evalf(50)) < 1e-45
+    assert float(found.elements["eccentricity"].xreplace(values)) == pytest.approx(e, rel=1e-9)
+    [orbit] = found.orbit.values()
+    book = latus / (side + eccentricity * sympy.cos(phi - start))
+    assert abs((orbit - book).xreplace(values).evalf(50)) < 1e-44
+    run = simulate(scene, t_end=1.0, rtol=1e-12, outputs=5)
+    x, z = run["body.position.x"], run["body.position.z"]
+    for place, angle in zip(np.hypot(x, z), np.arctan2(z, x), strict=True):
+        assert float(orbit.xreplace({**values, phi: sympy.Float(angle)})) == pytest.approx(place, rel=1e-9)
+    if e > 1.0:
+        assert found.formulas.period is None
+        angle = found.scattering_angle.xreplace(values).evalf(50)
+        speed = sympy.sqrt(2 * E / m)
+        rutherford = 2 * sympy.atan(abs(k) / (m * speed**2 * (L / (m * speed))))  # of the impact parameter L/(m v)
+        assert abs(angle - rutherford.xreplace(values).evalf(50)) < 1e-45
+        assert "inf" not in repr(found)
+    else:
+        third = 2 * sympy.pi * sympy.sqrt(m * found.elements["semi_major_axis"] ** 3 / k)  # Kepler's third law
+        assert abs((found.formulas.period - third).xreplace(values).evalf(50)) < 1e-44
+        assert float(found.formulas.period.xreplace(values)) == pytest.approx(found.period, rel=1e-10)
+        assert found.scattering_angle is None
+
+
+def test_a_space_oscillator_advances_by_half_a_turn() -> None:
+    scene = Scene(gravity=0.0)
+    field, body = scene.add("field", Potential(energy_function="0.7*(x**2 + z**2)")), scene.add("body", PointMass())
+    scene.connect(field.point, body.point)
+    scene.start.update({"body.position.x": 1.0, "body.position.z": 0.1, "body.velocity.x": 0.2, "body.velocity.z": 0.9})
+    found = reduced(scene, old=POLAR)
+    values = {one: sympy.Float(value) for one, value in found.formulas.values.items()}
+    [advance] = found.formulas.advance.values()
+    assert advance == sympy.pi
+    assert float(found.formulas.period.xreplace(values)) == pytest.approx(found.period, rel=1e-10)
+    [orbit], phi = found.orbit.values(), sympy.Symbol("phi")
+    low, high = found.turning_points
+    ends = sorted(float(orbit.xreplace({**values, sympy.Symbol("phi_0"): 0.0, phi: a})) for a in (0.0, math.pi / 2))
+    assert ends == pytest.approx([low, high], rel=1e-9)
 
 
 # -- in symbols -------------------------------------------------------------------------------------------------------

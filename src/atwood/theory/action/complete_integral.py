@@ -138,8 +138,8 @@ def complete_integral(
         rest = whole.xreplace({p: sympy.Integer(0)})
         pieces = [(b / (2 * a)) ** 2, *(-one / a for one in sympy.Add.make_args(rest))]
         square = sympy.Add(*pieces)
-        ways = sympy.Add(*map(tidied, pieces)), sympy.collect(sympy.expand(square), q, tidied)
-        root = min((sympy.expand(tidied(square)), *ways), key=_length)
+        others = sympy.Add(*map(tidied, pieces)), sympy.collect(sympy.expand(square), q, tidied)
+        root = min((sympy.expand(tidied(square)), *others), key=_length)
         parts.append(SeparatedPart(q, tidied(-b / (2 * a)), Quadrature(root, q, known), energy))
     return CompleteIntegral(total, tuple(ignorable), tuple(parts), constants)
 

@@ -77,6 +77,19 @@ class PointTransformation:
         return sympy.ImmutableMatrix([[x.diff(q) for q in self.coordinates] for x in self.old.values()])
 
     @cached_property
+    def accelerations(self) -> dict[Sympy, Sympy]:
+        """The second derivatives of the new coordinates, solved for, where no forces act but those in L."""
+        inertia = sympy.Matrix([[one.diff(v) for v in self.velocities] for one in self.definitions])
+        inverse, _ = _inverted(inertia, self.positive)
+        moved = [*zip(self.coordinates, self.velocities, strict=True), (sympy.Symbol("t"), 1)]
+        right = [
+            self.lagrangian.diff(q) - sum(p.diff(one) * rate for one, rate in moved)
+            for q, p in zip(self.coordinates, self.definitions, strict=True)
+        ]
+        found = (inverse * sympy.Matrix(right)).applyfunc(lambda one: _shorter(sympy.expand(one), self.positive))
+        return {sympy.Symbol(f"{q}''"): one for q, one in zip(self.coordinates, found, strict=True)}
+
+    @cached_property
     def old_momenta(self) -> dict[Sympy, Sympy]:
         """The old momenta in terms of the new coordinates and momenta."""
         h = self.source

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from atwood.arguments import ARRAY, TEXT, check, instance, optional, takes
+from atwood.arguments import ARRAY, BY_PATH, TEXT, check, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, UnsupportedError, UsageError, suggestion
 from atwood.expr import OutputGroup, Program, depends_on
@@ -22,7 +22,11 @@ from atwood.model.compose.composite import Model
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
 from atwood.theory.formulas.notation import SYMBOLS
-from atwood.theory.hamiltonian.point_transformations import PointTransformation, start_in
+from atwood.theory.hamiltonian.hamiltonian import hamiltonian
+from atwood.theory.hamiltonian.phase_space import EXPRESSION
+from atwood.theory.hamiltonian.point_transformations import PointTransformation, point_transformation, start_in
+from atwood.theory.hamiltonian.tidied import tidied
+from atwood.theory.reduction.orbit import RadialFormulas
 from atwood.theory.reduction.quadrature import Path, find_path
 from atwood.theory.reduction.routhian import (
     Radial,
@@ -63,6 +67,8 @@ class ReducedMotion:
         The effective potential in symbols, of a scene in other coordinates.
     scene, unit
         What the scene is called, and the unit of the coordinate that is left.
+    transformation
+        The scene in other coordinates, where it is one.
     """
 
     coordinate: str
@@ -77,6 +83,7 @@ class ReducedMotion:
     potential: Any = None
     scene: str = ""
     unit: str = ""
+    transformation: PointTransformation | None = None
 
     @property
     def kind(self) -> str:
@@ -111,6 +118,43 @@ class ReducedMotion:
     def expression(self) -> Any:
         """The effective potential as a sympy expression of the coordinate, the momenta and parameters."""
         return self.potential if self.routhian is None else self.routhian.effective_potential
+
+    @cached_property
+    def formulas(self) -> RadialFormulas:
+        """The orbit, its elements, the period and the angle of scattering as formulas, where they are closed."""
+        if self.transformation is not None:
+            given = self.transformation
+            names = [str(one) for one in given.coordinates]
+            k = names.index(self.coordinate)
+            s, mu, letters = given.coordinates[k], 1 / given.hamiltonian.diff(given.momenta[k], 2), given.source.values
+            others = {q: p for q, p in zip(given.coordinates, given.momenta, strict=True) if q != s}
+            potential = self.expression
+        else:
+            assert self.routhian is not None
+            [moving] = self.routhian.coordinates
+            s, t = sympy.Symbol(str(moving.func)), sympy.Symbol("t")
+            mu = tidied(-self.routhian.expression.diff(moving.diff(t), 2).xreplace({moving: s}))
+            potential = self.expression.xreplace({moving: s})
+            others = {sympy.Symbol(str(p).removeprefix("p_")): p for p in self.routhian.momenta}
+            letters = self.routhian.values
+        held = dict(zip(others.values(), self.momenta.values(), strict=True))
+        values = {**letters, **held, sympy.Symbol("E"): self.energy, s: self.start[self.coordinate]}
+        return RadialFormulas(s, mu, potential, others, values)
+
+    @property
+    def orbit(self) -> dict[Any, Any]:
+        """The coordinate as a function of each of the others since a turning point, where that is closed."""
+        return self.formulas.orbit
+
+    @property
+    def elements(self) -> dict[str, Any]:
+        """Semi-latus rectum, eccentricity and semi-major axis of a conic about its focus, as formulas."""
+        return self.formulas.elements
+
+    @property
+    def scattering_angle(self) -> Any:
+        """By how much the direction of an unbounded motion about a centre changes, as a formula; None of others."""
+        return self.formulas.scattering_angle
 
     def effective_potential(self, values: Any) -> FloatArray:
         """Return the effective potential at values of the coordinate, J."""
@@ -172,19 +216,21 @@ class ReducedMotion:
     def __repr__(self) -> str:
         low, high = self.turning_points
         told = f"{self.kind} between {low:.6g} and {high:.6g}" if self.kind == "libration" else self.kind
-        return f"<ReducedMotion of {self.coordinate}: {told}, period {self.period:.6g} s>"
+        period = f", period {self.period:.6g} s" if np.isfinite(self.period) else ""
+        return f"<ReducedMotion of {self.coordinate}: {told}{period}>"
 
 
 _GIVEN = instance("a scene, an assembly, or what `point_transformation` returns", Model, Assembly, PointTransformation)
 
 
-@takes(scene=_GIVEN, coordinate=optional(TEXT), orientation=optional(TEXT), symbols=SYMBOLS)
+@takes(scene=_GIVEN, coordinate=optional(TEXT), orientation=optional(TEXT), symbols=SYMBOLS, old=optional(BY_PATH))
 def reduced(
     scene: Model | Assembly | PointTransformation,
     coordinate: str | None = None,
     *,
     orientation: str | None = None,
     symbols: Mapping[str, str] | None = None,
+    old: Mapping[str, Any] | None = None,
 ) -> ReducedMotion:
     """Return the motion of a scene from its start, reduced to one coordinate and done by quadrature.
 
@@ -204,6 +250,9 @@ def reduced(
         Euler angles in which orientations in space are; ``"euler-zxz"`` if not given.
     symbols
         See `atwood.equations`; a transformed scene has its letters already.
+    old
+        Other coordinates, as of `atwood.point_transformation`: every coordinate of the scene by its path in terms of
+        those, such as ``{"body.position.x": "r*cos(phi)", "body.position.z": "r*sin(phi)"}``.
 
     Raises
     ------
@@ -213,6 +262,14 @@ def reduced(
     SolveError
         If the motion is too near to a separatrix.
     """
+    if old is not None:
+        old = {path: check(EXPRESSION, value, path, "reduced") for path, value in old.items()}
+        letters = {one for value in old.values() for one in value.free_symbols}
+        letters -= {
+            *(scene.source if isinstance(scene, PointTransformation) else hamiltonian(scene, symbols=symbols)).values
+        }
+        new = sorted(letters - {sympy.Symbol("t")}, key=str)
+        scene = point_transformation(scene, old, new, symbols=symbols)
     if isinstance(scene, PointTransformation):
         return _transformed(scene)
     assembly, found, names = ignorable_of(scene, orientation)
@@ -302,6 +359,7 @@ def _transformed(given: PointTransformation) -> ReducedMotion:
         given.hamiltonian.xreplace({given.momenta[number]: sympy.Integer(0)}),
         h.name,
         "rad" if is_angle else "m",
+        given,
     )
 
 

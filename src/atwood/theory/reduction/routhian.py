@@ -126,6 +126,11 @@ class Routhian:
         return min((short(total), collected(total, self.momenta)), key=lambda one: int(one.count_ops())).xreplace(back)
 
     @property
+    def values(self) -> dict[Sympy, float]:
+        """The value of each parameter's symbol, in SI units."""
+        return {objects.letter(one): one.value for one in self.formulas.legend if one.value is not None}
+
+    @property
     def rates(self) -> dict[str, Sympy]:
         """The derivatives of the ignorable coordinates in what is left, by path."""
         _, solved, _, back, _, _ = self._parts
