@@ -263,13 +263,7 @@ def reduced(
         If the motion is too near to a separatrix.
     """
     if old is not None:
-        old = {path: check(EXPRESSION, value, path, "reduced") for path, value in old.items()}
-        letters = {one for value in old.values() for one in value.free_symbols}
-        letters -= {
-            *(scene.source if isinstance(scene, PointTransformation) else hamiltonian(scene, symbols=symbols)).values
-        }
-        new = sorted(letters - {sympy.Symbol("t")}, key=str)
-        scene = point_transformation(scene, old, new, symbols=symbols)
+        scene = _in_others(scene, old, symbols)
     if isinstance(scene, PointTransformation):
         return _transformed(scene)
     assembly, found, names = ignorable_of(scene, orientation)
@@ -317,6 +311,17 @@ def reduced(
         scene=assembly.flat.name,
         unit=found.names[number].unit,
     )
+
+
+def _in_others(
+    scene: Model | Assembly | PointTransformation, old: Mapping[str, Any], symbols: Mapping[str, str] | None
+) -> PointTransformation:
+    """Return a scene in the coordinates that its own are given in terms of."""
+    old = {path: check(EXPRESSION, value, path, "reduced") for path, value in old.items()}
+    letters = {one for value in old.values() for one in value.free_symbols}
+    h = scene.source if isinstance(scene, PointTransformation) else hamiltonian(scene, symbols=symbols)
+    new = sorted(letters - {*h.values, sympy.Symbol("t")}, key=str)
+    return point_transformation(scene, old, new, symbols=symbols)
 
 
 def _transformed(given: PointTransformation) -> ReducedMotion:
