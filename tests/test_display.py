@@ -114,6 +114,8 @@ def roots(tmp_path_factory) -> dict[str, object]:
         "dynamics": atwood.dynamics(scene),
         "conserved": atwood.conserved(FourBar()),
         "transformations": _transformations(),
+        "flow": atwood.flow_of("p**2 + q**2", (("q",), ("p",)), "s"),
+        "algebra": atwood.bracket_algebra((("q",), ("p",)), ["a", "b"], ["p**2", "q*p"]),
         "reduced": atwood.reduced(SimplePendulum()),
         "symmetry": atwood.Symmetry(dict.fromkeys(angles, 1.0), 0.0),
         "modes": atwood.normal_modes(scene, at=hanging),

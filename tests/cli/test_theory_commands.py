@@ -67,6 +67,8 @@ def test_a_file_with_a_table_of_kinds_is_all_that_a_command_needs(tmp_path: Path
         ("action simple-pendulum --t-end 1", "value", "S, J s."),
         ("action-angle simple-pendulum", "period", "libration"),
         ("bracket simple-pendulum --f theta --g p_theta", "bracket", "1"),
+        ("bracket-algebra kepler", "functions", "2*L*h*m"),
+        ("flow-of simple-pendulum --f p_theta --s s", "leads_to", "s + theta(t)"),
         ("brackets simple-pendulum --function theta --function p_theta", "brackets", "Matrix([[0, 1], [-1, 0]])"),
         ("canonical-transformation simple-pendulum --coordinate Q=p_theta --momenta P=-theta", "hamiltonian", "cos(P)"),
         ("equilibrium-branches simple-pendulum --path gravity --span 9:10", "branches", "26 of 26 points stable"),
