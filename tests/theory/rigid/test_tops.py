@@ -6,7 +6,7 @@ import pytest
 import sympy
 
 import atwood
-from atwood import SymmetricTop, UnsupportedError, symmetric_top, top_formulas
+from atwood import SymmetricTop, UnsupportedError, UsageError, symmetric_top, top_formulas
 from atwood_library.scenes import Gyroscope, HeavyTop, LagrangeTop
 
 T = sympy.Symbol("t")
@@ -98,6 +98,18 @@ def test_from_its_constants() -> None:
     assert top.roots == pytest.approx(np.sort(top.roots))
     assert top.f(top.roots) == pytest.approx(0.0, abs=1e-9)
     assert -1.0 < top.roots[0] < top.steady < top.roots[1] < 1.0 < top.roots[2]
+
+
+def test_constants_of_no_motion_and_of_the_sleeping_top() -> None:
+    with pytest.raises(UsageError, match="below that of steady precession"):
+        SymmetricTop(across=0.025, along=0.01, weight=0.981, p_phi=0.43, p_psi=0.5, energy=13.0).kind  # noqa: B018
+    energy = 0.5**2 / 0.02 + 0.981
+    sleeping = SymmetricTop(across=0.025, along=0.01, weight=0.981, p_phi=0.5, p_psi=0.5, energy=energy)
+    assert sleeping.steady == pytest.approx(1.0, abs=1e-6)
+    assert sleeping.is_stable_upright
+    slow = SymmetricTop(across=0.025, along=0.01, weight=0.981, p_phi=0.2, p_psi=0.2, energy=0.2**2 / 0.02 + 0.981)
+    assert slow.steady == pytest.approx(0.2 / np.sqrt(0.025 * 0.981) - 1.0)
+    assert not slow.is_stable_upright
 
 
 def test_the_four_in_one_figure() -> None:

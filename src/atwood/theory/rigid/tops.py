@@ -9,7 +9,7 @@ import numpy as np
 
 from atwood.arguments import check, takes, takes_names
 from atwood.arrays import FloatArray
-from atwood.errors import UnsupportedError
+from atwood.errors import UnsupportedError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
@@ -21,6 +21,9 @@ from atwood.theory.rigid.bodies import principal_body
 
 _NEAR = 1e-7
 """Of u: roots of F that are as near are one, since rounding splits a double root by its square root."""
+
+_SPLIT = 1e-5
+"""Of u: imaginary parts that the rounding of an energy, which is mostly that of the spin, gives a double root."""
 
 _FITS = 1e-9
 """Relative to the effective potential: how well that of a scene must be that of a top."""
@@ -72,12 +75,16 @@ class SymmetricTop:
 
     Attributes
     ----------
-    across, along
-        Moments of inertia about the tip across its axis, I_1, and along it, I_3, kg m^2.
+    across
+        Moment of inertia across its axis about the tip, I_1, kg m^2.
+    along
+        Moment of inertia about its axis, I_3, kg m^2.
     weight
         m g l, J.
-    p_phi, p_psi
-        Angular momenta about the vertical and about its axis, kg m^2/s.
+    p_phi
+        Angular momentum about the vertical, kg m^2/s.
+    p_psi
+        Angular momentum about its axis, kg m^2/s.
     energy
         Kinetic and potential energy, J.
     name
@@ -116,7 +123,13 @@ class SymmetricTop:
     def roots(self) -> FloatArray:
         """The real roots of F, rising: its axis swings between the first two, which are from -1 to 1."""
         found = np.roots(self._cubic)
-        return np.sort(found.real[np.abs(found.imag) <= _NEAR * (1.0 + np.abs(found.real))])
+        if np.max(np.abs(found.imag)) > _SPLIT:
+            raise UsageError(
+                "no motion has these constants: its energy is below that of steady precession",
+                where=self.name,
+                advice=f"Give it more; with these momenta it precesses steadily at u = {self.steady:.6g}.",
+            )
+        return np.sort(found.real)
 
     @property
     def kind(self) -> str:
@@ -134,7 +147,7 @@ class SymmetricTop:
 
     @property
     def steady(self) -> float:
-        """The u of steady precession with these momenta: where the effective potential is least."""
+        """The u of steady precession with these momenta, where the potential is least; 1 of a sleeping top."""
         a, b, w = self.p_psi, self.p_phi, self.across * self.weight
         found = np.roots([w, 0.0, -(a * b) - 2.0 * w, a * a + b * b, w - a * b])
         inside = found.real[(np.abs(found.imag) <= _NEAR) & (np.abs(found.real) < 1.0)]
