@@ -14,6 +14,9 @@ import atwood
 from atwood.cli import app, main
 
 
+X, Z = "body.position.x", "body.position.z"
+
+
 def ran(*arguments: str) -> str:
     done = CliRunner().invoke(main, arguments, catch_exceptions=False)
     assert done.exit_code == 0, done.output
@@ -77,10 +80,12 @@ def test_a_file_with_a_table_of_kinds_is_all_that_a_command_needs(tmp_path: Path
         ("hamiltonian simple-pendulum", "momenta", "it is conserved"),
         ("motions simple-pendulum --end rod.angle=0.5 --t-end 0.3", "motions", "is_minimum"),
         ("reduced simple-pendulum", "turning_points", "-1, 1"),
+        (f"reduced kepler --old '{X}=r*cos(phi)' --old '{Z}=r*sin(phi)'", "elements", "eccentricity"),
         ("root-locus pendulum-on-cart --at rod.angle=0 --path gravity --values 9:11:3", "eigenvalues", "9 to 11"),
         ("routhian kepler", "effective_potential", "sqrt(x(t)**2 + z(t)**2)"),
         ("section double-pendulum --surface 'rod1.angle crosses 0' --quantity rod2.angle --t-end 1", "values", "rad"),
         ("separation kepler", "separates", "does not separate in x, z"),
+        (f"separation kepler --coordinate '{X}=r*cos(phi)' --coordinate '{Z}=r*sin(phi)'", "betas", "E*t"),
         ("solve-start simple-pendulum --unknown rod.angular_velocity --condition bob.velocity.x=1", "values", "1.850"),
         (
             "solve-initial-values simple-pendulum --unknown rod.angular_velocity --condition bob.velocity.x=1",
