@@ -13,7 +13,6 @@ from click.testing import CliRunner
 import atwood
 from atwood.cli import app, main
 
-
 X, Z = "body.position.x", "body.position.z"
 
 
