@@ -222,6 +222,8 @@ if TYPE_CHECKING:
     from atwood.theory.oscillations import (
         SymbolicEquilibria as SymbolicEquilibria,
         SymbolicEquilibrium as SymbolicEquilibrium,
+        SymbolicMode as SymbolicMode,
+        SymbolicModes as SymbolicModes,
     )
     from atwood.theory.reduction import (
         ReducedMotion as ReducedMotion,
@@ -289,7 +291,7 @@ _ROOMS = {
         "LinearModel", "NormalModes",
         "RootLocus", "Trim", "equilibria", "equilibrium_branches", "linearize", "normal_modes", "root_locus", "trim",
     ),
-    "atwood.theory.oscillations": ("SymbolicEquilibria", "SymbolicEquilibrium"),
+    "atwood.theory.oscillations": ("SymbolicEquilibria", "SymbolicEquilibrium", "SymbolicMode", "SymbolicModes"),
     "atwood.theory.reduction": ("ReducedMotion", "Routhian", "reduced", "routhian"),
     "atwood.theory.formulas.sheet": ("FormulaSheet", "Statement"),
     "atwood.theory.rigid": (

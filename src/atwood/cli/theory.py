@@ -128,10 +128,12 @@ def _equilibria(function: Callable[..., Any], scene: Assembly, asked: dict[str, 
 
 def _modes(function: Callable[..., Any], scene: Assembly, asked: dict[str, Any], request: Request) -> Any:
     """Show the normal modes of SCENE: about its start if it is at rest there, else about its stable equilibria."""
+    if asked.get("symbolic"):
+        return _called(function, scene, asked)
     try:
         return [_called(function, scene, asked)]
     except UsageError as error:
-        found = [one.modes for one in equilibria(scene) if one.stable] if not asked else []
+        found = [one.modes for one in equilibria(scene) if one.stable] if "at" not in asked else []
         if not found:
             raise error
         return found

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import field
-from typing import Any
+from typing import Any, Literal, overload
 
 import numpy as np
 
-from atwood.arguments import TEXT, Kind, check, command, number, takes, whole
+from atwood.arguments import FLAG, TEXT, Kind, check, command, number, takes, whole
 from atwood.arrays import ComplexArray, FloatArray
 from atwood.display import data_of, fitted, plain
 from atwood.errors import UsageError
@@ -22,7 +22,7 @@ from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import scipy
 from atwood.model.compose.composite import Model
 from atwood.numerics.rank import null_space
-from atwood.pipeline import SCENE, assemble
+from atwood.pipeline import SCENE, assemble, assembly_of
 from atwood.ranges import values_of
 from atwood.result.result import Result
 from atwood.simulation.dynamics.balance import balance_of
@@ -30,11 +30,13 @@ from atwood.simulation.initialization.start import Start
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.run import run
 from atwood.table import Shown, Table, table
+from atwood.theory.formulas.notation import SYMBOLS
 from atwood.theory.linear.linear_model import find_spectrum, rounding
 from atwood.theory.linear.linearize import StateSpace, find_state_space, linearize, not_steady, refuse_switches
 from atwood.theory.linear.operating_point import AT, At, OperatingPoint, find_operating_point, values_at
 from atwood.theory.linear.steady import find_steady, still
 from atwood.theory.linear.variations import Flow
+from atwood.theory.oscillations.modes import SymbolicModes, symbolic_modes
 
 _AMPLITUDE = number("a number above 0, in radians or in extents of the scene", above=0.0)
 
@@ -161,21 +163,43 @@ def _number(value: complex) -> float | list[float]:
     return value.real if value.imag == 0.0 else [value.real, value.imag]
 
 
+@overload
+def normal_modes(scene: Model | Assembly, *, at: At = ..., symbolic: Literal[False] = ...) -> NormalModes: ...
+
+
+@overload
+def normal_modes(
+    scene: Model | Assembly,
+    *,
+    at: Mapping[str, Any] | None = ...,
+    symbolic: Literal[True],
+    symbols: Mapping[str, str] | None = ...,
+) -> SymbolicModes: ...
+
+
 @command("modes")
-@takes(scene=SCENE, at=AT)
-def normal_modes(scene: Model | Assembly, *, at: At = None) -> NormalModes:
-    """Find the frequencies and shapes of small oscillations.
+@takes(scene=SCENE, at=AT, symbolic=FLAG, symbols=SYMBOLS)
+def normal_modes(
+    scene: Model | Assembly, *, at: At = None, symbolic: bool = False, symbols: Mapping[str, str] | None = None
+) -> NormalModes | SymbolicModes:
+    """Find the frequencies and shapes of small oscillations, in numbers or as formulas.
 
     Parameters
     ----------
     scene
         The scene, or an assembly of it.
     at
-        The state of rest or the steady motion, as for `linearize`. The scene's start if not given.
+        The state of rest or the steady motion, as for `linearize`. The scene's start if not given. If ``symbolic`` it
+        is a state of rest: the start if that is one, else the only stable one.
+    symbolic
+        Whether to give formulas: energies to second order, omega^2 and shapes in closed form where symmetry or degree
+        lets them be, and normal coordinates. An assembly says in which form.
+    symbols
+        See `equations`: letters of formulas by path. Two parameters that have one letter are equal.
 
     Returns
     -------
-    NormalModes
+    NormalModes, SymbolicModes
         One for each degree of freedom without velocity terms; with damping or gyroscopic terms one for each pair of
         conjugate eigenvalues and for each real one.
 
@@ -183,7 +207,15 @@ def normal_modes(scene: Model | Assembly, *, at: At = None) -> NormalModes:
     ------
     UsageError
         If the state is neither at rest nor a steady motion, or a law switches there.
+    UnsupportedError
+        If ``symbolic``, and rest has no closed form that one would find by hand.
     """
+    if symbolic:
+        if isinstance(at, tuple):
+            raise UsageError("formulas are about states of rest", where="normal_modes", advice="Give values by path.")
+        return symbolic_modes(assembly_of(scene, form=None, orientation=None), at, symbols)
+    if symbols is not None:
+        raise UsageError("numbers have no letters", where="normal_modes", advice="Give symbolic=True.")
     point = find_operating_point(scene, at, ())
     return modes_of(point)
 

@@ -93,7 +93,7 @@ class SymbolicEquilibria(Shown, list[SymbolicEquilibrium]):
         for one in self:
             state = ", ".join(f"{text_of(left)} = {text_of(right)}" for left, right in self._state(one))
             anything = "".join(f", any {text_of(self._plain.letter(path))}" for path in one.free)
-            rows.append((state + anything, _said(one.exists), _said(one.stable), one.stability))
+            rows.append((state + anything, said(one.exists), said(one.stable), one.stability))
         title = f"{self.scene}: {len(self)} state{'s' if len(self) != 1 else ''} of rest in closed form"
         headings = ("state", "exists where", "stable where", "with these values")
         return (table(headings, rows, title, [_SIGNS]),)
@@ -107,7 +107,8 @@ class SymbolicEquilibria(Shown, list[SymbolicEquilibrium]):
 _SIGNS = "Parameters have the sign that they have in the scene; stable: no small deviation grows."
 
 
-def _said(condition: Sympy | None) -> str:
+def said(condition: Sympy | None) -> str:
+    """Return a condition as plain text."""
     if condition is None:
         return "not decided to first order"
     words = {sympy.true: "always", sympy.false: "never"}
@@ -130,10 +131,7 @@ def find_symbolic(
     for solution in _solutions(plain):
         if is_singular(plain, solution, of_pole=True):
             continue
-        exists = sympy.And(*solution.conditions)
-        is_pole = is_singular(plain, solution)
-        stable = None if is_pole else _where_it_exists(stability_of(expand(plain, solution)), exists)
-        found.append((solution, _described(plain, solution, exists, stable)))
+        found.append((solution, described(plain, solution)))
     if not found:
         raise UsageError("it stays nowhere at rest", where=plain.name, advice="Look for a steady motion, with `trim`.")
     return found
@@ -162,7 +160,11 @@ def _solutions(plain: PlainEquations) -> list[Solution]:
         ) from None
 
 
-def _described(plain: PlainEquations, solution: Solution, exists: Sympy, stable: Sympy | None) -> SymbolicEquilibrium:
+def described(plain: PlainEquations, solution: Solution) -> SymbolicEquilibrium:
+    """Return what is said of a state of rest."""
+    exists = sympy.And(*solution.conditions)
+    is_pole = is_singular(plain, solution)
+    stable = None if is_pole else _where_it_exists(stability_of(expand(plain, solution)), exists)
     paths = dict(zip(plain.coordinates, plain.paths, strict=True))
     free = tuple(paths[one] for one in solution.free if one in paths)
     numbers: dict[str, float] = {}

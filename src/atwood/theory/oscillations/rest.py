@@ -70,7 +70,11 @@ class PlainEquations:
 
     def number(self, value: Sympy) -> complex:
         """Return an expression with the values of the scene."""
-        return complex(sympy.sympify(value).xreplace(self._exact).evalf(20))
+        return complex(self.exact(value).evalf(20))
+
+    def exact(self, value: Sympy) -> Sympy:
+        """Return an expression with the values of the scene in place of the parameters."""
+        return sympy.sympify(value).xreplace(self._exact)
 
     @cached_property
     def _exact(self) -> Mapping[Sympy, Sympy]:
@@ -78,7 +82,7 @@ class PlainEquations:
 
     def holds(self, condition: Sympy) -> bool:
         """Return whether a condition is fulfilled with the values of the scene."""
-        return bool(sympy.sympify(condition).xreplace(self._exact))
+        return bool(self.exact(condition))
 
     def place(self, coordinate: Sympy, value: Sympy) -> float:
         """Return the number of a coordinate, angles within half a turn."""

@@ -156,10 +156,23 @@ def _of_block(mass: Sympy, stiffness: Sympy, symbol: Sympy) -> Iterator[Eigenval
     if ends is not None:
         yield from _of_chain(mass, stiffness, ends, symbol)
         return
-    yield from _of_pencil(stiffness - symbol * mass, symbol)
+    yield from of_pencil(stiffness - symbol * mass, symbol)
 
 
-def _of_pencil(pencil: Sympy, symbol: Sympy) -> Iterator[Eigenvalue]:
+def roots_of(polynomial: Sympy, symbol: Sympy) -> Iterator[tuple[Sympy | None, Sympy]]:
+    """Yield the roots of the factors of degree one and two, and None for others, each with its factor."""
+    for factor, _ in sympy.factor_list(polynomial, symbol)[1]:
+        a, *others = map(sympy.factor, sympy.Poly(factor, symbol).all_coeffs())
+        if len(others) == 1:
+            yield short(-others[0] / a), factor
+        elif len(others) == 2:
+            reach = sympy.sqrt((others[0] ** 2 - 4 * a * others[1]).factor())
+            yield from ((sympy.factor_terms((-others[0] + sign * reach) / (2 * a)), factor) for sign in (1, -1))
+        else:
+            yield None, factor
+
+
+def of_pencil(pencil: Sympy, symbol: Sympy) -> Iterator[Eigenvalue]:
     """Yield the values at which a matrix is singular, by the factors of its determinant."""
     for factor, times in sympy.factor_list(pencil.det(method="berkowitz"), symbol)[1]:
         coefficients = sympy.Poly(factor, symbol).all_coeffs()
@@ -278,7 +291,7 @@ def _of_chain(mass: Sympy, stiffness: Sympy, ends: tuple[int, int], symbol: Symp
         if cosine.has(sympy.cos, sympy.sin):  # as a square it is short where nothing but the neighbours hold a mass
             value = (own - 4 * coupling * sympy.sin(angle / 2) ** 2) / mass[0, 0]
         else:
-            value = ((middle + 2 * coupling * cosine) / mass[0, 0]).expand().factor()
+            value = sympy.factor_terms(short((middle + 2 * coupling * cosine) / mass[0, 0]).expand())
         vector = sympy.Matrix(entries[::-1] if flipped else entries)
         yield Eigenvalue(value, (vector,), symbol - value)
 
