@@ -134,7 +134,7 @@ def test_the_bead_s_frequencies_about_the_bottom_and_aside() -> None:
     aside = {"hoop.angle": math.acos(-9.81 / 25.0)}
     (tilted,) = squares(atwood.normal_modes(scene, at=aside, symbolic=True, symbols=letters))
     assert sympy.simplify(tilted - (omega**2 - g**2 / (a**2 * omega**2))) == 0
-    with pytest.raises(atwood.UsageError, match="2 of its states of rest are stable.*1.97404"):
+    with pytest.raises(atwood.UsageError, match=r"2 of its states of rest are stable.*1\.97404"):
         atwood.normal_modes(scene, symbolic=True)
     with pytest.raises(atwood.UsageError, match="0 of its states of rest have these values"):
         atwood.normal_modes(scene, at={"hoop.angle": 0.3}, symbolic=True)
@@ -199,11 +199,7 @@ def test_damped_masses_have_the_roots_of_the_characteristic_polynomial() -> None
 
 
 def test_a_cart_is_free_and_its_pendulum_swings_faster() -> None:
-    free, swinging = (
-        squares(atwood.normal_modes(PendulumOnCart(), at={"slider.displacement": 0.0}, symbolic=True))
-        if ("slider.displacement" in atwood.equations(PendulumOnCart()).assembly.flat.start)
-        else squares(atwood.normal_modes(PendulumOnCart(), symbolic=True))
-    )
+    free, swinging = squares(atwood.normal_modes(PendulumOnCart(), symbolic=True))
     cart, bob = sympy.symbols("m_cart m_bob", positive=True)
     assert free == 0
     assert sympy.simplify(swinging - (cart + bob) * g / (cart * l)) == 0
