@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
-from atwood.arguments import one_of, optional, takes
+from atwood.arguments import FLAG, one_of, optional, takes
 from atwood.errors import UnsupportedError, UsageError, suggestion
 from atwood.expr import Expression
 from atwood.forms.assembly import Assembly
@@ -88,6 +88,8 @@ class EquationsOfMotion(EquationFormulas):
         What stands for what.
     parameters
         ``"symbolic"`` or ``"values"``.
+    by_part
+        Whether pages say of each term which parts it comes from.
     """
 
     # -- as sympy objects ---------------------------------------------------------------------------------------------
@@ -284,19 +286,22 @@ class EquationsOfMotion(EquationFormulas):
             said = self.structure.sentence.replace("_", r"\_")
             return rf"\text{{{said}}}"
         lines = equation_lines(self)
-        return page.as_latex([*lines, *page.shared_lines((one.formula for one in lines), self.book.shared)])
+        shared = page.shared_lines((one.formula for one in lines), self.book.shared)
+        return page.as_latex([*lines, *shared], self.by_part)
 
     def markdown(self) -> str:
         """Return a page with symbols, energies, momenta, equations and matrices, formulas between dollar signs."""
         if not self.is_readable:
             return f"# {self.name}\n\n{self.structure.sentence}\n\n```\n{self.structure.picture()}\n```\n"
-        return page.as_markdown(f"{self.name} ({self.form} form)", self.sections, [symbol_table(self)])
+        return page.as_markdown(f"{self.name} ({self.form} form)", self.sections, [symbol_table(self)], self.by_part)
 
     def text(self) -> str:
         """Return the same in plain text, for a terminal."""
         if not self.is_readable:
             return f"{self.structure.sentence}\n\n{self.structure.picture()}"
-        return "\n".join(["Symbols", *(line.rstrip() for line in symbol_lines(self)), "", page.as_text(self.sections)])
+        return "\n".join(
+            ["Symbols", *(line.rstrip() for line in symbol_lines(self)), "", page.as_text(self.sections, self.by_part)]
+        )
 
     @cached_property
     def sections(self) -> list[Section]:
@@ -343,7 +348,14 @@ def _sympy_matrix(entries: Sequence[Sequence[Sum]]) -> Sympy:
 PARAMETERS = one_of(("symbolic", "values"))
 
 
-@takes(scene=SCENE, form=optional(FORM), parameters=PARAMETERS, orientation=optional(ORIENTATION), symbols=SYMBOLS)
+@takes(
+    scene=SCENE,
+    form=optional(FORM),
+    parameters=PARAMETERS,
+    orientation=optional(ORIENTATION),
+    symbols=SYMBOLS,
+    by_part=FLAG,
+)
 def equations(
     scene: Model | Assembly,
     *,
@@ -351,6 +363,7 @@ def equations(
     parameters: str = "symbolic",
     orientation: str | None = None,
     symbols: Mapping[str, str] | None = None,
+    by_part: bool = False,
 ) -> EquationsOfMotion:
     """Return the equations of motion of a scene, to be read.
 
@@ -375,6 +388,9 @@ def equations(
     symbols
         Letters by path, before those of declarations and of `Scene.symbols`: ``{"hoop.angle": "theta"}``. Of a part it
         is what stands below its letters. Two parameters may share a letter where they are equal.
+    by_part
+        Say of each term which parts it comes from. A formula is left without where the parts' own terms are not proven
+        to add up to it, or the equations are no sum over parts: where rolling is solved, and in quaternions.
 
     Returns
     -------
@@ -390,4 +406,5 @@ def equations(
     """
     assembly = assembly_of(scene, form=form, orientation=orientation)
     chosen: Any = parameters
-    return read_equations(assembly, chosen, symbols)
+    made = read_equations(assembly, chosen, symbols)
+    return EquationsOfMotion(assembly, made.expressions, made.notation, chosen, by_part)

@@ -19,8 +19,8 @@ from atwood.expr.core import algebra
 from atwood.expr.core.relations import Relation
 from atwood.expr.simplify.polynomial import TooLargeError
 from atwood.forms.assembly import Assembly
-from atwood.forms.lagrangian import Lagrangian
-from atwood.lazy_dataclasses import dataclass
+from atwood.forms.lagrangian import Lagrangian, rows_by_part
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import sympy
 from atwood.theory.equations.pages import Structure, structure_of
 from atwood.theory.formulas.book import Book
@@ -50,12 +50,15 @@ class EquationFormulas:
         What stands for what.
     parameters
         ``"symbolic"`` or ``"values"``.
+    by_part
+        Whether pages say of each term which parts it comes from.
     """
 
     assembly: Assembly
     expressions: Lagrangian
     notation: Notation
     parameters: Parameters = "symbolic"
+    by_part: bool = False
 
     # -- as formulas --------------------------------------------------------------------------------------------------
 
@@ -174,9 +177,42 @@ class EquationFormulas:
         )
 
     @cached_property
+    def written_by_part(self) -> Written:
+        """The formulas with the parts that each term comes from: where their own terms are proven to be its sum."""
+        found, graph, shares = self.expressions, self.expressions.graph, rows_by_part(self.expressions)
+
+        def parted(total: Expression, own: Mapping[str, Expression], energy: bool = False) -> Sum:
+            is_sum = own and self.is_readable and not self.formula(total - sum(own.values(), graph.zero)).terms
+            return self.formula(total, own if is_sum else None, energy)
+
+        def of(name: str) -> dict[str, Expression]:
+            return {one.path: getattr(one, name) for one in found.parts}
+
+        linear = {one.path: one.lagrangian - one.kinetic + one.potential for one in found.parts}
+        momenta = {one.path: vjp([one.lagrangian], [graph.one], list(found.velocities)) for one in found.parts}
+        rows = range(len(found.velocities))
+        return replace(
+            self.written,
+            kinetic=parted(found.kinetic, of("kinetic"), True),
+            potential=parted(found.potential, of("potential"), True),
+            linear=parted(found.lagrangian - found.kinetic + found.potential, linear, True),
+            rayleigh=parted(found.rayleigh, of("rayleigh"), True),
+            momenta=tuple(parted(found.momenta[k], {path: one[k] for path, one in momenta.items()}) for k in rows),
+            forces=tuple(parted(found.forces[k], {one.path: one.forces[k] for one in found.parts}) for k in rows),
+            rows=tuple(parted(self.residuals[k], {path: one[k] for path, one in shares.items()}) for k in rows),
+            constraints=tuple(
+                parted(value, {one.key[0]: value}, True)
+                for one in found.constraints
+                for value in (one.rate if one.value is None else one.value,)
+            ),
+        )
+
+    @cached_property
     def momenta_shown(self) -> tuple[Sum, ...]:
         """The momenta as a page shows them: in terms of each other where that is shorter, as ``p_psi`` in ``p_phi``."""
         found, shown = self.expressions, list(self.written.momenta)
+        if self.by_part:
+            return self.written_by_part.momenta
         if not self.is_readable or found.has_angular_velocities or found.is_restricted:
             return tuple(shown)
         other = EquationFormulas(self.assembly, found, with_momenta(self.notation, found), self.parameters)

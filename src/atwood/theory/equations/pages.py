@@ -16,7 +16,7 @@ from atwood.display import count_of
 from atwood.errors import UnsupportedError
 from atwood.expr import dependencies, substitute
 from atwood.forms.assembly import Assembly
-from atwood.forms.lagrangian import Lagrangian, rows_by_part
+from atwood.forms.lagrangian import Lagrangian
 from atwood.lazy_dataclasses import dataclass
 from atwood.theory.formulas import page
 from atwood.theory.formulas.page import Line, Matrix, Section
@@ -26,18 +26,24 @@ from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
     from atwood.theory.equations.equations import EquationsOfMotion
+    from atwood.theory.equations.formulas import Written
 
 _NOTHING = ("", "")
 
 
 def equation_lines(eq: EquationsOfMotion) -> list[Line]:
     """Return the equations of motion and the constraints."""
-    return [Line(_NOTHING, one, "= 0") for one in (*eq.written.rows, *eq.written.constraints)]
+    return [Line(_NOTHING, one, "= 0") for one in (*_written(eq).rows, *_written(eq).constraints)]
+
+
+def _written(eq: EquationsOfMotion) -> Written:
+    """Return the formulas as a page shows them."""
+    return eq.written_by_part if eq.by_part else eq.written
 
 
 def sections_of(eq: EquationsOfMotion) -> list[Section]:
     """Return all that is to be said of equations of motion."""
-    written, found, notation = eq.written, eq.expressions, eq.notation
+    written, found, notation = _written(eq), eq.expressions, eq.notation
     sections = [_energies(eq)]
     own = [notation.velocities[u][0] for u in found.velocities]
     for title, letter, formulas in (("Momenta", "p", eq.momenta_shown), ("Generalized forces", "Q", written.forces)):
@@ -71,7 +77,7 @@ def sections_of(eq: EquationsOfMotion) -> list[Section]:
 
 
 def _energies(eq: EquationsOfMotion) -> Section:
-    written = eq.written
+    written = _written(eq)
     lines = [Line(("T", "T"), written.kinetic), Line(("V", "V"), written.potential)]
     note = "$L = T - V$."
     if written.linear.terms:
@@ -126,16 +132,9 @@ def symbol_lines(eq: EquationsOfMotion) -> list[str]:
 
 def html_of(eq: EquationsOfMotion) -> str:
     """Return the energies and equations for a notebook; each term says on hovering from which parts it comes."""
-    found, shares = eq.expressions, rows_by_part(eq.expressions)
-    energies = {one.path: (one.kinetic, one.potential) for one in found.parts}
-    lines = [
-        Line((letter, letter), eq.formula(total, {path: both[i] for path, both in energies.items()}, True))
-        for i, (letter, total) in enumerate((("T", found.kinetic), ("V", found.potential)))
-    ]
-    rows = [
-        Line(_NOTHING, eq.formula(row, {path: share[k] for path, share in shares.items()}), "= 0")
-        for k, row in enumerate(eq.residuals)
-    ]
+    written = eq.written_by_part
+    lines = [Line((letter, letter), one) for letter, one in (("T", written.kinetic), ("V", written.potential))]
+    rows = [Line(_NOTHING, row, "= 0") for row in written.rows]
     shown = [Section("Energies", tuple(lines)), Section("Equations of motion", tuple(rows))]
     if eq.written.constraints:
         shown.append(Section("Constraints", tuple(equation_lines(eq)[len(rows) :])))
@@ -143,7 +142,7 @@ def html_of(eq: EquationsOfMotion) -> str:
         (one for section in shown for line in section.lines for one in page.formulas_of(line)), eq.book.shared
     )
     shown += [Section("Shared terms", used)] if used else []
-    return page.as_html(f"{eq.name} ({eq.form} form)", shown)
+    return page.as_html(f"{eq.name} ({eq.form} form)", shown, by_part=eq.by_part)
 
 
 def as_data(eq: EquationsOfMotion) -> dict[str, Any]:

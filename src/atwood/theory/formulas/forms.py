@@ -44,7 +44,8 @@ class Owners:
         if not self.shares:
             return ()
         if self._keys is None:
-            self._keys = {path: self._waves(polynomial) for path, polynomial in self.shares.items()}
+            both = {path: (one, join_squares(self.expansion, one)) for path, one in self.shares.items()}
+            self._keys = {path: self._waves(one) | self._waves(joined) for path, (one, joined) in both.items()}
         mine = self._waves({monomial: coefficient})
         return tuple(path for path, keys in self._keys.items() if not mine.isdisjoint(keys))
 

@@ -157,13 +157,13 @@ def shared_lines(formulas: Iterable[Node], shared: Sequence[tuple[Name, Sum]]) -
 # -- lines ------------------------------------------------------------------------------------------------------------
 
 
-def _pieces(line: Line, write: Callable[[Sum], str]) -> list[str]:
-    """Return a formula in pieces that fit a line each, signs first."""
+def _pieces(line: Line, write: Callable[[Sum], str], by_part: bool = False) -> list[str]:
+    """Return a formula in pieces that fit a line each, signs first; by part each term is one."""
     pieces: list[list[Term]] = [[]]
     used = width(line.left[1])
     for term in line.formula.terms:
         size = width(text.formula(Sum((term,)))) + 2
-        if pieces[-1] and used + size > _WIDTH:
+        if pieces[-1] and (by_part or used + size > _WIDTH):
             pieces.append([])
             used = 6
         pieces[-1].append(term)
@@ -179,12 +179,20 @@ def _pieces(line: Line, write: Callable[[Sum], str]) -> list[str]:
     return written
 
 
-def _latex_rows(line: Line | Matrix) -> list[str]:
+def _owners_of(line: Line) -> list[str]:
+    """Return the parts that each term comes from; nothing where that is not known of any."""
+    return [", ".join(term.owners) for term in line.formula.terms] if any(t.owners for t in line.formula.terms) else []
+
+
+def _latex_rows(line: Line | Matrix, by_part: bool = False) -> list[str]:
     """Return the rows of an aligned block."""
     if isinstance(line, Matrix):
         return _latex_matrix(line)
-    pieces = _pieces(line, latex.formula)
+    owners = _owners_of(line) if by_part else []
+    pieces = _pieces(line, latex.formula, bool(owners))
     pieces[-1] += f" {line.right}" if line.right else ""
+    for i, one in enumerate(owners):
+        pieces[i] += rf" && \text{{{one}}}".replace("_", r"\_")
     head = f"{line.left[0]} &= " if line.left[0] else "& "
     return [head + pieces[0], *(rf"&\qquad {piece}" for piece in pieces[1:])]
 
@@ -211,53 +219,57 @@ def _single(matrix: Matrix) -> list[Line]:
     return found
 
 
-def as_latex(lines: Sequence[Line | Matrix]) -> str:
-    """Return equations as one aligned block, for use in display mathematics."""
-    rows = " \\\\\n".join(row for line in lines for row in _latex_rows(line))
+def as_latex(lines: Sequence[Line | Matrix], by_part: bool = False) -> str:
+    """Return equations as one aligned block, for use in display mathematics; by part, each term with its parts."""
+    rows = " \\\\\n".join(row for line in lines for row in _latex_rows(line, by_part))
     return f"\\begin{{aligned}}\n{rows}\n\\end{{aligned}}"
 
 
-def as_markdown(title: str, sections: Sequence[Section], tables: Sequence[str] = ()) -> str:
+def as_markdown(title: str, sections: Sequence[Section], tables: Sequence[str] = (), by_part: bool = False) -> str:
     """Return sections as a page of Markdown with formulas between dollar signs."""
     blocks = [f"# {title}", *tables]
     for section in sections:
         blocks.append(f"## {section.title}")
         if section.note:
             blocks.append(section.note)
-        blocks.append(f"$$\n{as_latex(section.lines)}\n$$")
+        blocks.append(f"$$\n{as_latex(section.lines, by_part)}\n$$")
     return "\n\n".join(blocks) + "\n"
 
 
-def as_text(sections: Sequence[Section]) -> str:
-    """Return sections in plain text."""
+def as_text(sections: Sequence[Section], by_part: bool = False) -> str:
+    """Return sections in plain text; by part, each term on a line with the parts that it comes from."""
     blocks = []
     for section in sections:
         blocks.append(section.title)
         for line in section.lines:
-            blocks += [f"  {one}" for one in _text_rows(line)]
+            blocks += [f"  {one}" for one in _text_rows(line, by_part)]
         blocks.append("")
     return "\n".join(blocks[:-1])
 
 
-def _text_rows(line: Line | Matrix) -> list[str]:
+def _text_rows(line: Line | Matrix, by_part: bool = False) -> list[str]:
     if isinstance(line, Matrix):
         return [row for one in _single(line) for row in _text_rows(one)]
-    pieces = _pieces(line, text.formula)
+    owners = _owners_of(line) if by_part else []
+    pieces = _pieces(line, text.formula, bool(owners))
     pieces[-1] += f" {line.right}" if line.right else ""
     head = f"{line.left[1]} = " if line.left[1] else ""
-    return [head + pieces[0], *(f"{' ' * 6}{piece}" for piece in pieces[1:])]
+    rows = [head + pieces[0], *(f"{' ' * 6}{piece}" for piece in pieces[1:])]
+    size = max(map(width, rows))
+    said = [f"   [{one}]" if one else "" for one in owners] or [""] * len(rows)
+    return [f"{row}{' ' * (size - width(row))}{one}".rstrip() for row, one in zip(rows, said, strict=True)]
 
 
-def as_html(title: str, sections: Sequence[Section], tables: Sequence[str] = ()) -> str:
+def as_html(title: str, sections: Sequence[Section], tables: Sequence[str] = (), by_part: bool = False) -> str:
     """Return sections for a notebook; each term says on hovering from which parts it comes."""
     blocks = [f"<h4>{escape(title)}</h4>", *tables]
     for section in sections:
-        rows = [f"<div>{_html_line(line)}</div>" for line in section.lines]
+        rows = [f"<div>{_html_line(line, by_part)}</div>" for line in section.lines]
         blocks.append(f"<p><b>{escape(section.title)}</b></p>" + "".join(rows))
     return "".join(blocks)
 
 
-def _html_line(line: Line | Matrix) -> str:
+def _html_line(line: Line | Matrix, by_part: bool) -> str:
     if isinstance(line, Matrix):
         return f"$\\displaystyle {as_latex([line])}$"
     head = f"${line.left[0]} =$ " if line.left[0] else ""
@@ -267,5 +279,6 @@ def _html_line(line: Line | Matrix) -> str:
         if i:
             body = f"- {body[1:]}" if term.number < 0 else f"+ {body}"
         tip = f' title="{escape(", ".join(term.owners), quote=True)}"' if term.owners else ""
-        spans.append(f"<span{tip}>$\\displaystyle {escape(body, quote=False)}$</span>")
+        said = f" <small>[{escape(', '.join(term.owners))}]</small>" if by_part and term.owners else ""
+        spans.append(f"<span{tip}>$\\displaystyle {escape(body, quote=False)}${said}</span>")
     return f"{head}{' '.join(spans) or '$0$'}" + (f" ${line.right}$" if line.right else "")

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from atwood.arguments import optional, takes
+from atwood.arguments import FLAG, optional, takes
 from atwood.arrays import FloatArray
 from atwood.display import count_of
 from atwood.errors import KernelEvaluationError, StartError, UnsupportedError
@@ -19,7 +19,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.lagrangian import Lagrangian, lagrangian_of
 from atwood.forms.quantities import known_program
-from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
@@ -52,7 +52,10 @@ _GOLDSTEIN = "euler-zxz"
 
 
 def read_hamiltonian(
-    assembly: Assembly, parameters: Parameters = "symbolic", symbols: Mapping[str, str] | None = None
+    assembly: Assembly,
+    parameters: Parameters = "symbolic",
+    symbols: Mapping[str, str] | None = None,
+    by_part: bool = False,
 ) -> Hamiltonian:
     """Return the Hamiltonian of an assembly."""
     refuse_without_hamiltonian(assembly)
@@ -62,7 +65,8 @@ def read_hamiltonian(
     transform = LegendreTransform(assembly, found)
     check_mass(transform)
     notation = with_momenta(notation_of(assembly, found, symbols), found)
-    return Hamiltonian(EquationFormulas(assembly, found, notation, parameters), transform, is_energy(transform))
+    formulas = EquationFormulas(assembly, found, notation, parameters, by_part)
+    return Hamiltonian(formulas, transform, is_energy(transform))
 
 
 @dataclass(frozen=True, eq=False)
@@ -322,7 +326,7 @@ class Hamiltonian:
         if self._written is None:
             return rf"\text{{{self._too_long}}}".replace("_", r"\_")
         shared = page.shared_lines([self.formula], self.formulas.book.shared)
-        return page.as_latex([Line(("H", "H"), self.formula), *shared])
+        return page.as_latex([Line(("H", "H"), self.formula), *shared], self.formulas.by_part)
 
     def markdown(self) -> str:
         """Return a page with H, the momenta and what stands for what, formulas between dollar signs."""
@@ -332,7 +336,7 @@ class Hamiltonian:
         for one in self._shown:
             value = "" if one.value is None else f"{one.value:.6g}"
             rows.append(f"| ${latex.letter(one)}$ | `{one.path}` | {one.unit} | {value} |")
-        return page.as_markdown(f"{self.name}: Hamiltonian", self.sections, ["\n".join(rows)])
+        return page.as_markdown(f"{self.name}: Hamiltonian", self.sections, ["\n".join(rows)], self.formulas.by_part)
 
     def text(self) -> str:
         """Return the same in plain text, for a terminal."""
@@ -344,7 +348,7 @@ class Hamiltonian:
             "  " + "".join(cell + " " * (size - page.width(cell)) for cell, size in zip(row, (*width, 0), strict=True))
             for row in rows
         ]
-        said = page.as_text(self.sections)
+        said = page.as_text(self.sections, self.formulas.by_part)
         return "\n".join(["Symbols", *(line.rstrip() for line in symbols), "", said, "", self.sentence])
 
     def to_dict(self) -> dict[str, Any]:
@@ -381,13 +385,14 @@ class Hamiltonian:
         return page.as_html(f"{self.name}: Hamiltonian", self.sections) + f"<p>{self.sentence}</p>"
 
 
-@takes(scene=SCENE, parameters=PARAMETERS, orientation=optional(ORIENTATION), symbols=SYMBOLS)
+@takes(scene=SCENE, parameters=PARAMETERS, orientation=optional(ORIENTATION), symbols=SYMBOLS, by_part=FLAG)
 def hamiltonian(
     scene: Model | Assembly,
     *,
     parameters: str = "symbolic",
     orientation: str | None = None,
     symbols: Mapping[str, str] | None = None,
+    by_part: bool = False,
 ) -> Hamiltonian:
     """Return the Hamiltonian of a scene, ``H(q, p, t) = p q' - L`` with ``p = dL/dq'``.
 
@@ -406,6 +411,8 @@ def hamiltonian(
         place.
     symbols
         See `atwood.equations`.
+    by_part
+        Say of each term which parts it comes from: of one in the momenta, all whose inertia is in it.
 
     Returns
     -------
@@ -422,7 +429,7 @@ def hamiltonian(
     """
     assembly = assembly_of(scene, orientation=orientation)
     chosen: Any = parameters
-    return read_hamiltonian(assembly, chosen, symbols)
+    return read_hamiltonian(assembly, chosen, symbols, by_part)
 
 
 _LARGEST_BLOCK = 3
@@ -447,8 +454,11 @@ def hamiltonian_formula(formulas: EquationFormulas, transform: LegendreTransform
         if len(block) > _LARGEST_BLOCK:
             return None
         ways = (_squares(formulas, order, entries, free) for order in permutations(reversed(block)))
-        terms += min(ways, key=lambda one: cost(Sum(tuple(one))))
-    rest = formulas.formula(-substitute([found.lagrangian], still)[0], energy=True)
+        rates = [found.velocities[i] for i in block]
+        owners = tuple(one.path for one in found.parts if depends_on(one.lagrangian, rates))
+        terms += [replace(one, owners=owners) for one in min(ways, key=lambda one: cost(Sum(tuple(one))))]
+    own = {one.path: -substitute([one.lagrangian], still)[0] for one in found.parts}
+    rest = formulas.formula(-substitute([found.lagrangian], still)[0], own, energy=True)
     return Sum((*terms, *rest.terms))
 
 
