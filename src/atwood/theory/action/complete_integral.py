@@ -48,6 +48,9 @@ class SeparatedPart:
         moved = sympy.Integral(by, self.coordinate) if moved is None else moved
         return moved + self.quadrature.integral(constant)
 
+    def __repr__(self) -> str:
+        return f"<SeparatedPart of {self.coordinate}>"
+
 
 @dataclass(frozen=True, eq=False)
 class CompleteIntegral:
@@ -106,6 +109,9 @@ class CompleteIntegral:
         """Action variables ``J_i``, integrals of p_i over a libration, of coordinates whose integrals are residues."""
         made = ((one.coordinate, one.quadrature.turn()) for one in self.parts if one.shift == 0)
         return {q: one for q, one in made if one is not None}
+
+    def __repr__(self) -> str:
+        return f"<CompleteIntegral with constants {', '.join(map(str, self.constants))}>"
 
 
 def complete_integral(

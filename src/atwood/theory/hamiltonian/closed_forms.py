@@ -144,6 +144,9 @@ class Quadrature:
         a, b, c = self._coefficients(None)
         return self.root(b * b / 4 - a * c)
 
+    def __repr__(self) -> str:
+        return f"<Quadrature over {self.coordinate}>"
+
     # -- the form -------------------------------------------------------------------------------------------------
 
     @property

@@ -87,5 +87,8 @@ class RadialFormulas:
         off = sympy.pi - (found[0] if self._number(found[0]) > 0.0 else -found[0])
         return off if self._number(off) > 0.0 else -off
 
+    def __repr__(self) -> str:
+        return f"<RadialFormulas of {self.coordinate}>"
+
     def _number(self, value: Sympy) -> float:
         return float(value.xreplace({one: sympy.Float(known) for one, known in self.values.items()}).evalf())
