@@ -6,7 +6,6 @@ that text can say; its help is what the docstring says of the argument, and its 
 
 from __future__ import annotations
 
-import importlib
 import inspect
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -18,6 +17,7 @@ import click
 from atwood.arguments import FILE, FLAG, TEXT, Kind, Refused, check
 from atwood.cli.errors import reporting_errors
 from atwood.cli.scenes import pairs
+from atwood.docstrings import documented, first_sentence, without_marks
 from atwood.errors import UsageError
 
 SCENE_HELP = """SCENE is the name of a scene of an installed library (see `atwood list`), or FILE.py:NAME, where NAME
@@ -111,7 +111,7 @@ def command(
         name,
         callback=called,
         params=params,
-        help=re.sub("^Return ", "Show ", _plain(text)),
+        help=re.sub("^Return ", "Show ", without_marks(text)),
         epilog=SCENE_HELP if argument == "scene" else None,
     )
 
@@ -199,40 +199,3 @@ def _read(typed: Any, kind: Kind, option: str) -> Any:
     if kind.is_many:
         return [_typed_again(kind, one, option) for one in typed] or None
     return _typed(kind, typed, option)
-
-
-# -- what docstrings say ---------------------------------------------------------------------------------------------
-
-
-def documented(of: Any) -> dict[str, str]:
-    """Return what a docstring says of each argument, or attribute; what it says that others say is read there."""
-    lines = inspect.cleandoc(of.__doc__ or "").split("\n")
-    found: dict[str, str] = {}
-    names: list[str] = []
-    is_on = False
-    for k, line in enumerate(lines):
-        if line and k + 1 < len(lines) and set(lines[k + 1]) == {"-"}:
-            is_on, names = line in ("Parameters", "Attributes"), []
-        elif is_on and line and not line.startswith(" ") and set(line) != {"-"}:
-            names = [one.strip(" *") for one in line.split(",")]
-        elif is_on and line.strip():
-            found |= {name: f"{found.get(name, '')} {line.strip()}".strip() for name in names}
-    return {name: _followed(name, text) for name, text in found.items()}
-
-
-def _followed(name: str, text: str) -> str:
-    """Return what is said of an argument elsewhere, where a docstring points there."""
-    pointed = re.match(r"(?:See|As for) `(?:atwood\.)?(\w+)`", text)
-    if not pointed:
-        return text
-    other = getattr(importlib.import_module("atwood"), pointed[1], None)
-    return documented(other).get(name, text)
-
-
-def first_sentence(text: str) -> str:
-    """Return the first sentence of a docstring, without marks of code."""
-    return _plain(re.split(r"(?<=\.)\s+(?=[A-Z])", text, maxsplit=1)[0])
-
-
-def _plain(text: str) -> str:
-    return re.sub(r"``([^`]*)``", lambda found: found[1].strip('"'), text).replace("`", "")

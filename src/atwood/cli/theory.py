@@ -4,32 +4,35 @@ from __future__ import annotations
 
 import importlib
 import inspect
-import math
-from collections.abc import Callable, Iterator, Mapping
-from functools import cached_property
+import re
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import click
 
-import atwood
 from atwood.arguments import FILE, FLAG, TEXT, Kind
-from atwood.cli.command import Request, command, documented, first_sentence, kinds_of
+from atwood.cli.command import Request, command, kinds_of
 from atwood.cli.output import print_json, warn, writer
 from atwood.cli.scenes import pairs, prepare, warn_of_radians
 from atwood.display import plain
-from atwood.errors import AtwoodError, UsageError
+from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
+from atwood.forms.lagrangian import lagrangian_of
 from atwood.lazy_dataclasses import replace
 from atwood.pipeline import assemble
 from atwood.plotting.canvas import check_picture
 from atwood.ranges import range_of
-from atwood.table import Shown, table
+from atwood.table import Shown
+from atwood.theory.formulas.described import Described, Page, attributes, has_formulas, is_theory, page_of
+from atwood.theory.formulas.mathml import document
+from atwood.theory.formulas.notation import notation_of
+from atwood.theory.formulas.tree import Symbol
 from atwood.theory.hamiltonian.hamiltonian import read_hamiltonian
 from atwood.theory.linear import equilibria, equilibrium_branches
 
-_WRITTEN = ("latex", "markdown", "python")
-"""Methods of results that write them down, each an option."""
+_WRITTEN = ("latex", "markdown", "html", "python")
+"""Languages in which results are written down, each an option; Python where they can be."""
 
 _PICTURES = {
     "EquilibriumBranches": "plot_branches",
@@ -51,7 +54,7 @@ def theory_command(name: str, module: str, function: str) -> click.Command:
     found = getattr(importlib.import_module(module), function)
     of = found.__annotations__["return"].split(" | ")
     made = [vars(importlib.import_module(module)).get(one) for one in of]
-    written = [one for one in _WRITTEN if any(hasattr(kind, one) for kind in made)]
+    written = [one for one in _WRITTEN if one != "python" or any(hasattr(kind, one) for kind in made)]
     more: dict[str, tuple[Kind, Any]] = dict.fromkeys(written, (FLAG, False))
     more |= {"plot": (FILE, None)} if _PICTURES.keys() & set(of) else {}
     special, own = _SPECIAL.get(name, (None, {}))
@@ -65,7 +68,7 @@ def theory_command(name: str, module: str, function: str) -> click.Command:
             check_picture(request.plot)
         asked, scene = _read(found, request)
         value = _called(found, scene, asked) if special is None else special(found, scene, asked, request)
-        _show(value, name, scene.flat.name, written[0] if written else "", getattr(request, "plot", None))
+        _show(value, name, scene, written[0] if written else "", getattr(request, "plot", None))
 
     run.__doc__ = inspect.cleandoc((special or found).__doc__ or "").partition("\n\nParameters\n")[0]
     told = [*([special] if special else []), _show, found]
@@ -150,11 +153,12 @@ _SPECIAL: dict[str, tuple[Callable[..., Any], dict[str, tuple[Kind, Any]]]] = {
 # -- what is shown -----------------------------------------------------------------------------------------------------
 
 
-def _show(value: Any, command: str, scene: str, written: str, picture: Path | None) -> None:
+def _show(value: Any, command: str, assembly: Assembly, written: str, picture: Path | None) -> None:
     """Write what was found to standard output, and draw it."""
+    scene = assembly.flat.name
     several = value if isinstance(value, (list, tuple)) and not isinstance(value, Shown) else [value]
-    if written not in ("", "as_json") and not hasattr(value, written):
-        raise UsageError(f"numbers are not written so: --{written} is of formulas", advice="Give --symbolic too.")
+    if written == "python" and not hasattr(value, written):
+        raise UsageError("numbers are not written so: --python is of formulas", advice="Give --symbolic too.")
     if picture is not None:
         if type(several[0]).__name__ not in _PICTURES:
             raise UsageError("formulas are not drawn", where="--plot", advice="Leave out --symbolic.")
@@ -163,7 +167,8 @@ def _show(value: Any, command: str, scene: str, written: str, picture: Path | No
         print_json(_data(value, command, scene))
         return
     if written:
-        text = getattr(value, written)()
+        pages = [_as_written(one, written, assembly) for one in several]
+        text = document(f"{scene}: {command}", "\n".join(pages)) if written == "html" else "\n".join(pages)
         click.echo(text, nl=not text.endswith("\n"))
         return
     out = writer()
@@ -173,15 +178,41 @@ def _show(value: Any, command: str, scene: str, written: str, picture: Path | No
         says = vars(type(one)).get("__str__")
         if isinstance(one, Shown) and says in (None, Shown.as_text):
             out.show(*one.tables())
+        elif isinstance(one, Described):
+            out.line((_page(one, assembly).text(), ""))
         elif hasattr(one, "text") or any("__str__" in vars(base) for base in type(one).__mro__[:-1]):
             out.line((one.text() if hasattr(one, "text") else str(one), ""))
         else:
-            rows = ((name, _text(held), meaning) for name, held, meaning in _attributes(one))
-            out.show(table(("", "~", "~"), rows, f"{scene}: {type(one).__name__}"))
+            out.line((_page(one, assembly).text(), ""))
     if picture is not None:
         out.files(plotted=picture)
     elif type(several[0]).__name__ == "PhasePortrait":
         out.line(("Draw it with --plot phase.png.", "dim"))
+
+
+def _page(value: Any, assembly: Assembly) -> Page:
+    """Return the page of what a value holds, in the letters of its scene."""
+    known: dict[str, Symbol] = {}
+    if has_formulas(value):
+        known = {one.name: one for one in notation_of(assembly, lagrangian_of(assembly, assembly.form)).legend}
+    return page_of(value, f"{assembly.flat.name}: {_words(value)}", known)
+
+
+def _as_written(value: Any, language: str, assembly: Assembly) -> str:
+    """Return a value in a language, as it writes itself, or by its tables, or as the page of what it holds."""
+    if hasattr(value, language) and not isinstance(value, Described):
+        return str(getattr(value, language)())
+    if not isinstance(value, Shown):
+        return str(getattr(_page(value, assembly), language)())
+    if language == "latex":
+        return "\n\n".join(one.latex() for one in value.tables())
+    return value._repr_html_() if language == "html" else f"```text\n{value.as_text()}\n```"
+
+
+def _words(value: Any) -> str:
+    """Return the name of a class in words."""
+    words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(value).__name__).lower()
+    return "result" if words in ("add", "mul", "pow") else words
 
 
 def _draw(value: Any, file: Path) -> None:
@@ -209,53 +240,5 @@ def _as_data(value: Any) -> Any:
     """Return a value as it says itself, or by what it holds."""
     if hasattr(value, "to_data") or hasattr(value, "to_dict") or not str(type(value).__module__).startswith("atwood"):
         return plain(value)
-    held = {name: _as_data(one) if _is_theory(one) else plain(one) for name, one, _ in _attributes(value)}
+    held = {name: _as_data(one) if is_theory(one) else plain(one) for name, one, _ in attributes(value)}
     return held or plain(value)
-
-
-def _attributes(value: Any) -> Iterator[tuple[str, Any, str]]:
-    """Yield what a value holds that can be written: name, value and meaning; first what its docstring tells."""
-    kind, told = type(value), documented(type(value))
-    for base in reversed(kind.__mro__):
-        for name, one in vars(base).items():
-            if isinstance(one, (property, cached_property)) and not name.startswith("_"):
-                told.setdefault(name, inspect.getdoc(one) or "")
-    for name, meaning in told.items():
-        try:
-            held = getattr(value, name)
-        except AtwoodError:  # what it does not have
-            continue
-        is_empty = isinstance(held, (str, tuple, list, Mapping)) and not held
-        if name not in ("name", "scene") and not is_empty and (_is_plain(held) or _is_theory(held)):
-            yield name, held, first_sentence(meaning)
-
-
-def _is_theory(value: Any) -> bool:
-    """Return whether a value is what a public function of theory returns."""
-    return str(type(value).__module__).startswith("atwood.theory") and type(value).__name__ in atwood.__all__
-
-
-def _is_plain(value: Any) -> bool:
-    if isinstance(value, (dict, tuple, list)):
-        return all(_is_plain(one) for one in (value.values() if isinstance(value, dict) else value))
-    is_one = isinstance(value, (str, bool, int, float, complex))
-    return is_one or hasattr(value, "dtype") or hasattr(value, "free_symbols")
-
-
-def _text(value: Any) -> str:
-    """Return a value in a line; of large arrays their shape."""
-    if _is_theory(value):
-        return repr(value)
-    if isinstance(value, Mapping):
-        return ", ".join(f"{name} = {_text(one)}" for name, one in value.items())
-    if getattr(value, "shape", None) and math.prod(value.shape) > _LARGE and hasattr(value, "dtype"):
-        return f"array of shape {value.shape}: --json writes it"
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, (tuple, list)):
-        return ", ".join(f"[{_text(one)}]" if isinstance(one, (tuple, list)) else _text(one) for one in value)
-    return f"{value:.9g}" if isinstance(value, (float, complex)) else str(value)
-
-
-_LARGE = 16
-"""Arrays of more numbers are not written in a line."""

@@ -23,11 +23,12 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import scipy
 from atwood.model.compose.composite import Model
 from atwood.simulation.initialization.start import find_start
+from atwood.theory.formulas.described import Described
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian
 
 
 @dataclass(frozen=True, eq=False)
-class ActionAngle:
+class ActionAngle(Described):
     """Action and angle variables of one degree of freedom (Goldstein, section 10.6).
 
     The action variable J is the integral of p dq over one turn, the angle w rises by one in it: ``dH/dJ`` is the

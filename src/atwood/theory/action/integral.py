@@ -25,6 +25,7 @@ from atwood.result.result import Result
 from atwood.result.work import joined_times
 from atwood.simulation.problem.arguments import RTOL, T_END, check_span
 from atwood.simulation.run.run_record import Run, run_again, times_of_steps
+from atwood.theory.formulas.described import Described
 from atwood.theory.hamiltonian.phase_space import as_expression
 
 PATH = replace(instance("a dictionary of functions of time by path", Mapping), word="PATH=EXPRESSION", is_many=True)
@@ -63,7 +64,7 @@ class Variation:
 
 
 @dataclass(frozen=True, eq=False)
-class Action:
+class Action(Described):
     """The action ``S``, the integral of L along a motion or a path, and its derivatives by the ends.
 
     For a motion, S as a function of its ends is Hamilton's principal function: ``dS/dq = p`` and ``dS/dt = -H`` at the

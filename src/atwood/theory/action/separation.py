@@ -21,6 +21,7 @@ from atwood.model.compose.composite import Model
 from atwood.theory.action.action_angle import Level, level_through
 from atwood.theory.action.complete_integral import CompleteIntegral, complete_integral
 from atwood.theory.formulas.notation import SYMBOLS
+from atwood.theory.formulas.described import Described
 from atwood.theory.formulas.printers import Sympy
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian
 from atwood.theory.hamiltonian.phase_space import EXPRESSION
@@ -79,7 +80,7 @@ class SeparatedMotion:
 
 
 @dataclass(frozen=True, eq=False)
-class Separation:
+class Separation(Described):
     """Whether H separates in some coordinates, by the conditions of Levi-Civita.
 
     The equation ``H(q, dW/dq) = E`` has a complete integral ``W = sum of W_i(q_i)`` if and only if, for each two

@@ -24,6 +24,7 @@ from atwood.theory.equations.pages import (
     as_data,
     equation_lines,
     html_of,
+    mathml_of,
     module_of,
     sections_of,
     symbol_lines,
@@ -294,6 +295,12 @@ class EquationsOfMotion(EquationFormulas):
         if not self.is_readable:
             return f"# {self.name}\n\n{self.structure.sentence}\n\n```\n{self.structure.picture()}\n```\n"
         return page.as_markdown(f"{self.name} ({self.form} form)", self.sections, [symbol_table(self)], self.by_part)
+
+    def html(self) -> str:
+        """Return the same as HTML, with formulas that browsers show as they are."""
+        if not self.is_readable:
+            return self._repr_html_()
+        return mathml_of(self)
 
     def text(self) -> str:
         """Return the same in plain text, for a terminal."""

@@ -18,7 +18,9 @@ from atwood.expr import dependencies, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian
 from atwood.lazy_dataclasses import dataclass
+from atwood.table import table
 from atwood.theory.formulas import page
+from atwood.theory.formulas.mathml import as_mathml
 from atwood.theory.formulas.page import Line, Matrix, Section
 from atwood.theory.formulas.printers import code, latex, text
 from atwood.theory.formulas.tree import Call, Name, Node, Sum, Symbol, names_in
@@ -132,6 +134,18 @@ def symbol_lines(eq: EquationsOfMotion) -> list[str]:
 
 def html_of(eq: EquationsOfMotion) -> str:
     """Return the energies and equations for a notebook; each term says on hovering from which parts it comes."""
+    return page.as_html(f"{eq.name} ({eq.form} form)", _sections_by_part(eq), by_part=eq.by_part)
+
+
+def mathml_of(eq: EquationsOfMotion) -> str:
+    """Return symbols, energies and equations as HTML that browsers show; terms say from which parts they come."""
+    rows = ((text.letter(one), one.path, one.unit, "" if one.value is None else one.value) for one in _shown(eq))
+    symbols = table(("symbol", "stands for", "unit", "value>"), rows)
+    return as_mathml(f"{eq.name} ({eq.form} form)", _sections_by_part(eq), [symbols.html()])
+
+
+def _sections_by_part(eq: EquationsOfMotion) -> list[Section]:
+    """Return energies, equations and constraints, each term with the parts that it comes from."""
     written = eq.written_by_part
     lines = [Line((letter, letter), one) for letter, one in (("T", written.kinetic), ("V", written.potential))]
     rows = [Line(_NOTHING, row, "= 0") for row in written.rows]
@@ -142,7 +156,7 @@ def html_of(eq: EquationsOfMotion) -> str:
         (one for section in shown for line in section.lines for one in page.formulas_of(line)), eq.book.shared
     )
     shown += [Section("Shared terms", used)] if used else []
-    return page.as_html(f"{eq.name} ({eq.form} form)", shown, by_part=eq.by_part)
+    return shown
 
 
 def as_data(eq: EquationsOfMotion) -> dict[str, Any]:

@@ -25,6 +25,7 @@ from atwood.simulation.problem.arguments import RTOL, SOLVER, T_END
 from atwood.table import Shown, Table, facts, table
 from atwood.theory.dynamics.dynamics import Dynamics
 from atwood.theory.flow.plane_field import Field, Window, separatrices, spaced_curves
+from atwood.theory.formulas.described import Described
 from atwood.theory.linear.linear_model import complex_text
 from atwood.theory.linear.variations import LinearScene
 
@@ -337,7 +338,7 @@ def _speeds(
 
 
 @dataclass(frozen=True, eq=False)
-class PoincareSection:
+class PoincareSection(Described):
     """The points at which motions pass through a surface.
 
     Attributes

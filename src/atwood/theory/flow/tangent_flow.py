@@ -27,10 +27,11 @@ from atwood.pipeline import SCENE
 from atwood.result.result import Result
 from atwood.simulation.problem.arguments import OUTPUTS, RTOL, SOLVER, T_END
 from atwood.theory.flow.variational_equations import Deviations, VariationalEquations, find_deviations
+from atwood.theory.formulas.described import Described
 
 
 @dataclass(frozen=True, eq=False)
-class TangentFlow:
+class TangentFlow(Described):
     """The derivative of the state at output times by the state at the start.
 
     Attributes
@@ -259,7 +260,7 @@ _POINTS = 201
 
 
 @dataclass(frozen=True, eq=False)
-class LyapunovExponents:
+class LyapunovExponents(Described):
     """The Lyapunov exponents of a motion, found over a finite time.
 
     Attributes

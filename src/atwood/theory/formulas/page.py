@@ -157,19 +157,24 @@ def shared_lines(formulas: Iterable[Node], shared: Sequence[tuple[Name, Sum]]) -
 # -- lines ------------------------------------------------------------------------------------------------------------
 
 
-def _pieces(line: Line, write: Callable[[Sum], str], by_part: bool = False) -> list[str]:
-    """Return a formula in pieces that fit a line each, signs first; by part each term is one."""
-    pieces: list[list[Term]] = [[]]
+def rows_of(line: Line, by_part: bool = False) -> list[list[Term]]:
+    """Return the terms of a formula in rows that fit a line of text each; by part each term is one."""
+    rows: list[list[Term]] = [[]]
     used = width(line.left[1])
     for term in line.formula.terms:
         size = width(text.formula(Sum((term,)))) + 2
-        if pieces[-1] and (by_part or used + size > _WIDTH):
-            pieces.append([])
+        if rows[-1] and (by_part or used + size > _WIDTH):
+            rows.append([])
             used = 6
-        pieces[-1].append(term)
+        rows[-1].append(term)
         used += size
+    return rows
+
+
+def _pieces(line: Line, write: Callable[[Sum], str], by_part: bool = False) -> list[str]:
+    """Return a formula in pieces that fit a line each, signs first."""
     written = []
-    for i, terms in enumerate(pieces):
+    for i, terms in enumerate(rows_of(line, by_part)):
         body = write(Sum(tuple(terms)))
         if i and terms[0].number > 0:
             body = f"+ {body}"

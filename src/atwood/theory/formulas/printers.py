@@ -23,7 +23,7 @@ Sympy: TypeAlias = Any
 _T = TypeVar("_T")
 
 
-class _Printer(ABC, Generic[_T]):
+class Printer(ABC, Generic[_T]):
     """Writes formulas in one language."""
 
     def formula(self, node: Node) -> _T:
@@ -45,7 +45,7 @@ class _Printer(ABC, Generic[_T]):
         """Return a sum of terms."""
 
 
-class _Lines(_Printer[str]):
+class _Lines(Printer[str]):
     """Writes formulas in one line of characters: signs between terms, what is below behind one stroke."""
 
     zero: ClassVar[str]
@@ -111,6 +111,7 @@ class _Text(_Lines):
         "pow": "({0})^({1})",
         "absolute": "|{0}|",
         "integral": "∫[{2}, {3}] {0} d{1}",
+        "antiderivative": "∫ {0} d{1}",
     }
     _LETTERS: ClassVar = dict(zip(GREEK, GREEK_SIGNS, strict=True))
     _BELOW, _ABOVE = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉"), str.maketrans("0123456789-/", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻ᐟ")
@@ -166,6 +167,7 @@ class _Latex(_Lines):
         "floor": r"\left\lfloor {0} \right\rfloor",
         "integral": r"\int_{{{2}}}^{{{3}}} {0} \, d{1}",
         "exp": "e^{{{0}}}",
+        "antiderivative": r"\int {0} \, d{1}",
     }
     _DOTS = ("", r"\dot", r"\ddot", r"\dddot")
     _WAVES = ("sin", "cos", "tan", "sinh", "cosh", "tanh")
@@ -298,7 +300,7 @@ class _Code(_Lines):
         return f"{self._NAMES.get(node.function, node.function)}({', '.join(arguments)})"
 
 
-class _Objects(_Printer[Sympy]):
+class _Objects(Printer[Sympy]):
     """Sympy objects: what moves is a function of time, so that it can be differentiated; nothing is assumed of it."""
 
     _NAMES: ClassVar = {"absolute": "Abs", "minimum": "Min", "maximum": "Max", "less": "Lt", "less_equal": "Le"}

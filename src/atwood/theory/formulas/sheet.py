@@ -4,79 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from fractions import Fraction
 from typing import Any
 
 from atwood.errors import UsageError, suggestion
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import sympy
 from atwood.theory.formulas import page
-from atwood.theory.formulas.book import PI
+from atwood.theory.formulas.mathml import as_mathml
 from atwood.theory.formulas.page import Line, Matrix, Section
 from atwood.theory.formulas.printers import Sympy, latex, text
-from atwood.theory.formulas.tree import (
-    Call,
-    Factor,
-    Name,
-    Node,
-    Sum,
-    Symbol,
-    Term,
-    alone,
-    in_brackets,
-    in_order,
-    names_in,
-    product,
-)
-
-_UNITS = {"m": "kg", "M": "kg", "I": "kg*m^2", "J": "kg*m^2", "g": "m/s^2"}
-"""Units of letters, by which textbooks order factors: what stands for masses comes first."""
-
-_FUNCTIONS = {"StrictLessThan": "less", "LessThan": "less_equal", "Abs": "absolute", "And": "logical_and"}
-_FUNCTIONS |= {"Or": "logical_or", "Equality": "equal", "StrictGreaterThan": "greater", "Integral": "integral"}
-
-
-def node_of(value: Sympy) -> Node:
-    """Return an expression of sympy as a formula, its products and fractions as they are."""
-    if value.is_Symbol or (isinstance(value, sympy.core.function.AppliedUndef) and value.args == (sympy.Symbol("t"),)):
-        return Name(_symbol_of(str(value) if value.is_Symbol else value.func.__name__, not value.is_Symbol))
-    if isinstance(value, sympy.Derivative):
-        inner = node_of(value.expr)
-        return (
-            Name(inner.symbol, int(value.derivative_count)) if isinstance(inner, Name) else Call("derivative", (inner,))
-        )
-    if value is sympy.pi:
-        return PI
-    if value.is_Number:
-        number = Fraction(int(value.p), int(value.q)) if value.is_Rational else float(value)
-        return Sum((Term(number),) if number else ())
-    if value.is_Add:
-        return in_brackets(map(_term_of, value.args))
-    if value.is_Mul or (value.is_Pow and value.exp.is_Rational):
-        return Sum((_term_of(value),))
-    name = value.func.__name__
-    arguments = [part for one in value.args for part in (one if isinstance(one, sympy.Tuple) else (one,))]
-    return Call("pow" if value.is_Pow else _FUNCTIONS.get(name, name), tuple(map(node_of, arguments)))
-
-
-def _term_of(value: Sympy) -> Term:
-    factors: list[Factor] = []
-    for one in sympy.Mul.make_args(value):
-        base, power = one.as_base_exp() if one.is_Pow and one.exp.is_Rational else (one, sympy.Integer(1))
-        factors.append((node_of(base), Fraction(int(power.p), int(power.q))))
-    found = in_order(product(Fraction(1), factors))
-    return replace(found, factors=tuple(sorted(found.factors, key=_is_plain_bracket)))
-
-
-def _is_plain_bracket(factor: Factor) -> bool:
-    """Return whether a factor is a sum of what has no mass, which stands last."""
-    return isinstance(factor[0], Sum) and not any("kg" in one.symbol.unit for one in names_in([factor[0]]))
-
-
-def _symbol_of(name: str, moves: bool) -> Symbol:
-    letter, *below = name.split("_")
-    kind = "coordinate" if moves else "momentum" if letter == "p" and below else "parameter"
-    return Symbol(letter, tuple(below), unit=_UNITS.get(letter, "1"), kind=kind)
+from atwood.theory.formulas.reading import read_formula, read_symbol
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +114,7 @@ class FormulaSheet(Mapping[str, Sympy]):
 
     def text(self) -> str:
         """Return the formulas in plain text."""
-        known = [f"  {text.letter(_symbol_of(name, False))} = {value:.9g}" for name, value in self.numbers.items()]
+        known = [f"  {text.letter(read_symbol(name))} = {value:.9g}" for name, value in self.numbers.items()]
         return "\n".join([page.as_text(self.sections), *(["", "Values, SI units", *known] if known else [])])
 
     def latex(self) -> str:
@@ -187,6 +124,10 @@ class FormulaSheet(Mapping[str, Sympy]):
     def markdown(self) -> str:
         """Return a page of Markdown with the formulas between dollar signs."""
         return page.as_markdown(self.title, self.sections)
+
+    def html(self) -> str:
+        """Return the formulas as HTML that browsers show as they are."""
+        return as_mathml(self.title, self.sections)
 
     def to_data(self) -> dict[str, Any]:
         """Return the formulas as plain data: each in sympy's words, in LaTeX, and what it means."""
@@ -214,14 +155,14 @@ def _letters_of(*values: Sympy | None) -> set[Sympy]:
 def _lines(one: Statement) -> tuple[Line | Matrix, ...]:
     """Return a statement as it is written: a vector that is equal to named components one by one."""
     if isinstance(one.left, sympy.MatrixBase):
-        return tuple(Line(_head(left), alone(node_of(value))) for left, value in zip(one.left, one.value, strict=True))
+        return tuple(Line(_head(left), read_formula(value)) for left, value in zip(one.left, one.value, strict=True))
     left = ("", "") if one.left is None else _head(one.left)
     if isinstance(one.value, sympy.MatrixBase):
         rows = one.value.tolist()
-        return (Matrix(left, tuple(tuple(alone(node_of(entry)) for entry in row) for row in rows)),)
-    return (Line(left, alone(node_of(one.value))),)
+        return (Matrix(left, tuple(tuple(read_formula(entry) for entry in row) for row in rows)),)
+    return (Line(left, read_formula(one.value)),)
 
 
 def _head(value: Sympy) -> tuple[str, str]:
-    node = node_of(value)
+    node = read_formula(value)
     return latex.formula(node), text.formula(node)

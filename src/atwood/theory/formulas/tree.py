@@ -29,8 +29,8 @@ class Symbol:
     value
         Of a parameter; None for what moves.
     kind
-        ``"coordinate"``, ``"momentum"``, ``"angular velocity"``, ``"parameter"``, ``"multiplier"``, ``"time"`` or
-        ``"shared"``.
+        ``"coordinate"``, ``"momentum"``, ``"angular velocity"``, ``"parameter"``, ``"multiplier"``, ``"time"``,
+        ``"constant"`` or ``"shared"``.
     order
         Where it stands among symbols of its kind.
     """
@@ -189,6 +189,8 @@ def _place_of_factor(factor: Factor) -> tuple[int, int, str]:
     node, _ = factor
     if isinstance(node, Name):
         symbol = node.symbol
+        if symbol.kind == "constant":
+            return (-1, 0, symbol.name)
         if symbol.kind == "time":
             return (3, 0, symbol.name)
         if symbol.moves:

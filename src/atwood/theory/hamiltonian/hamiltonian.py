@@ -29,6 +29,7 @@ from atwood.theory.dynamics.functions import Numbers
 from atwood.theory.equations.equations import PARAMETERS
 from atwood.theory.equations.formulas import EquationFormulas, Parameters
 from atwood.theory.formulas import page
+from atwood.theory.formulas.mathml import as_mathml
 from atwood.theory.formulas.notation import SYMBOLS, momentum_symbol, notation_of, with_momenta
 from atwood.theory.formulas.page import Line, Section
 from atwood.theory.formulas.printers import Sympy, latex, objects, text
@@ -337,6 +338,12 @@ class Hamiltonian:
             value = "" if one.value is None else f"{one.value:.6g}"
             rows.append(f"| ${latex.letter(one)}$ | `{one.path}` | {one.unit} | {value} |")
         return page.as_markdown(f"{self.name}: Hamiltonian", self.sections, ["\n".join(rows)], self.formulas.by_part)
+
+    def html(self) -> str:
+        """Return the same as HTML, with formulas that browsers show as they are."""
+        if self._written is None:
+            return self._repr_html_()
+        return as_mathml(f"{self.name}: Hamiltonian", self.sections) + f"<p>{self.sentence}</p>"
 
     def text(self) -> str:
         """Return the same in plain text, for a terminal."""

@@ -24,6 +24,7 @@ from atwood.model.compose.composite import Model
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
 from atwood.theory.equations.equations import EquationsOfMotion
+from atwood.theory.formulas.described import Described
 from atwood.theory.formulas.notation import SYMBOLS as LETTERS
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian
 from atwood.theory.hamiltonian.phase_space import EXPRESSION, SYMBOLS, Sympy
@@ -31,7 +32,7 @@ from atwood.theory.hamiltonian.tidied import is_positive, tidied
 
 
 @dataclass(frozen=True, eq=False)
-class PointTransformation:
+class PointTransformation(Described):
     """A scene in new coordinates; everything in sympy, with new coordinates and momenta as symbols.
 
     Attributes

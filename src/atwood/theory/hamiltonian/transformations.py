@@ -17,6 +17,7 @@ from atwood.arguments import command, takes, whole
 from atwood.errors import UnsupportedError, UsageError
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
+from atwood.theory.formulas.described import Described
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian
 from atwood.theory.hamiltonian.phase_space import (
     BY_SYMBOL,
@@ -40,7 +41,7 @@ _KINDS = {1: ("q", "Q"), 2: ("q", "P"), 3: ("p", "Q"), 4: ("p", "P")}
 
 
 @dataclass(frozen=True, eq=False)
-class CanonicalTransformation:
+class CanonicalTransformation(Described):
     """New coordinates and momenta in terms of the old ones, and whether they are canonical.
 
     Attributes

@@ -21,6 +21,7 @@ from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
+from atwood.theory.formulas.described import Described
 from atwood.theory.formulas.notation import SYMBOLS
 from atwood.theory.hamiltonian.hamiltonian import hamiltonian
 from atwood.theory.hamiltonian.phase_space import EXPRESSION
@@ -40,7 +41,7 @@ from atwood.theory.symmetry.quantities import Quantities
 
 
 @dataclass(frozen=True, eq=False)
-class ReducedMotion:
+class ReducedMotion(Described):
     """The motion of a scene from its start, reduced to one coordinate.
 
     Attributes

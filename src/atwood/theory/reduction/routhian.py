@@ -28,6 +28,7 @@ from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of
 from atwood.theory.equations.formulas import EquationFormulas
+from atwood.theory.formulas.described import Described
 from atwood.theory.formulas.notation import SYMBOLS, notation_of
 from atwood.theory.formulas.printers import objects
 from atwood.theory.formulas.tree import Sum
@@ -42,7 +43,7 @@ _EULER = "euler-zxz"
 
 
 @dataclass(frozen=True, eq=False)
-class Routhian:
+class Routhian(Described):
     """The Routhian of a scene; sympy expressions of functions of t, as those of `atwood.equations`.
 
     Attributes

@@ -1,0 +1,242 @@
+"""Pages of what functions of theory return: formulas written as in a book, the rest as a table with its meanings.
+
+What a value holds, and what it means, is read from its class: the attributes that its docstring tells, and its
+properties with the first sentence of theirs.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cached_property
+from typing import Any
+
+from atwood.docstrings import documented, first_sentence
+from atwood.errors import AtwoodError
+from atwood.lazy_dataclasses import dataclass, replace
+from atwood.table import Shown, Table, table
+from atwood.theory.formulas.mathml import as_mathml
+from atwood.theory.formulas.page import (
+    Line,
+    Matrix,
+    Section,
+    as_html,
+    as_latex,
+    as_markdown,
+    as_text,
+    with_names,
+)
+from atwood.theory.formulas.printers import latex, text
+from atwood.theory.formulas.reading import read_formula
+from atwood.theory.formulas.tree import Name, Symbol, names_in
+
+_LARGE = 16
+"""Arrays of more numbers are not written in a line."""
+
+_OTHERS = ("name", "scene")
+"""Attributes that say of what a page is."""
+
+
+@dataclass(frozen=True)
+class Page:
+    """A title, facts in words and numbers, and formulas under headings.
+
+    Attributes
+    ----------
+    title
+        Of what it is.
+    facts
+        Names, values and meanings of what is no formula.
+    sections
+        Formulas, with what they mean.
+    """
+
+    title: str
+    facts: Table
+    sections: tuple[Section, ...]
+
+    def text(self) -> str:
+        """Return it as plain text."""
+        told = [replace(one, title=f"{one.title}: {one.note}" if one.note else one.title) for one in self.sections]
+        facts = [self.facts.text()] if self.facts.rows else []
+        return "\n\n".join((self.title, *facts, *([as_text(told)] if told else [])))
+
+    def latex(self) -> str:
+        """Return its formulas as an aligned block of LaTeX for each heading, which is a comment."""
+        return "\n".join(f"% {one.title}\n{as_latex(one.lines)}" for one in self.sections)
+
+    def markdown(self) -> str:
+        """Return it as Markdown, with formulas between dollar signs."""
+        return as_markdown(self.title, self.sections, [f"```text\n{self.facts.text()}\n```"] if self.facts.rows else [])
+
+    def html(self) -> str:
+        """Return it as HTML with MathML, which browsers show as it is."""
+        return as_mathml(self.title, self.sections, [self.facts.html()] if self.facts.rows else [])
+
+    def notebook(self) -> str:
+        """Return it for a notebook, with formulas between dollar signs."""
+        return as_html(self.title, self.sections, [self.facts.html()] if self.facts.rows else [])
+
+
+class Described:
+    """A value that is shown by the page of what it holds: as text, in notebooks, and in LaTeX and Markdown."""
+
+    @property
+    def _page(self) -> Page:
+        return page_of(self, type(self).__name__)
+
+    def text(self) -> str:
+        """Return what it holds as plain text, formulas as in a book."""
+        return self._page.text()
+
+    def latex(self) -> str:
+        """Return its formulas in LaTeX, for use in display mathematics."""
+        return self._page.latex()
+
+    def markdown(self) -> str:
+        """Return what it holds as Markdown, with formulas between dollar signs."""
+        return self._page.markdown()
+
+    def html(self) -> str:
+        """Return what it holds as HTML, with formulas that browsers show as they are."""
+        return self._page.html()
+
+    def _repr_html_(self) -> str:
+        return self._page.notebook()
+
+
+def page_of(value: Any, title: str, known: Mapping[str, Symbol] | None = None) -> Page:
+    """Return the page of a value: a formula, or something that holds formulas and numbers.
+
+    Parameters
+    ----------
+    value
+        The value.
+    title
+        What stands above.
+    known
+        Symbols by the names that they have in formulas of sympy.
+    """
+    writer = _Writer(known or {})
+    if _is_formula(value):
+        return _page(title, [], [Section("Formula", tuple(writer.lines(value)))])
+    rows, sections = [], []
+    for name, held, meaning in attributes(value):
+        words = name.replace("_", " ").capitalize()
+        lines = tuple(writer.lines(held))
+        if lines:
+            sections.append(Section(words, lines, meaning))
+        else:
+            rows.append((name, writer.fact(held), meaning))
+    return _page(title, rows, sections)
+
+
+def _page(title: str, rows: Iterable[tuple[str, str, str]], sections: list[Section]) -> Page:
+    formulas = [one.formula for section in sections for one in section.lines if isinstance(one, Line)]
+    taken = [one.symbol.name for one in names_in(formulas)]
+    return Page(title, table(("", "~", "~"), rows), tuple(with_names(sections, taken)))
+
+
+def has_formulas(value: Any) -> bool:
+    """Return whether there is a formula of sympy in a value, or among what it holds."""
+    if isinstance(value, (dict, tuple, list)):
+        return any(map(has_formulas, value.values() if isinstance(value, dict) else value))
+    return _is_formula(value) or (is_theory(value) and any(has_formulas(held) for _, held, _ in attributes(value)))
+
+
+def attributes(value: Any) -> Iterator[tuple[str, Any, str]]:
+    """Yield what a value holds that can be written: name, value and meaning; first what its docstring tells."""
+    kind, told = type(value), documented(type(value))
+    for base in reversed(kind.__mro__):
+        for name, one in vars(base).items():
+            if isinstance(one, (property, cached_property)) and not name.startswith("_"):
+                told.setdefault(name, inspect.getdoc(one) or "")
+    for name, meaning in told.items():
+        try:
+            held = getattr(value, name)
+        except AtwoodError:  # what it does not have
+            continue
+        is_empty = isinstance(held, (str, tuple, list, Mapping)) and not held
+        if name not in _OTHERS and not is_empty and (_is_plain(held) or is_theory(held)):
+            yield name, held, first_sentence(meaning)
+
+
+def is_theory(value: Any) -> bool:
+    """Return whether a value is a result that shows itself."""
+    return isinstance(value, (Described, Shown)) or hasattr(type(value), "markdown")
+
+
+def _is_plain(value: Any) -> bool:
+    if isinstance(value, (dict, tuple, list)):
+        return all(_is_plain(one) for one in (value.values() if isinstance(value, dict) else value))
+    return isinstance(value, (str, bool, int, float, complex)) or hasattr(value, "dtype") or _is_formula(value)
+
+
+def _is_formula(value: Any) -> bool:
+    return hasattr(value, "free_symbols")
+
+
+def _is_letter(value: Any) -> bool:
+    """Return whether a value is a single name, of a symbol or of a function of the time."""
+    return _is_formula(value) and (getattr(value, "is_Symbol", False) or str(value).endswith("(t)"))
+
+
+class _Writer:
+    """Writes what a value holds.
+
+    Parameters
+    ----------
+    known
+        Symbols by the names that they have in formulas of sympy.
+    """
+
+    def __init__(self, known: Mapping[str, Symbol]) -> None:
+        self._known = known
+
+    def lines(self, held: Any) -> Iterator[Line | Matrix]:
+        """Yield the formulas in a value, each a line; none where there is nothing but names, numbers and words."""
+        if isinstance(held, Mapping):
+            if any(_is_formula(one) and one.free_symbols for one in held.values()):
+                for name, one in held.items():
+                    yield Line(self._left(name), read_formula(one, self._known))
+        elif isinstance(held, (tuple, list)):
+            if any(_is_formula(one) and not _is_letter(one) for one in held):
+                for one in held:
+                    yield from self.lines(one)
+        elif getattr(held, "is_Matrix", False):
+            rows = tuple(tuple(read_formula(one, self._known) for one in row) for row in held.tolist())
+            if rows:
+                yield Matrix(("M", "M"), rows)
+        elif getattr(held, "is_Equality", False):
+            yield Line(self._left(held.lhs), read_formula(held.rhs, self._known))
+        elif _is_formula(held):
+            yield Line(("", ""), read_formula(held, self._known))
+
+    def _left(self, name: Any) -> tuple[str, str]:
+        """Return a name before a sign of equality, in LaTeX and in plain text."""
+        if _is_formula(name):
+            read = read_formula(name, self._known)
+            return latex.formula(read), text.formula(read)
+        symbol = self._known.get(str(name))
+        if symbol is not None:
+            return latex.formula(Name(symbol)), text.formula(Name(symbol))
+        return rf"\text{{{str(name).replace('_', chr(92) + '_')}}}", str(name)
+
+    def fact(self, value: Any) -> str:
+        """Return a value in a line; of large arrays their shape."""
+        if is_theory(value):
+            return repr(value)
+        if _is_formula(value):
+            return text.formula(read_formula(value, self._known))
+        if isinstance(value, Mapping):
+            return ", ".join(f"{self._left(name)[1]} = {self.fact(one)}" for name, one in value.items())
+        if getattr(value, "shape", None) and math.prod(value.shape) > _LARGE and hasattr(value, "dtype"):
+            return f"array of shape {value.shape}: --json writes it"
+        if hasattr(value, "tolist"):
+            value = value.tolist()
+        if isinstance(value, (tuple, list)):
+            return ", ".join(
+                f"[{self.fact(one)}]" if isinstance(one, (tuple, list)) else self.fact(one) for one in value
+            )
+        return f"{value:.9g}" if isinstance(value, (float, complex)) else str(value)
