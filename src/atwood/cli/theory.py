@@ -24,7 +24,7 @@ from atwood.pipeline import assemble
 from atwood.plotting.canvas import check_picture
 from atwood.ranges import range_of
 from atwood.table import Shown
-from atwood.theory.formulas.described import Described, Page, attributes, has_formulas, is_theory, page_of
+from atwood.theory.formulas.described import Described, Page, attributes, has_formulas, is_formula, is_theory, page_of
 from atwood.theory.formulas.mathml import document
 from atwood.theory.formulas.notation import notation_of
 from atwood.theory.formulas.tree import Symbol
@@ -178,7 +178,7 @@ def _show(value: Any, command: str, assembly: Assembly, written: str, picture: P
         says = vars(type(one)).get("__str__")
         if isinstance(one, Shown) and says in (None, Shown.as_text):
             out.show(*one.tables())
-        elif isinstance(one, Described):
+        elif isinstance(one, Described) or is_formula(one):
             out.line((_page(one, assembly).text(), ""))
         elif hasattr(one, "text") or any("__str__" in vars(base) for base in type(one).__mro__[:-1]):
             out.line((one.text() if hasattr(one, "text") else str(one), ""))

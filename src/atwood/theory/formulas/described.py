@@ -119,7 +119,7 @@ def page_of(value: Any, title: str, known: Mapping[str, Symbol] | None = None) -
         Symbols by the names that they have in formulas of sympy.
     """
     writer = _Writer(known or {})
-    if _is_formula(value):
+    if is_formula(value):
         return _page(title, [], [Section("Formula", tuple(writer.lines(value)))])
     rows, sections = [], []
     for name, held, meaning in attributes(value):
@@ -142,7 +142,7 @@ def has_formulas(value: Any) -> bool:
     """Return whether there is a formula of sympy in a value, or among what it holds."""
     if isinstance(value, (dict, tuple, list)):
         return any(map(has_formulas, value.values() if isinstance(value, dict) else value))
-    return _is_formula(value) or (is_theory(value) and any(has_formulas(held) for _, held, _ in attributes(value)))
+    return is_formula(value) or (is_theory(value) and any(has_formulas(held) for _, held, _ in attributes(value)))
 
 
 def attributes(value: Any) -> Iterator[tuple[str, Any, str]]:
@@ -170,16 +170,17 @@ def is_theory(value: Any) -> bool:
 def _is_plain(value: Any) -> bool:
     if isinstance(value, (dict, tuple, list)):
         return all(_is_plain(one) for one in (value.values() if isinstance(value, dict) else value))
-    return isinstance(value, (str, bool, int, float, complex)) or hasattr(value, "dtype") or _is_formula(value)
+    return isinstance(value, (str, bool, int, float, complex)) or hasattr(value, "dtype") or is_formula(value)
 
 
-def _is_formula(value: Any) -> bool:
+def is_formula(value: Any) -> bool:
+    """Return whether a value is an expression or a matrix of sympy."""
     return hasattr(value, "free_symbols")
 
 
 def _is_letter(value: Any) -> bool:
     """Return whether a value is a single name, of a symbol or of a function of the time."""
-    return _is_formula(value) and (getattr(value, "is_Symbol", False) or str(value).endswith("(t)"))
+    return is_formula(value) and (getattr(value, "is_Symbol", False) or str(value).endswith("(t)"))
 
 
 class _Writer:
@@ -197,11 +198,11 @@ class _Writer:
     def lines(self, held: Any) -> Iterator[Line | Matrix]:
         """Yield the formulas in a value, each a line; none where there is nothing but names, numbers and words."""
         if isinstance(held, Mapping):
-            if any(_is_formula(one) and one.free_symbols for one in held.values()):
+            if any(is_formula(one) and one.free_symbols for one in held.values()):
                 for name, one in held.items():
                     yield Line(self._left(name), read_formula(one, self._known))
         elif isinstance(held, (tuple, list)):
-            if any(_is_formula(one) and not _is_letter(one) for one in held):
+            if any(is_formula(one) and not _is_letter(one) for one in held):
                 for one in held:
                     yield from self.lines(one)
         elif getattr(held, "is_Matrix", False):
@@ -210,12 +211,12 @@ class _Writer:
                 yield Matrix(("M", "M"), rows)
         elif getattr(held, "is_Equality", False):
             yield Line(self._left(held.lhs), read_formula(held.rhs, self._known))
-        elif _is_formula(held):
+        elif is_formula(held):
             yield Line(("", ""), read_formula(held, self._known))
 
     def _left(self, name: Any) -> tuple[str, str]:
         """Return a name before a sign of equality, in LaTeX and in plain text."""
-        if _is_formula(name):
+        if is_formula(name):
             read = read_formula(name, self._known)
             return latex.formula(read), text.formula(read)
         symbol = self._known.get(str(name))
@@ -227,7 +228,7 @@ class _Writer:
         """Return a value in a line; of large arrays their shape."""
         if is_theory(value):
             return repr(value)
-        if _is_formula(value):
+        if is_formula(value):
             return text.formula(read_formula(value, self._known))
         if isinstance(value, Mapping):
             return ", ".join(f"{self._left(name)[1]} = {self.fact(one)}" for name, one in value.items())
