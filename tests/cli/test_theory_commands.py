@@ -23,10 +23,15 @@ def ran(*arguments: str) -> str:
 
 
 def public_functions() -> dict[str, object]:
-    """Return the public functions of theory by name."""
+    """Return the public functions of theory that are asked of a scene, by name."""
     every = {name: getattr(atwood, name) for name in atwood.__all__}
     is_theory = {name: one for name, one in every.items() if getattr(one, "__module__", "").startswith("atwood.theory")}
-    return {name: one for name, one in is_theory.items() if inspect.isfunction(one)}
+    return {name: one for name, one in is_theory.items() if inspect.isfunction(one) and asks_a_scene(one)}
+
+
+def asks_a_scene(function: object) -> bool:
+    kinds = getattr(function, "kinds", {})
+    return "scene" in kinds or any(kind.of_scene is not None for kind in kinds.values())
 
 
 def test_every_public_function_of_theory_has_a_command() -> None:

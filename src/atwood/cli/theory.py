@@ -24,7 +24,7 @@ from atwood.pipeline import assemble
 from atwood.plotting.canvas import check_picture
 from atwood.ranges import range_of
 from atwood.table import Shown
-from atwood.theory.formulas.described import Described, Page, attributes, has_formulas, is_formula, is_theory, page_of
+from atwood.theory.formulas.described import Described, Page, attributes, is_formula, is_theory, page_of
 from atwood.theory.formulas.mathml import document
 from atwood.theory.formulas.notation import notation_of
 from atwood.theory.formulas.tree import Symbol
@@ -192,9 +192,10 @@ def _show(value: Any, command: str, assembly: Assembly, written: str, picture: P
 
 def _page(value: Any, assembly: Assembly) -> Page:
     """Return the page of what a value holds, in the letters of its scene."""
-    known: dict[str, Symbol] = {}
-    if has_formulas(value):
-        known = {one.name: one for one in notation_of(assembly, lagrangian_of(assembly, assembly.form)).legend}
+
+    def known() -> dict[str, Symbol]:
+        return {one.name: one for one in notation_of(assembly, lagrangian_of(assembly, assembly.form)).legend}
+
     return page_of(value, f"{assembly.flat.name}: {_words(value)}", known)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -106,7 +106,7 @@ class Described:
         return self._page.notebook()
 
 
-def page_of(value: Any, title: str, known: Mapping[str, Symbol] | None = None) -> Page:
+def page_of(value: Any, title: str, known: Callable[[], Mapping[str, Symbol]] = dict) -> Page:
     """Return the page of a value: a formula, or something that holds formulas and numbers.
 
     Parameters
@@ -116,9 +116,9 @@ def page_of(value: Any, title: str, known: Mapping[str, Symbol] | None = None) -
     title
         What stands above.
     known
-        Symbols by the names that they have in formulas of sympy.
+        Gives symbols by the names that they have in formulas of sympy; it is called where there is a formula.
     """
-    writer = _Writer(known or {})
+    writer = _Writer(known)
     if is_formula(value):
         return _page(title, [], [Section("Formula", tuple(writer.lines(value)))])
     rows, sections = [], []
@@ -134,15 +134,8 @@ def page_of(value: Any, title: str, known: Mapping[str, Symbol] | None = None) -
 
 def _page(title: str, rows: Iterable[tuple[str, str, str]], sections: list[Section]) -> Page:
     formulas = [one.formula for section in sections for one in section.lines if isinstance(one, Line)]
-    taken = [one.symbol.name for one in names_in(formulas)]
+    taken = [one.symbol for one in names_in(formulas)]
     return Page(title, table(("", "~", "~"), rows), tuple(with_names(sections, taken)))
-
-
-def has_formulas(value: Any) -> bool:
-    """Return whether there is a formula of sympy in a value, or among what it holds."""
-    if isinstance(value, (dict, tuple, list)):
-        return any(map(has_formulas, value.values() if isinstance(value, dict) else value))
-    return is_formula(value) or (is_theory(value) and any(has_formulas(held) for _, held, _ in attributes(value)))
 
 
 def attributes(value: Any) -> Iterator[tuple[str, Any, str]]:
@@ -163,8 +156,9 @@ def attributes(value: Any) -> Iterator[tuple[str, Any, str]]:
 
 
 def is_theory(value: Any) -> bool:
-    """Return whether a value is a result that shows itself."""
-    return isinstance(value, (Described, Shown)) or hasattr(type(value), "markdown")
+    """Return whether a value is a result of theory, which shows itself."""
+    is_shown = isinstance(value, (Described, Shown)) or hasattr(type(value), "markdown")
+    return is_shown and type(value).__module__.startswith("atwood.theory")
 
 
 def _is_plain(value: Any) -> bool:
@@ -189,11 +183,15 @@ class _Writer:
     Parameters
     ----------
     known
-        Symbols by the names that they have in formulas of sympy.
+        Gives symbols by the names that they have in formulas of sympy.
     """
 
-    def __init__(self, known: Mapping[str, Symbol]) -> None:
-        self._known = known
+    def __init__(self, known: Callable[[], Mapping[str, Symbol]]) -> None:
+        self._ask = known
+
+    @cached_property
+    def _known(self) -> Mapping[str, Symbol]:
+        return self._ask()
 
     def lines(self, held: Any) -> Iterator[Line | Matrix]:
         """Yield the formulas in a value, each a line; none where there is nothing but names, numbers and words."""
@@ -231,7 +229,7 @@ class _Writer:
         if is_formula(value):
             return text.formula(read_formula(value, self._known))
         if isinstance(value, Mapping):
-            return ", ".join(f"{self._left(name)[1]} = {self.fact(one)}" for name, one in value.items())
+            return ", ".join(f"{self.fact(name)} = {self.fact(one)}" for name, one in value.items())
         if getattr(value, "shape", None) and math.prod(value.shape) > _LARGE and hasattr(value, "dtype"):
             return f"array of shape {value.shape}: --json writes it"
         if hasattr(value, "tolist"):

@@ -139,7 +139,7 @@ _CONSTANTS = {"pi": "pi", "E": "e", "I": "i", "oo": "infinity", "-oo": "-infinit
 
 def _is_moving(one: Sympy) -> bool:
     """Return whether something is an unknown function of the time alone, ``theta(t)``."""
-    return isinstance(one, sympy.core.function.AppliedUndef) and one.args == (sympy.Symbol("t"),)
+    return isinstance(one, sympy.core.function.AppliedUndef) and [str(of) for of in one.args] == ["t"]
 
 
 def _number(one: Sympy) -> Number:

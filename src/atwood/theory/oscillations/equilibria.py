@@ -11,7 +11,7 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
 from atwood.table import Shown, Table, table
 from atwood.theory.formulas.printers import Sympy, latex, text
-from atwood.theory.formulas.sheet import node_of
+from atwood.theory.formulas.reading import read_formula
 from atwood.theory.oscillations.conditions import NoClosedFormError, Solution, solve_conditions
 from atwood.theory.oscillations.rest import PlainEquations, expand, is_singular, plain_equations
 from atwood.theory.oscillations.stability import stability_of
@@ -19,12 +19,12 @@ from atwood.theory.oscillations.stability import stability_of
 
 def text_of(value: Sympy) -> str:
     """Return an expression as plain text."""
-    return text.formula(node_of(value))
+    return text.formula(read_formula(value))
 
 
 def latex_of(value: Sympy) -> str:
     """Return an expression in LaTeX."""
-    return latex.formula(node_of(value))
+    return latex.formula(read_formula(value))
 
 
 @dataclass(frozen=True, eq=False)
