@@ -24,7 +24,7 @@ theta = sympy.Function("theta")(t)
     ("formula", "plain", "tex"),
     [
         (sympy.Integer(0), "0", "0"),
-        (sympy.Rational(-1, 2) * m * theta.diff(t) ** 2, "-½ m θ̇²", r"-\frac{m \dot{\theta}^{2}}{2}"),
+        (sympy.Rational(-1, 2) * m * theta.diff(t) ** 2, "-½ m θ̇²", r"-\frac{1}{2} m \dot{\theta}^{2}"),
         (p_phi / sympy.sin(theta) ** 2, "p_φ / sin² θ", r"\frac{p_{\phi}}{\sin^{2} \theta}"),
         (sympy.sqrt(x - k), "√(x - k)", r"\sqrt{x - k}"),
         (2 * sympy.pi * omega, "2 π ω₁", r"2 \pi \omega_{1}"),
