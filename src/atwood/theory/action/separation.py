@@ -20,8 +20,8 @@ from atwood.lazy_modules import mpmath, sympy
 from atwood.model.compose.composite import Model
 from atwood.theory.action.action_angle import Level, level_through
 from atwood.theory.action.complete_integral import CompleteIntegral, complete_integral
-from atwood.theory.formulas.notation import SYMBOLS
 from atwood.theory.formulas.described import Described
+from atwood.theory.formulas.notation import SYMBOLS
 from atwood.theory.formulas.printers import Sympy
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian
 from atwood.theory.hamiltonian.phase_space import EXPRESSION

@@ -14,7 +14,7 @@ _DOTS = ("", "\u02d9", "\u00a8", "\u20db")
 _WAVES = ("sin", "cos", "tan", "sinh", "cosh", "tanh")
 _NAMES = {"log": "ln", "asin": "arcsin", "acos": "arccos", "atan": "arctan", "minimum": "min", "maximum": "max"}
 _NAMES |= {"sign": "sgn"}
-_RELATIONS = {"less": "&lt;", "less_equal": "≤", "logical_and": "∧", "logical_or": "∨", "equal": "="}
+_RELATIONS = {"less": "&lt;", "greater": "&gt;", "less_equal": "≤", "logical_and": "∧", "logical_or": "∨", "equal": "="}
 _STYLE = (
     "body { font-family: serif; max-width: 60em; margin: 2em auto; padding: 0 1em } td, th { padding: 0 .8em; "
     "text-align: left; vertical-align: top } math { font-size: 115% } .line { overflow-x: auto; padding: .3em 0 }"
@@ -74,7 +74,7 @@ class _MathML(Printer[str]):
     def _call(self, node: Call) -> str:
         arguments = [self.formula(one) for one in node.arguments]
         match node.function:
-            case "less" | "less_equal" | "logical_and" | "logical_or" | "equal":
+            case "less" | "greater" | "less_equal" | "logical_and" | "logical_or" | "equal":
                 return f"<mo>{_RELATIONS[node.function]}</mo>".join(arguments)
             case "logical_not":
                 return f"<mo>¬</mo>{_brackets(arguments[0])}"

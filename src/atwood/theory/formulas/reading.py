@@ -29,8 +29,8 @@ from atwood.theory.formulas.tree import (
 )
 
 _FUNCTIONS = {"Abs": "absolute", "Min": "minimum", "Max": "maximum", "ceiling": "ceil", "Equality": "equal"}
-_RELATIONS = {"StrictLessThan": "less", "LessThan": "less_equal"}
-_TURNED = {"StrictGreaterThan": "less", "GreaterThan": "less_equal"}
+_RELATIONS = {"StrictLessThan": "less", "LessThan": "less_equal", "StrictGreaterThan": "greater"}
+_TURNED = {"GreaterThan": "less_equal"}
 _LOGIC = {"And": "logical_and", "Or": "logical_or", "Not": "logical_not"}
 
 
