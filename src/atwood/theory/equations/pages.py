@@ -141,7 +141,7 @@ def mathml_of(eq: EquationsOfMotion) -> str:
     """Return symbols, energies and equations as HTML that browsers show; terms say from which parts they come."""
     rows = ((text.letter(one), one.path, one.unit, "" if one.value is None else one.value) for one in _shown(eq))
     symbols = table(("symbol", "stands for", "unit", "value>"), rows)
-    return as_mathml(f"{eq.name} ({eq.form} form)", _sections_by_part(eq), [symbols.html()])
+    return as_mathml(f"{eq.name} ({eq.form} form)", _sections_by_part(eq), [symbols.html()], eq.by_part)
 
 
 def _sections_by_part(eq: EquationsOfMotion) -> list[Section]:

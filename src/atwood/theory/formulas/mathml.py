@@ -121,13 +121,13 @@ def _number(value: Number) -> str:
 mathml = _MathML()
 
 
-def as_mathml(title: str, sections: Sequence[Section], tables: Sequence[str] = ()) -> str:
-    """Return sections as HTML; each term says on hovering from which parts it comes."""
+def as_mathml(title: str, sections: Sequence[Section], tables: Sequence[str] = (), by_part: bool = False) -> str:
+    """Return sections as HTML; each term says on hovering, or by part beside it, from which parts it comes."""
     blocks = [f"<h2>{escape(title)}</h2>", *tables]
     for section in sections:
         blocks.append(f"<h3>{escape(section.title)}</h3>")
         blocks += [f"<p>{escape(section.note)}</p>"] if section.note else []
-        blocks += [_line(line) for line in section.lines]
+        blocks += [_line(line, by_part) for line in section.lines]
     return "\n".join(blocks)
 
 
@@ -137,20 +137,24 @@ def document(title: str, body: str) -> str:
     return f"<!doctype html>\n<html><head>{head}</head>\n<body>\n{body}\n</body></html>\n"
 
 
-def _line(line: Line | Matrix) -> str:
+def _line(line: Line | Matrix, by_part: bool) -> str:
     left = f"<mtext>{escape(line.left[1])}</mtext><mo>=</mo>" if line.left[1] else ""
     if isinstance(line, Matrix):
         cells = ("".join(f"<mtd>{mathml.formula(one)}</mtd>" for one in row) for row in line.entries)
         table = f"<mtable>{''.join(f'<mtr>{row}</mtr>' for row in cells)}</mtable>"
         return f'<div class="line"><math>{_row(left + _brackets(table))}</math></div>'
-    rows = ["".join(_owned(term, number + k) for k, term in enumerate(row)) for number, row in enumerate(rows_of(line))]
+    rows = [
+        "".join(_owned(term, number + k, by_part) for k, term in enumerate(row))
+        for number, row in enumerate(rows_of(line, by_part))
+    ]
     rows[-1] = (rows[-1] or "<mn>0</mn>") + (f"<mtext> {escape(line.right)}</mtext>" if line.right else "")
     shown = "".join(f"<mtr><mtd>{'' if k else left}</mtd><mtd>{row}</mtd></mtr>" for k, row in enumerate(rows))
     return f'<div class="line"><math><mtable columnalign="right left">{shown}</mtable></math></div>'
 
 
-def _owned(term: Term, place: int) -> str:
+def _owned(term: Term, place: int, by_part: bool) -> str:
     """Return a term with its sign, that says on hovering from which parts it comes."""
     tip = f' title="{escape(", ".join(term.owners), quote=True)}"' if term.owners else ""
     sign = "<mo>+</mo>" if place and term.number > 0 else ""
-    return f"<mrow{tip}>{sign}{mathml.formula(Sum((term,)))}</mrow>"
+    said = f"<mtext>&#xa0;&#xa0;[{escape(', '.join(term.owners))}]</mtext>" if by_part and term.owners else ""
+    return f"<mrow{tip}>{sign}{mathml.formula(Sum((term,)))}{said}</mrow>"
