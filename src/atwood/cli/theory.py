@@ -89,7 +89,7 @@ def _read(function: Callable[..., Any], request: Request) -> tuple[dict[str, Any
 
 
 def _called(function: Callable[..., Any], scene: Assembly, asked: Mapping[str, Any]) -> Any:
-    """Return what a function says of a scene, or of what it takes in place of one."""
+    """Call a function of theory with a scene, or with what it takes in place of one."""
     made = {key: kind.of_scene(scene) for key, kind in kinds_of(function).items() if kind.of_scene is not None}
     if "scene" in kinds_of(function):
         made["scene"] = scene

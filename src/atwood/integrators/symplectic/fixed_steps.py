@@ -18,7 +18,7 @@ FILES = ("integrators/symplectic/fixed_steps.py", "integrators/stepper.py")
 
 
 def unless_found(r: Routine, code: Value, given: int = 1) -> None:
-    """Return where a call failed."""
+    """Return a code from the routine that is being written if a call has failed."""
     with r.when(code != 0):
         r.give(given)
 

@@ -89,7 +89,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class _Symbols:
-    """What is left of the symbols of a forest."""
+    """Symbols of the independent coordinates and speeds of a spanning forest, with names and rates."""
 
     coordinates: tuple[Expression, ...]
     speeds: tuple[Expression, ...]

@@ -232,7 +232,7 @@ def unwound(
     near: FloatArray,
     q: FloatArray,
 ) -> FloatArray:
-    """Return the same place with the angles of joints, which count turns, within half a turn of what is said of them.
+    """Return the same position with each joint angle, which counts turns, within half a turn of its start value.
 
     Newton's method may go round on its way, and a spring on the joint would begin wound up. A turn is taken back if no
     body stands otherwise without it, and what is said holds as before.

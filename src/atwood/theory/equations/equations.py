@@ -297,7 +297,7 @@ class EquationsOfMotion(EquationFormulas):
         return page.as_markdown(f"{self.name} ({self.form} form)", self.sections, [symbol_table(self)], self.by_part)
 
     def html(self) -> str:
-        """Return the same as HTML, with formulas that browsers show as they are."""
+        """Return symbols, energies and equations as HTML with formulas in MathML, which browsers show."""
         if not self.is_readable:
             return self._repr_html_()
         return mathml_of(self)

@@ -271,7 +271,7 @@ def _coarse(pattern: BoolArray, most: int) -> BoolArray:
 
 
 def structure_of(assembly: Assembly, found: Lagrangian, operations: int) -> Structure:
-    """Return what the equations of a scene are like."""
+    """Return the size and the sparsity pattern of the equations of a scene."""
     n, m = len(found.velocities), len(found.constraints)
     pattern = np.zeros((n + m, n + m), dtype=bool)
     by_acceleration = {a: j for j, a in enumerate(found.accelerations)}

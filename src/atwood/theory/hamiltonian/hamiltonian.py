@@ -340,7 +340,7 @@ class Hamiltonian:
         return page.as_markdown(f"{self.name}: Hamiltonian", self.sections, ["\n".join(rows)], self.formulas.by_part)
 
     def html(self) -> str:
-        """Return the same as HTML, with formulas that browsers show as they are."""
+        """Return H and the momenta as HTML with formulas in MathML, which browsers show."""
         if self._written is None:
             return self._repr_html_()
         return as_mathml(f"{self.name}: Hamiltonian", self.sections) + f"<p>{self.sentence}</p>"
