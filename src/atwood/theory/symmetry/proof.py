@@ -129,7 +129,7 @@ class Prover:
     # -- displacements as formulas ------------------------------------------------------------------------------------
 
     def fitted(self, states: Sequence[State], moved: Sequence[FloatArray]) -> Generator:
-        """Generator fitted to displacements: affine in the coordinates, for orientations a rotation about an axis."""
+        """Fit a generator to displacements: affine in coordinates, for orientations a rotation about an axis."""
         e = self.quantities.found.equations
         if not self.is_small:
             return None
