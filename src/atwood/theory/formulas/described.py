@@ -198,19 +198,24 @@ class _Writer:
         if isinstance(held, Mapping):
             if any(is_formula(one) and one.free_symbols for one in held.values()):
                 for name, one in held.items():
-                    yield Line(self._left(name), read_formula(one, self._known))
+                    yield self._line(self._left(name), one)
         elif isinstance(held, (tuple, list)):
             if any(is_formula(one) and not _is_letter(one) for one in held):
                 for one in held:
                     yield from self.lines(one)
         elif getattr(held, "is_Matrix", False):
-            rows = tuple(tuple(read_formula(one, self._known) for one in row) for row in held.tolist())
-            if rows:
-                yield Matrix(("M", "M"), rows)
+            if held.rows:
+                yield self._line(("M", "M"), held)
         elif getattr(held, "is_Equality", False):
-            yield Line(self._left(held.lhs), read_formula(held.rhs, self._known))
+            yield self._line(self._left(held.lhs), held.rhs)
         elif is_formula(held):
-            yield Line(("", ""), read_formula(held, self._known))
+            yield self._line(("", ""), held)
+
+    def _line(self, left: tuple[str, str], held: Any) -> Line | Matrix:
+        """Return a formula, or a matrix of them, behind what it is equal to."""
+        if not getattr(held, "is_Matrix", False):
+            return Line(left, read_formula(held, self._known))
+        return Matrix(left, tuple(tuple(read_formula(one, self._known) for one in row) for row in held.tolist()))
 
     def _left(self, name: Any) -> tuple[str, str]:
         """Return a name before a sign of equality, in LaTeX and in plain text."""
