@@ -17,7 +17,7 @@ from atwood.display import LINES, WIDTH, fitted
 from atwood.result.trajectories import Group
 from atwood.table import Table, facts, table
 from atwood_library import Ground, PointMass, Rod
-from atwood_library.scenes import Chain, DoublePendulum, FourBar, HeavyTop, Kepler, SimplePendulum
+from atwood_library.scenes import Chain, DoublePendulum, FourBar, HeavyTop, Kepler, LagrangeTop, SimplePendulum
 
 FACADES = (atwood, atwood.checking, atwood.plotting, atwood.reporting, atwood.solids, atwood.study)
 PUBLIC = {one for room in FACADES for one in (getattr(room, name) for name in room.__all__) if isinstance(one, type)}
@@ -125,6 +125,10 @@ def roots(tmp_path_factory) -> dict[str, object]:
         "start": atwood.solve_initial_values(
             SimplePendulum(), unknowns=["rod.angular_velocity"], conditions={"bob.velocity.x": 1.0}
         ),
+        "symbolic equilibria": atwood.equilibria(DoublePendulum(), symbolic=True),
+        "symbolic modes": atwood.normal_modes(SimplePendulum(), symbolic=True),
+        "top in closed form": atwood.symmetric_top(LagrangeTop()),
+        "free rotation": atwood.free_rotation(moments=(1.0, 2.0, 3.0), spin=(1.0, 0.1, 0.2)),
         "locus": atwood.root_locus(scene, "gravity", [9.0, 10.0, 11.0], at=hanging),
         "branches": atwood.equilibrium_branches(DoublePendulum(), "gravity", (9.0, 10.0)),
         "branch point": atwood.BranchPoint(1.0, dict.fromkeys(angles, 0.0)),
