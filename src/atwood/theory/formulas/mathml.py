@@ -17,7 +17,8 @@ _NAMES |= {"sign": "sgn"}
 _RELATIONS = {"less": "&lt;", "greater": "&gt;", "less_equal": "≤", "logical_and": "∧", "logical_or": "∨", "equal": "="}
 _STYLE = (
     "body { font-family: serif; max-width: 60em; margin: 2em auto; padding: 0 1em } td, th { padding: 0 .8em; "
-    "text-align: left; vertical-align: top } math { font-size: 115% } .line { overflow-x: auto; padding: .3em 0 }"
+    "text-align: left; vertical-align: top } math { font-size: 115% } mtd { text-align: left; padding: .2em } "
+    ".line { overflow-x: auto; padding: .3em 0 }"
 )
 
 
@@ -36,11 +37,12 @@ class _MathML(Printer[str]):
         return f"<msub>{base}{_row(below)}</msub>" if below else base
 
     def _sum(self, terms: Iterable[Term]) -> str:
-        written = ""
-        for term in terms:
-            sign = "<mo>−</mo>" if term.number < 0 else "<mo>+</mo>" if written else ""
-            written += sign + self._term(term)
-        return written or "<mn>0</mn>"
+        return "".join(self.signed(term, not place) for place, term in enumerate(terms)) or "<mn>0</mn>"
+
+    def signed(self, term: Term, is_first: bool) -> str:
+        """Return a term with its sign, which the first one of a sum has only where it is subtracted."""
+        sign = "−" if term.number < 0 else "" if is_first else "+"
+        return (_sign(sign, not is_first) if sign else "") + self._term(term)
 
     def _term(self, term: Term) -> str:
         """Return a term without its sign, what is below as a fraction."""
@@ -69,6 +71,8 @@ class _MathML(Printer[str]):
         is_sum = isinstance(node, Sum) and (bool(raised) or not is_alone)
         if is_sum or (isinstance(node, Call) and (raised or node.function in _RELATIONS)):
             written = _brackets(written)
+        if raised and isinstance(node, Name) and written.startswith("<msub>"):
+            return f"<msubsup>{written.removeprefix('<msub>').removesuffix('</msub>')}{raised}</msubsup>"
         return f"<msup>{_row(written)}{raised}</msup>" if raised else written
 
     def _call(self, node: Call) -> str:
@@ -102,6 +106,11 @@ class _MathML(Printer[str]):
         if node.function in _WAVES and isinstance(node.arguments[0], Name):
             return f"{head}<mo>&#x2061;</mo>{arguments[0]}"
         return f"{head}<mo>&#x2061;</mo>{_brackets('<mo>,</mo>'.join(arguments))}"
+
+
+def _sign(sign: str, is_between: bool = True) -> str:
+    """Return a sign between two terms, or before one."""
+    return f'<mo form="{"infix" if is_between else "prefix"}">{sign}</mo>'
 
 
 def _row(inside: str) -> str:
@@ -138,7 +147,7 @@ def document(title: str, body: str) -> str:
 
 
 def _line(line: Line | Matrix, by_part: bool) -> str:
-    left = f"<mtext>{escape(line.left[1])}</mtext><mo>=</mo>" if line.left[1] else ""
+    left = f"<mtext>{escape(line.left[1])}</mtext>{_sign('=')}" if line.left[1] else ""
     if isinstance(line, Matrix):
         cells = ("".join(f"<mtd>{mathml.formula(one)}</mtd>" for one in row) for row in line.entries)
         table = f"<mtable>{''.join(f'<mtr>{row}</mtr>' for row in cells)}</mtable>"
@@ -149,12 +158,11 @@ def _line(line: Line | Matrix, by_part: bool) -> str:
     ]
     rows[-1] = (rows[-1] or "<mn>0</mn>") + (f"<mtext> {escape(line.right)}</mtext>" if line.right else "")
     shown = "".join(f"<mtr><mtd>{'' if k else left}</mtd><mtd>{row}</mtd></mtr>" for k, row in enumerate(rows))
-    return f'<div class="line"><math><mtable columnalign="right left">{shown}</mtable></math></div>'
+    return f'<div class="line"><math><mtable displaystyle="true">{shown}</mtable></math></div>'
 
 
 def _owned(term: Term, place: int, by_part: bool) -> str:
     """Return a term with its sign, that says on hovering from which parts it comes."""
     tip = f' title="{escape(", ".join(term.owners), quote=True)}"' if term.owners else ""
-    sign = "<mo>+</mo>" if place and term.number > 0 else ""
     said = f"<mtext>&#xa0;&#xa0;[{escape(', '.join(term.owners))}]</mtext>" if by_part and term.owners else ""
-    return f"<mrow{tip}>{sign}{mathml.formula(Sum((term,)))}{said}</mrow>"
+    return f"<mrow{tip}>{mathml.signed(term, not place)}{said}</mrow>"
