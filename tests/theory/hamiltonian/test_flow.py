@@ -36,6 +36,7 @@ def test_angular_momentum_turns_and_momentum_shifts() -> None:
     assert turned.coordinates == (x * sympy.cos(s) - y * sympy.sin(s), x * sympy.sin(s) + y * sympy.cos(s), z)
     assert same(turned.of(px**2 + py**2), px**2 + py**2)
     assert flow_of(px, SPACE, s).coordinates == (x + s, y, z)
+    assert r"x &\to s + x" in flow_of(px, SPACE, s).latex()
     assert turned.transformation(["X", "Y", "Z"], ["A", "B", "C"]).is_canonical
 
 

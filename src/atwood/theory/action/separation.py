@@ -26,6 +26,7 @@ from atwood.theory.formulas.printers import Sympy
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian
 from atwood.theory.hamiltonian.phase_space import EXPRESSION
 from atwood.theory.hamiltonian.point_transformations import PointTransformation, point_transformation_of, start_in
+from atwood.theory.hamiltonian.tidied import without_even
 
 _SHORT = 150
 """Up to so many operations H in other coordinates is tidied up to be read."""
@@ -379,22 +380,9 @@ def _old_momenta(transposed: Sequence[Sequence[Sympy]], momenta: Sequence[Sympy]
 
 
 def _tidied(made: Sympy) -> Sympy:
-    """Return an expression expanded, with no even power of a cosine: sums of squares of sines and cosines are one.
-
-    `sympy.trigsimp` finds more, and can take hours.
-    """
-
-    def without(e: Sympy) -> Sympy:
-        base, power = e.base, int(e.exp)
-        x, sign = base.args[0], -1 if base.func is sympy.cos else 1
-        other = sympy.sin(x) if sign < 0 else sympy.sinh(x)
-        return (1 + sign * other**2) ** (power // 2) * base ** (power % 2)
-
-    def is_even(e: Sympy) -> bool:
-        return bool(e.is_Pow and e.exp.is_Integer and e.exp > 1 and isinstance(e.base, (sympy.cos, sympy.cosh)))
-
+    """Return an expression expanded, with no even power of a cosine, in roots too."""
     made = made.replace(lambda e: bool(e.is_Pow and not e.exp.is_Integer), lambda e: _tidied(e.base) ** e.exp)
-    return sympy.expand(sympy.expand(made).replace(is_even, without))
+    return without_even(made, by_cosines=False)
 
 
 def _read(given: Mapping[str, Any], paths: list[str], where: str) -> dict[str, Sympy]:

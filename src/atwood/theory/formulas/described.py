@@ -28,7 +28,7 @@ from atwood.theory.formulas.page import (
     with_names,
 )
 from atwood.theory.formulas.printers import latex, text
-from atwood.theory.formulas.reading import read_formula
+from atwood.theory.formulas.reading import latex_of, read_formula, text_of
 from atwood.theory.formulas.tree import Name, Symbol, names_in
 
 _LARGE = 16
@@ -220,8 +220,7 @@ class _Writer:
     def _left(self, name: Any) -> tuple[str, str]:
         """Return a name before a sign of equality, in LaTeX and in plain text."""
         if is_formula(name):
-            read = read_formula(name, self._known)
-            return latex.formula(read), text.formula(read)
+            return latex_of(name, self._known), text_of(name, self._known)
         symbol = self._known.get(str(name))
         if symbol is not None:
             return latex.formula(Name(symbol)), text.formula(Name(symbol))
@@ -232,7 +231,7 @@ class _Writer:
         if is_theory(value):
             return repr(value)
         if is_formula(value):
-            return text.formula(read_formula(value, self._known))
+            return text_of(value, self._known)
         if isinstance(value, Mapping):
             return ", ".join(f"{self.fact(name)} = {self.fact(one)}" for name, one in value.items())
         if getattr(value, "shape", None) and math.prod(value.shape) > _LARGE and hasattr(value, "dtype"):

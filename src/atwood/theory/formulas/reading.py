@@ -9,7 +9,7 @@ from fractions import Fraction
 from atwood.lazy_dataclasses import replace
 from atwood.lazy_modules import sympy
 from atwood.model.values.letters import GREEK
-from atwood.theory.formulas.printers import Sympy
+from atwood.theory.formulas.printers import Sympy, latex, text
 from atwood.theory.formulas.tree import (
     ONE,
     Call,
@@ -37,6 +37,16 @@ _LOGIC = {"And": "logical_and", "Or": "logical_or", "Not": "logical_not"}
 def read_formula(formula: Sympy, known: Mapping[str, Symbol] | None = None) -> Sum:
     """Return a formula of sympy as a tree; names that are not known are read as letters with indices."""
     return alone(_Reader(known or {}).node(sympy.sympify(formula)))
+
+
+def text_of(formula: Sympy, known: Mapping[str, Symbol] | None = None) -> str:
+    """Return a formula of sympy in plain text, as in a book."""
+    return text.formula(read_formula(formula, known))
+
+
+def latex_of(formula: Sympy, known: Mapping[str, Symbol] | None = None) -> str:
+    """Return a formula of sympy in LaTeX, as in a book."""
+    return latex.formula(read_formula(formula, known))
 
 
 class _Reader:
@@ -115,9 +125,10 @@ def read_symbol(name: str, moves: bool = False) -> Symbol:
     split = re.fullmatch(rf"([A-Za-z]|{'|'.join(GREEK)})(\d+)", letter)
     if split:
         letter, subscripts = split[1], [split[2], *subscripts]
-    kind = "momentum" if letter == "p" and subscripts and not subscripts[0].isdigit() else "parameter"
+    is_momentum = letter == "p" and subscripts and not subscripts[0].isdigit()
+    kind = "momentum" if is_momentum else "coordinate" if moves else "parameter"
     below = tuple(one for one in subscripts if one)
-    return Symbol(letter, below, unit=_UNITS.get(letter, "1"), kind="coordinate" if moves else kind)
+    return Symbol(letter, below, unit=_UNITS.get(letter, "1"), kind=kind)
 
 
 _UNITS = {"m": "kg", "M": "kg", "I": "kg*m^2", "J": "kg*m^2", "g": "m/s^2"}

@@ -12,8 +12,8 @@ from atwood.lazy_modules import sympy
 from atwood.theory.formulas import page
 from atwood.theory.formulas.mathml import as_mathml
 from atwood.theory.formulas.page import Line, Matrix, Section
-from atwood.theory.formulas.printers import Sympy, latex, text
-from atwood.theory.formulas.reading import read_formula, read_symbol
+from atwood.theory.formulas.printers import Sympy, text
+from atwood.theory.formulas.reading import latex_of, read_formula, read_symbol, text_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,5 +164,4 @@ def _lines(one: Statement) -> tuple[Line | Matrix, ...]:
 
 
 def _head(value: Sympy) -> tuple[str, str]:
-    node = read_formula(value)
-    return latex.formula(node), text.formula(node)
+    return latex_of(value), text_of(value)

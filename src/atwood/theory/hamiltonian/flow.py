@@ -19,6 +19,7 @@ from atwood.errors import SolveError, UnsupportedError, UsageError
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
 from atwood.table import Shown, Table, table
+from atwood.theory.formulas.reading import latex_of, text_of
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian
 from atwood.theory.hamiltonian.phase_space import (
     EXPRESSION,
@@ -66,13 +67,21 @@ class Flow(Shown):
 
     def tables(self) -> tuple[Table, ...]:
         """Return where coordinates and momenta go."""
-        pairs = zip(self.space.given, (*self.coordinates, *self.momenta), strict=True)
-        return (table(("", "~"), [(str(old), str(new)) for old, new in pairs], repr(self)[1:-1]),)
+        rows = [(text_of(old), f"→ {text_of(new)}") for old, new in self._leads_to]
+        return (table(("", "~"), rows, repr(self)[1:-1]),)
+
+    def latex(self) -> str:
+        """Return where coordinates and momenta go as an aligned block of LaTeX."""
+        rows = " \\\\\n".join(rf"{latex_of(old)} &\to {latex_of(new)}" for old, new in self._leads_to)
+        return f"\\begin{{aligned}}\n{rows}\n\\end{{aligned}}"
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
-        pairs = zip(self.space.given, (*self.coordinates, *self.momenta), strict=True)
-        return {"order": self.order, "leads_to": {str(old): str(new) for old, new in pairs}}
+        return {"order": self.order, "leads_to": {str(old): str(new) for old, new in self._leads_to}}
+
+    @property
+    def _leads_to(self) -> list[tuple[Sympy, Sympy]]:
+        return list(zip(self.space.given, (*self.coordinates, *self.momenta), strict=True))
 
     @property
     def coordinates(self) -> tuple[Sympy, ...]:
@@ -159,7 +168,7 @@ class Flow(Shown):
 
     def __repr__(self) -> str:
         told = "exact" if self.order is None else f"to order {self.order}"
-        return f"<Flow of {self.space.shown(self.function)} by {self.parameter}, {told}>"
+        return f"<Flow of {text_of(self.space.shown(self.function))} by {self.parameter}, {told}>"
 
 
 @takes(f=EXPRESSION, space=PHASE_SPACE, s=EXPRESSION, order=optional(whole("an order of 1 or more", 1)))
@@ -291,23 +300,20 @@ class Algebra(Shown):
 
     def latex(self) -> str:
         """Return the table of brackets in LaTeX."""
-        head = " & ".join(["", *map(sympy.latex, self.names)])
-        rows = [
-            " & ".join([sympy.latex(name), *(sympy.latex(one) for one in self.brackets.row(k))])
-            for k, name in enumerate(self.names)
-        ]
+        head = " & ".join(["", *map(latex_of, self.names)])
+        rows = [" & ".join([latex_of(name), *map(latex_of, self.brackets.row(k))]) for k, name in enumerate(self.names)]
         ruled = " \\\\\n".join(rows)
         return f"\\begin{{array}}{{c|{'c' * len(rows)}}}\n{head} \\\\ \\hline\n{ruled}\n\\end{{array}}"
 
     def tables(self) -> tuple[Table, ...]:
         """Return the table of brackets, and what the functions are."""
-        rows = [(str(name), *map(str, self.brackets.row(k))) for k, name in enumerate(self.names)]
+        rows = [(text_of(name), *map(text_of, self.brackets.row(k))) for k, name in enumerate(self.names)]
         said = "they close: an algebra" if self.closes else "they do not close linearly"
-        known = [(str(name), str(one)) for name, one in zip(self.names, self.functions, strict=True)]
+        known = [(text_of(name), text_of(one)) for name, one in zip(self.names, self.functions, strict=True)]
         below = [said, *(f"{{{a}, {b}}} is none of these" for a, b in self.left_over)]
         return (
             table(("", "~"), known, "functions"),
-            table(("{row, column}", *map(str, self.names)), rows, "brackets", ["; ".join(below)]),
+            table(("{row, column}", *map(text_of, self.names)), rows, "brackets", ["; ".join(below)]),
         )
 
     def to_dict(self) -> dict[str, Any]:

@@ -10,21 +10,11 @@ from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
 from atwood.table import Shown, Table, table
-from atwood.theory.formulas.printers import Sympy, latex, text
-from atwood.theory.formulas.reading import read_formula
+from atwood.theory.formulas.printers import Sympy
+from atwood.theory.formulas.reading import latex_of, text_of
 from atwood.theory.oscillations.conditions import NoClosedFormError, Solution, solve_conditions
 from atwood.theory.oscillations.rest import PlainEquations, expand, is_singular, plain_equations
 from atwood.theory.oscillations.stability import stability_of
-
-
-def text_of(value: Sympy) -> str:
-    """Return an expression as plain text."""
-    return text.formula(read_formula(value))
-
-
-def latex_of(value: Sympy) -> str:
-    """Return an expression in LaTeX."""
-    return latex.formula(read_formula(value))
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,9 +21,10 @@ from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.simulation.initialization.start import find_start
 from atwood.table import Shown, Table, facts, table
 from atwood.theory.formulas.printers import Sympy
+from atwood.theory.formulas.reading import latex_of, text_of
 from atwood.theory.formulas.tree import as_fraction, of_pi
 from atwood.theory.oscillations.conditions import NoClosedFormError, Solution, solve_conditions
-from atwood.theory.oscillations.equilibria import SymbolicEquilibrium, described, find_symbolic, latex_of, said, text_of
+from atwood.theory.oscillations.equilibria import SymbolicEquilibrium, described, find_symbolic, said
 from atwood.theory.oscillations.rest import Expansion, PlainEquations, expand, plain_equations
 from atwood.theory.oscillations.spectrum import Eigenvalue, blocks, eigenvalues, of_pencil, on_block, roots_of, short
 
