@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import sympy
 
-from atwood import Scene, UnsupportedError, equations, hamiltonian, point_transformation, reduced, simulate
+from atwood import Scene, UnsupportedError, dynamics, equations, hamiltonian, point_transformation, reduced, simulate
 from atwood.theory.hamiltonian import PointTransformation
 from atwood.theory.hamiltonian.phase_space import vanishes
 from atwood.theory.hamiltonian.tidied import tidied
-from atwood_library import PointMass, Potential
+from atwood_library import Damper, Drag, Force, Ground, PointMass, Potential
 from atwood_library.scenes import SCENES
 
 R, X, Z, phi, theta, t, w = sympy.symbols("r X Z phi theta t omega")
@@ -134,6 +134,39 @@ def test_accelerations_in_a_frame_that_turns_unevenly() -> None:
     first, second = found.accelerations.values()
     assert same(first, 2 * rate * vz + rate**2 * X + a * Z)
     assert same(second, -2 * rate * vx + rate**2 * Z - a * X)
+
+
+@pytest.mark.parametrize("turning", [0.0, 0.7])
+def test_accelerations_have_the_forces_of_dampers_and_loads(turning: float) -> None:
+    """Of a polar chain of transformations, beside the accelerations of the scene itself."""
+    scene = Scene()
+    ground, body = scene.add("ground", Ground()), scene.add("body", PointMass(mass=1.3))
+    damper = scene.add("damper", Damper(damping=0.4))
+    pull, air = scene.add("pull", Force(direction=(1.0, 0.0, 1.0), value=0.7)), scene.add("air", Drag(linear=0.3))
+    for one, other in ((ground.frame, damper.a), (damper.b, body.point), (pull.point, body.point)):
+        scene.connect(one, other)
+    scene.connect(air.point, body.point)
+    place, speed = {"x": 0.6, "z": 0.3}, {"x": -0.4, "z": 1.1}
+    scene.start.update({f"body.position.{axis}": one for axis, one in place.items()})
+    scene.start.update({f"body.velocity.{axis}": one for axis, one in speed.items()})
+    first = point_transformation(
+        scene,
+        {
+            "body.position.x": X * sympy.cos(turning * t) - Z * sympy.sin(turning * t),
+            "body.position.z": X * sympy.sin(turning * t) + Z * sympy.cos(turning * t),
+        },
+        [X, Z],
+    )
+    found = point_transformation(first, {"X": R * sympy.cos(phi), "Z": R * sympy.sin(phi)}, [R, phi])
+    (x, z), (vx, vz) = place.values(), speed.values()
+    size = np.hypot(x, z)
+    along, around = (x * vx + z * vz) / size, (x * vz - z * vx) / size**2 - turning
+    at = dict(zip((*found.coordinates, *found.velocities), (size, np.arctan2(z, x), along, around), strict=True))
+    second, turned = (float(one.xreplace(at | {t: 0} | found.source.values)) for one in found.accelerations.values())
+    model = dynamics(scene)
+    ax, az = model.forward_dynamics(*model.start())
+    assert second - size * (around + turning) ** 2 == pytest.approx((x * ax + z * az) / size, rel=1e-12)
+    assert size * turned + 2 * along * (around + turning) == pytest.approx((x * az - z * ax) / size, rel=1e-12)
 
 
 def test_a_frame_that_accelerates() -> None:

@@ -79,16 +79,34 @@ class PointTransformation(Described):
 
     @cached_property
     def accelerations(self) -> dict[Sympy, Sympy]:
-        """The second derivatives of the new coordinates, solved for, where no forces act but those in L."""
+        """The second derivatives of the new coordinates, solved for: those of dampers and loads included."""
         inertia = sympy.Matrix([[one.diff(v) for v in self.velocities] for one in self.definitions])
         inverse, _ = _inverted(inertia, self.positive)
         moved = [*zip(self.coordinates, self.velocities, strict=True), (sympy.Symbol("t"), 1)]
         right = [
-            self.lagrangian.diff(q) - sum(p.diff(one) * rate for one, rate in moved)
-            for q, p in zip(self.coordinates, self.definitions, strict=True)
+            self.lagrangian.diff(q) - sum(p.diff(one) * rate for one, rate in moved) + force
+            for q, p, force in zip(self.coordinates, self.definitions, self._other_forces(), strict=True)
         ]
         found = (inverse * sympy.Matrix(right)).applyfunc(lambda one: _shorter(sympy.expand(one), self.positive))
         return {sympy.Symbol(f"{q}''"): one for q, one in zip(self.coordinates, found, strict=True)}
+
+    def _other_forces(self) -> Sequence[Sympy]:
+        """Return the generalized forces ``J^T Q`` of dampers and loads, which L does not give."""
+        h, t = self.source, sympy.Symbol("t")
+        if not h.other_forces:
+            return [sympy.Integer(0)] * len(self.coordinates)
+        eq = EquationsOfMotion(h.assembly, h.formulas.expressions, h.formulas.notation)
+        losses, v = eq.rayleigh_function, {one: sympy.Dummy() for one in eq.velocities}
+        slopes = [losses.xreplace(v).diff(one) for one in v.values()]
+        forces = {u: q - one for u, q, one in zip(v, eq.generalized_forces, slopes, strict=True)}
+        rates = self.jacobian * sympy.Matrix(self.velocities) + sympy.Matrix([x.diff(t) for x in self.old.values()])
+        moved = {q.diff(t): rate for q, rate in zip(self.old, rates, strict=True)}
+        moved |= {one: moved[u] for u, one in v.items()}
+        found = self.jacobian.T * sympy.Matrix([forces[q.diff(t)].xreplace(moved).xreplace(self.old) for q in self.old])
+        if found.atoms(sympy.core.function.AppliedUndef):
+            names = ", ".join(h.other_forces)
+            raise UnsupportedError("they depend on more than coordinates and velocities", where=f"{h.name}: {names}")
+        return list(found)
 
     @cached_property
     def old_momenta(self) -> dict[Sympy, Sympy]:
