@@ -295,3 +295,37 @@ def test_turned_moved_and_scaled_scenes_have_the_same_integral() -> None:
     assert abs(float(off.xreplace(there))) < 1e-12
     renamed = separation(kepler(), {"body.position.x": "s*cos(a)", "body.position.z": "s*sin(a)"})
     assert set(map(str, renamed.constants)) == {"p_a", "E"}
+
+
+@pytest.mark.parametrize(
+    ("law", "place", "speed"),
+    [
+        ("-0.7*x**2", -0.5, 0.1),
+        ("-0.7*x**2", 0.5, 0.1),
+        ("0.7/x**2 + 0.4*x**2", -0.9, 0.1),
+        ("1/sin(x)**2", -0.6, -0.1),
+        ("1/sin(x)**2", 6.9, -0.1),
+    ],
+)
+def test_a_coordinate_stays_on_its_side_as_a_function_of_time(law: str, place: float, speed: float) -> None:
+    """Since a turning point the motion is that of a run which begins there."""
+    scene = moving(field(law, space="line"), {"x": place}, {"x": speed})
+    found = separation(scene)
+    [(q, x)] = found.motions.items()
+    [constant] = found.constants
+    values = {**found.values, constant: 1.2 * speed**2 / 2 + float(sympy.sympify(law).subs("x", place))}
+    made = sympy.lambdify(sympy.Symbol("t"), x.xreplace(values).xreplace({sympy.Symbol(f"t_{q}"): 0.0}))
+    run = simulate(moving(scene, {"x": float(made(0.0))}, {"x": 0.0}), t_end=0.4, rtol=1e-12, outputs=5)
+    assert np.allclose([made(t) for t in run.time], run["body.position.x"], rtol=1e-8)
+
+
+def test_a_bead_goes_on_through_the_bottom_of_a_cycloid() -> None:
+    """``W' = p`` on both sides of it, and J of a closed form is ``2 pi (E + m g a)/omega``, ``omega^2 = g/(4 a)``."""
+    found = separation(SCENES["bead-on-wire"](shape="cycloid"))
+    [part] = found.complete.parts
+    values = {**found.values, next(iter(found.constants)): -0.3}
+    momentum = sympy.lambdify(part.coordinate, sympy.sqrt(part.quadrature.square).xreplace(values), "mpmath")
+    across = float(mpmath.quad(momentum, [-0.2, 0.2]))
+    assert difference(part.function().xreplace(values), part.coordinate, -0.2, 0.2) == pytest.approx(across)
+    expected = 2.0 * np.pi * (-0.3 + 9.81) / np.sqrt(9.81 / 4.0)
+    assert [float(one.xreplace(values)) for one in found.actions.values()] in ([], [pytest.approx(expected)])

@@ -8,6 +8,7 @@ coefficients are those of given values.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from functools import cache, cached_property
 from typing import NamedTuple
@@ -86,9 +87,9 @@ class Quadrature:
         return turned * arc * tidied(terms[0].weight / self.root(-a), self.known)
 
     def inverse(self, constant: Sympy, since: Sympy) -> Sympy | None:
-        """Return the coordinate where the derivative by a constant has risen since the turning point of least x.
+        """Return the coordinate where the derivative by a constant has risen since a turning point, if it is one arc.
 
-        None where that derivative is more than one arc.
+        Of two turning points it is that of least x; None where that derivative is more than one arc.
         """
         terms = self._terms(constant)
         if terms is None or len(terms) != 1 or terms[0].power:
@@ -107,13 +108,16 @@ class Quadrature:
         if terms[0].pole is not None and self._number(a) < 0.0:
             x = terms[0].pole - a * self._side(terms[0].pole) / (b / 2 + self._spread * wave(a))
         elif terms[0].pole is None and c != 0:
-            x = (self._spread * wave(c) - b / 2) / c
+            side = -1 if self._number(c) > 0.0 > self._number(c * self.form.x + b / 2) else 1
+            x = (side * self._spread * wave(c) - b / 2) / c
         elif terms[0].pole is None and b != 0:
             x = tidied(b * past**2 / 4 - a / b, self.known)
         else:
             return None
-        back = {self.coordinate: x, self.coordinate**2: sympy.sqrt(x), sympy.cos(self.coordinate): sympy.acos(x)}
-        return back.get(self.form.x)
+        q, turns = self.coordinate, round(self._number(self.coordinate) / (2.0 * math.pi))
+        side = 1 if self._number(q) > 0.0 else -1
+        arc = 2 * sympy.pi * turns + (1 if self._number(q) > 2.0 * math.pi * turns else -1) * sympy.acos(x)
+        return {q: x, q**2: side * sympy.sqrt(x), sympy.cos(q): arc}.get(self.form.x)
 
     @property
     def conic(self) -> tuple[Sympy, Sympy, Sympy] | None:
@@ -169,6 +173,9 @@ class Quadrature:
                     above = (sign * power) // 2  # what is odd below stands above, too
                     odd, even = odd * one ** (sign * power - 2 * above), even * one**above
             odd = sympy.expand(odd)
+            folds = {sympy.cos: (1, -1), sympy.Pow: (0,)}.get(x.func, ())
+            if any(sympy.expand(odd.subs(_x(), one)) == 0 for one in folds):
+                continue  # the motion goes on where x turns back
             if odd.is_polynomial(_x()) and sympy.degree(odd, _x()) <= 2:
                 even *= sympy.sign(self._number(even.xreplace({_x(): x})))
                 return _Form(x, slope, odd, even, 1 if self._number(x.diff(self.coordinate)) > 0.0 else -1)
