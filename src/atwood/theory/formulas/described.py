@@ -177,6 +177,13 @@ def _is_letter(value: Any) -> bool:
     return is_formula(value) and (getattr(value, "is_Symbol", False) or str(value).endswith("(t)"))
 
 
+def line_of(left: tuple[str, str], held: Any, known: Mapping[str, Symbol] | None = None) -> Line | Matrix:
+    """Return a formula, or a matrix of them, behind what it is equal to."""
+    if not getattr(held, "is_Matrix", False):
+        return Line(left, read_formula(held, known))
+    return Matrix(left, tuple(tuple(read_formula(one, known) for one in row) for row in held.tolist()))
+
+
 class _Writer:
     """Writes what a value holds.
 
@@ -198,24 +205,18 @@ class _Writer:
         if isinstance(held, Mapping):
             if any(is_formula(one) and one.free_symbols for one in held.values()):
                 for name, one in held.items():
-                    yield self._line(self._left(name), one)
+                    yield line_of(self._left(name), one, self._known)
         elif isinstance(held, (tuple, list)):
             if any(is_formula(one) and not _is_letter(one) for one in held):
                 for one in held:
                     yield from self.lines(one)
         elif getattr(held, "is_Matrix", False):
             if held.rows:
-                yield self._line(("M", "M"), held)
+                yield line_of(("M", "M"), held, self._known)
         elif getattr(held, "is_Equality", False):
-            yield self._line(self._left(held.lhs), held.rhs)
+            yield line_of(self._left(held.lhs), held.rhs, self._known)
         elif is_formula(held):
-            yield self._line(("", ""), held)
-
-    def _line(self, left: tuple[str, str], held: Any) -> Line | Matrix:
-        """Return a formula, or a matrix of them, behind what it is equal to."""
-        if not getattr(held, "is_Matrix", False):
-            return Line(left, read_formula(held, self._known))
-        return Matrix(left, tuple(tuple(read_formula(one, self._known) for one in row) for row in held.tolist()))
+            yield line_of(("", ""), held, self._known)
 
     def _left(self, name: Any) -> tuple[str, str]:
         """Return a name before a sign of equality, in LaTeX and in plain text."""

@@ -226,8 +226,12 @@ def _single(matrix: Matrix) -> list[Line]:
 
 def as_latex(lines: Sequence[Line | Matrix], by_part: bool = False) -> str:
     """Return equations as one aligned block, for use in display mathematics; by part, each term with its parts."""
-    rows = " \\\\\n".join(row for line in lines for row in _latex_rows(line, by_part))
-    return f"\\begin{{aligned}}\n{rows}\n\\end{{aligned}}"
+    return aligned(row for line in lines for row in _latex_rows(line, by_part))
+
+
+def aligned(rows: Iterable[str]) -> str:
+    """Return rows of LaTeX as an aligned block."""
+    return "\\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}"
 
 
 def as_markdown(title: str, sections: Sequence[Section], tables: Sequence[str] = (), by_part: bool = False) -> str:

@@ -10,10 +10,11 @@ from atwood.errors import UsageError, suggestion
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import sympy
 from atwood.theory.formulas import page
+from atwood.theory.formulas.described import line_of
 from atwood.theory.formulas.mathml import as_mathml
 from atwood.theory.formulas.page import Line, Matrix, Section
 from atwood.theory.formulas.printers import Sympy, text
-from atwood.theory.formulas.reading import latex_of, read_formula, read_symbol, text_of
+from atwood.theory.formulas.reading import latex_of, read_symbol, text_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,12 +156,8 @@ def _letters_of(*values: Sympy | None) -> set[Sympy]:
 def _lines(one: Statement) -> tuple[Line | Matrix, ...]:
     """Return a statement as it is written: a vector that is equal to named components one by one."""
     if isinstance(one.left, sympy.MatrixBase):
-        return tuple(Line(_head(left), read_formula(value)) for left, value in zip(one.left, one.value, strict=True))
-    left = ("", "") if one.left is None else _head(one.left)
-    if isinstance(one.value, sympy.MatrixBase):
-        rows = one.value.tolist()
-        return (Matrix(left, tuple(tuple(read_formula(entry) for entry in row) for row in rows)),)
-    return (Line(left, read_formula(one.value)),)
+        return tuple(line_of(_head(left), value) for left, value in zip(one.left, one.value, strict=True))
+    return (line_of(("", "") if one.left is None else _head(one.left), one.value),)
 
 
 def _head(value: Sympy) -> tuple[str, str]:

@@ -19,6 +19,7 @@ from atwood.errors import SolveError, UnsupportedError, UsageError
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
 from atwood.table import Shown, Table, table
+from atwood.theory.formulas.page import aligned
 from atwood.theory.formulas.reading import latex_of, text_of
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian
 from atwood.theory.hamiltonian.phase_space import (
@@ -72,8 +73,7 @@ class Flow(Shown):
 
     def latex(self) -> str:
         """Return where coordinates and momenta go as an aligned block of LaTeX."""
-        rows = " \\\\\n".join(rf"{latex_of(old)} &\to {latex_of(new)}" for old, new in self._leads_to)
-        return f"\\begin{{aligned}}\n{rows}\n\\end{{aligned}}"
+        return aligned(rf"{latex_of(old)} &\to {latex_of(new)}" for old, new in self._leads_to)
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""

@@ -16,6 +16,7 @@ import numpy as np
 
 from atwood.arguments import BY_PATH, check, command, instance, takes
 from atwood.arrays import FloatArray
+from atwood.display import fitted
 from atwood.errors import StartError, UnsupportedError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
@@ -26,6 +27,7 @@ from atwood.simulation.initialization.start import find_start
 from atwood.theory.equations.equations import EquationsOfMotion
 from atwood.theory.formulas.described import Described
 from atwood.theory.formulas.notation import SYMBOLS as LETTERS
+from atwood.theory.formulas.reading import text_of
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian
 from atwood.theory.hamiltonian.phase_space import EXPRESSION, SYMBOLS, Sympy
 from atwood.theory.hamiltonian.tidied import is_positive, tidied
@@ -132,7 +134,8 @@ class PointTransformation(Described):
         return dict.fromkeys(self.momenta, sympy.Integer(0))
 
     def __repr__(self) -> str:
-        return f"<PointTransformation to {', '.join(map(str, self.coordinates))}: K = {self.hamiltonian}>"
+        names = ", ".join(map(text_of, self.coordinates))
+        return fitted(f"<PointTransformation to {names}: K = {text_of(self.hamiltonian)}>")
 
 
 _SCENE = instance("a scene, an assembly, or what `point_transformation` returns", Model, Assembly, PointTransformation)

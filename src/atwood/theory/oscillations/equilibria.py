@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from atwood.display import fitted
 from atwood.errors import UnsupportedError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
 from atwood.table import Shown, Table, table
+from atwood.theory.formulas.page import aligned
 from atwood.theory.formulas.printers import Sympy
 from atwood.theory.formulas.reading import latex_of, text_of
 from atwood.theory.oscillations.conditions import NoClosedFormError, Solution, solve_conditions
@@ -57,6 +59,10 @@ class SymbolicEquilibrium:
             "stability": self.stability,
         }
 
+    def __repr__(self) -> str:
+        state = ", ".join(f"{path} = {text_of(value)}" for path, value in self.values.items())
+        return fitted(f"<SymbolicEquilibrium {state}; stable: {said(self.stable)}; with these values {self.stability}>")
+
 
 class SymbolicEquilibria(Shown, list[SymbolicEquilibrium]):
     """The states of rest of a scene as formulas."""
@@ -75,15 +81,11 @@ class SymbolicEquilibria(Shown, list[SymbolicEquilibrium]):
         for one in self:
             state = r",\ ".join(latex_of(sympy.Eq(left, right, evaluate=False)) for left, right in self._state(one))
             rows.append(rf"{state} &\quad {_where(one.exists, 0)} &\quad {_where(one.stable, 1)}")
-        return "\\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}"
+        return aligned(rows)
 
     def tables(self) -> tuple[Table, ...]:
         """Return each state, where it exists and where it is stable, and what it is with the values of the scene."""
-        rows = []
-        for one in self:
-            state = ", ".join(f"{text_of(left)} = {text_of(right)}" for left, right in self._state(one))
-            anything = "".join(f", any {text_of(self._plain.letter(path))}" for path in one.free)
-            rows.append((state + anything, said(one.exists), said(one.stable), one.stability))
+        rows = [(state_of(self._plain, one), said(one.exists), said(one.stable), one.stability) for one in self]
         title = f"{self.scene}: {len(self)} state{'s' if len(self) != 1 else ''} of rest in closed form"
         headings = ("state", "exists where", "stable where", "with these values")
         return (table(headings, rows, title, [_SIGNS]),)
@@ -95,6 +97,12 @@ class SymbolicEquilibria(Shown, list[SymbolicEquilibrium]):
 
 
 _SIGNS = "Parameters have the sign that they have in the scene; stable: no small deviation grows."
+
+
+def state_of(plain: PlainEquations, one: SymbolicEquilibrium) -> str:
+    """Return where a state of rest is as plain text, coordinates that may be anything last."""
+    told = [f"{text_of(plain.letter(path))} = {text_of(v)}" for path, v in one.values.items() if path not in one.free]
+    return ", ".join([*told, *(f"any {text_of(plain.letter(path))}" for path in one.free)])
 
 
 def said(condition: Sympy | None) -> str:

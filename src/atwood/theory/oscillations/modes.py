@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
-from atwood.display import count_of
+from atwood.display import count_of, fitted
 from atwood.errors import UnsupportedError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
@@ -20,11 +20,12 @@ from atwood.lazy_modules import sympy
 from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.simulation.initialization.start import find_start
 from atwood.table import Shown, Table, facts, table
+from atwood.theory.formulas.page import aligned
 from atwood.theory.formulas.printers import Sympy
 from atwood.theory.formulas.reading import latex_of, text_of
 from atwood.theory.formulas.tree import as_fraction, of_pi
 from atwood.theory.oscillations.conditions import NoClosedFormError, Solution, solve_conditions
-from atwood.theory.oscillations.equilibria import SymbolicEquilibrium, described, find_symbolic, said
+from atwood.theory.oscillations.equilibria import SymbolicEquilibrium, described, find_symbolic, said, state_of
 from atwood.theory.oscillations.rest import Expansion, PlainEquations, expand, plain_equations
 from atwood.theory.oscillations.spectrum import Eigenvalue, blocks, eigenvalues, of_pencil, on_block, roots_of, short
 
@@ -58,6 +59,10 @@ class SymbolicMode:
     def angular_frequency(self) -> Sympy | None:
         """omega, rad/s."""
         return None if self.square is None else sympy.sqrt(self.square)
+
+    def __repr__(self) -> str:
+        numbers, head = ", ".join(map(_number, self.number)), "" if self.square is None else "ω² = "
+        return fitted(f"<SymbolicMode {head}{_formula(self)}; s = {numbers} 1/s with these values>")
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,7 +223,7 @@ class SymbolicModes(Shown):
             left, value = (rf"\omega_{{{k}}}^2", one.square) if one.square is not None else (f"s_{{{k}}}", one.rate)
             rows.append(f"{left} &= {latex_of(value)}" if value is not None else f"0 &= {latex_of(one.polynomial)}")
             rows += [rf"A_{{{k}}} &\propto ({', '.join(map(latex_of, shape.values()))})" for shape in one.shapes]
-        return "\\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}"
+        return aligned(rows)
 
     def to_data(self) -> dict[str, Any]:
         """Return it as plain data, formulas in the words of Python."""
@@ -245,20 +250,17 @@ class SymbolicModes(Shown):
         """Return where it rests, both energies to second order, and the modes."""
         kinetic, potential = self.energies
         letters = {path: text_of(self.plain.letter(path)) for path in self.plain.paths}
-        known = (
-            f"any {letters[path]}" if path in self.rest.free else f"{letters[path]} = {text_of(value)}"
-            for path, value in self.rest.values.items()
-        )
-        state = ", ".join(known)
-        rows = [("about", state), ("exists where", said(self.rest.exists)), ("stable where", said(self.rest.stable))]
+        rows = [
+            ("about", state_of(self.plain, self.rest)),
+            ("exists where", said(self.rest.exists)),
+            ("stable where", said(self.rest.stable)),
+        ]
         rows += [("T", text_of(kinetic)), ("V", text_of(potential))]
         shown = []
         for k, one in enumerate(self.modes, 1):
-            value = one.rate if one.square is None else one.square
-            formula = f"{text_of(one.polynomial)} = 0" if value is None else text_of(value)
             shapes = "; ".join(" : ".join(map(text_of, shape.values())) for shape in one.shapes)
             numbers = ", ".join(_number(value) for value in one.number)
-            shown.append((str(k), formula, shapes, numbers))
+            shown.append((str(k), _formula(one), shapes, numbers))
         is_plain = self.expansion.damping.is_zero_matrix
         headings = ("mode", "ω²" if is_plain else "ω², or s", " : ".join(letters.values()), "s with these values, 1/s")
         return facts(rows, f"{self.scene}: {count_of(len(self), 'mode')} as formulas"), table(headings, shown)
@@ -267,6 +269,12 @@ class SymbolicModes(Shown):
 
 
 _MATRICES = ("mass", "damping", "stiffness")
+
+
+def _formula(one: SymbolicMode) -> str:
+    """Return omega^2, or s; the characteristic equation where these have no closed form."""
+    value = one.rate if one.square is None else one.square
+    return f"{text_of(one.polynomial)} = 0" if value is None else text_of(value)
 
 
 def _number(value: complex) -> str:
