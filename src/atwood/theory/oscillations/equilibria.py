@@ -79,7 +79,8 @@ class SymbolicEquilibria(Shown, list[SymbolicEquilibrium]):
         """Return them as an aligned block of LaTeX, a line for each."""
         rows = []
         for one in self:
-            state = r",\ ".join(latex_of(sympy.Eq(left, right, evaluate=False)) for left, right in self._state(one))
+            held = ((self._plain.letter(path), value) for path, value in one.values.items() if path not in one.free)
+            state = r",\ ".join(latex_of(sympy.Eq(*pair, evaluate=False)) for pair in held)
             rows.append(rf"{state} &\quad {_where(one.exists, 0)} &\quad {_where(one.stable, 1)}")
         return aligned(rows)
 
@@ -89,9 +90,6 @@ class SymbolicEquilibria(Shown, list[SymbolicEquilibrium]):
         title = f"{self.scene}: {len(self)} state{'s' if len(self) != 1 else ''} of rest in closed form"
         headings = ("state", "exists where", "stable where", "with these values")
         return (table(headings, rows, title, [_SIGNS]),)
-
-    def _state(self, one: SymbolicEquilibrium) -> list[tuple[Sympy, Sympy]]:
-        return [(self._plain.letter(path), value) for path, value in one.values.items() if path not in one.free]
 
     __str__ = Shown.as_text
 
