@@ -123,3 +123,10 @@ def test_what_is_refused() -> None:
         rigid_body(DoublePendulum())
     with pytest.raises(UsageError, match="topp: there is no such rigid body"):
         rigid_body(LagrangeTop(), "topp")
+
+
+def test_a_body_is_symmetric_about_its_third_axis_or_not() -> None:
+    assert "I_2" in rigid_body(IntermediateAxis()).numbers
+    assert "I_2" not in rigid_body(FreeSymmetricBody(), symmetric=True).numbers
+    with pytest.raises(UsageError, match="not equal"):
+        rigid_body(IntermediateAxis(), symmetric=True)

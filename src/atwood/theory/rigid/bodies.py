@@ -155,7 +155,7 @@ def rigid_body(
     angles
         Axes of three turns, see `rotation_kinematics`.
     symmetric
-        Whether I_1 and I_2 are equal; so they are where those of the scene's body are.
+        Whether I_1 and I_2 of a body in letters are equal; of a scene's body they must be.
     symbols
         Other letters, such as ``{"I_1": "A"}``.
 
@@ -166,7 +166,12 @@ def rigid_body(
         angles; ``energy`` and ``total``: of the whole motion. `FormulaSheet.numbers` are those of the scene's body.
     """
     own = None if scene is None else principal_body(assembly_of(scene), body)
-    symmetric = symmetric or (own is not None and bool(abs(own.moments[0] - own.moments[1]) <= 1e-9 * max(own.moments)))
+    if own is not None:
+        are_equal = bool(abs(own.moments[0] - own.moments[1]) <= 1e-9 * max(own.moments))
+        if symmetric and not are_equal:
+            told = "its moments of inertia across the third axis are {:.6g} and {:.6g}".format(*own.moments)
+            raise UsageError(f"{told}, not equal", where=own.part, advice="Leave out `symmetric`.")
+        symmetric = are_equal
     t, letters = sympy.Symbol("t"), sympy.symbols("I_1 I_1 I_3" if symmetric else "I_1 I_2 I_3")
     spins = list(rotation_kinematics(angles)["omega_body"])
     rates = [sympy.Function(name)(t).diff(t) for name in ("phi", "theta", "psi")]
