@@ -157,8 +157,6 @@ def _show(value: Any, command: str, assembly: Assembly, written: str, picture: P
     """Write what was found to standard output, and draw it."""
     scene = assembly.flat.name
     several = value if isinstance(value, (list, tuple)) and not isinstance(value, Shown) else [value]
-    if written == "python" and not hasattr(value, written):
-        raise UsageError("numbers are not written so: --python is of formulas", advice="Give --symbolic too.")
     if picture is not None:
         if type(several[0]).__name__ not in _PICTURES:
             raise UsageError("formulas are not drawn", where="--plot", advice="Leave out --symbolic.")

@@ -231,10 +231,10 @@ def test_the_commands_write_formulas() -> None:
     data = json.loads(ran("modes", "mass-spring-chain", "--symbolic", "--json"))
     assert data["coordinates"] == ["m1.displacement", "m2.displacement"]
     assert "g > a ω²" in ran("equilibria", "rotating-hoop-driven", "--symbolic")
-    for wrong in (("modes", "double-pendulum", "--latex"), ("equilibria", "four-bar", "--symbolic")):
-        done = CliRunner().invoke(main, wrong)
-        assert done.exit_code != 0
-        assert "symbolic" in done.output
+    assert r"\begin{tabular}" in ran("modes", "double-pendulum", "--latex")
+    done = CliRunner().invoke(main, ("equilibria", "four-bar", "--symbolic"))
+    assert done.exit_code != 0
+    assert "symbolic" in done.output
 
 
 _EQUAL = {"rod1.length": "l", "rod2.length": "l", "bob1.mass": "m", "bob2.mass": "m"}
