@@ -20,7 +20,7 @@ from atwood.integrators.methods import EXPLICIT, TAYLOR, Task
 from atwood.integrators.protocol import SolverOptions, Statistics, Status, StepResult
 from atwood.simulation.problem.explicit_scene import explicit_problem
 from atwood.simulation.problem.preparation import pack_state
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.problem import SceneProblem
 
 __all__ = ["Prepared", "explicit_run", "ida_run", "ida_session", "prepare", "taylor_run", "whole_run"]
 
@@ -40,7 +40,7 @@ class Prepared:
     """
 
     mechanism: Mechanism
-    plan: Plan
+    plan: SceneProblem
     y: FloatArray
     yp: FloatArray
 

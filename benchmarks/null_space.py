@@ -16,8 +16,8 @@ from timing import best_of, options, print_table, ratio, save
 from atwood import Scene, simulate
 from atwood.integrators.ida import library as sundials_library, native as ida_native, sundae as ida_sundae
 from atwood.integrators.protocol import Budget, SolverOptions, Statistics, Status
-from atwood.simulation.problem.preparation import make_plan, pack_state
-from atwood.simulation.problem.problem import Plan
+from atwood.simulation.problem.preparation import make_problem, pack_state
+from atwood.simulation.problem.problem import SceneProblem
 from atwood_library import Ground, Link, Pivot
 from atwood_library.scenes import FourBar, SliderCrank
 
@@ -58,18 +58,18 @@ CASES: dict[str, tuple[Callable[[], Scene], float]] = {
 }
 
 
-def runs_of(scene: Scene, t_end: float, rtol: float) -> dict[str, Callable[[], tuple[Statistics, Plan]]]:
+def runs_of(scene: Scene, t_end: float, rtol: float) -> dict[str, Callable[[], tuple[Statistics, SceneProblem]]]:
     """Return what runs each of the three."""
     first = simulate(scene, solver="ida", t_end=t_end, rtol=1e-4, outputs=2, samples=1).run
     segment, length = first.segments[0], first.start.length
     q, u = segment.coordinates[:, 0], segment.speeds[:, 0]
 
-    def prepared() -> tuple[Plan, SolverOptions, Any, Any]:
-        plan = make_plan(segment.assembly, 0.0, q, u, length, t_end)
+    def prepared() -> tuple[SceneProblem, SolverOptions, Any, Any]:
+        plan = make_problem(segment.assembly, 0.0, q, u, length, t_end)
         settings = SolverOptions(relative_tolerance=rtol, absolute_tolerances=plan.tolerances(rtol, {}), horizon=t_end)
         return plan, settings, *pack_state(plan, 0.0, q, u)
 
-    def native(compiled: bool) -> tuple[Statistics, Plan]:
+    def native(compiled: bool) -> tuple[Statistics, SceneProblem]:
         plan, settings, y, yp = prepared()
         tuning = ida_native.IdaTuning(angle_like=plan.angles)
         problem = plan.problem() if compiled else replace(plan.problem(), native=None)
@@ -79,7 +79,7 @@ def runs_of(scene: Scene, t_end: float, rtol: float) -> dict[str, Callable[[], t
                 raise SystemExit("a run did not reach its end")
             return session.statistics, plan
 
-    def sundae() -> tuple[Statistics, Plan]:
+    def sundae() -> tuple[Statistics, SceneProblem]:
         plan, settings, y, yp = prepared()
         session = ida_sundae.open_session(plan.problem(), settings, 0.0, y, yp, Budget(poll=plan.between_steps))
         return (session.advance(t_end) and session.statistics), plan
@@ -92,7 +92,7 @@ def measure(name: str, rtol: float, repeat: int) -> dict[str, Any]:
     make, t_end = CASES[name]
     seen: dict[str, tuple[int, int]] = {}
 
-    def timed(key: str, run: Callable[[], tuple[Statistics, Plan]]) -> Callable[[], float]:
+    def timed(key: str, run: Callable[[], tuple[Statistics, SceneProblem]]) -> Callable[[], float]:
         def once() -> float:
             statistics, plan = run()
             seen[key] = (statistics.steps, plan.switches)

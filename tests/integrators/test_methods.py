@@ -207,7 +207,7 @@ def test_stiffness_is_noticed(pair: Tableau) -> None:
     problem = ExplicitProblem(2, stiff)
     stepper = CompiledStepper(problem, options, pair)
     session = ExplicitSession(
-        problem, options, stepper, 0.0, np.ones(2), Budget(), leave=lambda t, y: bool(left.append(t) or True)
+        problem, options, stepper, 0.0, np.ones(2), Budget(), on_stiff=lambda t, y: bool(left.append(t) or True)
     )
     assert session.advance(10.0).status is Status.STIFF
     assert left[0] < 1.0

@@ -25,7 +25,7 @@ from atwood.mechanics.kinematics.mechanism import (
 )
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.model.declare.law_results import Carried
-from atwood.model.local.bound import ParameterTable
+from atwood.model.local.bound import ParameterTable, check_directions
 from atwood.model.local.flatten import FlatScene
 from atwood.model.local.laws import localize
 from atwood.model.local.parts import LocalPart
@@ -45,6 +45,7 @@ def read_mechanism(
 ) -> Mechanism:
     """Read the laws of all parts and find nodes, joints and bodies."""
     table, space = _empty_table(flat), flat.space
+    check_directions(flat.parts, space)
     check_components(flat.parts, space)
     found = _read_laws(flat, modes, table, known_line_signs)
     line_signs = known_line_signs if space.is_line else None

@@ -224,7 +224,7 @@ def by_name_only(value: Any) -> list[str]:
     """Return what a Python function takes by name only."""
     try:
         given = inspect.signature(value).parameters.values() if callable(value) else ()
-    except (TypeError, ValueError):
+    except Exception:  # whatever somebody's own object can raise; as a function it is refused by name
         return []
     empty = inspect.Parameter.empty
     return [one.name for one in given if one.kind is one.KEYWORD_ONLY and one.default is empty]

@@ -151,16 +151,27 @@ def read_parameter(part: Part, spec: ParameterSpec, table: ParameterTable) -> An
         return _with_symbols(value, name, table)
     if value is None or spec.integer or spec.choices or spec.text or spec.function_of or spec.array:
         return value
-    if spec.turning and table.space.is_planar and (value[0] != 0.0 or value[2] != 0.0):
-        advice = "Leave its x and z components zero: (0, -1, 0) turns counter-clockwise."
-        raise ParameterError("in a plane things turn about its normal only", where=name, advice=advice)
-    if spec.direction and not spec.turning and table.space.is_planar and value[1] != 0.0:
-        raise ParameterError("it points out of the plane", where=name, advice="Leave its y component zero.")
     if spec.size is None:
         return table.scalar(name, value, spec.structural)
     axes = "xyz" if spec.size == 3 else [str(i) for i in range(spec.size)]
     made = [table.scalar(f"{name}.{axis}", one, spec.structural) for axis, one in zip(axes, value, strict=True)]
     return Vector(*made) if spec.size == 3 else tuple(made)
+
+
+def check_directions(parts: Mapping[str, Part], space: Space) -> None:
+    """Refuse directions that have no meaning in a plane: those out of it, and axes of turning within it."""
+    if not space.is_planar:
+        return
+    for path, part in parts.items():
+        for spec in part.component.parameter_specs().values():
+            value, where = part.values[spec.name], f"{path}.{spec.name}"
+            if value is None or not (spec.direction or spec.turning):
+                continue
+            if spec.turning and (value[0] != 0.0 or value[2] != 0.0):
+                advice = "Leave its x and z components zero: (0, -1, 0) turns counter-clockwise."
+                raise ParameterError("in a plane things turn about its normal only", where=where, advice=advice)
+            if not spec.turning and value[1] != 0.0:
+                raise ParameterError("it points out of the plane", where=where, advice="Leave its y component zero.")
 
 
 def _with_symbols(function: Function, path: str, table: ParameterTable) -> Function:
