@@ -176,12 +176,10 @@ def _show(value: Any, command: str, assembly: Assembly, written: str, picture: P
         says = vars(type(one)).get("__str__")
         if isinstance(one, Shown) and says in (None, Shown.as_text):
             out.show(*one.tables())
-        elif isinstance(one, Described) or is_formula(one):
-            out.line((_page(one, assembly).text(), ""))
-        elif hasattr(one, "text") or any("__str__" in vars(base) for base in type(one).__mro__[:-1]):
-            out.line((one.text() if hasattr(one, "text") else str(one), ""))
+        elif hasattr(one, "text") or is_formula(one) or all("__str__" not in vars(b) for b in type(one).__mro__[:-1]):
+            out.line((_as_written(one, "text", assembly), ""))
         else:
-            out.line((_page(one, assembly).text(), ""))
+            out.line((str(one), ""))
     if picture is not None:
         out.files(plotted=picture)
     elif type(several[0]).__name__ == "PhasePortrait":

@@ -71,6 +71,19 @@ def test_forces_of_constraints_and_of_the_hamiltonian_have_parts() -> None:
     assert "source" in hamiltonian(ChargedParticle(), by_part=True).latex()
 
 
+def test_terms_in_the_momenta_name_the_parts_without_which_they_would_be_others() -> None:
+    """Of the double pendulum the lower bob alone gives ``p2^2 / (2 m2 l2^2)``, whatever the upper one is."""
+    h = hamiltonian(DoublePendulum(), by_part=True)
+    p1, p2 = h.momenta
+    others = h.formulas.notation.symbols
+    masses = {one.path: objects.letter(one) for one in others.values() if one.path.endswith(".mass")}
+    kinetic = [term for term in h.formula.terms if objects.formula(type(h.formula)((term,))).has(p1, p2)]
+    assert [term.owners for term in kinetic] == [("bob1", "bob2"), ("bob2",)]
+    for term in kinetic:
+        one = objects.formula(type(h.formula)((term,)))
+        assert {f"{path}.mass" for path in term.owners} == {path for path, m in masses.items() if one.has(m)}
+
+
 def test_equations_that_are_no_sum_over_parts_are_left_without() -> None:
     eq = equations(RollingDisc(), by_part=True)
     assert all(not term.owners for row in eq.written_by_part.rows for term in row.terms)

@@ -14,23 +14,15 @@ from atwood.errors import UnsupportedError, UsageError, suggestion
 from atwood.expr import Expression
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import lagrangian_of, rows_by_part
-from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of
 from atwood.simulation.problem.arguments import FORM, ORIENTATION
 from atwood.theory.equations.formulas import EquationFormulas, Parameters, solve_closures
-from atwood.theory.equations.pages import (
-    as_data,
-    equation_lines,
-    html_of,
-    mathml_of,
-    module_of,
-    sections_of,
-    symbol_lines,
-    symbol_table,
-)
+from atwood.theory.equations.pages import Structure, as_data, equation_lines, module_of, page_of_equations
 from atwood.theory.formulas import page
+from atwood.theory.formulas.described import Page, Paged
 from atwood.theory.formulas.notation import SYMBOLS, notation_of
 from atwood.theory.formulas.page import Section
 from atwood.theory.formulas.printers import Sympy, objects
@@ -71,7 +63,7 @@ class PartOfEquations:
     rows: tuple[Sympy, ...]
 
 
-class EquationsOfMotion(EquationFormulas):
+class EquationsOfMotion(Paged, EquationFormulas):
     """The equations of motion of a scene, to be read.
 
     Lagrange's equations with multipliers, ``d/dt dL/dq' - dL/dq + dR/dq' = Q + G^T lambda`` with ``g(q, t) = 0`` and
@@ -281,39 +273,34 @@ class EquationsOfMotion(EquationFormulas):
 
     # -- to be shown --------------------------------------------------------------------------------------------------
 
+    @cached_property
+    def _page(self) -> Page | Structure:
+        if not self.is_readable:
+            return self.structure
+        return page_of_equations(self, self.written_by_part if self.by_part else self.written)
+
+    @property
+    def _hovering(self) -> Page | Structure:
+        """The page on which each term says from which parts it comes."""
+        return page_of_equations(self, self.written_by_part) if self.is_readable else self.structure
+
     def latex(self) -> str:
         """Return the equations of motion, and the constraints if there are any, as an aligned block of LaTeX."""
         if not self.is_readable:
-            said = self.structure.sentence.replace("_", r"\_")
-            return rf"\text{{{said}}}"
-        lines = equation_lines(self)
+            return self.structure.latex()
+        lines = equation_lines(self.written_by_part if self.by_part else self.written)
         shared = page.shared_lines((one.formula for one in lines), self.book.shared)
         return page.as_latex([*lines, *shared], self.by_part)
 
-    def markdown(self) -> str:
-        """Return a page with symbols, energies, momenta, equations and matrices, formulas between dollar signs."""
-        if not self.is_readable:
-            return f"# {self.name}\n\n{self.structure.sentence}\n\n```\n{self.structure.picture()}\n```\n"
-        return page.as_markdown(f"{self.name} ({self.form} form)", self.sections, [symbol_table(self)], self.by_part)
-
     def html(self) -> str:
         """Return symbols, energies and equations as HTML with formulas in MathML, which browsers show."""
-        if not self.is_readable:
-            return self._repr_html_()
-        return mathml_of(self)
-
-    def text(self) -> str:
-        """Return the same in plain text, for a terminal."""
-        if not self.is_readable:
-            return f"{self.structure.sentence}\n\n{self.structure.picture()}"
-        return "\n".join(
-            ["Symbols", *(line.rstrip() for line in symbol_lines(self)), "", page.as_text(self.sections, self.by_part)]
-        )
+        return self._hovering.html()
 
     @cached_property
     def sections(self) -> list[Section]:
         """What a page of them says, section by section."""
-        return sections_of(self)
+        found = self._page
+        return list(found.sections) if isinstance(found, Page) else []
 
     def python(self) -> str:
         """Return a module of Python that computes and solves the equations, with nothing but `math` and NumPy.
@@ -342,9 +329,14 @@ class EquationsOfMotion(EquationFormulas):
         return f"$\\displaystyle {self.latex()}$"
 
     def _repr_html_(self) -> str:
-        if not self.is_readable:
-            return f"<p>{self.structure.sentence}</p>{self.structure.svg()}"
-        return html_of(self)
+        found = self._hovering
+        if isinstance(found, Page):
+            found = replace(found, sections=tuple(one for one in found.sections if one.title not in _NOT_IN_NOTEBOOKS))
+        return found.notebook()
+
+
+_NOT_IN_NOTEBOOKS = ("Momenta", "Generalized forces", "Kinematics", "Mass matrix", "Constraint Jacobian")
+"""Headings of what a notebook leaves to the pages."""
 
 
 def _sympy_matrix(entries: Sequence[Sequence[Sum]]) -> Sympy:

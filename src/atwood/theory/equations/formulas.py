@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from itertools import combinations
-from typing import Any, Literal, TypeAlias
+from typing import Literal
 
 from atwood.errors import UnsupportedError
 from atwood.expr import Expression, SparseMatrix, count_operations, depends_on, substitute, vjp
@@ -25,6 +25,7 @@ from atwood.lazy_modules import sympy
 from atwood.theory.equations.pages import Structure, structure_of
 from atwood.theory.formulas.book import Book
 from atwood.theory.formulas.notation import Notation, momentum_symbol, with_momenta
+from atwood.theory.formulas.printers import Sympy
 from atwood.theory.formulas.tree import Name, Sum, Symbol, cost
 
 _READABLE_COORDINATES, _READABLE_OPERATIONS = 12, 2_500
@@ -282,9 +283,6 @@ def _as_condition(one: Relation) -> Expression:
         return one.difference.graph.node(one.kind, (one.difference, zero))
     return one.difference if one.kind == "nonzero" else algebra.unary(one.kind, one.difference)
 
-
-Sympy: TypeAlias = Any
-"""A sympy object."""
 
 _LONGEST = 250
 """Equations of more operations are not looked at: nobody would solve them by hand."""

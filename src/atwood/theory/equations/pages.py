@@ -18,9 +18,8 @@ from atwood.expr import dependencies, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian
 from atwood.lazy_dataclasses import dataclass
-from atwood.table import table
 from atwood.theory.formulas import page
-from atwood.theory.formulas.mathml import as_mathml
+from atwood.theory.formulas.described import Page
 from atwood.theory.formulas.page import Line, Matrix, Section
 from atwood.theory.formulas.printers import code, latex, text
 from atwood.theory.formulas.tree import Call, Name, Node, Sum, Symbol, names_in
@@ -33,20 +32,20 @@ if TYPE_CHECKING:
 _NOTHING = ("", "")
 
 
-def equation_lines(eq: EquationsOfMotion) -> list[Line]:
+def equation_lines(written: Written) -> list[Line]:
     """Return the equations of motion and the constraints."""
-    return [Line(_NOTHING, one, "= 0") for one in (*_written(eq).rows, *_written(eq).constraints)]
+    return [Line(_NOTHING, one, "= 0") for one in (*written.rows, *written.constraints)]
 
 
-def _written(eq: EquationsOfMotion) -> Written:
-    """Return the formulas as a page shows them."""
-    return eq.written_by_part if eq.by_part else eq.written
+def page_of_equations(eq: EquationsOfMotion, written: Written) -> Page:
+    """Return the page of all that is to be said of equations of motion, with formulas as they are written."""
+    title = f"{eq.name} ({eq.form} form)"
+    return Page(title, tuple(_sections(eq, written)), symbols=tuple(_shown(eq)), by_part=eq.by_part)
 
 
-def sections_of(eq: EquationsOfMotion) -> list[Section]:
-    """Return all that is to be said of equations of motion."""
-    written, found, notation = _written(eq), eq.expressions, eq.notation
-    sections = [_energies(eq)]
+def _sections(eq: EquationsOfMotion, written: Written) -> list[Section]:
+    found, notation = eq.expressions, eq.notation
+    sections = [_energies(written)]
     own = [notation.velocities[u][0] for u in found.velocities]
     for title, letter, formulas in (("Momenta", "p", eq.momenta_shown), ("Generalized forces", "Q", written.forces)):
         lines = [
@@ -56,7 +55,7 @@ def sections_of(eq: EquationsOfMotion) -> list[Section]:
         ]
         if lines:
             sections.append(Section(title, tuple(lines)))
-    lines = equation_lines(eq)
+    lines = equation_lines(written)
     sections.append(Section("Equations of motion", tuple(lines[: len(written.rows)])))
     if written.constraints:
         sections.append(Section("Constraints", tuple(lines[len(written.rows) :]), _multipliers(eq)))
@@ -78,8 +77,7 @@ def sections_of(eq: EquationsOfMotion) -> list[Section]:
     return page.with_names(sections, notation.legend)
 
 
-def _energies(eq: EquationsOfMotion) -> Section:
-    written = _written(eq)
+def _energies(written: Written) -> Section:
     lines = [Line(("T", "T"), written.kinetic), Line(("V", "V"), written.potential)]
     note = "$L = T - V$."
     if written.linear.terms:
@@ -107,56 +105,6 @@ def _shown(eq: EquationsOfMotion) -> list[Symbol]:
     formulas += [*written.constraints, *(value for _, value in eq.book.shared)]
     used = {name.symbol for name in names_in(formulas)}
     return [one for one in eq.legend if one.kind != "parameter" or one in used]
-
-
-def symbol_table(eq: EquationsOfMotion) -> str:
-    """Return the symbols as a table in Markdown."""
-    rows = ["| symbol | stands for | unit | value |", "|---|---|---|---|"]
-    for one in _shown(eq):
-        value = "" if one.value is None else f"{one.value:.6g}"
-        unit = "" if one.unit == "1" else one.unit
-        rows.append(f"| ${latex.letter(one)}$ | `{one.path}` | {unit} | {value} |")
-    return "\n".join(rows)
-
-
-def symbol_lines(eq: EquationsOfMotion) -> list[str]:
-    """Return the symbols in plain text, a line each."""
-    rows = []
-    for one in _shown(eq):
-        unit = "" if one.unit == "1" else one.unit
-        rows.append((text.letter(one), one.path, f"{one.value:.6g} {unit}" if one.value is not None else unit))
-    widths = [max(page.width(row[i]) for row in rows) for i in range(2)]
-    return [
-        "  " + "  ".join(cell + " " * (width - page.width(cell)) for cell, width in zip(row, (*widths, 0), strict=True))
-        for row in rows
-    ]
-
-
-def html_of(eq: EquationsOfMotion) -> str:
-    """Return the energies and equations for a notebook; each term says on hovering from which parts it comes."""
-    return page.as_html(f"{eq.name} ({eq.form} form)", _sections_by_part(eq), by_part=eq.by_part)
-
-
-def mathml_of(eq: EquationsOfMotion) -> str:
-    """Return symbols, energies and equations as HTML that browsers show; terms say from which parts they come."""
-    rows = ((text.letter(one), one.path, one.unit, "" if one.value is None else one.value) for one in _shown(eq))
-    symbols = table(("symbol", "stands for", "unit", "value>"), rows)
-    return as_mathml(f"{eq.name} ({eq.form} form)", _sections_by_part(eq), [symbols.html()], eq.by_part)
-
-
-def _sections_by_part(eq: EquationsOfMotion) -> list[Section]:
-    """Return energies, equations and constraints, each term with the parts that it comes from."""
-    written = eq.written_by_part
-    lines = [Line((letter, letter), one) for letter, one in (("T", written.kinetic), ("V", written.potential))]
-    rows = [Line(_NOTHING, row, "= 0") for row in written.rows]
-    shown = [Section("Energies", tuple(lines)), Section("Equations of motion", tuple(rows))]
-    if eq.written.constraints:
-        shown.append(Section("Constraints", tuple(equation_lines(eq)[len(rows) :])))
-    used = page.shared_lines(
-        (one for section in shown for line in section.lines for one in page.formulas_of(line)), eq.book.shared
-    )
-    shown += [Section("Shared terms", used)] if used else []
-    return shown
 
 
 def as_data(eq: EquationsOfMotion) -> dict[str, Any]:
@@ -230,6 +178,24 @@ class Structure:
             f"its equations of motion take {self.operations} operations, with {filled} of {n * n} entries in the mass "
             f"matrix{held}."
         )
+
+    def text(self) -> str:
+        """Return counts and pattern as plain text."""
+        return f"{self.sentence}\n\n{self.picture()}"
+
+    def latex(self) -> str:
+        """Return the counts in LaTeX."""
+        return rf"\text{{{self.sentence}}}".replace("_", r"\_")
+
+    def markdown(self) -> str:
+        """Return counts and pattern as a page of Markdown."""
+        return f"# {self.name}\n\n{self.sentence}\n\n```\n{self.picture()}\n```\n"
+
+    def html(self) -> str:
+        """Return counts and pattern as HTML, the pattern as a picture in SVG."""
+        return f"<p>{self.sentence}</p>{self.svg()}"
+
+    notebook = html
 
     def picture(self) -> str:
         """Return the pattern as text: a block where there are entries."""

@@ -14,7 +14,7 @@ from typing import Any
 
 from atwood.docstrings import documented, first_sentence
 from atwood.errors import AtwoodError
-from atwood.lazy_dataclasses import dataclass, replace
+from atwood.lazy_dataclasses import dataclass
 from atwood.table import Shown, Table, table
 from atwood.theory.formulas.mathml import as_mathml
 from atwood.theory.formulas.page import (
@@ -38,72 +38,106 @@ _OTHERS = ("name", "scene")
 """Attributes that say of what a page is."""
 
 
+_NO_FACTS = table((), ())
+
+
 @dataclass(frozen=True)
 class Page:
-    """A title, facts in words and numbers, and formulas under headings.
+    """A title, what symbols stand for, facts in words and numbers, and formulas under headings.
 
     Attributes
     ----------
     title
         Of what it is.
-    facts
-        Names, values and meanings of what is no formula.
     sections
         Formulas, with what they mean.
+    facts
+        Names, values and meanings of what is no formula.
+    symbols
+        What is told with path, unit and value; as plain text they stand in place of the title.
+    by_part
+        Whether each term says from which parts it comes.
     """
 
     title: str
-    facts: Table
-    sections: tuple[Section, ...]
+    sections: tuple[Section, ...] = ()
+    facts: Table = _NO_FACTS
+    symbols: tuple[Symbol, ...] = ()
+    by_part: bool = False
+
+    @property
+    def _told(self) -> list[Table]:
+        return [self.facts] if self.facts.rows or self.facts.notes else []
+
+    @property
+    def _letters(self) -> list[tuple[Symbol, str, str]]:
+        """Symbols with their units and values as text."""
+        values = ("" if one.value is None else f"{one.value:.6g}" for one in self.symbols)
+        return [(one, "" if one.unit == "1" else one.unit, v) for one, v in zip(self.symbols, values, strict=True)]
 
     def text(self) -> str:
         """Return it as plain text."""
-        told = [replace(one, title=f"{one.title}: {one.note}" if one.note else one.title) for one in self.sections]
-        facts = [self.facts.text()] if self.facts.rows else []
-        return "\n\n".join((self.title, *facts, *([as_text(told)] if told else [])))
+        rows = ((text.letter(one), one.path, " ".join(filter(None, (v, unit)))) for one, unit, v in self._letters)
+        head = "\n  ".join(["Symbols", *table(("", "", ""), rows).lines()]) if self.symbols else self.title
+        told = [one.text() for one in self._told] + ([as_text(self.sections, self.by_part)] if self.sections else [])
+        return "\n\n".join((head, *told))
 
     def latex(self) -> str:
         """Return its formulas as an aligned block of LaTeX for each heading, which is a comment."""
-        return "\n".join(f"% {one.title}\n{as_latex(one.lines)}" for one in self.sections)
+        return "\n".join(f"% {one.title}\n{as_latex(one.lines, self.by_part)}" for one in self.sections)
 
     def markdown(self) -> str:
         """Return it as Markdown, with formulas between dollar signs."""
-        return as_markdown(self.title, self.sections, [f"```text\n{self.facts.text()}\n```"] if self.facts.rows else [])
+        rows = ["| symbol | stands for | unit | value |", "|---|---|---|---|"]
+        rows += [f"| ${latex.letter(one)}$ | `{one.path}` | {unit} | {value} |" for one, unit, value in self._letters]
+        tables = ["\n".join(rows)] if self.symbols else []
+        tables += [f"```text\n{one.text()}\n```" for one in self._told]
+        return as_markdown(self.title, self.sections, tables, self.by_part)
 
     def html(self) -> str:
         """Return it as HTML with MathML, which browsers show as it is."""
-        return as_mathml(self.title, self.sections, [self.facts.html()] if self.facts.rows else [])
+        rows = ((text.letter(one), one.path, unit, value) for one, unit, value in self._letters)
+        symbols = [table(("symbol", "stands for", "unit", "value>"), rows)] if self.symbols else []
+        return as_mathml(self.title, self.sections, [one.html() for one in (*symbols, *self._told)], self.by_part)
 
     def notebook(self) -> str:
-        """Return it for a notebook, with formulas between dollar signs."""
-        return as_html(self.title, self.sections, [self.facts.html()] if self.facts.rows else [])
+        """Return it for a notebook, with formulas between dollar signs; symbols say themselves on other pages."""
+        return as_html(self.title, self.sections, [one.html() for one in self._told], self.by_part)
 
 
-class Described:
-    """A value that is shown by the page of what it holds: as text, in notebooks, and in LaTeX and Markdown."""
+class Paged:
+    """A value that is shown by a page: as text, in notebooks, and in LaTeX and Markdown."""
+
+    @property
+    def _page(self) -> Any:
+        raise NotImplementedError
+
+    def text(self) -> str:
+        """Return it as plain text, for a terminal, formulas as in a book."""
+        return str(self._page.text())
+
+    def latex(self) -> str:
+        """Return its formulas in LaTeX, for use in display mathematics."""
+        return str(self._page.latex())
+
+    def markdown(self) -> str:
+        """Return a page of Markdown, with formulas between dollar signs."""
+        return str(self._page.markdown())
+
+    def html(self) -> str:
+        """Return it as HTML, with formulas in MathML, which browsers show as they are."""
+        return str(self._page.html())
+
+    def _repr_html_(self) -> str:
+        return str(self._page.notebook())
+
+
+class Described(Paged):
+    """A value that is shown by the page of what it holds."""
 
     @property
     def _page(self) -> Page:
         return page_of(self, type(self).__name__)
-
-    def text(self) -> str:
-        """Return what it holds as plain text, formulas as in a book."""
-        return self._page.text()
-
-    def latex(self) -> str:
-        """Return its formulas in LaTeX, for use in display mathematics."""
-        return self._page.latex()
-
-    def markdown(self) -> str:
-        """Return what it holds as Markdown, with formulas between dollar signs."""
-        return self._page.markdown()
-
-    def html(self) -> str:
-        """Return what it holds as HTML, with formulas that browsers show as they are."""
-        return self._page.html()
-
-    def _repr_html_(self) -> str:
-        return self._page.notebook()
 
 
 def page_of(value: Any, title: str, known: Callable[[], Mapping[str, Symbol]] = dict) -> Page:
@@ -135,7 +169,7 @@ def page_of(value: Any, title: str, known: Callable[[], Mapping[str, Symbol]] = 
 def _page(title: str, rows: Iterable[tuple[str, str, str]], sections: list[Section]) -> Page:
     formulas = [one.formula for section in sections for one in section.lines if isinstance(one, Line)]
     taken = [one.symbol for one in names_in(formulas)]
-    return Page(title, table(("", "~", "~"), rows), tuple(with_names(sections, taken)))
+    return Page(title, tuple(with_names(sections, taken)), table(("", "~", "~"), rows))
 
 
 def attributes(value: Any) -> Iterator[tuple[str, Any, str]]:

@@ -135,7 +135,7 @@ def as_mathml(title: str, sections: Sequence[Section], tables: Sequence[str] = (
     blocks = [f"<h2>{escape(title)}</h2>", *tables]
     for section in sections:
         blocks.append(f"<h3>{escape(section.title)}</h3>")
-        blocks += [f"<p>{escape(section.note)}</p>"] if section.note else []
+        blocks += [f"<p>{escape(section.said)}</p>"] if section.said else []
         blocks += [_line(line, by_part) for line in section.lines]
     return "\n".join(blocks)
 
@@ -153,7 +153,7 @@ def _line(line: Line | Matrix, by_part: bool) -> str:
         table = f"<mtable>{''.join(f'<mtr>{row}</mtr>' for row in cells)}</mtable>"
         return f'<div class="line"><math>{_row(left + _brackets(table))}</math></div>'
     rows = [
-        "".join(_owned(term, number + k, by_part) for k, term in enumerate(row))
+        "".join(_owned(term, not number + k, by_part) for k, term in enumerate(row))
         for number, row in enumerate(rows_of(line, by_part))
     ]
     rows[-1] = (rows[-1] or "<mn>0</mn>") + (f"<mtext> {escape(line.right)}</mtext>" if line.right else "")
@@ -161,8 +161,8 @@ def _line(line: Line | Matrix, by_part: bool) -> str:
     return f'<div class="line"><math><mtable displaystyle="true">{shown}</mtable></math></div>'
 
 
-def _owned(term: Term, place: int, by_part: bool) -> str:
+def _owned(term: Term, is_first: bool, by_part: bool) -> str:
     """Return a term with its sign, that says on hovering from which parts it comes."""
     tip = f' title="{escape(", ".join(term.owners), quote=True)}"' if term.owners else ""
     said = f"<mtext>&#xa0;&#xa0;[{escape(', '.join(term.owners))}]</mtext>" if by_part and term.owners else ""
-    return f"<mrow{tip}>{mathml.signed(term, not place)}{said}</mrow>"
+    return f"<mrow{tip}>{mathml.signed(term, is_first)}{said}</mrow>"

@@ -57,6 +57,11 @@ class Section:
     lines: tuple[Line | Matrix, ...]
     note: str = ""
 
+    @property
+    def said(self) -> str:
+        """The sentence where there are no formulas in it, so that it reads in any language."""
+        return "" if "$" in self.note else self.note
+
 
 def width(written: str) -> int:
     """Return how many columns a plain text takes."""
@@ -249,7 +254,7 @@ def as_text(sections: Sequence[Section], by_part: bool = False) -> str:
     """Return sections in plain text; by part, each term on a line with the parts that it comes from."""
     blocks = []
     for section in sections:
-        blocks.append(section.title)
+        blocks.append(": ".join(filter(None, (section.title, section.said))))
         for line in section.lines:
             blocks += [f"  {one}" for one in _text_rows(line, by_part)]
         blocks.append("")
@@ -274,7 +279,8 @@ def as_html(title: str, sections: Sequence[Section], tables: Sequence[str] = (),
     blocks = [f"<h4>{escape(title)}</h4>", *tables]
     for section in sections:
         rows = [f"<div>{_html_line(line, by_part)}</div>" for line in section.lines]
-        blocks.append(f"<p><b>{escape(section.title)}</b></p>" + "".join(rows))
+        said = f" {escape(section.said)}" if section.said else ""
+        blocks.append(f"<p><b>{escape(section.title)}</b>{said}</p>" + "".join(rows))
     return "".join(blocks)
 
 

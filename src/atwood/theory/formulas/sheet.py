@@ -9,9 +9,9 @@ from typing import Any
 from atwood.errors import UsageError, suggestion
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import sympy
+from atwood.table import table
 from atwood.theory.formulas import page
-from atwood.theory.formulas.described import line_of
-from atwood.theory.formulas.mathml import as_mathml
+from atwood.theory.formulas.described import Page, Paged, line_of
 from atwood.theory.formulas.page import Line, Matrix, Section
 from atwood.theory.formulas.printers import Sympy, text
 from atwood.theory.formulas.reading import latex_of, read_symbol, text_of
@@ -61,7 +61,7 @@ def _read(written: str) -> Sympy:
     )
 
 
-class FormulaSheet(Mapping[str, Sympy]):
+class FormulaSheet(Paged, Mapping[str, Sympy]):
     """Formulas by name, each an expression, a matrix or a relation of sympy; what moves is a function of `t`.
 
     Parameters
@@ -113,22 +113,14 @@ class FormulaSheet(Mapping[str, Sympy]):
         """The formulas on a page, each under what it means."""
         return [Section(one.meaning, _lines(one)) for one in self.statements]
 
-    def text(self) -> str:
-        """Return the formulas in plain text."""
-        known = [f"  {text.letter(read_symbol(name))} = {value:.9g}" for name, value in self.numbers.items()]
-        return "\n".join([page.as_text(self.sections), *(["", "Values, SI units", *known] if known else [])])
+    @property
+    def _page(self) -> Page:
+        values = [(text.letter(read_symbol(name)), f"{value:.9g}") for name, value in self.numbers.items()]
+        return Page(self.title, tuple(self.sections), table(("", ""), values, "Values, SI units" if values else ""))
 
     def latex(self) -> str:
         """Return the formulas in LaTeX, as one aligned block."""
         return page.as_latex([line for one in self.statements for line in _lines(one)])
-
-    def markdown(self) -> str:
-        """Return a page of Markdown with the formulas between dollar signs."""
-        return page.as_markdown(self.title, self.sections)
-
-    def html(self) -> str:
-        """Return the formulas as HTML that browsers show as they are."""
-        return as_mathml(self.title, self.sections)
 
     def to_data(self) -> dict[str, Any]:
         """Return the formulas as plain data: each in sympy's words, in LaTeX, and what it means."""
@@ -143,9 +135,6 @@ class FormulaSheet(Mapping[str, Sympy]):
 
     def _repr_latex_(self) -> str:
         return f"$\\displaystyle {self.latex()}$"
-
-    def _repr_html_(self) -> str:
-        return page.as_html(self.title, self.sections)
 
 
 def _letters_of(*values: Sympy | None) -> set[Sympy]:

@@ -14,7 +14,7 @@ from atwood.arguments import FLAG, optional, takes
 from atwood.arrays import FloatArray
 from atwood.display import count_of
 from atwood.errors import KernelEvaluationError, StartError, UnsupportedError
-from atwood.expr import Expression, Program, depends_on, jacobian, substitute
+from atwood.expr import Expression, Program, depends_on, jacobian, substitute, vjp
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.lagrangian import Lagrangian, lagrangian_of
@@ -25,11 +25,12 @@ from atwood.pipeline import SCENE, assembly_of
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.arguments import ORIENTATION
+from atwood.table import facts
 from atwood.theory.dynamics.functions import Numbers
 from atwood.theory.equations.equations import PARAMETERS
 from atwood.theory.equations.formulas import EquationFormulas, Parameters
 from atwood.theory.formulas import page
-from atwood.theory.formulas.mathml import as_mathml
+from atwood.theory.formulas.described import Page, Paged
 from atwood.theory.formulas.notation import SYMBOLS, momentum_symbol, notation_of, with_momenta
 from atwood.theory.formulas.page import Line, Section
 from atwood.theory.formulas.printers import Sympy, latex, objects, text
@@ -71,7 +72,7 @@ def read_hamiltonian(
 
 
 @dataclass(frozen=True, eq=False)
-class Hamiltonian:
+class Hamiltonian(Paged):
     """The Hamiltonian ``H(q, p, t) = p q' - L`` of a scene (Goldstein, equation 8.15).
 
     Functions of numbers take one state, or many with a row each; time is that of the start where it is not given.
@@ -314,13 +315,17 @@ class Hamiltonian:
             return []
         heads = [(latex.letter(one), text.letter(one)) for one in self._letters]
         lines = tuple(Line(head, one) for head, one in zip(heads, self._definitions, strict=True))
-        said = [
-            Section("Hamiltonian", (Line(("H", "H"), self.formula),), self.sentence),
-            Section("Momenta", lines),
-        ]
+        said = [Section("Hamiltonian", (Line(("H", "H"), self.formula),), self.sentence), Section("Momenta", lines)]
         used = page.shared_lines((self.formula, *self._definitions), self.formulas.book.shared)
         said += [Section("Shared terms", used)] if used else []
         return page.with_names(said, self.formulas.notation.legend)
+
+    @property
+    def _page(self) -> Page:
+        title = f"{self.name}: Hamiltonian"
+        if self._written is None:
+            return Page(title, facts=facts((), notes=(self._too_long, self.sentence)))
+        return Page(title, tuple(self.sections), symbols=tuple(self._shown), by_part=self.formulas.by_part)
 
     def latex(self) -> str:
         """Return H in LaTeX."""
@@ -328,35 +333,6 @@ class Hamiltonian:
             return rf"\text{{{self._too_long}}}".replace("_", r"\_")
         shared = page.shared_lines([self.formula], self.formulas.book.shared)
         return page.as_latex([Line(("H", "H"), self.formula), *shared], self.formulas.by_part)
-
-    def markdown(self) -> str:
-        """Return a page with H, the momenta and what stands for what, formulas between dollar signs."""
-        if self._written is None:
-            return f"# {self.name}\n\n{self._too_long}\n\n{self.sentence}\n"
-        rows = ["| symbol | stands for | unit | value |", "|---|---|---|---|"]
-        for one in self._shown:
-            value = "" if one.value is None else f"{one.value:.6g}"
-            rows.append(f"| ${latex.letter(one)}$ | `{one.path}` | {one.unit} | {value} |")
-        return page.as_markdown(f"{self.name}: Hamiltonian", self.sections, ["\n".join(rows)], self.formulas.by_part)
-
-    def html(self) -> str:
-        """Return H and the momenta as HTML with formulas in MathML, which browsers show."""
-        if self._written is None:
-            return self._repr_html_()
-        return as_mathml(f"{self.name}: Hamiltonian", self.sections) + f"<p>{self.sentence}</p>"
-
-    def text(self) -> str:
-        """Return the same in plain text, for a terminal."""
-        if self._written is None:
-            return f"{self._too_long}\n{self.sentence}"
-        rows = [(text.letter(one), one.path, "" if one.value is None else f"{one.value:.6g}") for one in self._shown]
-        width = [max(page.width(row[i]) for row in rows) + 2 for i in range(2)]
-        symbols = [
-            "  " + "".join(cell + " " * (size - page.width(cell)) for cell, size in zip(row, (*width, 0), strict=True))
-            for row in rows
-        ]
-        said = page.as_text(self.sections, self.formulas.by_part)
-        return "\n".join(["Symbols", *(line.rstrip() for line in symbols), "", said, "", self.sentence])
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data: H and the momenta in LaTeX, paths, and what is said of it."""
@@ -386,11 +362,6 @@ class Hamiltonian:
     def _repr_latex_(self) -> str:
         return f"$\\displaystyle {self.latex()}$"
 
-    def _repr_html_(self) -> str:
-        if self._written is None:
-            return f"<p>{self._too_long}</p><p>{self.sentence}</p>"
-        return page.as_html(f"{self.name}: Hamiltonian", self.sections) + f"<p>{self.sentence}</p>"
-
 
 @takes(scene=SCENE, parameters=PARAMETERS, orientation=optional(ORIENTATION), symbols=SYMBOLS, by_part=FLAG)
 def hamiltonian(
@@ -419,7 +390,7 @@ def hamiltonian(
     symbols
         See `atwood.equations`.
     by_part
-        Say of each term which parts it comes from: of one in the momenta, all whose inertia is in it.
+        Say of each term which parts it comes from: of one in the momenta, those without which it would be another.
 
     Returns
     -------
@@ -447,26 +418,50 @@ def hamiltonian_formula(formulas: EquationFormulas, transform: LegendreTransform
     """Return ``H = (p - a) M^-1 (p - a)/2 - L0`` as a formula; None where a block of M is too large.
 
     Each block of the mass matrix is taken apart as ``L D L^T``, in the order in which that is shortest: so each term
-    is the square of a momentum, less what other momenta contribute to it, over twice an inertia.
+    is the square of a momentum, less what other momenta contribute to it, over twice an inertia. A term comes from the
+    parts without whose part of L it would be another: where one of them is doubled, it changes.
     """
-    found = transform.lagrangian
-    still = dict.fromkeys(found.velocities, 0.0)
-    momenta = transform.momentum_expressions
-    at_rest = substitute(list(momenta), still)
-    mass = jacobian(list(momenta), list(transform.velocity_symbols))
-    entries = {(i, j): one for i, j, one in mass.triples if not one.is_zero}
-    free = [momentum_symbol(found, i) - at_rest[i] for i in range(transform.size)]
+    found, whole = transform.lagrangian, _Quadratic.of(transform, transform.momentum_expressions)
     terms: list[Term] = []
-    for block in _blocks(transform.size, entries):
+    for block in _blocks(transform.size, whole.entries):
         if len(block) > _LARGEST_BLOCK:
             return None
-        ways = (_squares(formulas, order, entries, free) for order in permutations(reversed(block)))
+        ways = ((_squares(formulas, order, whole), order) for order in permutations(reversed(block)))
+        best, order = min(ways, key=lambda one: cost(Sum(tuple(one[0]))))
         rates = [found.velocities[i] for i in block]
-        owners = tuple(one.path for one in found.parts if depends_on(one.lagrangian, rates))
-        terms += [replace(one, owners=owners) for one in min(ways, key=lambda one: cost(Sum(tuple(one))))]
+        acting = [one for one in found.parts if depends_on(one.lagrangian, rates)]
+        doubled = {
+            one.path: _squares(formulas, order, whole.with_more(transform, one.lagrangian))
+            for one in (acting if len(acting) > 1 else [])
+        }
+        for k, term in enumerate(best):
+            owners = [path for path, other in doubled.items() if other[k] != term] or [one.path for one in acting]
+            terms.append(replace(term, owners=tuple(owners)))
+    still = dict.fromkeys(found.velocities, 0.0)
     own = {one.path: -substitute([one.lagrangian], still)[0] for one in found.parts}
     rest = formulas.formula(-substitute([found.lagrangian], still)[0], own, energy=True)
     return Sum((*terms, *rest.terms))
+
+
+@dataclass(frozen=True)
+class _Quadratic:
+    """Momenta as ``M q' + a``: the entries of M that are not zero, and a by coordinate."""
+
+    entries: Mapping[tuple[int, int], Expression]
+    at_rest: Sequence[Expression]
+    momenta: Sequence[Expression]
+
+    @staticmethod
+    def of(transform: LegendreTransform, momenta: Sequence[Expression]) -> _Quadratic:
+        """Return them from momenta as functions of velocities."""
+        at_rest = substitute(list(momenta), dict.fromkeys(transform.lagrangian.velocities, 0.0))
+        mass = jacobian(list(momenta), list(transform.velocity_symbols))
+        return _Quadratic({(i, j): one for i, j, one in mass.triples if not one.is_zero}, at_rest, momenta)
+
+    def with_more(self, transform: LegendreTransform, lagrangian: Expression) -> _Quadratic:
+        """Return them with more terms of a Lagrangian."""
+        more = vjp([lagrangian], [lagrangian.graph.one], list(transform.velocity_symbols))
+        return _Quadratic.of(transform, [p + one for p, one in zip(self.momenta, more, strict=True)])
 
 
 def _blocks(size: int, entries: Mapping[tuple[int, int], Expression]) -> Iterator[list[int]]:
@@ -481,16 +476,11 @@ def _blocks(size: int, entries: Mapping[tuple[int, int], Expression]) -> Iterato
         yield sorted(block)
 
 
-def _squares(
-    formulas: EquationFormulas,
-    order: Sequence[int],
-    entries: Mapping[tuple[int, int], Expression],
-    free: Sequence[Expression],
-) -> list[Term]:
+def _squares(formulas: EquationFormulas, order: Sequence[int], of: _Quadratic) -> list[Term]:
     """Return the terms of a block, with its momenta eliminated in an order."""
-    graph = free[0].graph
-    matrix = {(i, j): entries.get((i, j), graph.zero) for i in order for j in order}
-    momenta = {i: free[i] for i in order}
+    found = formulas.expressions
+    matrix = {(i, j): of.entries.get((i, j), found.graph.zero) for i in order for j in order}
+    momenta = {i: momentum_symbol(found, i) - of.at_rest[i] for i in order}
     terms = []
     for k, one in enumerate(order):
         pivot = matrix[one, one]
