@@ -15,7 +15,7 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
 from atwood.theory.formulas.printers import Sympy
 from atwood.theory.hamiltonian.closed_forms import Quadrature
-from atwood.theory.hamiltonian.tidied import tidied, written_by
+from atwood.theory.hamiltonian.tidied import length, tidied, written_by
 
 Pairs = Sequence[tuple[Sympy, Sympy]]
 
@@ -145,7 +145,7 @@ def complete_integral(
         pieces = [(b / (2 * a)) ** 2, *(-one / a for one in sympy.Add.make_args(rest))]
         square = sympy.Add(*pieces)
         others = sympy.Add(*map(tidied, pieces)), sympy.collect(sympy.expand(square), q, tidied)
-        root = min((sympy.expand(tidied(square)), *others), key=_length)
+        root = min((sympy.expand(tidied(square)), *others), key=length)
         parts.append(SeparatedPart(q, tidied(-b / (2 * a)), Quadrature(root, q, known), energy))
     return CompleteIntegral(total, tuple(ignorable), tuple(parts), constants)
 
@@ -175,7 +175,7 @@ def _separate(
         mixed = [one for one in terms if len(_in(one, group)) > 1]
         least = mixed if not least or len(mixed) < len(least) else least
     else:
-        told = ", ".join(map(str, sorted(least, key=lambda one: int(one.count_ops()))[:3]))
+        told = ", ".join(map(str, sorted(least, key=length)[:3]))
         raise UnsupportedError(
             f"the equation of Hamilton and Jacobi does not separate: {told} is left over",
             where=name,
@@ -191,10 +191,6 @@ def _separate(
             rest += constant
             _separate(sums[k] - constant, part, None, constants, made, total, name)
     _separate(rest, parts[last], None, constants, made, total, name)
-
-
-def _length(value: Sympy) -> int:
-    return int(value.count_ops())
 
 
 def _in(term: Sympy, group: Pairs) -> set[Sympy]:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from atwood.arguments import BY_PATH, check, instance, optional, takes
+from atwood.arguments import BY_PATH, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, UnsupportedError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
@@ -24,21 +24,19 @@ from atwood.theory.formulas.described import Described
 from atwood.theory.formulas.notation import SYMBOLS
 from atwood.theory.formulas.printers import Sympy
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian
-from atwood.theory.hamiltonian.phase_space import EXPRESSION
-from atwood.theory.hamiltonian.point_transformations import PointTransformation, point_transformation_of, start_in
-from atwood.theory.hamiltonian.tidied import without_even
-
-_SHORT = 150
-"""Up to so many operations H in other coordinates is tidied up to be read."""
+from atwood.theory.hamiltonian.point_transformations import (
+    PointTransformation,
+    equations_of,
+    point_transformation_of,
+    read_places,
+    start_in,
+)
 
 _PLAIN = 40
 """Up to so many operations it is said what is left over where it does not separate."""
 
 _LONG = 10**6
 """A fraction with a larger denominator is a decimal number, known to 16 digits."""
-
-_FEW = 3
-"""Up to so many coordinates the old momenta are written over one determinant."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,12 +214,8 @@ class Separation(Described):
         SolveError
             If its motion has no period.
         """
-        names = [str(one) for one in self.coordinates]
-        if coordinate not in names:
-            raise UsageError("it is none of the coordinates", where=coordinate, advice=suggestion(coordinate, names))
-        if not self.separates:
-            raise UsageError(self.sentence, where=self.name)
-        here, momenta, i = np.array(q, dtype=float), np.array(p, dtype=float), names.index(coordinate)
+        i, names = self._number(coordinate), [str(one) for one in self.coordinates]
+        here, momenta = np.array(q, dtype=float), np.array(p, dtype=float)
         if here.shape != (len(names),) or momenta.shape != here.shape:
             raise UsageError(f"a state has {len(names)} coordinates and momenta", where=self.name)
 
@@ -248,12 +242,8 @@ class Separation(Described):
         UnsupportedError
             If H has a term linear in that momentum, or two or more other coordinates are left.
         """
-        names = [str(one) for one in self.coordinates]
-        if coordinate not in names:
-            raise UsageError("it is none of the coordinates", where=coordinate, advice=suggestion(coordinate, names))
-        if not self.separates:
-            raise UsageError(self.sentence, where=self.name)
-        q, p = self.coordinates[names.index(coordinate)], self.momenta[names.index(coordinate)]
+        i = self._number(coordinate)
+        q, p = self.coordinates[i], self.momenta[i]
         second = self.expression.diff(p, 2)
         if second.has(p) or self.expression.diff(p).subs(p, 0).expand() != 0:
             raise UnsupportedError("H has more than its square in this momentum", where=coordinate)
@@ -274,6 +264,15 @@ class Separation(Described):
         # What separates is the same whatever the other coordinate is.
         found = (plain.subs(square, 0) + slope * held).subs(other, 1)
         return sympy.expand(found) if found.has(q) and not found.expand().has(q) else found
+
+    def _number(self, coordinate: str) -> int:
+        """Return which coordinate has a name; refuse where H does not separate."""
+        names = [str(one) for one in self.coordinates]
+        if coordinate not in names:
+            raise UsageError("it is none of the coordinates", where=coordinate, advice=suggestion(coordinate, names))
+        if not self.separates:
+            raise UsageError(self.sentence, where=self.name)
+        return names.index(coordinate)
 
     @cached_property
     def _function(self) -> Any:
@@ -328,73 +327,36 @@ def separation(
     h = scene if isinstance(scene, Hamiltonian) else hamiltonian(scene, symbols=symbols)
     if h.depends_on_time:
         raise UnsupportedError("H depends on time", where=h.name)
-    old = dict(zip(h.paths, zip(h.coordinates, h.momenta, strict=True), strict=True))
-    if coordinates is None:
-        plain = [(sympy.Symbol(q.func.__name__), sympy.Symbol(p.func.__name__)) for q, p in old.values()]
-        places = {path: q for path, (q, _) in zip(old, plain, strict=True)}
-    else:
-        places = _read(coordinates, list(old), h.name)
+    plain = [sympy.Symbol(f"{by}{one.func.__name__}") for by in ("", "p_") for one in h.coordinates]
+    places = (
+        dict(zip(h.paths, plain, strict=False)) if coordinates is None else read_places(coordinates, h.paths, h.name)
+    )
     named = {symbol for one in places.values() for symbol in one.free_symbols} - set(h.values)
     new = tuple(sorted(named, key=str))
-    if len(new) != len(old):
+    if len(new) != len(h.paths):
         raise UsageError(
-            f"its {len(old)} coordinates are given by {len(new)} others: {', '.join(map(str, new)) or 'none'}",
+            f"its {len(h.paths)} coordinates are given by {len(new)} others: {', '.join(map(str, new)) or 'none'}",
             where=h.name,
-            advice=f"Write them in terms of {len(old)} others.",
+            advice=f"Write them in terms of {len(h.paths)} others.",
         )
     momenta = tuple(sympy.Symbol(f"p_{one}") for one in new)
     # Decimal numbers are symbols, so that it is seen what their last digits make of a condition.
-    given = places
-    numbers = {one: sympy.Dummy() for whole in (*places.values(), h.expression) for one in _decimals(whole)}
-    places = {path: one.xreplace(numbers) for path, one in places.items()}
-    if coordinates is not None and not numbers:
-        made = point_transformation_of(h, places, new).hamiltonian
-    else:
-        along = _old_momenta([[places[path].diff(one) for path in old] for one in new], momenta)
-        by = {q: places[path] for path, (q, _) in old.items()}
-        by |= {p: along[k] for k, (_, p) in enumerate(old.values())}
-        made = h.expression.xreplace(numbers).xreplace(by)
-        made = _tidied(made) if coordinates is not None and made.count_ops() < _SHORT else made
+    own = h.expression if coordinates is None else equations_of(h).lagrangian
+    numbers = {one: sympy.Dummy() for whole in (*places.values(), own) for one in _decimals(whole)}
     back = {symbol: one for one, symbol in numbers.items()}
+    if coordinates is None:
+        made = own.xreplace(numbers | dict(zip((*h.coordinates, *h.momenta), plain, strict=True)))
+    else:
+        read = {path: one.xreplace(numbers) for path, one in places.items()}
+        made = point_transformation_of(h, read, new, numbers).hamiltonian
     worst = worst_condition(made, new, momenta, {**h.values, **back}, h.name)
-    made = made.xreplace(back)
-    return Separation(h.name, new, momenta, made, h.values, worst[2] <= ZERO, worst, h, given)
+    return Separation(h.name, new, momenta, made.xreplace(back), h.values, worst[2] <= ZERO, worst, h, places)
 
 
 def _decimals(value: Sympy) -> list[Sympy]:
     """Return the numbers of an expression that are known to 16 digits."""
     every = value.atoms(sympy.Number)
     return sorted((one for one in every if one.is_Float or (one.is_Rational and one.q > _LONG)), key=float)
-
-
-def _old_momenta(transposed: Sequence[Sequence[Sympy]], momenta: Sequence[Sympy]) -> list[Sympy]:
-    """Return the old momenta in terms of the new ones, ``P = J^T p``, over one determinant."""
-    matrix = sympy.Matrix(transposed)
-    if len(momenta) > _FEW:
-        return list(matrix.LUsolve(sympy.Matrix(momenta)))
-    determinant = _tidied(matrix.det(method="berkowitz"))
-    if determinant == 0:
-        raise UsageError("the coordinates do not determine each other: their Jacobian is zero")
-    found = matrix.adjugate() * sympy.Matrix(momenta)
-    return [one / determinant for one in found]
-
-
-def _tidied(made: Sympy) -> Sympy:
-    """Return an expression expanded, with no even power of a cosine, in roots too."""
-    made = made.replace(lambda e: bool(e.is_Pow and not e.exp.is_Integer), lambda e: _tidied(e.base) ** e.exp)
-    return without_even(made, by_cosines=False)
-
-
-def _read(given: Mapping[str, Any], paths: list[str], where: str) -> dict[str, Sympy]:
-    for path in given:
-        if path not in paths:
-            advice = suggestion(path, paths) or f"There are {', '.join(paths)}."
-            raise UsageError(f"{path!r} is no coordinate of it", where=where, advice=advice)
-    missing = [path for path in paths if path not in given]
-    if missing:
-        advice = f"Give {', '.join(paths)}, each in terms of others."
-        raise UsageError(f"the coordinates leave out {', '.join(missing)}", where=where, advice=advice)
-    return {path: check(EXPRESSION, given[path], path, where) for path in paths}
 
 
 STATES, _TRIALS = 6, 200

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
-from atwood.theory.hamiltonian.phase_space import Sympy
+from atwood.theory.formulas.printers import Sympy
 from atwood.theory.hamiltonian.tidied import tidied, without_even
 
 _NONE = 1e-9

@@ -20,6 +20,7 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
 from atwood.table import Shown, Table, table
 from atwood.theory.formulas.page import aligned
+from atwood.theory.formulas.printers import Sympy
 from atwood.theory.formulas.reading import latex_of, text_of
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian
 from atwood.theory.hamiltonian.phase_space import (
@@ -28,15 +29,12 @@ from atwood.theory.hamiltonian.phase_space import (
     PHASE_SPACE,
     SYMBOLS,
     PhaseSpace,
-    Sympy,
     phase_space_of,
     short,
     vanishes,
 )
-from atwood.theory.hamiltonian.transformations import CanonicalTransformation, bracket
+from atwood.theory.hamiltonian.transformations import CanonicalTransformation, Space, bracket
 from atwood.theory.symmetry.conserved import conserved
-
-Space = Hamiltonian | tuple[Sequence[Sympy], Sequence[Sympy]]
 
 _CLOSED = 16
 """Functions that a flow turns into each other, beyond which no closed form is looked for."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import Any
 
 from atwood.arguments import Kind, Refused, each, instance, optional
 from atwood.errors import AtwoodError, UsageError, suggestion
@@ -13,13 +13,11 @@ from atwood.expr.sympy_bridge import from_sympy
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import mpmath, sympy
 from atwood.theory.formulas.book import Book
-from atwood.theory.formulas.printers import objects
+from atwood.theory.formulas.printers import Sympy, objects
 from atwood.theory.formulas.tree import Name, Symbol
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, read_hamiltonian
+from atwood.theory.hamiltonian.tidied import length
 from atwood.theory.symmetry.proof import is_proven_zero
-
-Sympy: TypeAlias = Any
-"""A sympy object."""
 
 _POINTS, _DIGITS = 8, 50
 """Where there is no proof: at so many random points, with so many digits."""
@@ -178,15 +176,11 @@ def _with_roots(value: Sympy) -> tuple[Sympy, dict[Sympy, Sympy]]:
     def taken(power: Sympy) -> Sympy:
         if power.base not in known:
             known[power.base] = sympy.Dummy(f"root{len(known)}", positive=True)
-            roots[known[power.base]] = min(_as_written(power.base), _cancelled(power.base), key=_signs)
+            roots[known[power.base]] = min(_as_written(power.base), _cancelled(power.base), key=length)
         return known[power.base] ** (2 * power.exp)
 
     plain = value.replace(lambda one: one.is_Pow and one.exp.is_Rational and one.exp.q == 2, taken)
     return plain, roots
-
-
-def _signs(value: Sympy) -> int:
-    return int(value.count_ops())
 
 
 def _cancelled(value: Sympy) -> Sympy:
@@ -207,9 +201,9 @@ def collected(value: Sympy, variables: Sequence[Sympy]) -> Sympy:
     found = []
     for powers, coefficient in terms:
         factor = sympy.Mul(*(one**power for one, power in zip(variables, powers, strict=True)))
-        made = min(short(coefficient), short(_cancelled(coefficient)), key=_signs)
-        if _signs(made) <= _FACTORED and not made.atoms(sympy.Float):
-            made = min(made, sympy.factor(made), key=_signs)
+        made = min(short(coefficient), short(_cancelled(coefficient)), key=length)
+        if length(made) <= _FACTORED and not made.atoms(sympy.Float):
+            made = min(made, sympy.factor(made), key=length)
         found.append(made.xreplace(back) * factor)
     return sympy.Add(*found)
 
@@ -304,7 +298,7 @@ def short(value: Sympy) -> Sympy:
     if not value.free_symbols:
         return value
     value = value.replace(sympy.tan, lambda x: sympy.sin(x) / sympy.cos(x))
-    return min((_as_written(value), _with_roots_cancelled(value)), key=_signs)
+    return min((_as_written(value), _with_roots_cancelled(value)), key=length)
 
 
 def _with_roots_cancelled(value: Sympy) -> Sympy:

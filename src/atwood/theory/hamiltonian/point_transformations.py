@@ -27,10 +27,11 @@ from atwood.simulation.initialization.start import find_start
 from atwood.theory.equations.equations import EquationsOfMotion
 from atwood.theory.formulas.described import Described
 from atwood.theory.formulas.notation import SYMBOLS as LETTERS
+from atwood.theory.formulas.printers import Sympy
 from atwood.theory.formulas.reading import text_of
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian
-from atwood.theory.hamiltonian.phase_space import EXPRESSION, SYMBOLS, Sympy
-from atwood.theory.hamiltonian.tidied import is_positive, tidied
+from atwood.theory.hamiltonian.phase_space import EXPRESSION, SYMBOLS
+from atwood.theory.hamiltonian.tidied import is_positive, length, tidied
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +98,7 @@ class PointTransformation(Described):
         h, t = self.source, sympy.Symbol("t")
         if not h.other_forces:
             return [sympy.Integer(0)] * len(self.coordinates)
-        eq = EquationsOfMotion(h.assembly, h.formulas.expressions, h.formulas.notation)
+        eq = equations_of(h)
         losses, v = eq.rayleigh_function, {one: sympy.Dummy() for one in eq.velocities}
         slopes = [losses.xreplace(v).diff(one) for one in v.values()]
         forces = {u: q - one for u, q, one in zip(v, eq.generalized_forces, slopes, strict=True)}
@@ -176,27 +177,20 @@ def point_transformation(
     UnsupportedError
         If the scene has no Hamiltonian in symbols, or L is of higher than second degree in the velocities.
     """
-    old = {path: check(EXPRESSION, value, path, "point_transformation") for path, value in old.items()}
     if isinstance(scene, PointTransformation):
         paths: tuple[str, ...] = tuple(map(str, scene.coordinates))
         stay = [one for one in scene.coordinates if str(one) not in old]
-        old |= {str(one): one for one in stay}
+        old = {**old, **{str(one): one for one in stay}}
         coordinates = (*(one for one in stay if one not in coordinates), *coordinates)
         h = scene.source
     else:
         h = hamiltonian(scene, symbols=symbols)
         paths = h.paths
-    for path in old:
-        if path not in paths:
-            told = suggestion(path, paths) or f"There are {', '.join(paths)}."
-            raise UsageError("no coordinate has this path", where=path, advice=told)
-    missing = [path for path in paths if path not in old]
-    n = len(paths)
+    old = read_places(old, paths, h.name)
     new = tuple(coordinates)
-    if missing or len(new) != n or len(set(new)) != n:
-        told = f"{missing[0]} is not given" if missing else f"{n} new coordinates are needed"
-        advice = f"Give {', '.join(paths)}, each in terms of {n} new ones that are all different."
-        raise UsageError(f"the coordinates are not all transformed: {told}", where=h.name, advice=advice)
+    if len(new) != len(paths) or len(set(new)) != len(paths):
+        advice = f"Give {', '.join(paths)}, each in terms of {len(paths)} new ones that are all different."
+        raise UsageError(f"{len(paths)} new coordinates are needed", where=h.name, advice=advice)
     if isinstance(scene, PointTransformation):
         values = [old[path] for path in paths]
         before = dict(zip(scene.coordinates, values, strict=True))
@@ -205,14 +199,33 @@ def point_transformation(
     return point_transformation_of(h, old, new)
 
 
-def point_transformation_of(h: Hamiltonian, old: Mapping[str, Sympy], new: tuple[Sympy, ...]) -> PointTransformation:
-    """Return a scene in new coordinates, from its Hamiltonian in the old ones."""
+def read_places(given: Mapping[str, Any], paths: Sequence[str], where: str) -> dict[str, Sympy]:
+    """Return expressions by the paths of all coordinates."""
+    for path in given:
+        if path not in paths:
+            advice = suggestion(path, paths) or f"There are {', '.join(paths)}."
+            raise UsageError(f"{path!r} is no coordinate of it", where=where, advice=advice)
+    missing = [path for path in paths if path not in given]
+    if missing:
+        advice = f"Give {', '.join(paths)}, each in terms of others."
+        raise UsageError(f"the coordinates leave out {', '.join(missing)}", where=where, advice=advice)
+    return {path: check(EXPRESSION, given[path], path, where) for path in paths}
+
+
+def equations_of(h: Hamiltonian) -> EquationsOfMotion:
+    """Return Lagrange's equations of a Hamiltonian's scene, in its letters."""
+    return EquationsOfMotion(h.assembly, h.formulas.expressions, h.formulas.notation)
+
+
+def point_transformation_of(
+    h: Hamiltonian, old: Mapping[str, Sympy], new: tuple[Sympy, ...], numbers: Mapping[Sympy, Sympy] | None = None
+) -> PointTransformation:
+    """Return a scene in new coordinates, from its Hamiltonian in the old ones; symbols may stand for numbers."""
     if not h.is_short:
         raise UnsupportedError("its Hamiltonian would fill a page", where=h.name, advice="It is there in numbers.")
-    values = [old[path] for path in h.paths]
-    eq = EquationsOfMotion(h.assembly, h.formulas.expressions, h.formulas.notation)
+    values, eq = [old[path] for path in h.paths], equations_of(h)
     whole = dict(zip(h.coordinates, values, strict=True))
-    return _moved(h, eq.lagrangian, eq.coordinates, eq.velocities, values, new, whole)
+    return _moved(h, eq.lagrangian.xreplace(numbers or {}), eq.coordinates, eq.velocities, values, new, whole)
 
 
 def _moved(
@@ -274,7 +287,7 @@ def _shorter(value: Sympy, positive: Sequence[Sympy]) -> Sympy:
     """Return an expression as a sum of tidied terms, or tidied as a whole where that is far shorter."""
     parts = sympy.Add(*(tidied(one, positive) for one in sympy.Add.make_args(value)))
     whole = tidied(parts, positive)
-    return min((sympy.expand(whole), 1), (parts, 1), (whole, 2), key=lambda one: int(one[0].count_ops()) * one[1])[0]
+    return min((sympy.expand(whole), 1), (parts, 1), (whole, 2), key=lambda one: length(one[0]) * one[1])[0]
 
 
 def _inverted(matrix: Sympy, known: Sequence[Sympy]) -> tuple[Sympy, Sympy]:

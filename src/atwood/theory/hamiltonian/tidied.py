@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from itertools import product
 
 from atwood.lazy_modules import sympy
-from atwood.theory.hamiltonian.phase_space import Sympy
+from atwood.theory.formulas.printers import Sympy
 
 _LONG = 700
 """Operations beyond which nothing is cancelled or factored."""
@@ -23,7 +23,7 @@ def tidied(value: Sympy, positive: Iterable[Sympy] = ()) -> Sympy:
     value = value.replace(_is_root, lambda e: _root(tidied(e.base, known), 2 * e.exp, known))
     if not value.has(*_waves(), sympy.Pow):
         return value
-    return min((value, *(one for way in _ways(value) for one in written_by(value, way))), key=_length)
+    return min((value, *(one for way in _ways(value) for one in written_by(value, way))), key=length)
 
 
 def _waves() -> tuple[Sympy, ...]:
@@ -79,7 +79,8 @@ def _is_root(e: Sympy) -> bool:
     return bool(e.is_Pow and e.exp.is_Rational and e.exp.q == 2 and e.free_symbols)
 
 
-def _length(value: Sympy) -> int:
+def length(value: Sympy) -> int:
+    """Return how many signs an expression has."""
     return int(value.count_ops())
 
 
@@ -89,7 +90,7 @@ def _root(base: Sympy, power: Sympy, positive: frozenset[Sympy]) -> Sympy:
         return sympy.sqrt(base) ** power
     every = {one for way in _ways(base) for one in written_by(base, way)}
     made = [_taken_out(one, power, positive) for one in sorted(every, key=str)]
-    return min((sympy.sqrt(base) ** power, *made), key=_length)
+    return min((sympy.sqrt(base) ** power, *made), key=length)
 
 
 def _taken_out(base: Sympy, power: Sympy, positive: frozenset[Sympy]) -> Sympy:

@@ -18,6 +18,7 @@ from atwood.errors import UnsupportedError, UsageError
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
 from atwood.theory.formulas.described import Described
+from atwood.theory.formulas.printers import Sympy
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian
 from atwood.theory.hamiltonian.phase_space import (
     BY_SYMBOL,
@@ -28,7 +29,6 @@ from atwood.theory.hamiltonian.phase_space import (
     PHASE_SPACE,
     SYMBOLS,
     PhaseSpace,
-    Sympy,
     Verdict,
     on_branch,
     phase_space_of,
@@ -432,7 +432,7 @@ def _added(values: Sequence[Sympy], new: Sequence[Sympy], inverse: Mapping[Sympy
 def poisson_bracket(
     f: Any,
     g: Any,
-    hamiltonian: Hamiltonian | tuple[Sequence[Sympy], Sequence[Sympy]],
+    hamiltonian: Space,
     *,
     constants: Sequence[Any] = (),
 ) -> Sympy:
@@ -466,7 +466,7 @@ def poisson_bracket(
 @takes(functions=EXPRESSIONS, hamiltonian=PHASE_SPACE, constants=SYMBOLS)
 def poisson_brackets(
     functions: Sequence[Any],
-    hamiltonian: Hamiltonian | tuple[Sequence[Sympy], Sequence[Sympy]],
+    hamiltonian: Space,
     *,
     constants: Sequence[Any] = (),
 ) -> Sympy:
@@ -490,7 +490,7 @@ def poisson_brackets(
 def fundamental_brackets(
     coordinates: Sequence[Any],
     momenta: Sequence[Any],
-    hamiltonian: Hamiltonian | tuple[Sequence[Sympy], Sequence[Sympy]],
+    hamiltonian: Space,
 ) -> Sympy:
     """Return the brackets of new coordinates and momenta: the matrix Omega if they are canonical.
 

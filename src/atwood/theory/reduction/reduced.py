@@ -30,6 +30,7 @@ from atwood.theory.hamiltonian.tidied import tidied
 from atwood.theory.reduction.orbit import RadialFormulas
 from atwood.theory.reduction.quadrature import Path, find_path
 from atwood.theory.reduction.routhian import (
+    PartsAt,
     Radial,
     Routhian,
     ignorable_of,
@@ -285,32 +286,44 @@ def reduced(
             if not left
             else "Other coordinates may have symmetries that these do not show: see `conserved`.",
         )
-    number = paths.index(left[0])
+    number, unit = paths.index(left[0]), found.names[paths.index(left[0])].unit
+    ignorable = tuple(path for path in paths if path != left[0])
+    parts = parts_of(assembly, number, find_start(assembly).time)
+    symbolic = {"routhian": routhian_of(assembly, found, ignorable, symbols)}
+    return _motion(assembly, parts, paths, number, _start_of(assembly, found), unit, symbolic)
+
+
+def _motion(
+    assembly: Assembly,
+    parts: PartsAt,
+    paths: Sequence[str],
+    number: int,
+    start: tuple[FloatArray, FloatArray],
+    unit: str,
+    symbolic: Mapping[str, Any],
+) -> ReducedMotion:
+    """Return the motion of one coordinate, all others being ignorable, from a start of coordinates and velocities."""
+    (q, v), begun, name = start, find_start(assembly), assembly.flat.name
     others = tuple(k for k in range(len(paths)) if k != number)
-    start = find_start(assembly)
-    q, v = _start_of(assembly, found)
-    parts = parts_of(assembly, number, start.time)
     now = parts(q[:, None])
     momenta = now.mass[:, :, 0] @ v + now.linear[:, 0]
     radial = Radial(parts, number, others, momenta[list(others)], q)
-    is_angle = found.names[number].unit == "rad"
-    scale = 1.0 if is_angle else start.length
-    here = radial.at([q[number]])
-    path = find_path(radial, float(q[number]), float(v[number]), is_angle, scale, f"{assembly.flat.name}: {left[0]}")
-    energy = float(here.potential[0] + 0.5 * here.inertia[0] * v[number] ** 2)
+    here, is_angle = radial.at([q[number]]), unit == "rad"
+    scale = 1.0 if is_angle else begun.length
+    path = find_path(radial, float(q[number]), float(v[number]), is_angle, scale, f"{name}: {paths[number]}")
     ignorable = tuple(paths[k] for k in others)
     return ReducedMotion(
-        left[0],
-        ignorable,
-        dict(zip(ignorable, map(float, radial.momenta), strict=True)),
-        energy,
-        radial,
-        path,
-        routhian_of(assembly, found, ignorable, symbols),
-        dict(zip(paths, map(float, q), strict=True)),
-        start.time,
-        scene=assembly.flat.name,
-        unit=found.names[number].unit,
+        coordinate=paths[number],
+        ignorable=ignorable,
+        momenta=dict(zip(ignorable, map(float, radial.momenta), strict=True)),
+        energy=float(here.potential[0] + 0.5 * here.inertia[0] * v[number] ** 2),
+        radial=radial,
+        path=path,
+        start=dict(zip(paths, map(float, q), strict=True)),
+        t_start=begun.time,
+        scene=name,
+        unit=unit,
+        **{"routhian": None, **symbolic},
     )
 
 
@@ -318,8 +331,7 @@ def _in_others(
     scene: Model | Assembly | PointTransformation, old: Mapping[str, Any], symbols: Mapping[str, str] | None
 ) -> PointTransformation:
     """Return a scene in the coordinates that its own are given in terms of."""
-    old = {path: check(EXPRESSION, value, path, "reduced") for path, value in old.items()}
-    letters = {one for value in old.values() for one in value.free_symbols}
+    letters = {one for path, value in old.items() for one in check(EXPRESSION, value, path, "reduced").free_symbols}
     h = scene.source if isinstance(scene, PointTransformation) else hamiltonian(scene, symbols=symbols)
     new = sorted(letters - {*h.values, sympy.Symbol("t")}, key=str)
     return point_transformation(scene, old, new, symbols=symbols)
@@ -336,37 +348,15 @@ def _transformed(given: PointTransformation) -> ReducedMotion:
                 f"{', '.join(str(given.coordinates[k]) for k in left) or 'none'} of its coordinates are not ignorable"
             )
         raise UnsupportedError(f"its motion is not reduced to one coordinate: {told}", where=h.name)
-    number, others = left[0], tuple(k for k in range(len(given.coordinates)) if k != left[0])
-    t, q, v = start_in(given)
+    number, (_, q, v) = left[0], start_in(given)
     parts = transformed_parts(given, number)
-    now = parts(q[:, None])
-    momenta = now.mass[:, :, 0] @ v + now.linear[:, 0]
-    radial = Radial(parts, number, others, momenta[list(others)], q)
-    here, names = radial.at([q[number]]), [str(one) for one in given.coordinates]
     # What turns as an angle does is known by its sines and cosines alone: then a whole turn changes nothing.
-    turned = parts(q[:, None] + 2.0 * np.pi * np.eye(len(q))[:, [number]])
-    is_angle = (
-        bool(np.allclose(turned.potential, now.potential, rtol=1e-12, atol=0.0))
-        and not given.coordinates[number].is_positive
-    )
-    scale = 1.0 if is_angle else find_start(h.assembly).length
-    path = find_path(radial, float(q[number]), float(v[number]), is_angle, scale, f"{h.name}: {names[number]}")
-    ignorable = tuple(names[k] for k in others)
-    return ReducedMotion(
-        names[number],
-        ignorable,
-        dict(zip(ignorable, map(float, radial.momenta), strict=True)),
-        float(here.potential[0] + 0.5 * here.inertia[0] * v[number] ** 2),
-        radial,
-        path,
-        None,
-        dict(zip(names, map(float, q), strict=True)),
-        t,
-        given.hamiltonian.xreplace({given.momenta[number]: sympy.Integer(0)}),
-        h.name,
-        "rad" if is_angle else "m",
-        given,
-    )
+    here, turned = (parts(q[:, None] + turn * np.eye(len(q))[:, [number]]).potential for turn in (0.0, 2.0 * np.pi))
+    same = np.allclose(turned, here, rtol=1e-12, atol=0.0)
+    unit = "rad" if same and not given.coordinates[number].is_positive else "m"
+    potential = given.hamiltonian.xreplace({given.momenta[number]: sympy.Integer(0)})
+    names, symbolic = [str(one) for one in given.coordinates], {"potential": potential, "transformation": given}
+    return _motion(h.assembly, parts, names, number, (q, v), unit, symbolic)
 
 
 def _start_of(assembly: Assembly, found: Lagrangian) -> tuple[FloatArray, FloatArray]:

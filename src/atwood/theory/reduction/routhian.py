@@ -30,10 +30,11 @@ from atwood.pipeline import SCENE, assembly_of
 from atwood.theory.equations.formulas import EquationFormulas
 from atwood.theory.formulas.described import Described
 from atwood.theory.formulas.notation import SYMBOLS, notation_of
-from atwood.theory.formulas.printers import objects
+from atwood.theory.formulas.printers import Sympy, objects
 from atwood.theory.formulas.tree import Sum
-from atwood.theory.hamiltonian.phase_space import Sympy, collected, short
+from atwood.theory.hamiltonian.phase_space import collected, short
 from atwood.theory.hamiltonian.point_transformations import PointTransformation
+from atwood.theory.hamiltonian.tidied import length
 from atwood.theory.symmetry.find import find_conserved
 from atwood.theory.symmetry.proof import Prover
 from atwood.theory.symmetry.quantities import Quantities
@@ -124,7 +125,7 @@ class Routhian(Described):
         rates = {rate: w.xreplace(still) for rate, w in zip(own, solved, strict=True)}
         total = sympy.Add(*(p * w for p, w in zip(self.momenta, rates.values(), strict=True)))
         total = total - plain.xreplace(still).xreplace(rates)
-        return min((short(total), collected(total, self.momenta)), key=lambda one: int(one.count_ops())).xreplace(back)
+        return min((short(total), collected(total, self.momenta)), key=length).xreplace(back)
 
     @property
     def values(self) -> dict[Sympy, float]:
