@@ -17,7 +17,16 @@ from atwood.display import LINES, WIDTH, fitted
 from atwood.result.trajectories import Group
 from atwood.table import Table, facts, table
 from atwood_library import Ground, PointMass, Rod
-from atwood_library.scenes import Chain, DoublePendulum, FourBar, HeavyTop, Kepler, LagrangeTop, SimplePendulum
+from atwood_library.scenes import (
+    Chain,
+    DoublePendulum,
+    FourBar,
+    HeavyTop,
+    Kepler,
+    LagrangeTop,
+    Oscillators,
+    SimplePendulum,
+)
 
 FACADES = (atwood, atwood.checking, atwood.plotting, atwood.reporting, atwood.solids, atwood.study)
 PUBLIC = {one for room in FACADES for one in (getattr(room, name) for name in room.__all__) if isinstance(one, type)}
@@ -116,6 +125,7 @@ def roots(tmp_path_factory) -> dict[str, object]:
         "transformations": _transformations(),
         "flow": atwood.flow_of("p**2 + q**2", (("q",), ("p",)), "s"),
         "algebra": atwood.bracket_algebra((("q",), ("p",)), ["a", "b"], ["p**2", "q*p"]),
+        "principal function": atwood.principal_function(atwood.hamiltonian(Oscillators())),
         "reduced": atwood.reduced(SimplePendulum()),
         "symmetry": atwood.Symmetry(dict.fromkeys(angles, 1.0), 0.0),
         "modes": atwood.normal_modes(scene, at=hanging),

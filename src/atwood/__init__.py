@@ -151,12 +151,14 @@ if TYPE_CHECKING:
         Action as Action,
         ActionAngle as ActionAngle,
         JoiningMotion as JoiningMotion,
+        PrincipalFunction as PrincipalFunction,
         SeparatedMotion as SeparatedMotion,
         Separation as Separation,
         Variation as Variation,
         action as action,
         action_angle as action_angle,
         boundary_value_motions as boundary_value_motions,
+        principal_function as principal_function,
         separation as separation,
     )
     from atwood.theory.dynamics import (
@@ -270,8 +272,8 @@ _ROOMS = {
     "atwood.study": ("Comparison", "ComparisonRow", "Sweep", "compare", "load_sweep", "sweep"),
     "atwood.study.comparison.long_runs": ("LongComparison", "compare_long"),
     "atwood.theory.action": (
-        "Action", "ActionAngle", "JoiningMotion", "SeparatedMotion", "Separation", "Variation",
-        "action", "action_angle", "boundary_value_motions", "separation",
+        "Action", "ActionAngle", "JoiningMotion", "PrincipalFunction", "SeparatedMotion", "Separation", "Variation",
+        "action", "action_angle", "boundary_value_motions", "principal_function", "separation",
     ),
     "atwood.theory.hamiltonian": (
         "Algebra", "CanonicalTransformation", "Flow", "Hamiltonian", "PointTransformation",

@@ -3,17 +3,20 @@
 from atwood.theory.action.action_angle import ActionAngle, action_angle
 from atwood.theory.action.boundary_values import JoiningMotion, boundary_value_motions
 from atwood.theory.action.integral import Action, Variation, action
+from atwood.theory.action.principal import PrincipalFunction, principal_function
 from atwood.theory.action.separation import SeparatedMotion, Separation, separation
 
 __all__ = [
     "Action",
     "ActionAngle",
     "JoiningMotion",
+    "PrincipalFunction",
     "SeparatedMotion",
     "Separation",
     "Variation",
     "action",
     "action_angle",
     "boundary_value_motions",
+    "principal_function",
     "separation",
 ]

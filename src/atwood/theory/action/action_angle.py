@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -20,10 +21,13 @@ from atwood.display import data_of
 from atwood.errors import SolveError, UnsupportedError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
-from atwood.lazy_modules import scipy
+from atwood.lazy_modules import scipy, sympy
 from atwood.model.compose.composite import Model
 from atwood.simulation.initialization.start import find_start
+from atwood.theory.action.complete_integral import complete_integral
 from atwood.theory.formulas.described import Described
+from atwood.theory.formulas.printers import Sympy
+from atwood.theory.hamiltonian.closed_forms import Quadrature
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian
 
 
@@ -82,6 +86,27 @@ class ActionAngle(Described):
     def turning_points(self) -> tuple[float, float] | None:
         """Between which coordinates it swings; None where it goes round."""
         return self.level.ends if self.kind == "libration" else None
+
+    @property
+    def action_formula(self) -> Sympy | None:
+        """J of the energy E, where the integral is closed; K(m) and E(m) are Legendre's of ``m = k^2``."""
+        return None if self._quadrature is None else self._quadrature.turn()
+
+    @property
+    def period_formula(self) -> Sympy | None:
+        """The period ``dJ/dE`` likewise."""
+        return None if self._quadrature is None else self._quadrature.turn(sympy.Symbol("E"))
+
+    @cached_property
+    def _quadrature(self) -> Quadrature | None:
+        """The integral of p in symbols, where H is short."""
+        h, [q], [p] = self.hamiltonian, self.hamiltonian.coordinates, self.hamiltonian.momenta
+        if not h.is_short:
+            return None
+        plain = {one: sympy.Symbol(one.func.__name__) for one in (q, p)}
+        state = {plain[one]: float(value[0]) for one, value in zip((q, p), h.start(), strict=True)}
+        made = complete_integral(h.expression.xreplace(plain), [(*plain.values(),)], h.values, state, h.name)
+        return made.parts[0].quadrature if made.parts else None
 
     def angle(self, q: float, p: float) -> float:
         """Return the angle variable w of a state on this level, between 0 and 1: the share of a turn since its begin.

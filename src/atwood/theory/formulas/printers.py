@@ -112,6 +112,8 @@ class _Text(_Lines):
         "absolute": "|{0}|",
         "integral": "∫[{2}, {3}] {0} d{1}",
         "antiderivative": "∫ {0} d{1}",
+        "elliptic_k": "K({0})",
+        "elliptic_e": "E({0})",
     }
     _LETTERS: ClassVar = dict(zip(GREEK, GREEK_SIGNS, strict=True))
     _BELOW, _ABOVE = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉"), str.maketrans("0123456789-/", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻ᐟ")
@@ -168,6 +170,8 @@ class _Latex(_Lines):
         "integral": r"\int_{{{2}}}^{{{3}}} {0} \, d{1}",
         "exp": "e^{{{0}}}",
         "antiderivative": r"\int {0} \, d{1}",
+        "elliptic_k": r"K\left({0}\right)",
+        "elliptic_e": r"E\left({0}\right)",
     }
     _DOTS = ("", r"\dot", r"\ddot", r"\dddot")
     _WAVES = ("sin", "cos", "tan", "sinh", "cosh", "tanh")

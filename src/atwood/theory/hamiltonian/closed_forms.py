@@ -16,7 +16,7 @@ from typing import NamedTuple
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
 from atwood.theory.formulas.printers import Sympy
-from atwood.theory.hamiltonian.tidied import tidied, without_even
+from atwood.theory.hamiltonian.tidied import length, tidied, without_even
 
 _NONE = 1e-9
 """Where a value is zero, signs are those of formulas with a small positive one."""
@@ -72,7 +72,9 @@ class Quadrature:
     def turn(self, constant: Sympy | None = None) -> Sympy | None:
         """Return the same to and fro between two turning points; None where there is no closed form."""
         found = self._total(constant, True)
-        return None if found is None else tidied(sympy.expand(found * self.form.sign), self.known)
+        if found is None:
+            return self._elliptic(constant)
+        return tidied(sympy.expand(found * self.form.sign), self.known)
 
     def unbound(self, constant: Sympy) -> Sympy | None:
         """Return the derivative of the integral from infinity to a turning point and back, where that is one arc."""
@@ -161,6 +163,18 @@ class Quadrature:
 
     @cached_property
     def _form(self) -> _Form | None:
+        """The form with Q of second degree, where the motion goes on from one end of x to the other."""
+        for one, folds in self._forms:
+            goes_on = any(sympy.expand(one.root.subs(_x(), fold)) == 0 for fold in folds)
+            if not goes_on and sympy.degree(one.root, _x()) <= 2:
+                sign = sympy.sign(self._number(one.outside.xreplace({_x(): one.x})))
+                return one._replace(outside=one.outside * sign)
+        return None
+
+    @cached_property
+    def _forms(self) -> list[tuple[_Form, tuple[int, ...]]]:
+        """Forms with any polynomial Q, and the values of x at which x turns back and the motion may go on."""
+        found = []
         for x, slope in _substitutions(self.square, self.coordinate):
             made = _in_terms_of(self.square, self.coordinate, x)
             if made is None:
@@ -172,13 +186,44 @@ class Quadrature:
                 for one, power in factors:
                     above = (sign * power) // 2  # what is odd below stands above, too
                     odd, even = odd * one ** (sign * power - 2 * above), even * one**above
-            odd = sympy.expand(odd)
-            folds = {sympy.cos: (1, -1), sympy.Pow: (0,)}.get(x.func, ())
-            if any(sympy.expand(odd.subs(_x(), one)) == 0 for one in folds):
-                continue  # the motion goes on where x turns back
-            if odd.is_polynomial(_x()) and sympy.degree(odd, _x()) <= 2:
-                even *= sympy.sign(self._number(even.xreplace({_x(): x})))
-                return _Form(x, slope, odd, even, 1 if self._number(x.diff(self.coordinate)) > 0.0 else -1)
+            odd, rises = sympy.expand(odd), 1 if self._number(x.diff(self.coordinate)) > 0.0 else -1
+            if odd.is_polynomial(_x()):
+                folds = {sympy.cos: (1, -1), sympy.Pow: (0,)}.get(x.func, ())
+                found.append((_Form(x, slope, odd, even, rises), folds))
+        return found
+
+    def _elliptic(self, constant: Sympy | None) -> Sympy | None:
+        """Return a whole turn between roots of a cubic Q, by Legendre's complete integrals; None of other motions."""
+        for form, folds in self._forms:
+            first = sympy.Poly(form.root, _x()).LC()
+            side = 1 if self._number(first) > 0.0 else -1
+            roots = sympy.roots(sympy.Poly(form.root.xreplace({_x(): side * _x()}), _x()), cubics=False)
+            if sympy.degree(form.root, _x()) != 3 or len(roots) != 3:
+                continue
+            low, high, top = sorted((tidied(one, self.known) for one in roots), key=self._number)
+            numbers = [self._number(one) for one in (low, high, top)]
+            if not numbers[0] < numbers[1] < numbers[2] or self._number(side * form.x) > 0.5 * sum(numbers[1:]):
+                continue
+            middle = {_x(): side * sympy.Float(0.5 * sum(numbers[:2]))}
+            terms = self._terms(
+                constant, form._replace(outside=form.outside * sympy.sign(self._number(form.outside.xreplace(middle))))
+            )
+            if terms is None or any(one.pole is not None or one.power > 2 for one in terms):
+                continue
+            _, b, c, _ = sympy.Poly(form.root.xreplace({_x(): side * _x()}), _x()).all_coeffs()
+            modulus, rate = (
+                tidied(one, self.known) for one in ((high - low) / (top - low), side * first * (top - low))
+            )
+            whole = 2 * sympy.elliptic_k(modulus) / self.root(rate)
+            once = top * whole - 2 * self.root(rate) / (side * first) * sympy.elliptic_e(modulus)
+            powers = (whole, once, -(2 * b * once + c * whole) / (3 * side * first))
+            times = 4 if sum(side * fold in (low, high) for fold in folds) == 1 else 2
+            total = sympy.expand(
+                sympy.Add(*(times * side**one.power * one.weight * powers[one.power] for one in terms))
+            )
+            return sympy.collect(
+                total, [*total.atoms(sympy.elliptic_k, sympy.elliptic_e)], lambda one: tidied(one, self.known)
+            )
         return None
 
     def _coefficients(self, pole: Sympy | None) -> tuple[Sympy, Sympy, Sympy]:
@@ -191,9 +236,9 @@ class Quadrature:
     def _side(self, pole: Sympy) -> int:
         return 1 if self._number(self.form.x - pole) > 0.0 else -1
 
-    def _terms(self, constant: Sympy | None) -> list[_Term] | None:
+    def _terms(self, constant: Sympy | None, form: _Form | None = None) -> list[_Term] | None:
         """Return what stands over the root of Q; None where that is more than a polynomial and simple poles."""
-        form = self._form
+        form = form or self._form
         if form is None:
             return None
         whole = form.outside * form.root
@@ -285,7 +330,7 @@ class _Term(NamedTuple):
 def _substitutions(square: Sympy, q: Sympy) -> Iterator[tuple[Sympy, Sympy]]:
     """Yield what x may be in terms of q, and ``(dq/dx)^2`` in terms of x."""
     inside = {one.args[0] for one in square.atoms(sympy.sin, sympy.cos) if one.has(q)}
-    powers = sorted((one.args[0] for one in square.atoms(sympy.exp) if one.has(q)), key=lambda one: one.count_ops())
+    powers = sorted((one.args[0] for one in square.atoms(sympy.exp) if one.has(q)), key=length)
     if powers:
         yield sympy.exp(powers[0]), 1 / (powers[0].diff(q) * _x()) ** 2
     elif inside:

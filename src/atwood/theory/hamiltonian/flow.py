@@ -255,7 +255,7 @@ def _moved(matrix: Sympy, start: Sympy, number: int, s: Sympy) -> Sympy:
     positive = {one: sympy.Dummy(one.name, positive=True) for one in letters}
     back = {own: one for one, own in positive.items()}
     roots = sympy.roots(polynomial.xreplace(positive), x)
-    if sum(roots.values()) != len(powers):
+    if sum(roots.values()) != len(powers) or any(map(_is_nested, roots)):
         raise UnsupportedError("the rates of its linear equations have no closed form", where="flow_of")
     equations, right = [], []
     for root, times in roots.items():
@@ -264,8 +264,15 @@ def _moved(matrix: Sympy, start: Sympy, number: int, s: Sympy) -> Sympy:
             right.append(s.xreplace(positive) ** k * sympy.exp(root * s.xreplace(positive)))
     shares = sympy.Matrix(equations).LUsolve(sympy.Matrix(right))
     plain = [sympy.expand(one) for one in shares]
-    real = [(sympy.expand(one.rewrite(sympy.cos)) if one.has(sympy.I) else one).xreplace(back) for one in plain]
+    is_wave = any(root.has(sympy.I) or (root != 0 and -root in roots) for root in roots)
+    real = [(sympy.expand(one.rewrite(sympy.cos)) if is_wave else one).xreplace(back) for one in plain]
     return sum(c * (one * start)[0, 0] for c, one in zip(real, powers, strict=True))
+
+
+def _is_nested(root: Sympy) -> bool:
+    """Return whether roots stand under roots, so that what follows would fill pages."""
+    powers = [one for one in root.atoms(sympy.Pow) if not one.exp.is_Integer]
+    return any(inner != one and one.base.has(inner) for one in powers for inner in powers)
 
 
 # -- the algebra of several functions ----------------------------------------------------------------------------------
