@@ -50,32 +50,40 @@ class Owners:
         return tuple(path for path, keys in self._keys.items() if not mine.isdisjoint(keys))
 
     def _waves(self, polynomial: Polynomial) -> set[tuple[Monomial, Monomial]]:
-        with suppress(TooLargeError):
-            polynomial = sum_of_waves(self.expansion, polynomial, LIMIT)
-        return {(monomial, inner) for monomial, coefficient in polynomial.items() for inner in coefficient}
+        found = _waves_of(self.expansion, polynomial) or polynomial
+        return {(monomial, inner) for monomial, coefficient in found.items() for inner in coefficient}
 
 
 def forms_of(expansion: Expansion, row: Polynomial) -> Iterator[Polynomial]:
     """Yield a polynomial in the forms of which the shortest is taken."""
+    joined = join_squares(expansion, row)
+    waves = _waves_of(expansion, row) or _waves_of(expansion, joined)
+    squares = squares_of_waves(expansion, waves) if waves else {}
     forms: list[Callable[[], Polynomial]] = [
         lambda: row,
-        lambda: join_squares(expansion, row),
-        lambda: sum_of_waves(expansion, row, LIMIT),
-        lambda: products_of_waves(expansion, sum_of_waves(expansion, row, LIMIT)),
+        lambda: joined,
+        lambda: waves or row,
+        lambda: products_of_waves(expansion, waves) if waves else row,
         lambda: without_squares(expansion, row, "sin", LIMIT),
         lambda: without_squares(expansion, row, "cos", LIMIT),
-        lambda: squares_of_waves(expansion, sum_of_waves(expansion, row, LIMIT)),
-        lambda: products_of_waves(expansion, sum_of_waves(expansion, join_squares(expansion, row), LIMIT)),
+        lambda: squares or row,
+        lambda: without_squares(expansion, squares, "sin", LIMIT) if squares else row,
+        lambda: without_squares(expansion, squares, "cos", LIMIT) if squares else row,
     ]
     seen: list[Polynomial] = []
     for form in forms:
-        try:
+        with suppress(TooLargeError):
             made = form()
-        except TooLargeError:
-            continue
-        if made not in seen:
-            seen.append(made)
-            yield made
+            if made not in seen:
+                seen.append(made)
+                yield made
+
+
+def _waves_of(expansion: Expansion, row: Polynomial) -> Polynomial:
+    """Return a polynomial as a sum of waves; nothing where that is too long."""
+    with suppress(TooLargeError):
+        return sum_of_waves(expansion, row, LIMIT)
+    return {}
 
 
 def length_of(expansion: Expansion, polynomial: Polynomial) -> int:

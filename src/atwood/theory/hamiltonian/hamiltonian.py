@@ -14,7 +14,7 @@ from atwood.arguments import FLAG, optional, takes
 from atwood.arrays import FloatArray
 from atwood.display import count_of
 from atwood.errors import KernelEvaluationError, StartError, UnsupportedError
-from atwood.expr import Expression, Program, depends_on, jacobian, substitute, vjp
+from atwood.expr import Expression, Program, collect, depends_on, jacobian, substitute, vjp
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.lagrangian import Lagrangian, lagrangian_of
@@ -421,17 +421,18 @@ def hamiltonian_formula(formulas: EquationFormulas, transform: LegendreTransform
     is the square of a momentum, less what other momenta contribute to it, over twice an inertia. A term comes from the
     parts without whose part of L it would be another: where one of them is doubled, it changes.
     """
-    found, whole = transform.lagrangian, _Quadratic.of(transform, transform.momentum_expressions)
+    found = transform.lagrangian
+    entries, free = _inertia(formulas, transform, found.lagrangian)
     terms: list[Term] = []
-    for block in _blocks(transform.size, whole.entries):
+    for block in _blocks(transform.size, entries):
         if len(block) > _LARGEST_BLOCK:
             return None
-        ways = ((_squares(formulas, order, whole), order) for order in permutations(reversed(block)))
+        ways = ((_squares(formulas, order, entries, free), order) for order in permutations(reversed(block)))
         best, order = min(ways, key=lambda one: cost(Sum(tuple(one[0]))))
         rates = [found.velocities[i] for i in block]
         acting = [one for one in found.parts if depends_on(one.lagrangian, rates)]
         doubled = {
-            one.path: _squares(formulas, order, whole.with_more(transform, one.lagrangian))
+            one.path: _squares(formulas, order, *_inertia(formulas, transform, found.lagrangian + one.lagrangian))
             for one in (acting if len(acting) > 1 else [])
         }
         for k, term in enumerate(best):
@@ -443,25 +444,20 @@ def hamiltonian_formula(formulas: EquationFormulas, transform: LegendreTransform
     return Sum((*terms, *rest.terms))
 
 
-@dataclass(frozen=True)
-class _Quadratic:
-    """Momenta as ``M q' + a``: the entries of M that are not zero, and a by coordinate."""
+def _inertia(
+    formulas: EquationFormulas, transform: LegendreTransform, lagrangian: Expression
+) -> tuple[dict[tuple[int, int], Expression], list[Expression]]:
+    """Return the entries of M that are not zero and ``p - a``, where ``M q' + a`` are the momenta.
 
-    entries: Mapping[tuple[int, int], Expression]
-    at_rest: Sequence[Expression]
-    momenta: Sequence[Expression]
-
-    @staticmethod
-    def of(transform: LegendreTransform, momenta: Sequence[Expression]) -> _Quadratic:
-        """Return them from momenta as functions of velocities."""
-        at_rest = substitute(list(momenta), dict.fromkeys(transform.lagrangian.velocities, 0.0))
-        mass = jacobian(list(momenta), list(transform.velocity_symbols))
-        return _Quadratic({(i, j): one for i, j, one in mass.triples if not one.is_zero}, at_rest, momenta)
-
-    def with_more(self, transform: LegendreTransform, lagrangian: Expression) -> _Quadratic:
-        """Return them with more terms of a Lagrangian."""
-        more = vjp([lagrangian], [lagrangian.graph.one], list(transform.velocity_symbols))
-        return _Quadratic.of(transform, [p + one for p, one in zip(self.momenta, more, strict=True)])
+    An entry that is the same wherever the coordinates are is that of parameters alone, so that it cancels.
+    """
+    rates = list(transform.velocity_symbols)
+    momenta = vjp([lagrangian], [lagrangian.graph.one], rates)
+    mass = [one for one in jacobian(momenta, rates).triples if not one[2].is_zero]
+    short = collect([one for _, _, one in mass], formulas.book.angles, formulas.book.parameters)
+    at_rest = substitute(momenta, dict.fromkeys(rates, 0.0))
+    free = [momentum_symbol(transform.lagrangian, i) - one for i, one in enumerate(at_rest)]
+    return {(i, j): few if few.is_parametric else one for (i, j, one), few in zip(mass, short, strict=True)}, free
 
 
 def _blocks(size: int, entries: Mapping[tuple[int, int], Expression]) -> Iterator[list[int]]:
@@ -476,11 +472,15 @@ def _blocks(size: int, entries: Mapping[tuple[int, int], Expression]) -> Iterato
         yield sorted(block)
 
 
-def _squares(formulas: EquationFormulas, order: Sequence[int], of: _Quadratic) -> list[Term]:
+def _squares(
+    formulas: EquationFormulas,
+    order: Sequence[int],
+    entries: Mapping[tuple[int, int], Expression],
+    free: Sequence[Expression],
+) -> list[Term]:
     """Return the terms of a block, with its momenta eliminated in an order."""
-    found = formulas.expressions
-    matrix = {(i, j): of.entries.get((i, j), found.graph.zero) for i in order for j in order}
-    momenta = {i: momentum_symbol(found, i) - of.at_rest[i] for i in order}
+    matrix = {(i, j): entries.get((i, j), free[0].graph.zero) for i in order for j in order}
+    momenta = {i: free[i] for i in order}
     terms = []
     for k, one in enumerate(order):
         pivot = matrix[one, one]
