@@ -160,3 +160,46 @@ def test_times_have_units_and_pictures_are_drawn(tmp_path: Path) -> None:
         str(picture),
     )
     assert picture.stat().st_size > 1000
+
+
+@pytest.mark.sample(2)
+@pytest.mark.parametrize(
+    "command",
+    [
+        "action simple-pendulum --t-end 0.5",
+        "action-angle simple-pendulum",
+        "equations double-pendulum --latex",
+        "hamiltonian simple-pendulum",
+        "motions simple-pendulum --end rod.angle=0.5 --t-end 0.3",
+        "routhian lagrange-top",
+        "symmetric-top lagrange-top",
+    ],
+)
+def test_formulas_have_a_picture_of_the_motion_beside_them(command: str, tmp_path: Path) -> None:
+    written = ran(*command.split(), "--plot", str(tmp_path / "one.png"))
+    assert written
+    assert (tmp_path / "one.png").stat().st_size > 5000
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        ("bracket-algebra kepler", "what `bracket-algebra` finds here is not drawn"),
+        ("hamiltonian kepler", "a phase portrait is of one coordinate"),
+        ("modes mass-spring-chain --symbolic", "Leave out --symbolic."),
+    ],
+)
+def test_what_has_no_picture_says_so(command: str, said: str, tmp_path: Path) -> None:
+    done = CliRunner().invoke(main, [*command.split(), "--plot", str(tmp_path / "one.png")])
+    assert done.exit_code == 1
+    assert said in " ".join(done.output.split())
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("more", [(), ("--hamiltonian",)])
+def test_parts_of_terms_are_in_the_data(more: tuple[str, ...]) -> None:
+    data = json.loads(ran("equations", "double-pendulum", *more, "--by-part", "--json"))
+    terms = data["terms"] if more else data["kinetic_energy"]["terms"]
+    assert ["bob1", "bob2"] in [one["parts"] for one in terms]
+    assert ["bob2"] in [one["parts"] for one in terms]
+    assert '"parts"' not in ran("equations", "double-pendulum", *more, "--json")

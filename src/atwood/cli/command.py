@@ -179,7 +179,7 @@ def _option(name: str, kind: Kind, default: Any, told: Sequence[Callable[..., An
         settings["required"] = True
     elif not kind.is_many:
         settings["default"] = default if not kind.words or default is None else str(default)
-    made = _Option([declared, name], **settings)
+    made = _Option([*declared.split(","), name], **settings)
     made.told = told
     return made
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +46,18 @@ _PICTURES = {
 }
 """Functions of `atwood` that draw results, by their classes."""
 
+_PICTURES_OF_SCENES = {
+    "Action": ("simulate", "plot"),
+    "ActionAngle": ("phase_portrait", "plot_phase_portrait"),
+    "EquationsOfMotion": ("simulate", "plot_mechanism"),
+    "Hamiltonian": ("phase_portrait", "plot_phase_portrait"),
+    "JoiningMotion": ("", "plot"),
+    "Routhian": ("reduced", "plot_effective_potential"),
+    "SymmetricTop": ("reduced", "plot_top_path"),
+}
+"""What is drawn beside formulas, by their classes: a function of the scene (none for a run that a value holds), and the
+function that draws what it gives."""
+
 _MOST_PICTURES = 12
 
 
@@ -56,7 +68,7 @@ def theory_command(name: str, module: str, function: str) -> click.Command:
     made = [vars(importlib.import_module(module)).get(one) for one in of]
     written = [one for one in _WRITTEN if one != "python" or any(hasattr(kind, one) for kind in made)]
     more: dict[str, tuple[Kind, Any]] = dict.fromkeys(written, (FLAG, False))
-    more |= {"plot": (FILE, None)} if _PICTURES.keys() & set(of) else {}
+    more["plot"] = FILE, None
     special, own = _SPECIAL.get(name, (None, {}))
 
     def run(request: Request) -> None:
@@ -64,15 +76,17 @@ def theory_command(name: str, module: str, function: str) -> click.Command:
         if len(written) > 1:
             names = " and ".join(f"--{one.removeprefix('as_')}" for one in written)
             raise UsageError(f"{names} do not go together", advice="Give one of them.")
-        if getattr(request, "plot", None) is not None:
+        if request.plot is not None:
             check_picture(request.plot)
         asked, scene = _read(found, request)
         value = _called(found, scene, asked) if special is None else special(found, scene, asked, request)
-        _show(value, name, scene, written[0] if written else "", getattr(request, "plot", None))
+        if request.plot is not None:
+            _draw(value, name, scene, request.plot, asked.get("t_end"))
+        _show(value, name, scene, written[0] if written else "", request.plot)
 
     run.__doc__ = inspect.cleandoc((special or found).__doc__ or "").partition("\n\nParameters\n")[0]
     told = [*([special] if special else []), _show, found]
-    names = {"plot": "--bode"} if of == ["LinearModel"] else {}
+    names = {"plot": "--bode,--plot"} if of == ["LinearModel"] else {}
     return command(name, run, *told, more=more | own, names=names)
 
 
@@ -144,7 +158,7 @@ def _modes(function: Callable[..., Any], scene: Assembly, asked: dict[str, Any],
 
 _SPECIAL: dict[str, tuple[Callable[..., Any], dict[str, tuple[Kind, Any]]]] = {
     "equations": (_equations, {"values": (FLAG, False), "hamiltonian": (FLAG, False)}),
-    "equilibria": (_equilibria, {"along": (replace(TEXT, word="PATH=FROM:TO"), None), "plot": (FILE, None)}),
+    "equilibria": (_equilibria, {"along": (replace(TEXT, word="PATH=FROM:TO"), None)}),
     "modes": (_modes, {}),
 }
 """What commands do beside calling their function, and their further options."""
@@ -156,11 +170,7 @@ _SPECIAL: dict[str, tuple[Callable[..., Any], dict[str, tuple[Kind, Any]]]] = {
 def _show(value: Any, command: str, assembly: Assembly, written: str, picture: Path | None) -> None:
     """Write what was found to standard output, and draw it."""
     scene = assembly.flat.name
-    several = value if isinstance(value, (list, tuple)) and not isinstance(value, Shown) else [value]
-    if picture is not None:
-        if type(several[0]).__name__ not in _PICTURES:
-            raise UsageError("formulas are not drawn", where="--plot", advice="Leave out --symbolic.")
-        _draw(several[0], picture)
+    several = _each(value)
     if written == "as_json":
         print_json(_data(value, command, scene))
         return
@@ -184,6 +194,11 @@ def _show(value: Any, command: str, assembly: Assembly, written: str, picture: P
         out.files(plotted=picture)
     elif type(several[0]).__name__ == "PhasePortrait":
         out.line(("Draw it with --plot phase.png.", "dim"))
+
+
+def _each(value: Any) -> Sequence[Any]:
+    """Return what is shown one after another."""
+    return value if isinstance(value, (list, tuple)) and not isinstance(value, Shown) else [value]
 
 
 def _page(value: Any, assembly: Assembly) -> Page:
@@ -212,16 +227,30 @@ def _words(value: Any) -> str:
     return "result" if words in ("add", "mul", "pow") else words
 
 
-def _draw(value: Any, file: Path) -> None:
-    """Draw what was found; every mode in a picture of its own, numbered where there are several."""
-    draw = getattr(importlib.import_module("atwood"), _PICTURES[type(value).__name__])
-    if draw.__name__ != "plot_mode":
-        draw(value, file=file)
+def _draw(value: Any, command: str, scene: Assembly, file: Path, t_end: Any) -> None:
+    """Draw what was found, or the motion that it is of; every mode in a picture of its own, numbered where several."""
+    engine = importlib.import_module("atwood")
+    first: Any = next(iter(_each(value)), None)
+    kind = type(first).__name__
+    if kind in _PICTURES_OF_SCENES:
+        how, draw = _PICTURES_OF_SCENES[kind]
+        given = {} if t_end is None else {"t_end": t_end}
+        found = getattr(engine, how)(scene, **given) if how else getattr(first, "result", None)
+        getattr(engine, draw)(found, file=file)
         return
-    if len(value) > _MOST_PICTURES:
-        warn(f"only the first {_MOST_PICTURES} of {len(value)} modes are drawn")
-    for mode in range(min(len(value), _MOST_PICTURES)):
-        draw(value, mode, file if len(value) == 1 else file.with_name(f"{file.stem}-{mode}{file.suffix}"))
+    if kind not in _PICTURES:
+        motions = "Leave it out; `atwood phase`, `atwood reduced` and `atwood run` draw motions."
+        advice = "Leave out --symbolic." if kind.startswith("Symbolic") else motions
+        raise UsageError(f"what `{command}` finds here is not drawn", where="--plot", advice=advice)
+    draw = getattr(engine, _PICTURES[kind])
+    if draw.__name__ != "plot_mode":
+        draw(first, file=file)
+        return
+    count = len(first)
+    if count > _MOST_PICTURES:
+        warn(f"only the first {_MOST_PICTURES} of {count} modes are drawn")
+    for mode in range(min(count, _MOST_PICTURES)):
+        draw(first, mode, file if count == 1 else file.with_name(f"{file.stem}-{mode}{file.suffix}"))
 
 
 def _data(value: Any, command: str, scene: str) -> dict[str, Any]:

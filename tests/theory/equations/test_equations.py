@@ -529,6 +529,7 @@ def test_what_is_too_large_to_read_shows_its_structure() -> None:
         _ = equations(SCENES["chain"](links=400)).rows
 
 
+@pytest.mark.sample(0)
 def test_formulas_that_are_too_long_have_names_for_what_they_share() -> None:
     eq = equations(SCENES["chain"](links=13))
     assert not eq.is_readable

@@ -87,6 +87,7 @@ def defined(text: str) -> None:
     assert used <= said
 
 
+@pytest.mark.sample(0)
 def test_every_name_is_said_what_it_is() -> None:
     for scene, orientation in ((HeavyTop(), "euler-zxz"), (RollingDisc(), None)):
         eq = equations(scene, orientation=orientation)

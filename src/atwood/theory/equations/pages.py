@@ -113,7 +113,7 @@ def as_data(eq: EquationsOfMotion) -> dict[str, Any]:
     made |= {"readable": eq.is_readable, "structure": eq.structure.to_dict()}
     if not eq.is_readable:
         return made
-    written = eq.written
+    written = eq.written_by_part if eq.by_part else eq.written
     made["symbols"] = [
         {"symbol": one.name, "path": one.path, "unit": one.unit, "value": one.value, "kind": one.kind}
         for one in eq.legend
@@ -134,8 +134,8 @@ def as_data(eq: EquationsOfMotion) -> dict[str, Any]:
     return made
 
 
-def _both(one: Sum) -> dict[str, str]:
-    return {"latex": latex.formula(one), "python": code.formula(one)}
+def _both(one: Sum) -> dict[str, Any]:
+    return {"latex": latex.formula(one), "python": code.formula(one), **page.terms_data(one)}
 
 
 _COLUMNS = 64

@@ -6,6 +6,7 @@ import unicodedata
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
+from typing import Any
 
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.theory.formulas.printers import latex, text
@@ -192,6 +193,12 @@ def _pieces(line: Line, write: Callable[[Sum], str], by_part: bool = False) -> l
 def _owners_of(line: Line) -> list[str]:
     """Return the parts that each term comes from; nothing where that is not known of any."""
     return [", ".join(term.owners) for term in line.formula.terms] if any(t.owners for t in line.formula.terms) else []
+
+
+def terms_data(formula: Sum) -> dict[str, list[dict[str, Any]]]:
+    """Return each term with the parts that it comes from as plain data; nothing where that is not known of any."""
+    terms = [{"latex": latex.formula(Sum((one,))), "parts": list(one.owners)} for one in formula.terms]
+    return {"terms": terms} if any(one.owners for one in formula.terms) else {}
 
 
 def _latex_rows(line: Line | Matrix, by_part: bool = False) -> list[str]:
