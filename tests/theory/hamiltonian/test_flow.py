@@ -14,6 +14,7 @@ from atwood import (
     generated_transformation,
     hamiltonian,
     poisson_bracket,
+    poisson_brackets,
     simulate,
     total_derivative,
 )
@@ -165,3 +166,15 @@ def test_a_name_that_the_scene_has_not_is_an_error() -> None:
     assert poisson_bracket("c*theta", "p_theta", h, constants=["c"]) == sympy.Symbol("c")
     with pytest.raises(UsageError, match="foo"):
         total_derivative("foo", h)
+    with pytest.raises(UsageError, match=r"(?s)p_thetta is neither.*p_theta"):
+        flow_of("p_thetta", h, s)
+    [moved] = flow_of("c*p_theta", h, s, constants=["c"]).coordinates
+    assert moved == h.coordinates[0] + sympy.Symbol("c") * s
+
+
+def test_brackets_of_nothing_in_particular_are_the_fundamental_ones() -> None:
+    h = hamiltonian(SCENES["double-pendulum"]())
+    one, none = sympy.eye(2), sympy.zeros(2, 2)
+    assert poisson_brackets(hamiltonian=h) == sympy.Matrix([[none, one], [-one, none]])
+    with pytest.raises(UsageError, match="hamiltonian"):
+        poisson_brackets()

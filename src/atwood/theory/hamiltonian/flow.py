@@ -169,8 +169,14 @@ class Flow(Shown):
         return f"<Flow of {text_of(self.space.shown(self.function))} by {self.parameter}, {told}>"
 
 
-@takes(f=EXPRESSION, space=PHASE_SPACE, s=EXPRESSION, order=optional(whole("an order of 1 or more", 1)))
-def flow_of(f: Any, space: Space, s: Any, order: int | None = None) -> Flow:
+@takes(
+    f=EXPRESSION,
+    space=PHASE_SPACE,
+    s=EXPRESSION,
+    order=optional(whole("an order of 1 or more", 1)),
+    constants=SYMBOLS,
+)
+def flow_of(f: Any, space: Space, s: Any, order: int | None = None, *, constants: Sequence[Any] = ()) -> Flow:
     """Return the flow that a function generates: ``e^(-s D_f)`` with ``D_f g = {f, g}``.
 
     Of order 1 it is the infinitesimal canonical transformation ``delta q = s df/dp``, ``delta p = -s df/dq``
@@ -186,14 +192,18 @@ def flow_of(f: Any, space: Space, s: Any, order: int | None = None) -> Flow:
         How far: a symbol, or an expression of parameters.
     order
         The highest power of s; if it is not given the flow is exact.
+    constants
+        See `poisson_bracket`.
 
     Raises
     ------
+    UsageError
+        If f holds what is neither coordinate nor momentum, parameter nor time.
     UnsupportedError
         If no closed form is found: where repeated brackets lead to ever new functions.
     """
     found = phase_space_of(space)
-    read = found.read(f)
+    read = found.declared(f, (*constants, *s.free_symbols))
     own = (*found.coordinates, *found.momenta)
     if s.has(*own):
         raise UsageError(f"{s} depends on coordinates or momenta", where="flow_of", advice="Give a symbol, such as s.")

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
-from atwood.arguments import command, takes, whole
+from atwood.arguments import check, command, takes, whole
 from atwood.errors import UnsupportedError, UsageError
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
@@ -465,8 +465,8 @@ def poisson_bracket(
 @command("brackets")
 @takes(functions=EXPRESSIONS, hamiltonian=PHASE_SPACE, constants=SYMBOLS)
 def poisson_brackets(
-    functions: Sequence[Any],
-    hamiltonian: Space,
+    functions: Sequence[Any] = (),
+    hamiltonian: Space | None = None,
     *,
     constants: Sequence[Any] = (),
 ) -> Sympy:
@@ -475,12 +475,13 @@ def poisson_brackets(
     Parameters
     ----------
     functions
-        The functions, such as the components of angular momentum.
+        The functions, such as the components of angular momentum; coordinates and momenta, in this order, if there are
+        none: then these are the fundamental brackets (Goldstein, equation 9.69).
     hamiltonian, constants
         See `poisson_bracket`.
     """
-    space = phase_space_of(hamiltonian)
-    read = [space.declared(one, constants) for one in functions]
+    space = phase_space_of(check(PHASE_SPACE, hamiltonian, "hamiltonian", "poisson_brackets"))
+    read = [space.declared(one, constants) for one in functions or space.given]
     return sympy.ImmutableMatrix(
         len(read), len(read), [space.shown(short(bracket(f, g, space))) for f in read for g in read]
     )
