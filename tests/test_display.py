@@ -126,6 +126,8 @@ def roots(tmp_path_factory) -> dict[str, object]:
         "flow": atwood.flow_of("p**2 + q**2", (("q",), ("p",)), "s"),
         "algebra": atwood.bracket_algebra((("q",), ("p",)), ["a", "b"], ["p**2", "q*p"]),
         "principal function": atwood.principal_function(atwood.hamiltonian(Oscillators())),
+        "cloud": atwood.phase_cloud(SimplePendulum(), t_end=0.1),
+        "density": atwood.liouville_density("p_u**2", atwood.hamiltonian(Oscillators())),
         "reduced": atwood.reduced(SimplePendulum()),
         "symmetry": atwood.Symmetry(dict.fromkeys(angles, 1.0), 0.0),
         "modes": atwood.normal_modes(scene, at=hanging),

@@ -111,6 +111,7 @@ if TYPE_CHECKING:
         plot_root_locus as plot_root_locus,
     )
     from atwood.plotting.plots.phase import (
+        plot_phase_cloud as plot_phase_cloud,
         plot_phase_portrait as plot_phase_portrait,
         plot_section as plot_section,
     )
@@ -173,12 +174,17 @@ if TYPE_CHECKING:
         equations as equations,
     )
     from atwood.theory.flow import (
+        LiouvilleDensity as LiouvilleDensity,
         LyapunovExponents as LyapunovExponents,
+        PhaseCloud as PhaseCloud,
         PhasePortrait as PhasePortrait,
         PoincareSection as PoincareSection,
         RestPoint as RestPoint,
+        Separatrix as Separatrix,
         TangentFlow as TangentFlow,
+        liouville_density as liouville_density,
         lyapunov_exponents as lyapunov_exponents,
+        phase_cloud as phase_cloud,
         phase_portrait as phase_portrait,
         poincare_section as poincare_section,
         tangent_flow as tangent_flow,
@@ -264,7 +270,7 @@ _ROOMS = {
     "atwood.plotting.plots.energies": ("plot_energies",),
     "atwood.plotting.plots.linear": ("plot_bode", "plot_branches", "plot_nyquist", "plot_root_locus"),
     "atwood.plotting.plots.reduction": ("plot_effective_potential", "plot_top_path"),
-    "atwood.plotting.plots.phase": ("plot_phase_portrait", "plot_section"),
+    "atwood.plotting.plots.phase": ("plot_phase_cloud", "plot_phase_portrait", "plot_section"),
     "atwood.plotting.polhodes": ("plot_free_rotation", "plot_polhodes"),
     "atwood.reporting": ("MechanismReport", "report"),
     "atwood.result.files": ("SavedResult", "load_result", "save_result"),
@@ -284,8 +290,8 @@ _ROOMS = {
     "atwood.theory.dynamics": ("Dynamics", "StartSolution", "dynamics", "solve_initial_values"),
     "atwood.theory.equations": ("EquationsOfMotion", "PartOfEquations", "equations"),
     "atwood.theory.flow": (
-        "LyapunovExponents", "PhasePortrait", "PoincareSection", "RestPoint", "TangentFlow",
-        "lyapunov_exponents", "phase_portrait",
+        "LiouvilleDensity", "LyapunovExponents", "PhaseCloud", "PhasePortrait", "PoincareSection", "RestPoint",
+        "Separatrix", "TangentFlow", "liouville_density", "lyapunov_exponents", "phase_cloud", "phase_portrait",
         "poincare_section", "tangent_flow",
     ),
     "atwood.theory.linear": (

@@ -39,6 +39,7 @@ _PICTURES = {
     "FreeRotation": "plot_free_rotation",
     "LinearModel": "plot_bode",
     "NormalModes": "plot_mode",
+    "PhaseCloud": "plot_phase_cloud",
     "PhasePortrait": "plot_phase_portrait",
     "PoincareSection": "plot_section",
     "ReducedMotion": "plot_effective_potential",

@@ -25,6 +25,7 @@ ENERGIES = {
     "inverted": lambda q: -2.0 * q**2,
     "pendulum": lambda q: 4.0 * (1.0 - np.cos(q)),
 }
+TURN = round(math.pi, 9)
 KINDS = {"free": [], "harmonic": ["centre"], "inverted": ["saddle"], "pendulum": ["saddle", "centre", "saddle"]}
 
 
@@ -50,6 +51,23 @@ def test_separatrices_of_the_pendulum_have_the_energy_of_its_top() -> None:
         assert np.abs(curve[:, 1]) == pytest.approx(speed, abs=5e-3)
 
 
+def test_over_the_momentum_curves_are_level_sets_of_h() -> None:
+    """``H = p^2/(2 m l^2) - m g l cos(theta)``, and m g l on the separatrices from one saddle to the other."""
+    found = phase_portrait(SimplePendulum(mass=2.0, length=0.7), momenta=True)
+    assert found.speed == "p_theta"
+    assert found.units == ("rad", "J s")
+    assert found.levels is not None
+    for curve, level in zip(found.curves, found.levels, strict=True):
+        h = curve[:, 1] ** 2 / (2.0 * 2.0 * 0.7**2) - 2.0 * 9.81 * 0.7 * np.cos(curve[:, 0])
+        assert h == pytest.approx(level, rel=1e-4, abs=1e-4)
+    between = [one for one in found.named if one.kind == "heteroclinic"]
+    assert {(round(one.begin, 9), round(one.end, 9)) for one in between} == {(-TURN, TURN), (TURN, -TURN)}
+    assert [one.energy for one in found.named] == pytest.approx([2.0 * 9.81 * 0.7] * 8, rel=1e-12)
+    assert "heteroclinic" in found.as_text()
+    hoop = phase_portrait(RotatingHoopDriven(), momenta=True)
+    assert "homoclinic" in {one.kind for one in hoop.named if one.begin == pytest.approx(math.pi)}
+
+
 def test_motions_run_in_their_sense() -> None:
     for curve in phase_portrait(SimplePendulum()).curves:
         ahead = np.diff(curve, axis=0)
@@ -57,6 +75,7 @@ def test_motions_run_in_their_sense() -> None:
         assert np.all(ahead[fast, 0] * curve[:-1, 1][fast] > 0.0)
 
 
+@pytest.mark.sample(0)
 def test_friction_makes_a_focus() -> None:
     scene = SimplePendulum()
     drag = scene.add("drag", Drag(linear=0.5))

@@ -11,7 +11,7 @@ from atwood.arguments import FILE, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.plotting.canvas import COLOURS, GREY, INK, finished, headed, new_figure, polish, with_unit
-from atwood.theory.flow import PhasePortrait, PoincareSection
+from atwood.theory.flow import PhaseCloud, PhasePortrait, PoincareSection
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -125,4 +125,31 @@ def plot_section(section: PoincareSection, file: str | os.PathLike[str] | None =
         )
     polish(axes, *(with_unit(path, section.units[path]) for path in paths[:2]))
     headed(axes, f"{section.scene}: {section.surface}")
+    return finished(figure, file)
+
+
+@takes(cloud=instance("a PhaseCloud, as phase_cloud returns it", PhaseCloud), file=optional(FILE))
+def plot_phase_cloud(cloud: PhaseCloud, file: str | os.PathLike[str] | None = None) -> Figure:
+    """Draw a cloud of states as it flows, in the plane of its coordinate: its area at each time beside it.
+
+    Parameters
+    ----------
+    cloud
+        What `atwood.phase_cloud` gave.
+    file
+        Where to save the picture.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+    """
+    figure = new_figure(7.0, 5.0)
+    axes, i = figure.subplots(), cloud.number
+    for k, (t, area) in enumerate(zip(cloud.time, cloud.area, strict=True)):
+        colour, label = COLOURS[k % len(COLOURS)], f"{t:.3g} s: area {area:.6g}"
+        axes.fill(cloud.q[k, :, i], cloud.p[k, :, i], color=colour, alpha=0.35, label=label)
+    polish(axes, cloud.coordinate, f"momentum of {cloud.coordinate}")
+    axes.legend()
+    headed(axes, f"{cloud.scene}: a cloud of states")
     return finished(figure, file)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from atwood.arguments import BY_PATH, TEXT, Kind, Refused, command, each, optional, real, takes
+from atwood.arguments import BY_PATH, FLAG, TEXT, Kind, Refused, command, each, optional, real, takes
 from atwood.arrays import FloatArray
 from atwood.display import count_of, data_of, fitted
 from atwood.errors import SolveError, UsageError
@@ -26,6 +26,7 @@ from atwood.table import Shown, Table, facts, table
 from atwood.theory.dynamics.dynamics import Dynamics
 from atwood.theory.flow.plane_field import Field, Window, separatrices, spaced_curves
 from atwood.theory.formulas.described import Described
+from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, read_hamiltonian
 from atwood.theory.linear.linear_model import complex_text
 from atwood.theory.linear.variations import LinearScene
 
@@ -57,15 +58,36 @@ class RestPoint:
 
 
 @dataclass(frozen=True, eq=False)
+class Separatrix:
+    """A motion that comes out of a saddle, or goes into one, in infinite time.
+
+    Attributes
+    ----------
+    kind
+        ``"homoclinic"``, out of and into one saddle, ``"heteroclinic"``, from one to another, or ``"open"``: it does
+        not come to another in the window.
+    begin, end
+        The saddles; None where there is none.
+    energy
+        H on it, J; None where it is not known or not kept.
+    """
+
+    kind: str
+    begin: float | None
+    end: float | None
+    energy: float | None
+
+
+@dataclass(frozen=True, eq=False)
 class PhasePortrait(Shown):
-    """The motions of a scene with one degree of freedom, as curves over coordinate and speed.
+    """The motions of a scene with one degree of freedom, as curves over coordinate and speed, or momentum.
 
     Attributes
     ----------
     coordinate, speed
-        Names of both.
+        Names of both; that of the momentum in the place of the speed where the curves are over that.
     units
-        Of coordinate and speed.
+        Of coordinate and speed, or momentum.
     window
         Their ranges.
     rest_points
@@ -76,6 +98,11 @@ class PhasePortrait(Shown):
         Motions, each of shape (points, 2), in the direction in which they are run through.
     separatrices
         Those into and out of saddles.
+    levels
+        H on each of the curves, J: over coordinate and momentum they are its level sets; None where it is not kept, or
+        curves are over the speed.
+    named
+        What each separatrix is.
     scene
         Name of the scene.
     """
@@ -88,6 +115,8 @@ class PhasePortrait(Shown):
     everywhere_at_rest: bool
     curves: tuple[FloatArray, ...]
     separatrices: tuple[FloatArray, ...]
+    levels: tuple[float, ...] | None
+    named: tuple[Separatrix, ...]
     scene: str
 
     def to_data(self) -> dict[str, Any]:
@@ -95,7 +124,8 @@ class PhasePortrait(Shown):
         window = [list(self.window.across), list(self.window.up)]
         told = data_of(self, "scene", "coordinate", "speed", "units")
         points = [data_of(one, "coordinate", "kind", "eigenvalues") for one in self.rest_points]
-        ends = data_of(self, "curves", "separatrices")
+        ends = data_of(self, "curves", "levels", "separatrices")
+        ends["named"] = [data_of(one, "kind", "begin", "end", "energy") for one in self.named]
         return {**told, "window": window, "everywhere_at_rest": self.everywhere_at_rest, "rest_points": points, **ends}
 
     def tables(self) -> tuple[Table, ...]:
@@ -109,7 +139,10 @@ class PhasePortrait(Shown):
             (one.kind, f"{one.coordinate:.9g}", ", ".join(complex_text(value) for value in one.eigenvalues))
             for one in self.rest_points
         ]
-        return (table(("at rest", f"{self.coordinate}, {self.units[0]}>", "eigenvalues, 1/s"), rows, title),)
+        rest = table(("at rest", f"{self.coordinate}, {self.units[0]}>", "eigenvalues, 1/s"), rows, title)
+        places = [["" if one is None else f"{one:.9g}" for one in (x.begin, x.end, x.energy)] for x in self.named]
+        lines = sorted({(one.kind, *place) for one, place in zip(self.named, places, strict=True)})
+        return (rest, table(("separatrix", "out of>", "into>", "H, J>"), lines)) if lines else (rest,)
 
     def __repr__(self) -> str:
         points = ", ".join(f"{one.kind} at {one.coordinate:.4g}" for one in self.rest_points) or "no point of rest"
@@ -139,12 +172,13 @@ _BOUNDS = optional(
 
 
 @command("phase")
-@takes(scene=SCENE, coordinates=_BOUNDS, speeds=_BOUNDS)
+@takes(scene=SCENE, coordinates=_BOUNDS, speeds=_BOUNDS, momenta=FLAG)
 def phase_portrait(
     scene: Model | Assembly,
     *,
     coordinates: Bounds | None = None,
     speeds: Bounds | None = None,
+    momenta: bool = False,
 ) -> PhasePortrait:
     """Return the phase portrait of a scene with one degree of freedom: curves, points of rest, separatrices.
 
@@ -159,6 +193,8 @@ def phase_portrait(
     coordinates, speeds
         Ranges of the coordinate and of its rate, in SI units or text with units such as ``"180 deg"``; chosen by the
         points of rest and the start if not given.
+    momenta
+        Whether curves are over the momentum that belongs to the coordinate, and not over its rate.
 
     Returns
     -------
@@ -198,16 +234,62 @@ def phase_portrait(
     window = Window(across, up)
     saddles = [(np.array([one.coordinate, 0.0]), linear(one.coordinate)) for one in rest_points if one.kind == "saddle"]
     special = separatrices(field, saddles, window, rest)
-    return PhasePortrait(
+    curves = spaced_curves(field, window, rest, special)
+    near = 0.02 * (across[1] - across[0]), 0.02 * (up[1] - up[0])
+    ends = [[_saddle_at(place, saddles, near) for place in curve[[0, -1]]] for curve in special]
+    made = PhasePortrait(
         coordinate=name,
         speed=functions.speeds[0],
         units=(unit, f"{unit}/s"),
         window=window,
         rest_points=rest_points,
         everywhere_at_rest=everywhere,
-        curves=tuple(spaced_curves(field, window, rest, special)),
+        curves=tuple(curves),
         separatrices=tuple(special),
+        levels=None,
+        named=tuple(Separatrix(_kind_of(a, b), a, b, None) for a, b in ends),
         scene=assembly.flat.name,
+    )
+    return _over_momenta(made, read_hamiltonian(assembly)) if momenta else made
+
+
+def _saddle_at(
+    place: FloatArray, saddles: Sequence[tuple[FloatArray, FloatArray]], near: tuple[float, float]
+) -> float | None:
+    """Return the saddle that a separatrix begins or ends at."""
+    found = [where[0] for where, _ in saddles if np.all(np.abs(where - place) < near)]
+    return float(found[0]) if found else None
+
+
+def _kind_of(begin: float | None, end: float | None) -> str:
+    return "open" if begin is None or end is None else "homoclinic" if begin == end else "heteroclinic"
+
+
+def _over_momenta(portrait: PhasePortrait, h: Hamiltonian) -> PhasePortrait:
+    """Return a portrait with momenta in the place of speeds, and H on its curves."""
+
+    def moved(curve: FloatArray) -> FloatArray:
+        return np.column_stack([curve[:, 0], h.momenta_at(curve[:, :1], curve[:, 1:])[:, 0]])
+
+    window, levels, named = portrait.window, None, portrait.named
+    rims = [moved(np.column_stack([np.linspace(*window.across, 101), np.full(101, one)])) for one in window.up]
+    up = [one[:, 1] for one in rims]
+    curves, special = (tuple(map(moved, one)) for one in (portrait.curves, portrait.separatrices))
+    if h.is_conserved:
+        levels = tuple(float(np.median(h(one[:, :1], one[:, 1:]))) for one in curves)
+        tops = [moved(np.array([[one.end if one.begin is None else one.begin, 0.0]])) for one in named]
+        named = tuple(
+            replace(one, energy=float(h(top[0, :1], top[0, 1:]))) for one, top in zip(named, tops, strict=True)
+        )
+    return replace(
+        portrait,
+        speed=str(h.momenta[0].func),
+        units=(portrait.units[0], "J s" if portrait.units[0] == "rad" else "kg m/s"),
+        window=Window(window.across, (float(np.min(up)), float(np.max(up)))),
+        curves=curves,
+        separatrices=special,
+        levels=levels,
+        named=named,
     )
 
 
