@@ -15,6 +15,7 @@ from atwood import (
     UsageError,
     assemble,
     connector,
+    connect,
     conserved,
     equations,
     from_data,
@@ -258,3 +259,51 @@ def test_a_function_may_not_take_what_the_model_around_does_not_have() -> None:
     scene.connect(well.point, scene.add("bob", PointMass(mass=1.0)).point)
     with pytest.raises(ParameterError, match="stiffness"):
         equations(scene)
+
+
+class Halved(Scene):
+    """A pendulum on a pendulum of twice its length and half its mass."""
+
+    length: Number = parameter(0.8, unit="m", above=0.0, doc="Length of the upper rod.", symbol="l")
+    mass: Number = parameter(3.0, unit="kg", above=0.0, doc="Mass of the upper bob.", symbol="m")
+
+    ground: Ground = Ground()
+    rod1: Rod = Rod(length=length)
+    rod2: Rod = Rod(length=length / 2)
+    bob1: PointMass = PointMass(mass=mass / 3)
+    bob2: PointMass = PointMass(mass=2 * mass / 3)
+    connections = [
+        connect(ground.frame, rod1.a),
+        connect(rod1.b, bob1.point),
+        connect(bob1.point, rod2.a),
+        connect(rod2.b, bob2.point),
+    ]
+    start = {"rod1.angle": 0.3, "rod2.angle": 0.1}
+
+
+def test_what_is_worked_out_from_a_letter_is_written_with_it() -> None:
+    """``l/2`` has no letter of its own, nor has ``m/3``, of which m itself stands nowhere."""
+    eq = equations(Halved())
+    assert [one.name for one in eq.legend] == ["theta_1", "theta_2", "l", "g", "m"]
+    l, m, g = (eq.symbol(path) for path in ("rod1.length", "mass", "gravity"))
+    assert eq.symbol("rod2.length") == l / 2
+    assert eq.symbol("bob2.mass") == 2 * m / 3
+    assert eq.values == {l: 0.8, m: 3.0, g: 9.81}
+    one, two = eq.coordinates
+    assert sympy.expand(eq.potential_energy + m * g * l * (sympy.cos(one) + sympy.cos(two) / 3)) == 0
+    assert "V = -⅓ m g l (3 cos θ₁ + cos θ₂)" in eq.text()
+    numbers = equations(Halved(), parameters="values").potential_energy
+    assert float((numbers - eq.potential_energy.subs(eq.values)).subs({one: 0.3, two: 0.1})) == pytest.approx(0.0)
+
+
+def test_a_value_that_was_changed_keeps_a_letter_of_its_own() -> None:
+    changed = assemble(Halved()).with_values({"rod2.length": 0.7})
+    eq = equations(changed)
+    assert "l_2" in [one.name for one in eq.legend]
+    assert eq.values[eq.symbol("rod2.length")] == 0.7
+
+
+def test_letters_given_to_a_part_win_over_what_its_value_is_worked_out_from() -> None:
+    eq = equations(Halved(), symbols={"rod2.length": "b", "mass": "M"})
+    assert str(eq.symbol("rod2.length")) == "b"
+    assert str(eq.symbol("bob1.mass")) == "M/3"

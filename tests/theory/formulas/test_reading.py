@@ -27,6 +27,8 @@ theta = sympy.Function("theta")(t)
         (sympy.Rational(-1, 2) * m * theta.diff(t) ** 2, "-½ m θ̇²", r"-\frac{1}{2} m \dot{\theta}^{2}"),
         (p_phi / sympy.sin(theta) ** 2, "p_φ / sin² θ", r"\frac{p_{\phi}}{\sin^{2} \theta}"),
         (sympy.sqrt(x - k), "√(x - k)", r"\sqrt{x - k}"),
+        (sympy.sqrt(2) * k * x / 2, "½ √2 k x", r"\frac{1}{2} \sqrt{2} k x"),
+        ((2 - sympy.sqrt(2)) * k, "(2 - √2) k", r"\left(2 - \sqrt{2}\right) k"),
         (2 * sympy.pi * omega, "2 π ω₁", r"2 \pi \omega_{1}"),
         (sympy.Integral(x, (x, 0, k)), "∫[0, k] x dx", r"\int_{0}^{k} x \, dx"),
         (sympy.Integral(1 / x, x), "∫ 1 / x dx", r"\int \frac{1}{x} \, dx"),

@@ -98,9 +98,9 @@ class EquationsOfMotion(Paged, EquationFormulas):
         for one in self.legend:
             if one.path == path:
                 return objects.letter(one)
-        merged = {other.name: self.notation.symbols[first] for other, first in self.notation.merged.items()}
+        merged = {other.name: first for other, first in self.notation.merged.items()}
         if path in merged and self.parameters == "symbolic":
-            return objects.letter(merged[path])
+            return objects.formula(self.formula(merged[path]))
         raise UsageError("it has no symbol", where=path, advice=suggestion(path, [one.path for one in self.legend]))
 
     @property

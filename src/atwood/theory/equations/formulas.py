@@ -101,10 +101,11 @@ class EquationFormulas:
         names |= {expression: Name(symbol, dots) for expression, (symbol, dots) in notation.velocities.items()}
         angles = [q for q, name in zip(found.coordinates, found.names, strict=True) if name.unit == "rad"]
         orientations = [one for one in found.equations.orientation_coordinates if one.kind == "quaternion"]
+        own = (expression for expression, symbol in notation.symbols.items() if symbol.kind == "parameter")
         return Book(
             names,
             tuple(angles),
-            self.assembly.parameters,
+            tuple(dict.fromkeys((*self.assembly.parameters, *own))),
             self.parameters == "symbolic",
             [[found.coordinates[i] for i in one.coordinates] for one in orientations],
         )

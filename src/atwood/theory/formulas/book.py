@@ -194,7 +194,11 @@ class Book:
                     found.append(in_order(product(number * one.number, [*constants, *one.factors], one.owners)))
                 continue
             number, constants = self._coefficient(expansion, made[0][2])
-            inner = [one.times(as_fraction(lead / made[0][1])) for one, lead, _ in made]
+            ratios = [as_fraction(lead / made[0][1]) for _, lead, _ in made]
+            whole = abs(content_of(ratios))
+            content = min((whole, Fraction(1)), key=lambda c: sum(abs(ratio) != c for ratio in ratios))
+            inner = [one.times(ratio / content) for (one, _, _), ratio in zip(made, ratios, strict=True)]
+            number = number * content
             who = tuple(dict.fromkeys(owner for one, _, _ in made for owner in one.owners))
             shared = [] if grouped else [one for one in inner[0].factors if one[1] < 0 and _all_have(inner, one)]
             inner = [replace(one, factors=tuple(f for f in one.factors if f not in shared)) for one in inner]

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from atwood.arguments import optional
 from atwood.errors import UsageError, suggestion
-from atwood.expr import Expression
+from atwood.expr import Expression, depends_on, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.declare.component import Component
+from atwood.model.declare.fields import FieldReference
+from atwood.model.declare.parameter_expressions import OPERATIONS, ParameterExpression
 from atwood.model.local.flatten import passed_on
 from atwood.model.values.letters import GREEK, LETTERS, split_letter
 from atwood.theory.formulas.tree import Symbol
@@ -115,7 +119,7 @@ class Notation:
         All symbols in order: coordinates, angular velocities, multipliers, sampled values, parameters.
     merged
         Parameters that another stands for: equal principal moments of a body, what one parameter of a model with a
-        letter of its own is passed on to, and equal values that were given one letter.
+        letter of its own is passed on to or that is worked out from it, and equal values that were given one letter.
     """
 
     symbols: Mapping[Expression, Symbol]
@@ -160,13 +164,15 @@ def notation_of(assembly: Assembly, found: Lagrangian, symbols: Mapping[str, str
     _check_paths(assembly, found, said)
     wanted = [*_coordinates(found), *_spins(found), *_multipliers(found)]
     wanted += [*_sampled_values(assembly), *_parameters(assembly)]
-    wanted, merged = _put_together([_with_letter(assembly, one, said) for one in wanted], _equal_moments(assembly))
+    wanted = [_with_letter(assembly, one, said) for one in wanted]
+    derived, more = _worked_out(assembly, wanted, said)
+    wanted, merged = _put_together([*wanted, *more], _equal_moments(assembly) | derived)
     names: dict[tuple[str, ...], str] = {}
     symbols_of: dict[Expression, Symbol] = {
         found.time: Symbol("t", path="time", unit="s", meaning="Time.", kind="time")
     }
-    for order, (one, more) in enumerate(zip(wanted, _subscripts(wanted), strict=True)):
-        name = (*one.stem, *more)
+    for order, (one, below) in enumerate(zip(wanted, _subscripts(wanted), strict=True)):
+        name = (*one.stem, *below)
         momentum = ("p", *name) if one.kind == "coordinate" else name
         for taken in (name, momentum):
             if names.setdefault(taken, one.path) != one.path:
@@ -284,6 +290,52 @@ def _put_together(
         if one.expression not in by:
             kept.append(one)
     return kept, by
+
+
+def _worked_out(
+    assembly: Assembly, wanted: Sequence[_Wanted], said: Mapping[str, str]
+) -> tuple[dict[Expression, Expression], list[_Wanted]]:
+    """Return parameters such as ``length / 2`` in terms of those with letters around them, and which of these are new.
+
+    What has another value than its declaration says, as a changed copy may, keeps a letter of its own.
+    """
+    known = {one.shared: one.expression for one in reversed(wanted) if one.shared}
+    values, more = dict(assembly.mechanism.table.values), dict[Expression, _Wanted]()
+
+    def letter(model: Component, name: str) -> Expression | None:
+        for component, own in passed_on(model, name):
+            path = f"{component.path}.{own}" if component.path else own
+            given = said.get(path) or next(iter(_declared(component, own)), "")
+            if given and path not in known:
+                known[path] = symbol = assembly.mechanism.table.graph.parameter(path)
+                values[symbol], spec = float(component._value(own)), component._parameters[own]
+                more[symbol] = _Wanted(
+                    *(symbol, split_letter(given), path, component.path, spec.unit.text, spec.doc, values[symbol]),
+                    *("parameter", path in said, path),
+                )
+            if given:
+                return known[path]
+        return None
+
+    def formula(bound: Any, model: Component) -> Any:
+        if isinstance(bound, FieldReference):
+            return letter(model, bound.name)
+        if not isinstance(bound, ParameterExpression):
+            return bound
+        inner = [formula(one, model) for one in bound.arguments]
+        return None if None in inner else OPERATIONS[bound.operation](*inner)
+
+    found: dict[Expression, Expression] = {}
+    for one in wanted:
+        part, name, axis = _place(assembly, one.path)
+        if one.kind == "parameter" and not one.is_given and not axis and part in assembly.mechanism.locals_:
+            *_, (component, own) = passed_on(assembly.mechanism.locals_[part].part.component, name)
+            made = None if component._parent is None else formula(component._settings.get(own), component._parent)
+            if isinstance(made, Expression) and math.isclose(
+                substitute([made], values)[0].value, values[one.expression]
+            ):
+                found[one.expression] = made
+    return found, [one for symbol, one in more.items() if any(depends_on(made, [symbol]) for made in found.values())]
 
 
 def _coordinates(found: Lagrangian) -> list[_Wanted]:

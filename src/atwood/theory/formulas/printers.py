@@ -140,7 +140,7 @@ class _Text(_Lines):
     def _power(self, node: Node, power: Fraction) -> str:
         if power == Fraction(1, 2):
             inner = self.formula(node)
-            return f"√{inner}" if isinstance(node, Name) else f"√({inner})"
+            return f"√{inner}" if isinstance(node, Name) or inner.isdigit() else f"√({inner})"
         raised = "" if power == 1 else str(power).translate(self._ABOVE)
         if isinstance(node, Call) and node.function in ("sin", "cos", "tan"):
             return self._call(node, raised)

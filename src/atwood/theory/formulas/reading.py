@@ -142,7 +142,8 @@ def _bracket_last(term: Term) -> Term:
 
 
 def _is_plain_bracket(factor: Factor) -> bool:
-    return isinstance(factor[0], Sum) and not any("kg" in one.symbol.unit for one in names_in([factor[0]]))
+    units = [one.symbol.unit for one in names_in([factor[0]])]
+    return isinstance(factor[0], Sum) and bool(units) and not any("kg" in one for one in units)
 
 
 _CONSTANTS = {"pi": "pi", "E": "e", "I": "i", "oo": "infinity", "-oo": "-infinity"}

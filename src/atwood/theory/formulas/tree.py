@@ -199,8 +199,9 @@ def _place_of_factor(factor: Factor) -> tuple[int, int, str]:
         return (_rank_of_unit(symbol), symbol.order, symbol.name)
     if isinstance(node, Call):
         return (8, 0, node.function)
-    moving = any(name.symbol.moves for name in names_in([node]))
-    return (7 if moving else 0, 0, "")
+    names = list(names_in([node]))
+    moving = any(name.symbol.moves for name in names)
+    return (7 if moving else 0 if names else -2, 0, "")
 
 
 def _rank_of_unit(symbol: Symbol) -> int:
