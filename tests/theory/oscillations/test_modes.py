@@ -224,7 +224,7 @@ def test_the_commands_write_formulas() -> None:
         return done.stdout
 
     letters = [f"--symbol={path}={letter}" for path, letter in _EQUAL.items()]
-    assert "(2 - √2) / l" in ran("modes", "double-pendulum", "--symbolic", *letters)
+    assert "(2 - √2) g / l" in ran("modes", "double-pendulum", "--symbolic", *letters)
     assert r"\omega_{1}^2 &= \frac{\left(2 - \sqrt{2}\right) g}{l}" in ran(
         "modes", "double-pendulum", "--symbolic", "--latex", *letters
     )
