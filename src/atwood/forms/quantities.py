@@ -86,7 +86,7 @@ def internal_reactions_of(assembly: Assembly) -> InternalReactions | None:
     return assembly.shared.get(_INTERNAL, lambda: internal_reaction_program(*parts))
 
 
-def _places(reduced: Equations, maximal: Equations) -> tuple[list[Expression], list[Expression]]:
+def places(reduced: Equations, maximal: Equations) -> tuple[list[Expression], list[Expression]]:
     """Return maximal coordinates and speeds in terms of generalized ones."""
     forest = maximal.forest
     positions: list[Expression] = [reduced.graph.constant(0.0)] * len(forest.coordinates)
@@ -112,13 +112,13 @@ def _places(reduced: Equations, maximal: Equations) -> tuple[list[Expression], l
 
 def with_reactions(reduced: Equations, maximal: Equations) -> Equations:
     """Return equations in generalized coordinates with the reactions that forces read as functions of the state."""
-    positions, speeds = _places(reduced, maximal)
+    positions, speeds = places(reduced, maximal)
     where = dict(zip((*maximal.coordinates, *maximal.speeds), (*positions, *speeds), strict=True))
     return with_known(reduced, dict(zip(maximal.read, substitute(list(maximal.read.values()), where), strict=True)))
 
 
 def _make(assembly: Assembly, reduced: Equations, maximal: Equations) -> Program:
-    positions, speeds = _places(reduced, maximal)
+    positions, speeds = places(reduced, maximal)
     outputs = (OutputGroup("q", tuple(positions)), OutputGroup("u", tuple(speeds)))
     name = f"{assembly.flat.name} to maximal coordinates"
     return Program(name, state_groups(reduced), assembly.parameters, outputs)

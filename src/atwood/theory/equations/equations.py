@@ -5,26 +5,34 @@ The equations of motion of a scene, to be read.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
 from atwood.arguments import FLAG, one_of, optional, takes
 from atwood.errors import UnsupportedError, UsageError, suggestion
-from atwood.expr import Expression
+from atwood.expr import Expression, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import lagrangian_of, rows_by_part
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
+from atwood.model.declare.connectors import PATHS
 from atwood.pipeline import SCENE, assembly_of
 from atwood.simulation.problem.arguments import FORM, ORIENTATION
 from atwood.theory.equations.formulas import EquationFormulas, Parameters, solve_closures
-from atwood.theory.equations.pages import Structure, as_data, equation_lines, module_of, page_of_equations
+from atwood.theory.equations.pages import (
+    Structure,
+    as_data,
+    asked_sections,
+    equation_lines,
+    module_of,
+    page_of_equations,
+)
 from atwood.theory.formulas import page
 from atwood.theory.formulas.described import Page, Paged
 from atwood.theory.formulas.notation import SYMBOLS, notation_of
-from atwood.theory.formulas.page import Section
+from atwood.theory.formulas.page import Line, Section
 from atwood.theory.formulas.printers import Sympy, objects
 from atwood.theory.formulas.tree import Sum
 
@@ -83,6 +91,8 @@ class EquationsOfMotion(Paged, EquationFormulas):
         ``"symbolic"`` or ``"values"``.
     by_part
         Whether pages say of each term which parts it comes from.
+    is_solved, paths
+        Whether pages have the accelerations, and which quantities.
     """
 
     # -- as sympy objects ---------------------------------------------------------------------------------------------
@@ -194,6 +204,44 @@ class EquationsOfMotion(Paged, EquationFormulas):
         _ = self.written
         return tuple((objects.formula(name), objects.formula(value)) for name, value in self.book.shared)
 
+    @property
+    def solved(self) -> dict[Sympy, Sympy]:
+        """The accelerations and the multipliers as functions of the state.
+
+        Raises
+        ------
+        UnsupportedError
+            If too many equations hang together, or the formulas would fill a page.
+        """
+        names = (*self.accelerations, *self.multipliers)
+        return dict(zip(names, (objects.formula(one.formula) for one in self.lines_solved), strict=True))
+
+    @property
+    def constraint_powers(self) -> tuple[Sympy, ...]:
+        """The power of each constraint's forces, W: ``-lambda dg/dt``, zero where a constraint does not move."""
+        found = self.expressions
+        still = substitute([one.rate for one in found.constraints], dict.fromkeys(found.velocities, 0.0))
+        powers = (-one.multiplier * rate for one, rate in zip(found.constraints, still, strict=True))
+        return tuple(objects.formula(self.formula(one)) for one in powers)
+
+    def quantity(self, path: str) -> Sympy:
+        """Return a quantity of a part as a formula: what a sensor measures, an energy, or a reaction.
+
+        Parameters
+        ----------
+        path
+            The quantity, such as ``"rod.tension"``. Reactions of joints that the coordinates solve follow from the
+            balance of forces; they are in terms of coordinates, velocities and accelerations.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such quantity.
+        UnsupportedError
+            If it is a reaction that hangs together with others.
+        """
+        return objects.formula(self.written_quantity(path))
+
     def eliminate(self, *paths: str) -> list[dict[Sympy, Sympy]]:
         """Return dependent coordinates of closed loops in closed form.
 
@@ -289,6 +337,7 @@ class EquationsOfMotion(Paged, EquationFormulas):
         if not self.is_readable:
             return self.structure.latex()
         lines = equation_lines(self.written_by_part if self.by_part else self.written)
+        lines += [line for one in asked_sections(self) for line in one.lines if isinstance(line, Line)]
         shared = page.shared_lines((one.formula for one in lines), self.book.shared)
         return page.as_latex([*lines, *shared], self.by_part)
 
@@ -354,6 +403,8 @@ PARAMETERS = one_of(("symbolic", "values"))
     orientation=optional(ORIENTATION),
     symbols=SYMBOLS,
     by_part=FLAG,
+    solved=FLAG,
+    quantities=PATHS,
 )
 def equations(
     scene: Model | Assembly,
@@ -363,6 +414,8 @@ def equations(
     orientation: str | None = None,
     symbols: Mapping[str, str] | None = None,
     by_part: bool = False,
+    solved: bool = False,
+    quantities: Iterable[str] | None = None,
 ) -> EquationsOfMotion:
     """Return the equations of motion of a scene, to be read.
 
@@ -390,6 +443,11 @@ def equations(
     by_part
         Say of each term which parts it comes from. A formula is left without where the parts' own terms are not proven
         to add up to it, or the equations are no sum over parts: where rolling is solved, and in quaternions.
+    solved
+        Write the accelerations and the multipliers as functions of the state, too; see `EquationsOfMotion.solved`.
+    quantities
+        Paths of quantities of parts that are written as formulas, too, such as ``["rod.tension"]``: what sensors
+        measure, energies and reactions; see `EquationsOfMotion.quantity`.
 
     Returns
     -------
@@ -406,4 +464,5 @@ def equations(
     assembly = assembly_of(scene, form=form, orientation=orientation)
     chosen: Any = parameters
     made = read_equations(assembly, chosen, symbols)
-    return EquationsOfMotion(assembly, made.expressions, made.notation, chosen, by_part)
+    paths = tuple(quantities or ())
+    return EquationsOfMotion(assembly, made.expressions, made.notation, chosen, by_part, solved, paths)

@@ -23,10 +23,12 @@ from atwood.forms.lagrangian import Lagrangian, rows_by_part
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import sympy
 from atwood.theory.equations.pages import Structure, structure_of
+from atwood.theory.equations.solved import quantity_of, solved_for
 from atwood.theory.formulas.book import Book
 from atwood.theory.formulas.notation import Notation, momentum_symbol, with_momenta
+from atwood.theory.formulas.page import Line, line_for
 from atwood.theory.formulas.printers import Sympy
-from atwood.theory.formulas.tree import Name, Sum, Symbol, cost
+from atwood.theory.formulas.tree import Name, Sum, Symbol, cost, fraction
 
 _READABLE_COORDINATES, _READABLE_OPERATIONS = 12, 2_500
 """Beyond either nobody reads equations: their structure is shown."""
@@ -53,6 +55,8 @@ class EquationFormulas:
         ``"symbolic"`` or ``"values"``.
     by_part
         Whether pages say of each term which parts it comes from.
+    is_solved, paths
+        Whether pages have the accelerations, and which quantities.
     """
 
     assembly: Assembly
@@ -60,6 +64,8 @@ class EquationFormulas:
     notation: Notation
     parameters: Parameters = "symbolic"
     by_part: bool = False
+    is_solved: bool = False
+    paths: tuple[str, ...] = ()
 
     # -- as formulas --------------------------------------------------------------------------------------------------
 
@@ -178,14 +184,17 @@ class EquationFormulas:
             rates=self.formulas(found.rates),
         )
 
+    def _parted(self, total: Expression, own: Mapping[str, Expression], energy: bool = False) -> Sum:
+        """Return a formula with the parts of each term, where what these have is proven to add up to it."""
+        graph = self.expressions.graph
+        is_sum = own and self.is_readable and not self.formula(total - sum(own.values(), graph.zero)).terms
+        return self.formula(total, own if is_sum else None, energy)
+
     @cached_property
     def written_by_part(self) -> Written:
         """The formulas with the parts that each term comes from: where their own terms are proven to be its sum."""
-        found, graph, shares = self.expressions, self.expressions.graph, rows_by_part(self.expressions)
-
-        def parted(total: Expression, own: Mapping[str, Expression], energy: bool = False) -> Sum:
-            is_sum = own and self.is_readable and not self.formula(total - sum(own.values(), graph.zero)).terms
-            return self.formula(total, own if is_sum else None, energy)
+        found, parted = self.expressions, self._parted
+        graph, shares = found.graph, rows_by_part(found)
 
         def of(name: str) -> dict[str, Expression]:
             return {one.path: getattr(one, name) for one in found.parts}
@@ -232,6 +241,26 @@ class EquationFormulas:
                         changed |= {i, j}
         return tuple(shown)
 
+    @cached_property
+    def lines_solved(self) -> tuple[Line, ...]:
+        """The accelerations and the multipliers as functions of the state."""
+        found, notation = self.expressions, self.notation
+        names = [Name(*notation.velocities[one]) for one in found.accelerations]
+        names += [Name(notation.symbols[one.multiplier]) for one in found.constraints]
+        values = [fraction(*self.formulas(pair)) for pair in solved_for(self)]
+        if any(cost(one) > _LONGEST_FRACTION for one in values):
+            raise UnsupportedError(
+                "its accelerations would fill a page",
+                where=self.name,
+                advice="The equations of motion are shorter, and atwood.dynamics solves them in numbers.",
+            )
+        return tuple(line_for(name, one) for name, one in zip(names, values, strict=True))
+
+    def written_quantity(self, path: str) -> Sum:
+        """Return a quantity of a part as a formula; see `quantity_of`."""
+        total, shares = quantity_of(self, path)
+        return self._parted(total, shares)
+
     @property
     def residuals(self) -> tuple[Expression, ...]:
         """The equations of motion as expressions, forces of constraints included."""
@@ -256,6 +285,9 @@ class EquationFormulas:
         found = self.expressions
         return self._matrix(found.constraint_jacobian, (len(found.constraints), len(found.velocities)))
 
+
+_LONGEST_FRACTION = 250
+"""Signs and symbols of an acceleration beyond which none are written down."""
 
 _SUM = 2
 """A momentum of fewer terms is no shorter than what it stands for."""

@@ -68,13 +68,21 @@ def _sections(eq: EquationsOfMotion, written: Written) -> list[Section]:
             if q not in {found.coordinates[place] for place in found.moves if place is not None}
         ]
         sections.append(Section("Kinematics", tuple(rates)))
+    sections += asked_sections(eq)
     sections.append(Section("Mass matrix", (Matrix(("M", "M"), eq.mass),)))
     if written.constraints:
         sections.append(Section("Constraint Jacobian", (Matrix(("G", "G"), eq.slopes),)))
     if eq.book.shared:
-        names = [Line((latex.formula(name), text.formula(name)), value) for name, value in eq.book.shared]
-        sections.append(Section("Shared terms", tuple(names)))
+        sections.append(Section("Shared terms", tuple(page.line_for(*one) for one in eq.book.shared)))
     return page.with_names(sections, notation.legend)
+
+
+def asked_sections(eq: EquationsOfMotion) -> list[Section]:
+    """Return what is written where it is asked for: the accelerations, and quantities of parts."""
+    made = [Section("Accelerations and multipliers", eq.lines_solved)] if eq.is_solved else []
+    heads = ((rf"\text{{{path}}}".replace("_", r"\_"), path) for path in eq.paths)
+    known = tuple(Line(head, eq.written_quantity(path)) for head, path in zip(heads, eq.paths, strict=True))
+    return [*made, Section("Quantities", known)] if known else made
 
 
 def _energies(written: Written) -> Section:
@@ -128,6 +136,10 @@ def as_data(eq: EquationsOfMotion) -> dict[str, Any]:
         ("rates", written.rates),
     ):
         made[key] = [_both(one) for one in several]
+    if eq.is_solved:
+        made["solved"] = {line.left[1]: _both(line.formula) for line in eq.lines_solved}
+    if eq.paths:
+        made["quantities"] = {path: _both(eq.written_quantity(path)) for path in eq.paths}
     made["mass_matrix"] = [[_both(one) for one in row] for row in eq.mass]
     made["constraint_jacobian"] = [[_both(one) for one in row] for row in eq.slopes]
     made["shared"] = [{"name": code.formula(name), **_both(value)} for name, value in eq.book.shared]

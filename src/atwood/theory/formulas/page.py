@@ -42,6 +42,11 @@ class Line:
     right: str = ""
 
 
+def line_for(name: Name, formula: Sum) -> Line:
+    """Return a line that says what a name stands for."""
+    return Line((latex.formula(name), text.formula(name)), formula)
+
+
 @dataclass(frozen=True)
 class Matrix:
     """A matrix with its name, by rows; entries that are zero are empty sums."""
@@ -81,7 +86,7 @@ def with_names(sections: Sequence[Section], legend: Sequence[Symbol]) -> list[Se
     where = {
         name: Line((f"{latex.formula(name)}^2", f"{text.formula(name)}²"), one) for name, one in distances.values()
     }
-    where |= {name: Line((latex.formula(name), text.formula(name)), one) for one, name in moments.items()}
+    where |= {name: line_for(name, one) for one, name in moments.items()}
     if where:
         named = [replace(one, lines=tuple(_with(line, distances, moments) for line in one.lines)) for one in sections]
         sections = [*named, Section("Distances and moments of inertia", tuple(where.values()))]
@@ -118,7 +123,7 @@ def _with_short_names(sections: Sequence[Section], taken: Iterable[str]) -> list
         shown = replaced(bracket, inner)
         assert isinstance(name, Name)
         assert isinstance(shown, Sum)
-        where.append(Line((latex.formula(name), text.formula(name)), shown))
+        where.append(line_for(name, shown))
     return [*shorter, Section("Abbreviations", tuple(where), "What stands in brackets several times has a name.")]
 
 
@@ -157,7 +162,7 @@ def shared_in(formulas: Iterable[Node], shared: Sequence[tuple[Name, Sum]]) -> l
 
 def shared_lines(formulas: Iterable[Node], shared: Sequence[tuple[Name, Sum]]) -> tuple[Line, ...]:
     """Return what these names stand for, a line each."""
-    return tuple(Line((latex.formula(name), text.formula(name)), one) for name, one in shared_in(formulas, shared))
+    return tuple(line_for(name, one) for name, one in shared_in(formulas, shared))
 
 
 # -- lines ------------------------------------------------------------------------------------------------------------

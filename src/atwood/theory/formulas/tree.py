@@ -130,6 +130,22 @@ def product(number: Number, factors: Iterable[Factor], owners: tuple[str, ...] =
     return Term(number, tuple((node, power) for node, power in powers.items() if power), owners)
 
 
+def fraction(above: Sum, below: Sum) -> Sum:
+    """Return a quotient without the factors that all terms above and below share, and without quotients in them."""
+    every = [dict(term.factors) for term in (*above.terms, *below.terms)]
+    over = [
+        (node, -min(one.get(node, ONE * 0) for one in every)) for node in dict.fromkeys(k for d in every for k in d)
+    ]
+    above, below = (
+        Sum(tuple(in_order(product(term.number, [*term.factors, *over], term.owners)) for term in one.terms))
+        for one in (above, below)
+    )
+    if len(below.terms) == 1:
+        under = (below, -ONE)
+        return Sum(tuple(in_order(product(term.number, [*term.factors, under])) for term in above.terms))
+    return Sum((product(ONE, [(above, ONE), (below, -ONE)]),)) if above.terms else above
+
+
 def cost(node: Node) -> int:
     """Return how much there is to read: symbols, functions, numbers and signs."""
     if isinstance(node, Name):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property
 from itertools import permutations
@@ -14,7 +14,7 @@ from atwood.arguments import FLAG, optional, takes
 from atwood.arrays import FloatArray
 from atwood.display import count_of
 from atwood.errors import KernelEvaluationError, StartError, UnsupportedError
-from atwood.expr import Expression, Program, collect, depends_on, jacobian, substitute, vjp
+from atwood.expr import Expression, Program, depends_on, substitute, vjp
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.lagrangian import Lagrangian, lagrangian_of
@@ -29,6 +29,7 @@ from atwood.table import facts
 from atwood.theory.dynamics.functions import Numbers
 from atwood.theory.equations.equations import PARAMETERS
 from atwood.theory.equations.formulas import EquationFormulas, Parameters
+from atwood.theory.equations.solved import LARGEST_BLOCK, blocks, entries_of
 from atwood.theory.formulas import page
 from atwood.theory.formulas.described import Page, Paged
 from atwood.theory.formulas.notation import SYMBOLS, momentum_symbol, notation_of, with_momenta
@@ -411,10 +412,6 @@ def hamiltonian(
     return read_hamiltonian(assembly, chosen, symbols, by_part)
 
 
-_LARGEST_BLOCK = 3
-"""Mass matrices are inverted in symbols block by block, where no block has more rows."""
-
-
 def hamiltonian_formula(formulas: EquationFormulas, transform: LegendreTransform) -> Sum | None:
     """Return ``H = (p - a) M^-1 (p - a)/2 - L0`` as a formula; None where a block of M is too large.
 
@@ -425,8 +422,8 @@ def hamiltonian_formula(formulas: EquationFormulas, transform: LegendreTransform
     found = transform.lagrangian
     entries, free = _inertia(formulas, transform, found.lagrangian)
     terms: list[Term] = []
-    for block in _blocks(transform.size, entries):
-        if len(block) > _LARGEST_BLOCK:
+    for block in blocks(transform.size, entries):
+        if len(block) > LARGEST_BLOCK:
             return None
         ways = ((_squares(formulas, order, entries, free), order) for order in permutations(reversed(block)))
         best, order = min(ways, key=lambda one: cost(Sum(tuple(one[0]))))
@@ -448,29 +445,12 @@ def hamiltonian_formula(formulas: EquationFormulas, transform: LegendreTransform
 def _inertia(
     formulas: EquationFormulas, transform: LegendreTransform, lagrangian: Expression
 ) -> tuple[dict[tuple[int, int], Expression], list[Expression]]:
-    """Return the entries of M that are not zero and ``p - a``, where ``M q' + a`` are the momenta.
-
-    An entry that is the same wherever the coordinates are is that of parameters alone, so that it cancels.
-    """
+    """Return the entries of M that are not zero and ``p - a``, where ``M q' + a`` are the momenta."""
     rates = list(transform.velocity_symbols)
     momenta = vjp([lagrangian], [lagrangian.graph.one], rates)
-    mass = [one for one in jacobian(momenta, rates).triples if not one[2].is_zero]
-    short = collect([one for _, _, one in mass], formulas.book.angles, formulas.book.parameters)
     at_rest = substitute(momenta, dict.fromkeys(rates, 0.0))
     free = [momentum_symbol(transform.lagrangian, i) - one for i, one in enumerate(at_rest)]
-    return {(i, j): few if few.is_parametric else one for (i, j, one), few in zip(mass, short, strict=True)}, free
-
-
-def _blocks(size: int, entries: Mapping[tuple[int, int], Expression]) -> Iterator[list[int]]:
-    """Yield the rows that belong together since entries join them."""
-    left = set(range(size))
-    while left:
-        block, new = set[int](), {min(left)}
-        while new:
-            block |= new
-            new = {j for i, j in entries if i in new} - block
-        left -= block
-        yield sorted(block)
+    return entries_of(formulas, momenta, rates), free
 
 
 def _squares(
