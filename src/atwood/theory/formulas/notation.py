@@ -23,85 +23,34 @@ from atwood.theory.formulas.tree import Symbol
 SYMBOLS = optional(LETTERS)
 """The kind of the argument ``symbols`` of every function that writes formulas; see `notation_of`."""
 
-_LETTERS: Mapping[str, tuple[str, ...]] = {
-    "mass": ("m",),
-    "length": ("l",),
-    "natural_length": ("l", "0"),
-    "stiffness": ("k",),
-    "damping": ("c",),
-    "gravity": ("g",),
-    "radius": ("r",),
-    "moment": ("I",),
-    "axial_moment": ("I",),
-    "amplitude": ("A",),
-    "frequency": ("f",),
-    "angular_frequency": ("Omega",),
-    "angular_speed": ("Omega",),
-    "rate": ("Omega",),
-    "charge": ("e",),
-    "charge_a": ("e", "a"),
-    "charge_b": ("e", "b"),
-    "gravitational_constant": ("G",),
-    "gravitational_parameter": ("mu",),
-    "coulomb_constant": ("k", "e"),
-    "field": ("B",),
-    "angle": ("alpha",),
-    "phase": ("delta",),
-    "torque": ("M",),
-    "force": ("F",),
-    "pitch": ("h",),
-    "height": ("h",),
-    "width": ("b",),
-    "inertia": ("I",),
-    "ratio": ("n",),
-    "slope": ("Omega",),
-    "offset": ("b",),
-    "speed": ("v",),
-    "time": ("T",),
-    "friction": ("mu",),
-    "strength": ("K",),
-    "acceleration": ("a",),
-    "density": ("rho",),
-    "area": ("A",),
-    "temperature": ("T",),
-    "voltage": ("U",),
-    "current": ("I",),
-}
+
+def _table(text: str) -> dict[str, tuple[str, ...]]:
+    """Return letters with what stands below them from pairs of a name and a letter."""
+    return {name: tuple(letter.split("_")) for name, letter in (pair.split(":") for pair in text.split())}
+
+
+_LETTERS = _table(
+    """
+    mass:m  length:l  natural_length:l_0  stiffness:k  damping:c  gravity:g  radius:r  moment:I  axial_moment:I
+    amplitude:A  frequency:f  angular_frequency:Omega  angular_speed:Omega  rate:Omega  charge:e  charge_a:e_a
+    charge_b:e_b  gravitational_constant:G  gravitational_parameter:mu  coulomb_constant:k_e  field:B  angle:alpha
+    phase:delta  torque:M  force:F  pitch:h  height:h  width:b  inertia:I  ratio:n  slope:Omega  offset:b  speed:v
+    time:T  friction:mu  strength:K  acceleration:a  density:rho  area:A  temperature:T  voltage:U  current:I
+"""
+)
 """Letters of parameters by their names."""
 
-_VECTORS: Mapping[str, tuple[str, Mapping[str, str]]] = {
-    "moments": ("I", {"x": "1", "y": "2", "z": "3"}),
-    "center": ("c", {"x": "x", "y": "y", "z": "z"}),
-    "center_of_mass": ("c", {"x": "x", "y": "y", "z": "z"}),
-    "displacement": ("d", {"x": "x", "y": "y", "z": "z"}),
-    "products": ("D", {"x": "1", "y": "2", "z": "3"}),
-}
-"""Letters of the components of vectors."""
+_VECTORS = _table("moments:I_123  center:c_xyz  center_of_mass:c_xyz  displacement:d_xyz  products:D_123")
+"""Letters of vectors, and what stands below those of their components x, y and z."""
 
-_COORDINATES: Mapping[str, tuple[str, ...]] = {
-    "angle": ("theta",),
-    "angle_a": ("alpha",),
-    "angle_b": ("beta",),
-    "displacement": ("x",),
-    "displacement_1": ("x",),
-    "displacement_2": ("y",),
-    "quaternion.w": ("e", "0"),
-    "quaternion.x": ("e", "1"),
-    "quaternion.y": ("e", "2"),
-    "quaternion.z": ("e", "3"),
-    "spin.x": ("omega", "x"),
-    "spin.y": ("omega", "y"),
-    "spin.z": ("omega", "z"),
-    "euler.phi": ("phi",),
-    "euler.theta": ("theta",),
-    "euler.psi": ("psi",),
-    "position.x": ("x",),
-    "position.y": ("y",),
-    "position.z": ("z",),
-    "longitude": ("phi",),
-    "inclination": ("theta",),
-    "distance": ("r",),
-}
+_COORDINATES = _table(
+    """
+    angle:theta  angle_a:alpha  angle_b:beta  displacement:x  displacement_1:x  displacement_2:y  quaternion.w:e_0
+    quaternion.x:e_1  quaternion.y:e_2  quaternion.z:e_3  spin.x:omega_x  spin.y:omega_y  spin.z:omega_z
+    euler.phi:phi  euler.theta:theta  euler.psi:psi  position.x:x  position.y:y  position.z:z  longitude:phi
+    inclination:theta  distance:r
+"""
+)
 """Letters of coordinates and of angular velocities, by the ends of their paths."""
 
 
@@ -417,7 +366,7 @@ def _said(assembly: Assembly, part: str, name: str) -> tuple[str, str]:
 def _parameter_stem(name: str, axis: str) -> tuple[str, ...]:
     if axis and name in _VECTORS:
         letter, axes = _VECTORS[name]
-        return letter, axes.get(axis, axis)
+        return letter, axes["xyz".index(axis)]
     if axis and name == "position":
         return (axis,)
     if axis:
