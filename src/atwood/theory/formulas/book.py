@@ -195,8 +195,10 @@ class Book:
                 continue
             number, constants = self._coefficient(expansion, made[0][2])
             ratios = [as_fraction(lead / made[0][1]) for _, lead, _ in made]
-            contents: tuple[Number, ...] = abs(content_of(ratios)), Fraction(1)
-            content = min(contents, key=lambda c: sum(abs(ratio) != c for ratio in ratios))
+            whole = content_of(ratios)
+            content = min(
+                (whole if whole > 0 else -whole, Fraction(1)), key=lambda c: sum(abs(ratio) != c for ratio in ratios)
+            )
             inner = [one.times(ratio / content) for (one, _, _), ratio in zip(made, ratios, strict=True)]
             number = number * content
             who = tuple(dict.fromkeys(owner for one, _, _ in made for owner in one.owners))
