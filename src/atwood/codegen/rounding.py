@@ -70,6 +70,9 @@ _ROUNDED: dict[str, Callable[..., Any]] = {
     "tanh": np.tanh,
 }
 
+ON_ARRAYS = {**_EXACT, **_ROUNDED}
+"""Operations on arrays, entry by entry."""
+
 
 def roughly(count: int, start: int = 0) -> FloatArray:
     """Return factors next to one, up or down, shape (count, `WAYS`): the same ones each time, not to be changed."""

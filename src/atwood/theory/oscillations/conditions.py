@@ -8,13 +8,11 @@ as ``A cos + B sin + C``, or as a polynomial of degree two in one of sine and co
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
-
-Sympy: TypeAlias = Any
-"""A sympy object."""
+from atwood.theory.formulas.printers import Sympy
 
 _LONGEST, _LONGEST_OF_SEVERAL = 250, 60
 """Equations of more operations in one unknown, or in several, are not factored: nobody would solve them by hand."""

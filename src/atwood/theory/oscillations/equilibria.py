@@ -15,7 +15,7 @@ from atwood.theory.formulas.page import aligned
 from atwood.theory.formulas.printers import Sympy
 from atwood.theory.formulas.reading import latex_of, text_of
 from atwood.theory.oscillations.conditions import NoClosedFormError, Solution, solve_conditions
-from atwood.theory.oscillations.rest import PlainEquations, expand, is_singular, plain_equations
+from atwood.theory.oscillations.rest import Expansion, PlainEquations, expand, is_singular, plain_equations
 from atwood.theory.oscillations.stability import stability_of
 
 
@@ -119,15 +119,14 @@ def _where(condition: Sympy | None, number: int) -> str:
     return rf"\text{{{('exists for', 'stable for')[number]} }} {said}"
 
 
-def find_symbolic(
-    plain: PlainEquations,
-) -> list[tuple[Solution, SymbolicEquilibrium]]:
+def find_symbolic(plain: PlainEquations) -> list[tuple[SymbolicEquilibrium, Expansion | None]]:
     """Return the states of rest with what is said of them."""
-    found = []
-    for solution in _solutions(plain):
-        if is_singular(plain, solution, of_pole=True):
-            continue
-        found.append((solution, described(plain, solution)))
+    made = ((solution, *described(plain, solution)) for solution in _solutions(plain))
+    found = [
+        (state, expansion)
+        for solution, state, expansion in made
+        if expansion or (solution.free and not is_singular(plain, solution, of_pole=True))
+    ]
     if not found:
         raise UsageError("it stays nowhere at rest", where=plain.name, advice="Look for a steady motion, with `trim`.")
     return found
@@ -156,11 +155,10 @@ def _solutions(plain: PlainEquations) -> list[Solution]:
         ) from None
 
 
-def described(plain: PlainEquations, solution: Solution) -> SymbolicEquilibrium:
-    """Return what is said of a state of rest."""
-    exists = sympy.And(*solution.conditions)
-    is_pole = is_singular(plain, solution)
-    stable = None if is_pole else _where_it_exists(stability_of(expand(plain, solution)), exists)
+def described(plain: PlainEquations, solution: Solution) -> tuple[SymbolicEquilibrium, Expansion | None]:
+    """Return what is said of a state of rest, and the equations near it."""
+    exists, expansion = sympy.And(*solution.conditions), expand(plain, solution)
+    stable = None if expansion is None else _where_it_exists(stability_of(expansion), exists)
     paths = dict(zip(plain.coordinates, plain.paths, strict=True))
     free = tuple(paths[one] for one in solution.free if one in paths)
     numbers: dict[str, float] = {}
@@ -172,12 +170,11 @@ def described(plain: PlainEquations, solution: Solution) -> SymbolicEquilibrium:
     else:
         stability = "undecided" if stable is None else "stable" if plain.holds(stable) else "unstable"
     values = {path: plain.told(solution.values.get(q, q)) for q, path in paths.items()}
-    return SymbolicEquilibrium(
-        values, plain.told(exists), None if stable is None else plain.told(stable), free, numbers, stability
-    )
+    told = None if stable is None else plain.told(stable)
+    return SymbolicEquilibrium(values, plain.told(exists), told, free, numbers, stability), expansion
 
 
 def symbolic_equilibria(assembly: Assembly, symbols: Mapping[str, str] | None = None) -> SymbolicEquilibria:
     """Return the states of rest of a scene as formulas."""
     plain = plain_equations(assembly, symbols)
-    return SymbolicEquilibria((one for _, one in find_symbolic(plain)), plain)
+    return SymbolicEquilibria((one for one, _ in find_symbolic(plain)), plain)

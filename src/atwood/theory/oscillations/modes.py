@@ -26,8 +26,9 @@ from atwood.theory.formulas.reading import latex_of, text_of
 from atwood.theory.formulas.tree import as_fraction, of_pi
 from atwood.theory.oscillations.conditions import NoClosedFormError, Solution, solve_conditions
 from atwood.theory.oscillations.equilibria import SymbolicEquilibrium, described, find_symbolic, said, state_of
-from atwood.theory.oscillations.rest import Expansion, PlainEquations, expand, plain_equations
+from atwood.theory.oscillations.rest import Expansion, PlainEquations, plain_equations
 from atwood.theory.oscillations.spectrum import Eigenvalue, blocks, eigenvalues, of_pencil, on_block, roots_of, short
+from atwood.theory.oscillations.stability import characteristic
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,10 +211,9 @@ class SymbolicModes(Shown):
     @property
     def equation(self) -> Sympy:
         """The characteristic polynomial: ``det(K - lambda M)``, lambda = omega^2; with velocity terms in s."""
-        s, square = sympy.symbols("s lambda")
         if self.expansion.damping.is_zero_matrix:
-            return (self.stiffness - square * self.mass).det(method="berkowitz")
-        return (s**2 * self.mass + s * self.damping + self.stiffness).det(method="berkowitz")
+            return (self.stiffness - sympy.Symbol("lambda") * self.mass).det(method="berkowitz")
+        return characteristic(self.mass, self.damping, self.stiffness, sympy.Symbol("s")).as_expr()
 
     def latex(self) -> str:
         """Return energies to second order, and omega^2 and shapes of all modes, as an aligned block of LaTeX."""
@@ -287,8 +287,13 @@ def symbolic_modes(
 ) -> SymbolicModes:
     """Return small oscillations about a state of rest as formulas."""
     plain = plain_equations(assembly, symbols)
-    solution, rest = _chosen(plain, at)
-    expansion = expand(plain, solution)
+    rest, expansion = _chosen(plain, at)
+    if expansion is None:
+        raise UsageError(
+            "its coordinates are singular at this state of rest, or its constraints are",
+            where=plain.name,
+            advice="Choose other coordinates, or places with a constraint.",
+        )
     if expansion.damping.is_zero_matrix and expansion.stiffness.is_symmetric():
         found = eigenvalues(expansion.mass, expansion.stiffness, sympy.Dummy("lambda"))
     else:
@@ -303,12 +308,11 @@ def _with_velocities(one: Expansion) -> Iterator[Eigenvalue]:
     matrices, s = (one.mass, one.damping, one.stiffness), sympy.Dummy("s")
     for basis in blocks(matrices):
         m, c, k = (on_block(matrix, basis) for matrix in matrices)
-        pencil, square = s**2 * m + s * c + k, sympy.Dummy("square")
-        whole = sympy.Poly(pencil.det(method="berkowitz"), s)
-        if any(whole.all_coeffs()[1::2]):
-            found = list(of_pencil(pencil, s))
+        coefficients, square = characteristic(m, c, k, s).all_coeffs(), sympy.Dummy("square")
+        if any(coefficients[1::2]):
+            found = list(of_pencil(s**2 * m + s * c + k, s))
         else:
-            even = sympy.Poly(whole.all_coeffs()[::2], square)
+            even = sympy.Poly(coefficients[::2], square)
             found = [
                 Eigenvalue(value if value is None else sympy.sqrt(value), (), one.xreplace({square: s**2}))
                 for value, one in roots_of(even.as_expr(), square)
@@ -347,22 +351,22 @@ def _upper(value: complex) -> complex:
 # -- about which state -------------------------------------------------------------------------------------------------
 
 
-def _chosen(plain: PlainEquations, at: Mapping[str, Any] | None) -> tuple[Solution, SymbolicEquilibrium]:
+def _chosen(plain: PlainEquations, at: Mapping[str, Any] | None) -> tuple[SymbolicEquilibrium, Expansion | None]:
     """Return the state that was asked for: that of given values, the start if it is at rest, or the only stable one."""
     numbers = _start(plain) if at is None else {path: _in_si(plain, path, value) for path, value in at.items()}
     exact = _at_rest(plain, numbers)
     if exact is not None:
-        return exact, described(plain, exact)
+        return described(plain, exact)
     found = find_symbolic(plain)
-    there = [one for one in found if numbers and _is_there(plain, one[1], numbers)]
+    there = [one for one in found if numbers and _is_there(plain, one[0], numbers)]
     if at is None and not there:
-        there = [one for one in found if one[1].stability == "stable"]
+        there = [one for one in found if one[0].stability == "stable"]
     if len(there) == 1:
         return there[0]
     ahead = "its start is not at rest, and " if at is None else ""
     listed = "; ".join(
         f"{', '.join(f'{path} = {value:.6g}' for path, value in one.numbers.items())} ({one.stability})"
-        for _, one in found
+        for one, _ in found
     )
     raise UsageError(
         f"{ahead}{len(there)} of its states of rest {'are stable' if at is None else 'have these values'}: {listed}",

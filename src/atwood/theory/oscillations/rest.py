@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.errors import UnsupportedError, UsageError
+from atwood.errors import UnsupportedError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
@@ -166,14 +166,10 @@ class Expansion:
     independent: tuple[int, ...]
 
 
-def expand(plain: PlainEquations, solution: Solution) -> Expansion:
-    """Return equations of motion to first order about a state of rest."""
+def expand(plain: PlainEquations, solution: Solution) -> Expansion | None:
+    """Return equations of motion to first order about a state of rest; None where coordinates are singular there."""
     if is_singular(plain, solution):
-        raise UsageError(
-            "its coordinates are singular at this state of rest, or its constraints are",
-            where=plain.name,
-            advice="Choose other coordinates, or places with a constraint.",
-        )
+        return None
     by = dict(solution.values)
     still = dict.fromkeys((*plain.velocities, *plain.accelerations), sympy.Integer(0))
 

@@ -9,13 +9,11 @@ E-Notes 5, 2005); else the factors of the characteristic polynomial of degree on
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, TypeAlias
+from functools import partial
 
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
-
-Sympy: TypeAlias = Any
-"""A sympy object."""
+from atwood.theory.formulas.printers import Sympy
 
 
 @dataclass(frozen=True)
@@ -61,7 +59,7 @@ def _place_of(value: Sympy, among: Sequence[Eigenvalue]) -> int | None:
 
 def short(value: Sympy) -> Sympy:
     """Return an expression as one fraction of factors."""
-    return value.cancel().factor() if value.is_Add or value.is_Mul else value
+    return value.factor() if value.is_Add or value.is_Mul else value
 
 
 def on_block(matrix: Sympy, basis: Sympy) -> Sympy:
@@ -173,53 +171,46 @@ def roots_of(polynomial: Sympy, symbol: Sympy) -> Iterator[tuple[Sympy | None, S
 
 
 def of_pencil(pencil: Sympy, symbol: Sympy) -> Iterator[Eigenvalue]:
-    """Yield the values at which a matrix is singular, by the factors of its determinant."""
+    """Yield the values at which a matrix is singular, by the factors of its determinant, the smaller of two first."""
     for factor, times in sympy.factor_list(pencil.det(method="berkowitz"), symbol)[1]:
-        coefficients = sympy.Poly(factor, symbol).all_coeffs()
-        if len(coefficients) > 3:
+        modulus = sympy.Poly(factor, symbol)
+        if modulus.degree() > 2:
             yield Eigenvalue(None, (), factor)
-        elif len(coefficients) == 2:
-            value = short(-coefficients[1] / coefficients[0])
-            yield Eigenvalue(value, _vectors(pencil.subs(symbol, value), times), factor)
-        elif len(coefficients) == 3:
-            yield from _of_quadratic(pencil, symbol, coefficients, factor, times)
+        elif modulus.degree() > 0:
+            found = _vectors(pencil, modulus, times)
+            a, b, *rest = map(sympy.factor, modulus.all_coeffs())
+            twice = 2 * a if rest else a
+            middle, outside = short(-b / twice), sympy.sqrt((b**2 - 4 * a * rest[0]).factor()) if rest else 0
+            reach = short(sympy.sympify(outside / twice))
+            sign = 1 if reach.could_extract_minus_sign() else -1
+            for one in (sign, -sign) if rest else (0,):
+                told = partial(_with_root, symbol=symbol, middle=middle, share=one * outside, twice=twice)
+                value = sympy.factor_terms(middle + one * reach)
+                yield Eigenvalue(value, tuple(vector.applyfunc(told) for vector in found), factor)
 
 
-def _of_quadratic(
-    pencil: Sympy, symbol: Sympy, coefficients: Sequence[Sympy], factor: Sympy, times: int
-) -> Iterator[Eigenvalue]:
-    """Yield the two roots of ``a lambda^2 + b lambda + c``, the smaller first; vectors are rational in the root."""
-    a, b, c = map(sympy.factor, coefficients)
-    square = (b**2 - 4 * a * c).factor()
-    outside, root = sympy.sqrt(square), sympy.Dummy("root")
+def _with_root(entry: Sympy, symbol: Sympy, middle: Sympy, share: Sympy, twice: Sympy) -> Sympy:
+    """Return ``p + q lambda`` at the root ``middle + share / twice``."""
+    slope = entry.diff(symbol)
+    return sympy.factor_terms(short(entry.subs(symbol, middle)) + short(slope / twice) * share)
+
+
+def _vectors(pencil: Sympy, modulus: Sympy, times: int) -> tuple[Sympy, ...]:
+    """Return so many vectors that a matrix takes to zero at the roots of a polynomial, the first entry made one."""
+    symbol = modulus.gen
 
     def reduced(value: Sympy) -> Sympy:
-        return _rationalized(value, root, square) if value.has(root) else short(value)
+        above, below = (sympy.Poly(one, symbol) for one in sympy.fraction(sympy.together(value)))
+        return (above * below.invert(modulus)).rem(modulus).as_expr()
 
-    found = _vectors(pencil.subs(symbol, (-b + root) / (2 * a)), times, reduced)
-    middle, reach = short(-b / (2 * a)), short(outside / (2 * a))
-    sign = 1 if reach.could_extract_minus_sign() else -1
-    for one in (sign, -sign):
-        value = sympy.factor_terms(middle + one * reach)
-        vectors = (v.applyfunc(lambda x, one=one: sympy.factor_terms(x.subs(root, one * outside))) for v in found)
-        yield Eigenvalue(value, tuple(vectors), factor)
-
-
-def _rationalized(value: Sympy, root: Sympy, square: Sympy) -> Sympy:
-    """Return a rational function of a square root as ``p + q root``."""
-    above, below = (sympy.Poly(one, root) for one in sympy.fraction(sympy.together(value)))
-    modulus = sympy.Poly(root**2 - square, root)
-    (p, q), (s, t) = ((one.rem(modulus).nth(0), one.rem(modulus).nth(1)) for one in (above, below))
-    size = s**2 - t**2 * square
-    first, second = (p * s - q * t * square) / size, (q * s - p * t) / size
-    return first.cancel().factor() + second.cancel().factor() * root
-
-
-def _vectors(singular: Sympy, times: int, reduce: Callable[[Sympy], Sympy] = short) -> tuple[Sympy, ...]:
-    """Return so many vectors that a matrix takes to zero, the first entry that is not zero made one."""
-    found, _ = null_space(singular, times, reduce)
-    vectors = (found[:, k] for k in range(found.shape[1]))
-    return tuple((v / next(one for one in v if one != 0)).applyfunc(reduce) for v in vectors)
+    if times > 1:
+        found, _ = null_space(pencil, times, reduced)
+        columns = [found[:, k] for k in range(found.shape[1])]
+    else:  # the cofactors of a row
+        n = pencil.shape[0]
+        rows = (sympy.Matrix([reduced(pencil.cofactor(i, j, "berkowitz")) for j in range(n)]) for i in range(n))
+        columns = [next(row for row in rows if not row.is_zero_matrix)]
+    return tuple((v / next(one for one in v if one != 0)).applyfunc(reduced) for v in columns)
 
 
 def null_space(

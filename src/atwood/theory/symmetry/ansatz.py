@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from atwood.arrays import FloatArray
+from atwood.codegen.rounding import ON_ARRAYS
 from atwood.errors import AtwoodError
 from atwood.expr import Expression, depends_on, jvp, live, substitute, vjp
-from atwood.expr.core.operations import BINARY, LEAVES, UNARY
 from atwood.expr.simplify.polynomial import Expansion, Polynomial, TooLargeError
 from atwood.expr.sympy_bridge import from_sympy
 from atwood.lazy_dataclasses import dataclass
@@ -300,9 +300,6 @@ class _Ansatz:
         yield [graph.constant(float(one)) for one in near]
 
 
-_PLAIN = {"add": np.add, "sub": np.subtract, "mul": np.multiply, "div": np.divide, "neg": np.negative}
-
-
 def _values(outputs: Sequence[Expression], points: Mapping[Expression, FloatArray]) -> FloatArray:
     """Return expressions at many points, a row each."""
     known = {one.index: np.asarray(value) for one, value in points.items()}
@@ -311,14 +308,10 @@ def _values(outputs: Sequence[Expression], points: Mapping[Expression, FloatArra
         for node in live(outputs):
             if node.index in known:
                 continue
-            data = [known[one.index] for one in node.arguments if one.index in known]
-            if node.operation in _PLAIN:
-                known[node.index] = _PLAIN[node.operation](*data)
-            elif node.operation in UNARY or node.operation in BINARY:
-                of = UNARY.get(node.operation) or BINARY[node.operation]
-                known[node.index] = np.asarray(np.frompyfunc(of, len(data), 1)(*data), dtype=float)
-            elif node.operation in LEAVES and node.operation != "symbol":
+            if node.operation == "constant":
                 known[node.index] = np.full(count, node.value)
+            elif node.operation in ON_ARRAYS and node.operation != "select":
+                known[node.index] = ON_ARRAYS[node.operation](*(known[one.index] for one in node.arguments))
             else:
                 raise _UnknownError
     return np.array([known[one.index] for one in outputs])
