@@ -7,16 +7,24 @@ from itertools import pairwise
 from atwood import Scene
 from atwood_library import (
     Damper,
+    Drag,
     Ground,
+    Link,
+    LorentzForce,
     Mass1D,
+    Pivot,
     PointMass,
     PointOnCircle,
+    PointOnCurve,
+    PointOnPlane,
+    Potential,
     Ramp,
     RigidBody,
     Rod,
     RotaryDrive,
     Slider,
     Spring,
+    Torque,
 )
 
 
@@ -88,4 +96,59 @@ def hanging(names: tuple[str, str] = ("upper", "lower"), turn: tuple[float, floa
         scene.connect(rod.b, bob.point)
         point = bob.point
         scene.symbols.update({f"{name}_rod.length": "l", f"{name}_bob.mass": "m"})
+    return scene
+
+
+def torqued(torque: float = 2.0) -> Scene:
+    """Return a uniform link on a hinge under a steady torque."""
+    scene = Scene()
+    ground, hinge = scene.add("ground", Ground()), scene.add("hinge", Pivot())
+    link, load = scene.add("link", Link(length=0.8, mass=1.0)), scene.add("load", Torque(value=torque))
+    scene.connect(ground.frame, hinge.a)
+    scene.connect(hinge.b, link.a)
+    scene.connect(load.frame, link.a)
+    scene.symbols["load.value"] = "tau"
+    return scene
+
+
+def wire(height: str, rate: float = 3.0) -> Scene:
+    """Return a bead on a wire that turns evenly about the vertical."""
+    scene = Scene(space="space")
+    ground, clock = scene.add("ground", Ground()), scene.add("clock", Ramp(slope=rate))
+    motor = scene.add("motor", RotaryDrive(axis=(0.0, 0.0, 1.0)))
+    curve, bead = scene.add("wire", PointOnCurve(curve=("p", 0, height))), scene.add("bead", PointMass(mass=1.0))
+    scene.connect(clock.output("value"), motor.input("rotation"))
+    scene.connect(ground.frame, motor.a)
+    scene.connect(motor.b, curve.a)
+    scene.connect(curve.b, bead.point)
+    scene.symbols.update({"clock.slope": "omega", "wire.scale": "a"})
+    return scene
+
+
+def rotor(rate: float = 1.0) -> Scene:
+    """Return a disc on a round shaft that turns evenly, with friction inside the shaft and in the bearing."""
+    scene = Scene(space="space", gravity=0.0)
+    ground, clock = scene.add("ground", Ground()), scene.add("clock", Ramp(slope=rate))
+    motor = scene.add("motor", RotaryDrive(axis=(0.0, 0.0, 1.0)))
+    shaft, disc = scene.add("shaft", PointOnPlane(stiffness=4.0, damping=0.2)), scene.add("disc", PointMass(mass=1.3))
+    bearing = scene.add("bearing", Drag(linear=0.3))
+    scene.connect(clock.output("value"), motor.input("rotation"))
+    scene.connect(ground.frame, motor.a)
+    scene.connect(motor.b, shaft.a)
+    scene.connect(shaft.b, disc.point)
+    scene.connect(bearing.point, disc.point)
+    letters = {"bearing.linear": "b", "shaft.damping": "c", "shaft.stiffness": "k", "clock.slope": "Omega"}
+    scene.symbols.update(letters)
+    return scene
+
+
+def trap(first: float = 3.0, second: float = 5.0, field: float = 2.0) -> Scene:
+    """Return a charge in a uniform magnetic field, held by springs along both axes, or on a hill."""
+    scene = Scene(gravity=0.0)
+    body, charge = scene.add("body", PointMass(mass=1.3)), scene.add("charge", LorentzForce(charge=0.7))
+    scene.connect(charge.point, body.point)
+    scene.set("charge.magnetic_field", lambda x, y, z, t: (0.0, field, 0.0))
+    springs = scene.add("field", Potential())
+    scene.connect(springs.point, body.point)
+    scene.set("field.energy_function", lambda x, y, z, t: 0.5 * first * x * x + 0.5 * second * z * z)
     return scene

@@ -22,7 +22,7 @@ from atwood_library.scenes import (
     WilberforcePendulum,
 )
 
-from .scenes import chain, hanging
+from .scenes import chain, hanging, rotor, trap
 
 g, l, k, m = sympy.symbols("g l k m", positive=True)
 
@@ -196,6 +196,46 @@ def test_damped_masses_have_the_roots_of_the_characteristic_polynomial() -> None
     assert told == {(round(value.real, 9), round(value.imag, 9)) for value in numbers.eigenvalues}
     with pytest.raises(atwood.UnsupportedError, match="terms with velocities"):
         modes.to_normal({})
+
+
+@pytest.mark.parametrize("scene", [trap(), trap(3.0, 3.0), trap(-1.0, -1.0, 4.0), chain(2, 1.3, 7.0, damping=0.4)])
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+def test_shapes_with_velocity_terms_solve_the_equations_and_are_those_in_numbers(
+    scene: atwood.Scene, form: str
+) -> None:
+    modes = atwood.normal_modes(atwood.assemble(scene, form=form), at=None, symbolic=True)
+    values = atwood.equations(scene, form=form).values
+    terms = (modes.mass, modes.damping, modes.stiffness)
+    m, c, k = (np.array(one.subs(values).tolist(), dtype=complex) for one in terms)
+    numbers = atwood.normal_modes(scene, at=modes.rest.numbers)
+    for one in modes.modes:
+        (shape,) = one.shapes
+        s = complex(sympy.sympify(one.rate).subs(values))
+        z = np.array([complex(sympy.sympify(value).subs(values)) for value in shape.values()])
+        assert np.abs((s**2 * m + s * c + k) @ z).max() < 1e-12 * np.abs(k @ z).max()
+        j = int(np.argmin(abs(numbers.eigenvalues - one.number[0])))
+        other = numbers.matrix()[:, j] if s.imag >= 0.0 else numbers.matrix()[:, j].conj()
+        assert abs(z[0] * other[1] - z[1] * other[0]) < 1e-10 * np.abs(np.outer(z, other)).max()
+
+
+def test_a_charge_in_a_round_trap_goes_round_to_both_sides() -> None:
+    """Larmor: omega = sqrt(k/m + w^2) -+ w with w = e B/(2 m), on circles."""
+    slow, fast = atwood.normal_modes(trap(3.0, 3.0), symbolic=True).modes
+    e, mass = sympy.symbols("e m", positive=True)
+    for sign, one in ((-1, slow), (1, fast)):
+        book = (sympy.sqrt(3 / mass + (e / mass) ** 2) + sign * e / mass) ** 2
+        assert sympy.simplify(plain(one.square) - book) == 0
+        (shape,) = one.shapes
+        across = complex(sympy.sympify(shape["body.position.z"]).subs({"e": 0.7, "m": 1.3}))
+        assert abs(across) == pytest.approx(1.0, abs=1e-12)
+        assert across.real == 0.0
+    assert slow.shapes[0]["body.position.z"] != fast.shapes[0]["body.position.z"]
+
+
+def test_a_rotor_s_polynomial_has_the_numbers_as_roots() -> None:
+    modes, numbers = atwood.normal_modes(rotor(), symbolic=True), atwood.normal_modes(rotor())
+    found = sorted(value.imag for one in modes.modes for value in one.number)
+    assert found == pytest.approx(sorted(value.imag for value in numbers.eigenvalues), rel=1e-10)
 
 
 def test_a_cart_is_free_and_its_pendulum_swings_faster() -> None:

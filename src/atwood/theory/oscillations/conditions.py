@@ -375,21 +375,23 @@ def is_positive(value: Sympy) -> Sympy:
     value = sympy.sympify(value)
     if value.is_positive or sympy.expand(value).is_positive:
         return sympy.true
-    negative, found = False, []
+    negative, found, under = False, [], []
     for factor in sympy.Mul.make_args(sympy.factor(sympy.together(value))):
         base, exponent = factor.as_base_exp()
         if factor.is_zero:
             return sympy.false
+        if exponent.is_Rational and exponent.q == 2:
+            under.append(is_positive(base))
+            continue
         if factor.is_negative:
             negative = not negative
         elif not (factor.is_positive or sympy.expand(factor).is_positive):
             found.append(base if exponent.is_odd else factor)
-    if not found:
-        return sympy.false if negative else sympy.true
-    return _balanced(sympy.Mul(-1 if negative else 1, *found))
+    sign = sympy.Integer(-1 if negative else 1)
+    return sympy.And(balanced(sympy.Mul(sign, *found)) if found else sign > 0, *under)
 
 
-def _balanced(value: Sympy) -> Sympy:
+def balanced(value: Sympy) -> Sympy:
     """Return ``a - b > 0`` as ``a > b``."""
     is_turned = value.is_Mul and len(value.args) == 2 and value.args[0] == -1
     terms = sympy.Add.make_args(value.expand() if is_turned else value)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import cached_property
 from typing import Any
 
 from atwood.display import fitted
@@ -14,6 +15,7 @@ from atwood.table import Shown, Table, table
 from atwood.theory.formulas.page import aligned
 from atwood.theory.formulas.printers import Sympy
 from atwood.theory.formulas.reading import latex_of, text_of
+from atwood.theory.oscillations.bifurcations import Bifurcation, State, find_bifurcations
 from atwood.theory.oscillations.conditions import NoClosedFormError, Solution, solve_conditions
 from atwood.theory.oscillations.rest import Expansion, PlainEquations, expand, is_singular, plain_equations
 from atwood.theory.oscillations.stability import stability_of
@@ -67,9 +69,24 @@ class SymbolicEquilibrium:
 class SymbolicEquilibria(Shown, list[SymbolicEquilibrium]):
     """The states of rest of a scene as formulas."""
 
-    def __init__(self, found: Iterable[SymbolicEquilibrium], plain: PlainEquations) -> None:
-        super().__init__(found)
-        self.scene, self._plain = plain.name, plain
+    def __init__(self, found: Iterable[tuple[SymbolicEquilibrium, Expansion | None]], plain: PlainEquations) -> None:
+        every = [*found]
+        super().__init__(state for state, _ in every)
+        self.scene, self._plain, self._expansions = plain.name, plain, [expansion for _, expansion in every]
+
+    @cached_property
+    def bifurcations(self) -> tuple[Bifurcation, ...]:
+        """Where in the parameters states meet, appear, or begin to oscillate, by kind."""
+        plain, own = self._plain, {seen: one for one, seen in self._plain.back.items() if one in self._plain.values}
+        states = []
+        for one, expansion in zip(self, self._expansions, strict=True):
+            *values, exists, stable = (
+                sympy.sympify(value).xreplace(own) if path not in one.free else None
+                for path, value in (*one.values.items(), ("", one.exists), ("", one.stable))
+            )
+            known = [x if x is not None and x.free_symbols <= plain.values.keys() else None for x in values]
+            states.append(State(tuple(known), exists, stable, expansion))
+        return tuple(find_bifurcations(plain, states))
 
     def to_data(self) -> list[dict[str, Any]]:
         """Return them as plain data, for JSON."""
@@ -89,7 +106,12 @@ class SymbolicEquilibria(Shown, list[SymbolicEquilibrium]):
         rows = [(state_of(self._plain, one), said(one.exists), said(one.stable), one.stability) for one in self]
         title = f"{self.scene}: {len(self)} state{'s' if len(self) != 1 else ''} of rest in closed form"
         headings = ("state", "exists where", "stable where", "with these values")
-        return (table(headings, rows, title, [_SIGNS]),)
+        first = table(headings, rows, title, [_SIGNS])
+        change = [
+            (f"{one.sense} {one.kind}".strip(), text_of(one.condition), ", ".join(str(k + 1) for k in one.states))
+            for one in self.bifurcations
+        ]
+        return (first, table(("bifurcation", "where", "states"), change)) if change else (first,)
 
     __str__ = Shown.as_text
 
@@ -177,4 +199,4 @@ def described(plain: PlainEquations, solution: Solution) -> tuple[SymbolicEquili
 def symbolic_equilibria(assembly: Assembly, symbols: Mapping[str, str] | None = None) -> SymbolicEquilibria:
     """Return the states of rest of a scene as formulas."""
     plain = plain_equations(assembly, symbols)
-    return SymbolicEquilibria((one for one, _ in find_symbolic(plain)), plain)
+    return SymbolicEquilibria(find_symbolic(plain), plain)

@@ -27,7 +27,7 @@ from atwood.theory.formulas.tree import as_fraction, of_pi
 from atwood.theory.oscillations.conditions import NoClosedFormError, Solution, solve_conditions
 from atwood.theory.oscillations.equilibria import SymbolicEquilibrium, described, find_symbolic, said, state_of
 from atwood.theory.oscillations.rest import Expansion, PlainEquations, plain_equations
-from atwood.theory.oscillations.spectrum import Eigenvalue, blocks, eigenvalues, of_pencil, on_block, roots_of, short
+from atwood.theory.oscillations.spectrum import Eigenvalue, blocks, eigenvalues, of_even, of_pencil, on_block, short
 from atwood.theory.oscillations.stability import characteristic
 
 
@@ -297,27 +297,20 @@ def symbolic_modes(
     if expansion.damping.is_zero_matrix and expansion.stiffness.is_symmetric():
         found = eigenvalues(expansion.mass, expansion.stiffness, sympy.Dummy("lambda"))
     else:
-        found = list(_with_velocities(expansion))
+        found = list(_with_velocities(plain, expansion))
     made = [(_mode(plain, expansion, one), one) for one in found]
     made.sort(key=lambda pair: (abs(pair[0].number[0].imag), -pair[0].number[0].real))
     return SymbolicModes(rest, tuple(mode for mode, _ in made), plain, expansion, tuple(one for _, one in made))
 
 
-def _with_velocities(one: Expansion) -> Iterator[Eigenvalue]:
+def _with_velocities(plain: PlainEquations, one: Expansion) -> Iterator[Eigenvalue]:
     """Yield the roots s of ``det(s^2 M + s C + K)``; where it is even, in pairs of opposite ones, by one of them."""
     matrices, s = (one.mass, one.damping, one.stiffness), sympy.Dummy("s")
     for basis in blocks(matrices):
         m, c, k = (on_block(matrix, basis) for matrix in matrices)
-        coefficients, square = characteristic(m, c, k, s).all_coeffs(), sympy.Dummy("square")
-        if any(coefficients[1::2]):
-            found = list(of_pencil(s**2 * m + s * c + k, s))
-        else:
-            even = sympy.Poly(coefficients[::2], square)
-            found = [
-                Eigenvalue(value if value is None else sympy.sqrt(value), (), one.xreplace({square: s**2}))
-                for value, one in roots_of(even.as_expr(), square)
-            ]
-        for eigen in found:
+        pencil, coefficients = s**2 * m + s * c + k, characteristic(m, c, k, s).all_coeffs()
+        is_even = not any(coefficients[1::2])
+        for eigen in of_even(pencil, coefficients[::2], s, plain.number) if is_even else of_pencil(pencil, s):
             yield Eigenvalue(eigen.value, tuple(basis * vector for vector in eigen.vectors), eigen.polynomial)
 
 
@@ -332,8 +325,8 @@ def _mode(plain: PlainEquations, expansion: Expansion, found: Eigenvalue) -> Sym
         roots = [plain.number(value)]
     numbers = {_upper(cmath.sqrt(-one) if is_square else one) for one in roots}
     square = value if is_square else None
-    if value is not None and not is_square and not found.vectors:  # of gyroscopic terms
-        square = -(value**2)
+    if value is not None and not is_square and not any(sympy.Poly(found.polynomial, symbol).all_coeffs()[1::2]):
+        square = short(-(value**2))  # of gyroscopic terms
     shapes = (dict(zip(plain.paths, map(plain.told, expansion.basis * one), strict=True)) for one in found.vectors)
     rate = None if value is None else plain.told(sympy.I * sympy.sqrt(value) if is_square else value)
     polynomial = plain.told(found.polynomial.xreplace({symbol: sympy.Symbol(symbol.name)}))

@@ -157,19 +157,6 @@ def _of_block(mass: Sympy, stiffness: Sympy, symbol: Sympy) -> Iterator[Eigenval
     yield from of_pencil(stiffness - symbol * mass, symbol)
 
 
-def roots_of(polynomial: Sympy, symbol: Sympy) -> Iterator[tuple[Sympy | None, Sympy]]:
-    """Yield the roots of the factors of degree one and two, and None for others, each with its factor."""
-    for factor, _ in sympy.factor_list(polynomial, symbol)[1]:
-        a, *others = map(sympy.factor, sympy.Poly(factor, symbol).all_coeffs())
-        if len(others) == 1:
-            yield short(-others[0] / a), factor
-        elif len(others) == 2:
-            reach = sympy.sqrt((others[0] ** 2 - 4 * a * others[1]).factor())
-            yield from ((sympy.factor_terms((-others[0] + sign * reach) / (2 * a)), factor) for sign in (1, -1))
-        else:
-            yield None, factor
-
-
 def of_pencil(pencil: Sympy, symbol: Sympy) -> Iterator[Eigenvalue]:
     """Yield the values at which a matrix is singular, by the factors of its determinant, the smaller of two first."""
     for factor, times in sympy.factor_list(pencil.det(method="berkowitz"), symbol)[1]:
@@ -187,6 +174,27 @@ def of_pencil(pencil: Sympy, symbol: Sympy) -> Iterator[Eigenvalue]:
                 told = partial(_with_root, symbol=symbol, middle=middle, share=one * outside, twice=twice)
                 value = sympy.factor_terms(middle + one * reach)
                 yield Eigenvalue(value, tuple(vector.applyfunc(told) for vector in found), factor)
+
+
+def of_even(
+    pencil: Sympy, coefficients: Sequence[Sympy], symbol: Sympy, number: Callable[[Sympy], complex]
+) -> Iterator[Eigenvalue]:
+    """Yield one of each pair of values ``+-s`` at which a matrix is singular, by the factors of a polynomial in s^2."""
+    square = sympy.Dummy("square")
+    for factor, times in sympy.factor_list(sympy.Poly(coefficients, square).as_expr(), square)[1]:
+        a, *others = map(sympy.factor, sympy.Poly(factor, square).all_coeffs())
+        polynomial, values = factor.xreplace({square: symbol**2}), [short(-others[0] / a)]
+        if len(others) == 2:
+            reach = sympy.sqrt((others[0] ** 2 - 4 * a * others[1]).factor())
+            values = [sympy.factor_terms((-others[0] + sign * reach) / (2 * a)) for sign in (1, -1)]
+        elif len(others) > 2:
+            yield Eigenvalue(None, (), polynomial)
+            continue
+        for value in values:
+            found = _vectors(pencil, sympy.Poly(symbol**2 - value, symbol), times) if times == 1 else ()
+            root = sympy.sqrt(value) if number(value).real > 0.0 else sympy.I * sympy.sqrt(-value)
+            told = partial(_with_root, symbol=symbol, middle=sympy.Integer(0), share=root, twice=sympy.Integer(1))
+            yield Eigenvalue(root, tuple(vector.applyfunc(told) for vector in found), polynomial)
 
 
 def _with_root(entry: Sympy, symbol: Sympy, middle: Sympy, share: Sympy, twice: Sympy) -> Sympy:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import field
 from functools import cached_property
 from typing import Any
 
@@ -40,64 +41,37 @@ from atwood.tolerances import tolerances
 
 
 @dataclass(frozen=True, eq=False)
-class ConservedQuantity:
+class ConservedQuantity(Finding):
     """A quantity that is conserved along all motions of a scene.
 
     Attributes
     ----------
-    finding
-        What was found.
+    name
+        Such as ``"h"``, ``"p:rail.displacement"``, ``"P.x"``, ``"L.z"`` and ``"K.x"``.
+    kind
+        By what it is conserved: ``"energy function"``, ``"ignorable coordinate"``, ``"linear momentum"``, ``"angular
+        momentum"``, ``"boost"``, ``"symmetric body"``, ``"rolling body"``, ``"affine symmetry"``, ``"symmetry in
+        time"``, ``"quadratic in momenta"``, ``"total energy"`` where that is not the energy function, or ``"stated
+        symmetry"``.
+    unit
+        Its SI unit.
+    meaning
+        What it is, in words.
+    value
+        The quantity on the symbols of the scene's Lagrangian.
+    proven
+        Whether it is proven on the expression graph; else it was checked at random states.
+    evidence
+        How it is known: proven, or checked at how many states, and why it is not proven.
+    direction
+        Of a total momentum or a boost, its direction in world axes; of a symmetric body, its axis in the body's.
+    point
+        Of an angular momentum, a point of its axis, m.
     formulas
         What writes it down.
     """
 
-    finding: Finding
-    formulas: EquationFormulas
-
-    @property
-    def name(self) -> str:
-        """Such as ``"h"``, ``"p:rail.displacement"``, ``"P.x"``, ``"L.z"`` and ``"K.x"``."""
-        return self.finding.name
-
-    @property
-    def kind(self) -> str:
-        """By what it is conserved.
-
-        ``"energy function"``, ``"ignorable coordinate"``, ``"linear momentum"``, ``"angular momentum"``, ``"boost"``,
-        ``"symmetric body"``, ``"rolling body"``, ``"affine symmetry"``, ``"symmetry in time"``, ``"quadratic in
-        momenta"``, ``"total energy"`` where that is not the energy function, or ``"stated symmetry"``.
-        """
-        return self.finding.kind
-
-    @property
-    def unit(self) -> str:
-        """Its SI unit."""
-        return self.finding.unit
-
-    @property
-    def meaning(self) -> str:
-        """What it is, in words."""
-        return self.finding.meaning
-
-    @property
-    def proven(self) -> bool:
-        """Whether it is proven on the expression graph; else it was checked at random states."""
-        return self.finding.proven
-
-    @property
-    def evidence(self) -> str:
-        """How it is known: proven, or checked at how many states, and why it is not proven."""
-        return self.finding.evidence
-
-    @property
-    def direction(self) -> tuple[float, ...]:
-        """Of a total momentum or a boost, its direction in world axes; of a symmetric body, its axis in the body's."""
-        return self.finding.direction
-
-    @property
-    def point(self) -> tuple[float, ...]:
-        """Of an angular momentum, a point of its axis, m."""
-        return self.finding.point
+    formulas: EquationFormulas = field(kw_only=True, repr=False)
 
     @cached_property
     def expression(self) -> Sympy:
@@ -112,7 +86,7 @@ class ConservedQuantity:
 
     @cached_property
     def _written(self) -> Sum:
-        return self.formulas.formula(self.finding.value, energy=True)
+        return self.formulas.formula(self.value, energy=True)
 
     @property
     def _shared(self) -> tuple[Line, ...]:
@@ -221,7 +195,7 @@ class Conserved(Shown, Sequence[ConservedQuantity]):
             return ConservedLedger(())
         source = self.quantities[0].formulas
         quantities = Quantities(source.assembly, source.expressions)
-        values, sizes = along_run(quantities, [one.finding.value for one in self], result)
+        values, sizes = along_run(quantities, [one.value for one in self], result)
         rows = zip(self, values, sizes, strict=True)
         return ConservedLedger(
             tuple(ConservedValues(one.name, one.kind, one.unit, row, float(size)) for one, row, size in rows)
@@ -325,7 +299,7 @@ def conserved(
     every: Any = symmetries
     stated = [check_symmetry(one, quantities, prover, formulas) for one in every]
     findings = find_conserved(assembly, quantities, prover)
-    made = [ConservedQuantity(one, formulas) for one in (*findings.items, *stated)]
+    made = [ConservedQuantity(**vars(one), formulas=formulas) for one in (*findings.items, *stated)]
     beyond = [_BEYOND, *([_ROLLING] if any(not one.holonomic for one in assembly.reduced.constraints) else [])]
     return Conserved(made, findings.notes, assembly.flat.name, beyond)
 
