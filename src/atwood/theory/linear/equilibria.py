@@ -25,7 +25,7 @@ from atwood.table import Shown, Table, table
 from atwood.theory.formulas.notation import SYMBOLS
 from atwood.theory.linear.normal_modes import NormalModes, modes_of, values_text
 from atwood.theory.linear.operating_point import OperatingPoint, find_operating_point, moved_to, values_at
-from atwood.theory.linear.rest import Degenerate, Rest, RestSearch, difference, follow_null_space, wrapped
+from atwood.theory.linear.rest import Degenerate, Rest, RestSearch, difference, falling, follow_null_space, wrapped
 from atwood.theory.oscillations.equilibria import SymbolicEquilibria, symbolic_equilibria
 
 _STARTS = 32
@@ -39,6 +39,9 @@ _IDLE = 24
 """For each independent coordinate, so many starts one after another that lead to nothing new end the search."""
 
 _ALONE = 5.0
+
+_SAG, _FARTHEST = 0.75, 1e4
+"""In how far the stiffness at the start leads: the size of a scene; in sizes, what is no longer a sag."""
 
 _NEARBY = 4
 """Of so many starts one is ten to a thousand times nearer to the scene's own start, where a well may be narrow."""
@@ -201,11 +204,21 @@ def numeric_equilibria(scene: Model | Assembly, region: Mapping[str, Any] | None
 
 
 def _length(point: OperatingPoint) -> float:
-    """Return the size of a scene; of a body alone in a field some times as far as from the origin to its start."""
-    away = [abs(float(point.q[i])) for i, k in point.scene.tangents.plain if point.scene.tangents.units[k] == "m"]
-    if extent(point.assembly.mechanism) or point.scene.length != 1.0:
-        return point.scene.length
-    return _ALONE * max(away, default=0.0) or point.scene.length
+    """Return the size of a scene; of a body alone in a field some times as far as from the origin to its start.
+
+    It is larger where the stiffness at the start leads farther: a soft spring sags by many times its length.
+    """
+    own = [i for i, k in point.scene.tangents.plain if point.scene.tangents.units[k] == "m"]
+    length = point.scene.length
+    if not extent(point.assembly.mechanism) and length == 1.0:
+        length = _ALONE * float(np.max(np.abs(point.q[own]), initial=0.0)) or length
+    search = RestSearch(point.scene.sized(length), balance_of(point.assembly, "reduced"), point.t, point.kept)
+    start = search.at(point.q)
+    step = None if start is None else falling(start)
+    if start is None or step is None:
+        return length
+    reach = float(np.max(np.abs(search.moved(start, step)[own]), initial=0.0))
+    return max(length, _SAG * reach) if reach <= _FARTHEST * length else length
 
 
 def _none_found(point: OperatingPoint, found: int, given: bool, seen_moving: bool) -> AtwoodError:

@@ -181,7 +181,7 @@ class RestSearch:
             now = self.at(q)
             if now is None:  # as in the singular place of angles that the search has come to
                 break
-            down = _falling(now) if falls else None
+            down = falling(now) if falls else None
             if down is None:
                 down = -least_norm(now.slopes, now.accelerations)
             step = down
@@ -297,7 +297,7 @@ class RestSearch:
         return bool(np.max(np.abs(off) / sizes) < _HALFWAY * np.max(np.abs(apart) / sizes))
 
 
-def _falling(now: Rest) -> FloatArray | None:
+def falling(now: Rest) -> FloatArray | None:
     """Return Newton's step with all curvatures taken as those of a minimum; None where they are not real."""
     if now.slopes.shape[0] != now.slopes.shape[1] or not len(now.slopes):
         return None

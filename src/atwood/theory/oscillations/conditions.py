@@ -296,18 +296,9 @@ def _alone(factor: Sympy, unknown: Sympy) -> list[tuple[Sympy, Sympy | None]] | 
     form = factor.subs({sympy.sin(unknown): s, sympy.cos(unknown): c})
     if form.has(unknown):
         return None
-    if not form.has(c):
-        return [
-            (angle, condition)
-            for value, condition in _of_polynomial(form, s) or ()
-            for angle, condition in _arcs(sympy.asin, value, condition, lambda angle: sympy.pi - angle)
-        ]
-    if not form.has(s):
-        return [
-            (angle, condition)
-            for value, condition in _of_polynomial(form, c) or ()
-            for angle, condition in _arcs(sympy.acos, value, condition, lambda angle: -angle)
-        ]
+    for own, absent, inverse, other in ((s, c, sympy.asin, lambda x: sympy.pi - x), (c, s, sympy.acos, lambda x: -x)):
+        if not form.has(absent):
+            return [arc for found in _of_polynomial(form, own) or () for arc in _arcs(inverse, *found, other)]
     a, b = form.diff(c), form.diff(s)
     if a.has(c, s) or b.has(c, s):
         return None
