@@ -256,6 +256,7 @@ if TYPE_CHECKING:
         ConservedQuantity as ConservedQuantity,
         Symmetry as Symmetry,
         conserved as conserved,
+        galilean as galilean,
     )
 
     __version__: str
@@ -306,7 +307,7 @@ _ROOMS = {
         "FreeRotation", "SymmetricTop", "foucault_formulas", "free_body", "free_rotation", "inertia_tensor",
         "rigid_body", "rotation_kinematics", "symmetric_top", "top_formulas",
     ),
-    "atwood.theory.symmetry": ("Conserved", "ConservedQuantity", "Symmetry", "conserved"),
+    "atwood.theory.symmetry": ("Conserved", "ConservedQuantity", "Symmetry", "conserved", "galilean"),
 }  # fmt: skip
 _LATER = {name: room for room, names in _ROOMS.items() for name in names}
 """Names whose modules are imported when they are first used; type checkers read them above."""

@@ -222,3 +222,27 @@ def test_a_stated_symmetry_that_is_none_is_refused_with_what_is_left_over() -> N
     g, m = equations(scene).symbol("gravity"), equations(scene).symbol("body.mass")
     stated = conserved(scene, Symmetry({"body.position.z": 1}, f=-m * g * t, name="p"))
     assert stated["p"].proven
+
+
+def around() -> dict[str, Any]:
+    x, z = (sympy.Function(name)(t) for name in "xz")
+    return {"particle.position.x": -z, "particle.position.z": x}
+
+
+@pytest.mark.parametrize(
+    ("scene", "generator", "left"),
+    [
+        ("simple-pendulum", {"rod.angle": 1}, "-m g l sin θ"),
+        ("kepler", {"body.position.x": 1}, "k_e e_a e_b x / (x² + z²)³ᐟ²"),
+        ("charged-particle", around(), "q E_z x"),
+        ("pendulum-on-cart", {"rod.angle": 1}, "-m_bob l ẋ θ̇ sin θ - m_bob g l sin θ"),
+        ("rotating-hoop-driven", {"hoop.angle": 1}, "m g a sin θ + m ω² a² cos θ sin θ"),
+        ("mass-spring-chain", {"m1.displacement": 1, "m2.displacement": 1}, "-k₁ x₁ - k₃ x₂ + k₁ l₀₁ - k₃ l₀₃"),
+        ("falling-with-drag", {"ball.position.x": 1}, "-b ẋ + b w_x"),
+    ],
+)
+def test_each_refusal_names_the_term(scene: str, generator: dict[str, Any], left: str) -> None:
+    with pytest.raises(UsageError) as refused:
+        conserved(SCENES[scene](), Symmetry(generator))
+    assert f"L changes by more than df/dt: {left}" in str(refused.value)
+    assert "is left over" in str(refused.value)

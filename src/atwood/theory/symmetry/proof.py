@@ -154,13 +154,13 @@ class Prover:
             if orientation.kind != "quaternion" or len(orientation.speeds) != 3:
                 return None
             own = list(orientation.coordinates)
-            basis = [np.array([_in_body(list(one.q[own]), axis) for axis in _AXES]).T for one in states]
+            basis = [np.array([in_body(list(one.q[own]), axis) for axis in _AXES]).T for one in states]
             values = np.concatenate([one[list(orientation.speeds)] for one in moved])
             weights = least_squares(np.concatenate(basis), values)
             if np.max(np.abs(np.concatenate(basis) @ weights - values)) > _FITTED * largest:
                 return None
             axis = [_share(w) for w in weights]
-            turn = _in_body([e.coordinates[i] for i in own], axis)
+            turn = in_body([e.coordinates[i] for i in own], axis)
             found |= {k: e.graph.convert(w) for k, w in zip(orientation.speeds, turn, strict=True)}
         return {k: w for k, w in found.items() if not w.is_zero}
 
@@ -183,7 +183,7 @@ def _share(value: float) -> float:
     return near if abs(value - near) <= _FITTED * max(abs(near), 1.0 / _SHARES) else float(value)
 
 
-def _in_body(quaternion: Sequence[Any], axis: Sequence[float]) -> list[Any]:
+def in_body(quaternion: Sequence[Any], axis: Sequence[float]) -> list[Any]:
     """Return an axis of the space in the axes of a body, from its quaternion: of numbers, or of expressions."""
     w, v = quaternion[0], quaternion[1:]
     along = v[0] * axis[0] + v[1] * axis[1] + v[2] * axis[2]
