@@ -126,6 +126,28 @@ def test_along_runs(scene: atwood.Scene, form: str) -> None:
     assert np.unwrap(chi) == pytest.approx(turned, abs=1e-5)
 
 
+@pytest.mark.parametrize("scene", [FreeBody(), FreeSymmetricBody(), IntermediateAxis()])
+def test_orientations_along_runs(scene: atwood.Scene) -> None:
+    result = atwood.simulate(scene, t_end=8.0, rtol=1e-11, outputs=41)
+    found = free_rotation(result.assembly)
+    turned = found.orientation(result.time)
+    assert turned @ np.swapaxes(turned, 1, 2) == pytest.approx(np.broadcast_to(np.eye(3), turned.shape), abs=1e-12)
+    run = np.array([[result[f"body.{axis}_axis.{k}"] for axis in "xyz"] for k in "xyz"]).transpose(2, 0, 1)
+    rest = run[0] @ turned[0].T
+    assert np.linalg.det(rest) == pytest.approx(1.0)
+    momentum = np.array([result[f"body.angular_momentum.{k}"][0] for k in "xyz"])
+    assert rest[:, 2] * found.momentum == pytest.approx(momentum, abs=1e-9)
+    assert rest @ turned == pytest.approx(run, abs=1e-5)
+
+
+def test_the_orientation_of_steady_rotation() -> None:
+    steady = free_rotation(moments=(1, 2, 3), spin=(0, 0.7, 0))
+    first, later = steady.orientation([0.0, 2.0])
+    c, s = np.cos(1.4), np.sin(1.4)
+    assert later @ first.T == pytest.approx(np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]), abs=1e-12)
+    assert first @ [0, 1, 0] == pytest.approx([0, 0, 1])
+
+
 @pytest.mark.parametrize("moments", [(1, 2, 3), (3, 1, 2), (2, 1, 3), (3, 2, 1), (1, 1, 1.6), (1.6, 1, 1), (1, 1.6, 1)])
 @pytest.mark.parametrize("spin", [(0.4, -1.0, 0.7), (-1.2, 0.3, -0.1), (0.1, 0.9, -1.3)])
 def test_any_order_of_axes(moments: tuple, spin: tuple) -> None:

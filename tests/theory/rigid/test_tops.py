@@ -119,6 +119,44 @@ def test_the_four_in_one_figure() -> None:
     plt.close(figure)
 
 
+@pytest.mark.parametrize("motion", ["cusps", "loops", "waves", "steady"])
+def test_the_path_of_its_constants_is_that_of_a_run(motion: str) -> None:
+    scene = LagrangeTop(motion=motion)
+    top = symmetric_top(scene)
+    result = atwood.simulate(scene, t_end=3.0 * top.period, rtol=1e-11, outputs=601)
+    theta, phi, psi = top.angles(np.linspace(0.0, top.period, 201))
+    run = np.stack([result[f"top.{name}"] for name in ("theta", "phi", "psi")])
+    highest = int(np.argmin(run[0][:201])) if motion != "steady" else 0
+    own = result.time[highest : highest + 201]
+    found = np.stack([np.interp(own - own[0], np.linspace(0.0, top.period, 201), one) for one in (theta, phi, psi)])
+    away = run[:, highest : highest + 201] - run[:, highest : highest + 1]
+    assert found[0] == pytest.approx(run[0, highest : highest + 201], abs=2e-4)
+    assert found[1] == pytest.approx(away[1], abs=2e-3)
+    assert found[2] == pytest.approx(away[2], abs=2e-2)
+    h = 1e-5
+    for t in (0.2 * top.period, 0.7 * top.period):  # the rates are those of the formulas
+        before, now, after = top.angles([t - h, t, t + h]).T
+        values = {sympy.Symbol(k): v for k, v in top.formulas.numbers.items()} | {M: top.weight, G: 1, H: 1}
+        rates = [float(top.formulas[k].subs(values).subs(THETA, now[0])) for k in ("phi", "psi")]
+        assert (after - before)[1:] / (2.0 * h) == pytest.approx(rates, rel=1e-5)
+        u = np.cos(now[0])
+        assert (np.sin(now[0]) * (after - before)[0] / (2.0 * h)) ** 2 == pytest.approx(float(top.f(u)), abs=1e-5)
+
+
+def test_the_four_motions_in_one_figure_from_their_constants() -> None:
+    """At one p_phi and p_psi by the energy, or at one p_psi by p_phi; here of one top."""
+    tops = [symmetric_top(LagrangeTop(motion=one)) for one in ("loops", "cusps", "waves", "steady")]
+    same = [SymmetricTop(one.across, one.along, one.weight, one.p_phi, one.p_psi, one.energy) for one in tops]
+    assert [one.kind for one in same] == ["loops", "cusps", "waves", "steady"]
+    figure = atwood.plot_top_path(same)
+    assert len(figure.axes) == 8
+    for one, axes in zip(same, figure.axes[::2], strict=True):
+        (u, f), root = axes.lines[0].get_data(), one.roots[0]
+        assert f == pytest.approx(one.f(np.asarray(u)))
+        assert axes.lines[2].get_xdata()[0] == pytest.approx(root)
+    plt.close(figure)
+
+
 def test_what_is_no_top() -> None:
     with pytest.raises(UnsupportedError, match=r"it is no top on a fixed tip: it has inner_bearing\.angle"):
         symmetric_top(Gyroscope())

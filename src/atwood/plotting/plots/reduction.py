@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +14,7 @@ from atwood.errors import UsageError, suggestion
 from atwood.plotting.canvas import COLOURS, GREY, INK, finished, headed, legend, new_figure, polish, with_unit
 from atwood.plotting.sphere import draw_on_sphere, draw_sphere
 from atwood.theory.reduction import ReducedMotion
+from atwood.theory.rigid import SymmetricTop
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,23 +58,15 @@ def plot_effective_potential(motion: ReducedMotion, file: str | os.PathLike[str]
             _label(axes, point, motion.energy)
     axes.set_xlim(low, high)
     axes.set_ylim(bottom, top)
-    polish(axes, with_unit(motion.coordinate, _unit(motion)), "energy, J")
+    polish(axes, with_unit(motion.coordinate, motion.unit), "energy, J")
     legend(axes)
-    headed(axes, f"{_scene(motion)}: {motion.kind}")
+    headed(axes, f"{motion.scene}: {motion.kind}")
     return finished(figure, file)
 
 
 def _label(axes: Axes, x: float, y: float) -> None:
     """Write the value of x above a point."""
     axes.annotate(f"{x:.4g}", (x, y), (0, 8), textcoords="offset points", ha="center", fontsize=9, color=INK)
-
-
-def _scene(motion: ReducedMotion) -> str:
-    return motion.scene
-
-
-def _unit(motion: ReducedMotion) -> str:
-    return motion.unit
 
 
 def _range(motion: ReducedMotion) -> tuple[float, float]:
@@ -96,12 +89,13 @@ def _heights(motion: ReducedMotion, potential: FloatArray) -> tuple[float, float
     return motion.energy + 1.2 * depth, motion.energy - 1.4 * depth
 
 
-_MOTIONS = either(_MOTION, each(_MOTION, "several of them", 1, single=False))
+_TOP = instance("a ReducedMotion or a SymmetricTop", ReducedMotion, SymmetricTop)
+_MOTIONS = either(_TOP, each(_TOP, "several of them", 1, single=False))
 
 
 @takes(motion=_MOTIONS, azimuth=optional(TEXT), periods=optional(whole("a number of periods", 1)), file=optional(FILE))
 def plot_top_path(
-    motion: ReducedMotion | Sequence[ReducedMotion],
+    motion: ReducedMotion | SymmetricTop | Sequence[ReducedMotion | SymmetricTop],
     azimuth: str | None = None,
     periods: int | None = None,
     file: str | os.PathLike[str] | None = None,
@@ -114,7 +108,7 @@ def plot_top_path(
     ----------
     motion
         What `atwood.reduced` gave of a top, or of what else has a polar angle for its coordinate; several, such as the
-        four motions of a top, stand below each other.
+        four motions of a top, stand below each other. Or a `SymmetricTop`, also one made of its constants.
     azimuth
         Path of the angle about the vertical; the first ignorable coordinate if not given.
     periods
@@ -132,46 +126,63 @@ def plot_top_path(
     UsageError
         If there is no such angle, or the polar angle does not come back.
     """
-    motions = [motion] if isinstance(motion, ReducedMotion) else list(motion)
+    motions = [motion] if isinstance(motion, (ReducedMotion, SymmetricTop)) else list(motion)
     figure = new_figure(10.0, 4.8 if len(motions) == 1 else 3.8 * len(motions))
     for axes, one in zip(figure.subplots(len(motions), 2, squeeze=False), motions, strict=True):
-        _draw_top(axes[0], axes[1], one, azimuth, periods)
-    names = ", ".join(dict.fromkeys(map(_scene, motions)))
+        (_draw_constants if isinstance(one, SymmetricTop) else _draw_reduced)(axes[0], axes[1], one, azimuth, periods)
+    names = ", ".join(dict.fromkeys(one.name if isinstance(one, SymmetricTop) else one.scene for one in motions))
     figure.suptitle(names, x=0.02, ha="left", fontsize=11, fontweight="bold", color=INK)
     return finished(figure, file)
 
 
-def _draw_top(left: Axes, right: Axes, motion: ReducedMotion, azimuth: str | None, periods: int | None) -> None:
+def _draw_constants(left: Axes, right: Axes, top: SymmetricTop, azimuth: str | None, periods: int | None) -> None:
+    """Draw F(u) and the path of the axis of a top by its constants."""
+    once = abs(float(top.angles(top.period)[1, 0]))
+    count = periods or max(1, min(60, round(2.0 * np.pi / max(once, 0.1))))
+    theta, phi, _ = top.angles(np.linspace(0.0, count * top.period, 200 * min(count, 30)))
+    low, high = map(float, top.roots[:2])
+    _draw_f(left, low, high, top.f, top.kind == "steady")
+    _draw_path(right, (low, high), theta, phi, count)
+
+
+def _draw_reduced(left: Axes, right: Axes, motion: ReducedMotion, azimuth: str | None, periods: int | None) -> None:
     """Draw F(u) and the path of the axis of one motion."""
     known = motion.ignorable
     if not known:
-        raise UsageError(
-            "nothing turns about the vertical in it", where=_scene(motion), advice="It has one coordinate."
-        )
+        raise UsageError("nothing turns about the vertical in it", where=motion.scene, advice="It has one coordinate.")
     path = known[0] if azimuth is None else azimuth
     if path not in known:
         raise UsageError("there is no such ignorable angle", where=path, advice=suggestion(path, known))
     if motion.kind not in ("libration", "rest"):
-        raise UsageError("its polar angle does not come back", where=_scene(motion))
+        raise UsageError("its polar angle does not come back", where=motion.scene)
     advance = abs(motion.advance[path])
     count = periods or (max(1, min(60, round(2.0 * np.pi / advance))) if advance else 1)
     found = motion.at(motion.t_start + np.linspace(0.0, count * motion.period, 200 * min(count, 30)))
-    theta, phi = found[motion.coordinate], found[path]
-    _draw_f(left, motion)
-    draw_sphere(right)
-    around = np.linspace(0.0, 2.0 * np.pi, 300)
-    for end in motion.turning_points:
-        draw_on_sphere(right, _direction(np.full_like(around, end), around), GREY, 1.0)
-    draw_on_sphere(right, _direction(theta, phi), COLOURS[0], 1.8)
-    right.set_title(f"path of the axis, {count} periods", loc="left", fontsize=10, color=INK)
-
-
-def _draw_f(axes: Axes, motion: ReducedMotion) -> None:
     low, high = sorted(float(np.cos(end)) for end in motion.turning_points)
-    width = 0.1 if motion.kind == "rest" else max(high - low, 1e-3)
+
+    def square(u: FloatArray) -> FloatArray:
+        now = motion.radial.at(np.arccos(u))
+        return np.asarray((1.0 - u**2) * 2.0 * (motion.energy - now.potential) / now.inertia)
+
+    _draw_f(left, low, high, square, motion.kind == "rest")
+    _draw_path(right, (low, high), found[motion.coordinate], found[path], count)
+
+
+def _draw_path(axes: Axes, ends: tuple[float, float], theta: FloatArray, phi: FloatArray, count: int) -> None:
+    """Draw the path of an axis on the sphere, between the circles of two heights."""
+    draw_sphere(axes)
+    around = np.linspace(0.0, 2.0 * np.pi, 300)
+    for end in ends:
+        draw_on_sphere(axes, _direction(np.full_like(around, np.arccos(end)), around), GREY, 1.0)
+    draw_on_sphere(axes, _direction(theta, phi), COLOURS[0], 1.8)
+    axes.set_title(f"path of the axis, {count} periods", loc="left", fontsize=10, color=INK)
+
+
+def _draw_f(axes: Axes, low: float, high: float, square: Callable[[FloatArray], FloatArray], is_steady: bool) -> None:
+    """Draw F(u) about the roots that a motion is between."""
+    width = 0.1 if is_steady else max(high - low, 1e-3)
     u = np.linspace(max(-1.0, low - 0.8 * width), min(1.0, high + 0.8 * width), _POINTS)[1:-1]
-    now = motion.radial.at(np.arccos(u))
-    f = (1.0 - u**2) * 2.0 * (motion.energy - now.potential) / now.inertia
+    f = square(u)
     axes.plot(u, f, color=COLOURS[0], linewidth=1.8)
     axes.axhline(0.0, color=GREY, linewidth=0.9)
     for root in (low, high):
@@ -180,7 +191,7 @@ def _draw_f(axes: Axes, motion: ReducedMotion) -> None:
             f"{root:.4g}", (root, 0.0), (0, 8), textcoords="offset points", ha="center", fontsize=9, color=INK
         )
     inside = (u >= low) & (u <= high)
-    largest = float(np.max(f[inside], initial=0.0)) if motion.kind != "rest" else float(np.max(np.abs(f)))
+    largest = float(np.max(np.abs(f))) if is_steady else float(np.max(f[inside], initial=0.0))
     largest = largest or 1.0
     axes.set_ylim(-1.2 * largest, 1.4 * largest)
     polish(axes, "u = cos \N{GREEK SMALL LETTER THETA}", "F(u), 1/s\N{SUPERSCRIPT TWO}")

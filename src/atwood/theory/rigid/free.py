@@ -7,7 +7,7 @@ inertia rolls (Goldstein, section 5.6).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -203,11 +203,28 @@ class FreeRotation:
     def herpolhode(self, times: Any) -> tuple[FloatArray, FloatArray]:
         """Return distance, rad/s, and angle of the angular velocity in the plane square to L at times, which rise."""
         t = np.atleast_1d(check(ARRAY, times, "times", "herpolhode"))
-        nodes, weights = np.polynomial.legendre.leggauss(12)
-        steps = np.diff(np.r_[self.t_start, t])
-        inside = (t - steps)[:, None] + 0.5 * steps[:, None] * (1.0 + nodes)
-        rates = self._rate_of_angle(self.at(inside.ravel())).reshape(inside.shape)
-        return self._distance(self.at(t)), np.cumsum(0.5 * steps * (rates @ weights))
+        return self._distance(self.at(t)), integrated(lambda s: self._rate_of_angle(self.at(s)), self.t_start, t)
+
+    def orientation(self, times: Any) -> FloatArray:
+        """Return the matrices from the principal axes to axes at rest at times, which rise, shape (times, 3, 3).
+
+        Of those at rest the third is along L, and at the start the angular velocity is between it and the first.
+        """
+        rho, angle = self.herpolhode(times)
+        w = self.at(times)
+        along = self.moments[:, None] * w / self.momentum
+        across = np.where(rho > _SAME * np.linalg.norm(w, axis=0), w - along * np.sum(along * w, axis=0), self._aside)
+        across = across / np.linalg.norm(across, axis=0)
+        body = np.stack([across, np.cross(along, across, axis=0), along])
+        c, s, zero = np.cos(angle), np.sin(angle), np.zeros_like(angle)
+        space = np.array([[c, -s, zero], [s, c, zero], [zero, zero, zero + 1.0]])
+        return np.asarray(np.einsum("ijt,jkt->tik", space, body))
+
+    @property
+    def _aside(self) -> FloatArray:
+        """A direction in the body square to L at the start, as a column."""
+        along = self.moments * self.spin
+        return np.cross(along, np.eye(3)[int(np.argmin(np.abs(along)))])[:, None]
 
     def _distance(self, w: FloatArray) -> FloatArray:
         """Return the distance from the foot of L, as the size of the part of the spin square to it."""
@@ -219,6 +236,14 @@ class FreeRotation:
         square = np.maximum(self._distance(w) ** 2, 1e-300)
         rates = 2.0 * self.energy / self.momentum + product / (np.prod(self.moments) * self.momentum**3 * square)
         return np.asarray(rates)
+
+
+def integrated(rate: Callable[[FloatArray], FloatArray], start: float, times: FloatArray) -> FloatArray:
+    """Return the integral of a rate from a start to times, which rise, by Gauss's nodes between them."""
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    steps = np.diff(np.r_[start, times])
+    inside = (times - steps)[:, None] + 0.5 * steps[:, None] * (1.0 + nodes)
+    return np.asarray(np.cumsum(0.5 * steps * (rate(inside.ravel()).reshape(inside.shape) @ weights)))
 
 
 _TRIPLE = each(number(), "three numbers", 3, single=False)

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from atwood.arguments import check, takes, takes_names
+from atwood.arguments import ARRAY, check, takes, takes_names
 from atwood.arrays import FloatArray
 from atwood.errors import UnsupportedError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_modules import scipy
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of
 from atwood.theory.formulas.notation import SYMBOLS
 from atwood.theory.formulas.sheet import FormulaSheet, statements_of
 from atwood.theory.reduction import reduced
 from atwood.theory.rigid.bodies import principal_body
+from atwood.theory.rigid.free import integrated
 
 _NEAR = 1e-7
 """Of u: roots of F that are as near are one, since rounding splits a double root by its square root."""
@@ -144,6 +147,39 @@ class SymmetricTop:
         if min(abs(back - low), abs(back - high)) <= _NEAR:
             return "cusps"
         return "loops" if low < back < high else "waves"
+
+    @cached_property
+    def _swing(self) -> tuple[float, float]:
+        """Rate of Jacobi's functions, and their parameter ``k^2``, of ``u = u_1 + (u_2 - u_1) sn^2``."""
+        low, high, beyond = self.roots
+        return float(np.sqrt(0.25 * self._cubic[0] * (beyond - low))), float((high - low) / (beyond - low))
+
+    @property
+    def period(self) -> float:
+        """Period of the nutation, s."""
+        rate, square = self._swing
+        return 2.0 * float(scipy.special.ellipk(square)) / rate
+
+    def angles(self, times: Any) -> FloatArray:
+        """Return theta, phi and psi at times, which rise, shape (3, times); at 0 it is highest, phi and psi are 0.
+
+        The height is in Jacobi's functions, phi and psi are quadratures of their rates.
+        """
+        t = np.atleast_1d(check(ARRAY, times, "times", "angles"))
+        (low, high), (rate, square) = self.roots[:2], self._swing
+
+        def height(s: FloatArray) -> FloatArray:
+            sn = scipy.special.ellipj(rate * (s + 0.5 * self.period), square)[0]
+            return np.asarray(low + (high - low) * sn**2)
+
+        def around(s: FloatArray) -> FloatArray:
+            u = height(s)
+            return (self.p_phi - self.p_psi * u) / (self.across * (1.0 - u**2))
+
+        def spin(s: FloatArray) -> FloatArray:
+            return self.p_psi / self.along - height(s) * around(s)
+
+        return np.stack([np.arccos(height(t)), integrated(around, 0.0, t), integrated(spin, 0.0, t)])
 
     @property
     def steady(self) -> float:
