@@ -129,13 +129,16 @@ def plot_top_path(
     motions = [motion] if isinstance(motion, (ReducedMotion, SymmetricTop)) else list(motion)
     figure = new_figure(10.0, 4.8 if len(motions) == 1 else 3.8 * len(motions))
     for axes, one in zip(figure.subplots(len(motions), 2, squeeze=False), motions, strict=True):
-        (_draw_constants if isinstance(one, SymmetricTop) else _draw_reduced)(axes[0], axes[1], one, azimuth, periods)
+        if isinstance(one, SymmetricTop):
+            _draw_constants(axes[0], axes[1], one, periods)
+        else:
+            _draw_reduced(axes[0], axes[1], one, azimuth, periods)
     names = ", ".join(dict.fromkeys(one.name if isinstance(one, SymmetricTop) else one.scene for one in motions))
     figure.suptitle(names, x=0.02, ha="left", fontsize=11, fontweight="bold", color=INK)
     return finished(figure, file)
 
 
-def _draw_constants(left: Axes, right: Axes, top: SymmetricTop, azimuth: str | None, periods: int | None) -> None:
+def _draw_constants(left: Axes, right: Axes, top: SymmetricTop, periods: int | None) -> None:
     """Draw F(u) and the path of the axis of a top by its constants."""
     once = abs(float(top.angles(top.period)[1, 0]))
     count = periods or max(1, min(60, round(2.0 * np.pi / max(once, 0.1))))

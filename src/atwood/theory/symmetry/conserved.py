@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import field
 from functools import cached_property
 from typing import Any
 
@@ -71,7 +70,7 @@ class ConservedQuantity(Finding):
         What writes it down.
     """
 
-    formulas: EquationFormulas = field(kw_only=True, repr=False)
+    formulas: EquationFormulas
 
     @cached_property
     def expression(self) -> Sympy:

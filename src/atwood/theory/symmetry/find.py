@@ -87,8 +87,8 @@ class Finding:
     value: Expression
     proven: bool
     evidence: str
-    direction: tuple[float, ...] = ()
-    point: tuple[float, ...] = ()
+    direction: tuple[float, ...]
+    point: tuple[float, ...]
 
 
 @dataclass(frozen=True, eq=False)

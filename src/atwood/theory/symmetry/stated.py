@@ -126,7 +126,7 @@ def check_symmetry(symmetry: Symmetry, quantities: Quantities, prover: Prover, f
     if is_constant_at(states):
         meaning += "; it has one value at all states"
     evidence = "proven on the graph" if proven else f"checked at {len(states)} random states ({prover.why_not})"
-    return Finding(symmetry.name, "stated symmetry", symmetry.unit, meaning, value, proven, evidence)
+    return Finding(symmetry.name, "stated symmetry", symmetry.unit, meaning, value, proven, evidence, (), ())
 
 
 def is_constant_at(states: list[State]) -> bool:
