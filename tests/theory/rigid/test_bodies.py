@@ -64,7 +64,7 @@ def test_the_symmetric_body_as_in_books() -> None:
     assert "T_S = ½ I₁ (θ̇² + φ̇² sin² θ) + ½ I₃ (ψ̇ + φ̇ cos θ)²" in text
     assert "p_φ = I₁ φ̇ sin² θ + I₃ cos θ (ψ̇ + φ̇ cos θ)" in text
     assert "I₁ ω̇₁ = (I₁ - I₃) ω₂ ω₃ + N₁" in text
-    assert "I₃ = 1.6" in text
+    assert "I₃  1.6" in text
 
 
 def test_orbital_and_internal_parts_make_the_whole() -> None:

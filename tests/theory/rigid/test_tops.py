@@ -71,6 +71,7 @@ def test_the_sleeping_top() -> None:
         assert bool(np.max(result["top.theta"]) < 0.05) is stable
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 @pytest.mark.parametrize("motion", ["cusps", "loops", "waves", "steady"])
 def test_the_four_motions_of_a_scene(motion: str, form: str) -> None:
@@ -112,6 +113,7 @@ def test_constants_of_no_motion_and_of_the_sleeping_top() -> None:
     assert not slow.is_stable_upright
 
 
+@pytest.mark.sample(0)
 def test_the_four_in_one_figure() -> None:
     motions = [atwood.reduced(LagrangeTop(motion=one)) for one in ("loops", "cusps", "waves", "steady")]
     figure = atwood.plot_top_path(motions)
@@ -119,6 +121,7 @@ def test_the_four_in_one_figure() -> None:
     plt.close(figure)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("motion", ["cusps", "loops", "waves", "steady"])
 def test_the_path_of_its_constants_is_that_of_a_run(motion: str) -> None:
     scene = LagrangeTop(motion=motion)

@@ -230,6 +230,7 @@ def around() -> dict[str, Any]:
     return {"particle.position.x": -z, "particle.position.z": x}
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     ("scene", "generator", "left"),
     [
