@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from atwood import Scene, SolveError, UnsupportedError, UsageError, action, boundary_value_motions, connect, simulate
+from atwood import (
+    Scene,
+    SolveError,
+    UnsupportedError,
+    UsageError,
+    action,
+    boundary_value_motions,
+    connect,
+    hamiltonian,
+    simulate,
+)
 from atwood_library import Ground, Mass1D, Spring
 from atwood_library.scenes import (
     ChargedParticle,
@@ -15,6 +25,7 @@ from atwood_library.scenes import (
     FallingWithDrag,
     FourBar,
     LagrangeTop,
+    Oscillators,
     SimplePendulum,
 )
 
@@ -188,3 +199,49 @@ def test_ends_are_coordinates_of_the_scene():
         boundary_value_motions(LagrangeTop(), {"top.theta": 0.1}, t_end=1.0)
     (motion,) = boundary_value_motions(pendulum(), {"rod.angle": "30 deg"}, t_end=1.0)
     assert motion.result["rod.angle"][-1] == pytest.approx(np.pi / 6.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(("turns", "index"), [(0.4, 0), (0.75, 1), (1.25, 2)])
+def test_the_second_variation_has_as_many_directions_as_conjugate_points(turns, index):
+    """Of the oscillator with k/m = 4, points conjugate to the start come each half turn (Morse)."""
+    scene, end = Oscillators(kind="harmonic"), turns * np.pi
+    [motion] = boundary_value_motions(scene, {"track.parameter": 0.7}, t_end=end)
+    found = motion.action.second_variation()
+    assert found.index == index == len(motion.conjugate_times)
+    k = np.arange(1, 9)
+    # The form is diagonal on sines: m a^2 ((k pi/T)^2 - 4) T/2.
+    assert found.matrix == pytest.approx(np.diag(((k * np.pi / end) ** 2 - 4.0) * end / 2.0), abs=1e-8)
+
+
+def test_the_second_variation_is_that_of_s_along_a_path():
+    """Differences of S on paths beside one, for a scene with mass that moves and two coordinates."""
+    path = {"rod1.angle": "sin(t)", "rod2.angle": "t**2/2"}
+    eta = {"rod1.angle": "t*(1 - t)", "rod2.angle": "sin(3.141592653589793*t)"}
+
+    def value(size):
+        return action(DoublePendulum(), {one: f"{path[one]} + {size}*({eta[one]})" for one in path}, t_end=1.0).value
+
+    form = action(DoublePendulum(), path, t_end=1.0).second_variation(eta).matrix[0, 0]
+    assert form == pytest.approx((value(1e-3) - 2.0 * value(0.0) + value(-1e-3)) / 1e-6, rel=1e-5)
+
+
+def test_paths_in_phase_space_are_varied_in_q_and_p_on_their_own():
+    """``dS = integral of (q' - dH/dp) xi + p eta' - dH/dq eta``: zero on motions, whatever xi is at the ends."""
+    scene = Oscillators(kind="harmonic")  # m = a = 1, k = 4
+    motion = {"track.parameter": "cos(2*t)", "p:track.parameter": "-2*sin(2*t)"}
+    found = action(scene, motion, t_end=0.6)
+    assert found.value == pytest.approx(action(scene, {"track.parameter": "cos(2*t)"}, t_end=0.6).value, rel=1e-12)
+    either = {"track.parameter": "t*(0.6 - t)", "p:track.parameter": "1 + t**2"}
+    assert found.variation(either).largest < 1e-12
+    other = action(scene, {"track.parameter": "0", "p:track.parameter": "t"}, t_end=0.6)
+    assert other.variation({"p:track.parameter": "1"}).values[0] == pytest.approx(-0.18, rel=1e-12)
+    assert other.value == pytest.approx(-(0.6**3) / 6.0, rel=1e-12)
+    with pytest.raises(UsageError, match="does not vanish"):
+        found.variation({"track.parameter": "t"})
+    with pytest.raises(UnsupportedError, match="phase space"):
+        found.second_variation()
+    with pytest.raises(UsageError, match="leaves out p:track"):
+        action(scene, {"track.parameter": "0", "p:nothing": "1"})
+    driven = action(DrivenPendulum(), {"rod.angle": "0", "p:rod.angle": "1"}, t_end=0.3)
+    h = hamiltonian(DrivenPendulum())
+    assert driven.time_derivative == pytest.approx(-float(h([0.0], [1.0], 0.3)), rel=1e-12)

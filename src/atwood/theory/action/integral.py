@@ -12,7 +12,7 @@ from numpy.polynomial import legendre
 from atwood.arguments import instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, UnsupportedError, UsageError, suggestion
-from atwood.expr import OutputGroup, Program, vjp
+from atwood.expr import OutputGroup, Program, jacobian_by_rows, vjp
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.lagrangian import lagrangian_along_speeds
@@ -26,11 +26,13 @@ from atwood.result.work import joined_times
 from atwood.simulation.problem.arguments import RTOL, T_END, check_span
 from atwood.simulation.run.run_record import Run, run_again, times_of_steps
 from atwood.theory.formulas.described import Described
+from atwood.theory.hamiltonian.hamiltonian import read_hamiltonian
 from atwood.theory.hamiltonian.phase_space import as_expression
 
 PATH = replace(instance("a dictionary of functions of time by path", Mapping), word="PATH=EXPRESSION", is_many=True)
 
 _PROGRAM: Key[Program] = Key("action")
+_SECONDS: Key[Program] = Key("second variation")
 _PANELS, _MODES = 64, 8
 _AT_ENDS = 1e-9
 """A direction vanishes at the ends where it is so small, of its largest size."""
@@ -61,6 +63,29 @@ class Variation:
 
     def __repr__(self) -> str:
         return f"<Variation in {len(self.names)} directions: at most {self.largest:.2g} of the terms that cancel>"
+
+
+@dataclass(frozen=True, eq=False)
+class SecondVariation(Described):
+    """The second variation of an action as a quadratic form.
+
+    Attributes
+    ----------
+    names
+        The directions.
+    matrix
+        The form on these, J s for directions in the units of the coordinates: the second derivatives of S.
+    index
+        How many independent directions lower the action: for a motion, the number of points conjugate to its start that
+        it has passed (Morse), as far as these directions tell them.
+    """
+
+    names: tuple[str, ...]
+    matrix: FloatArray
+    index: int
+
+    def __repr__(self) -> str:
+        return f"<SecondVariation on {len(self.names)} directions: {self.index} of them lower the action>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,27 +170,57 @@ class Action(Described):
         UnsupportedError
             See `gradient`.
         """
+        names, curves = self._directions(direction)
+        values, sizes = np.zeros(len(names)), np.zeros(len(names))
+        for piece, found in zip(self._pieces, curves, strict=True):
+            first = np.concatenate([piece.slopes, piece.momenta])
+            values += np.einsum("ait,it,t->a", found, first, piece.nodes.weights)
+            sizes += np.einsum("ait,it,t->a", np.abs(found), np.abs(first), piece.nodes.weights)
+        return Variation(names, values, np.divide(values, sizes, out=np.zeros(len(names)), where=sizes > 0.0))
+
+    def second_variation(self, direction: Mapping[str, Any] | None = None) -> SecondVariation:
+        """Return the second variation, the integral of ``eta' L_vv eta' + 2 eta' L_vq eta + eta L_qq eta``.
+
+        Parameters
+        ----------
+        direction
+            See `variation`.
+
+        Raises
+        ------
+        UsageError
+            If a direction does not vanish at the ends.
+        UnsupportedError
+            See `gradient`; or the path is one of coordinates and momenta.
+        """
+        names, curves = self._directions(direction)
+        matrix = np.zeros((len(names), len(names)))
+        for piece, found in zip(self._pieces, curves, strict=True):
+            if piece.seconds is None:
+                raise UnsupportedError(
+                    "on paths in phase space no direction has the action least", where=self.name, advice="Give q alone."
+                )
+            matrix += np.einsum("ait,ijt,bjt,t->ab", found, piece.seconds(), found, piece.nodes.weights, optimize=True)
+        return SecondVariation(names, matrix, int(np.sum(np.linalg.eigvalsh(matrix) < 0.0)))
+
+    def _directions(self, direction: Mapping[str, Any] | None) -> tuple[tuple[str, ...], list[FloatArray]]:
+        """Return names of directions, and values and rates of each at the nodes of each piece."""
         self._momenta()
+        held = [not one.startswith("p:") for one in self.coordinates]  # momenta are free at the ends
         chosen = self._sines() if direction is None else {"the direction": direction}
-        values, sizes = [], []
-        for given in chosen.values():
-            total = size = 0.0
-            largest, last = 0.0, np.zeros(0)
-            for piece in self._pieces:
-                eta, rate, at_ends = curves_at(given, self.coordinates, piece.nodes, self.name)
-                total += piece.nodes.integral(np.sum(piece.slopes * eta + piece.momenta * rate, axis=0))
-                size += piece.nodes.integral(np.sum(np.abs(piece.slopes * eta) + np.abs(piece.momenta * rate), axis=0))
-                largest = max(largest, float(np.max(np.abs(eta), initial=0.0)))
-                first = at_ends[:, 0] if piece is self._pieces[0] else np.zeros(1)
-                last = at_ends[:, 1]
-                if np.max(np.abs(first)) > _AT_ENDS * largest:
-                    raise self._does_not_vanish()
-            if np.max(np.abs(last)) > _AT_ENDS * largest:
-                raise self._does_not_vanish()
-            values.append(total)
-            sizes.append(size)
-        relative = np.divide(values, sizes, out=np.zeros(len(values)), where=np.array(sizes) > 0.0)
-        return Variation(tuple(chosen), np.array(values), relative)
+        curves = []
+        for piece in self._pieces:
+            found = [curves_at(given, self.coordinates, piece.nodes, self.name) for given in chosen.values()]
+            for eta, _, at_ends in found:
+                ends = [*([0] if piece is self._pieces[0] else []), *([1] if piece is self._pieces[-1] else [])]
+                if np.any(np.abs(at_ends[held][:, ends]) > _AT_ENDS * np.max(np.abs(eta), initial=0.0)):
+                    raise UsageError(
+                        "the direction does not vanish at both ends",
+                        where=self.name,
+                        advice="Multiply it by (t - t0)*(t1 - t).",
+                    )
+            curves.append(np.array([np.concatenate([eta, rate]) for eta, rate, _ in found]))
+        return tuple(chosen), curves
 
     def _sines(self) -> dict[str, dict[str, Any]]:
         begin, end = self.time
@@ -178,11 +233,6 @@ class Action(Described):
             for path in self.coordinates
             for k in range(1, _MODES + 1)
         }
-
-    def _does_not_vanish(self) -> UsageError:
-        return UsageError(
-            "the direction does not vanish at both ends", where=self.name, advice="Multiply it by (t - t0)*(t1 - t)."
-        )
 
     def _momenta(self) -> FloatArray:
         if self.momenta is None:
@@ -201,12 +251,13 @@ class Action(Described):
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """A stretch without jumps: L, dL/dq, dL/du and the energy at the nodes, rows of one number for each."""
+    """A stretch without jumps: L, dL/dq, dL/du at the nodes, rows of one number for each, and second derivatives."""
 
     nodes: Nodes
     values: FloatArray
     slopes: FloatArray
     momenta: FloatArray
+    seconds: Callable[[], FloatArray] | None = None
 
 
 @takes(
@@ -230,7 +281,8 @@ def action(
         The scene, which is run from its start; or the result of a run.
     path
         A path instead: for each coordinate by its path a number, text or a sympy expression in t, or a function of an
-        array of times.
+        array of times. With ``"p:PATH"`` for each momentum, too, it is a path in phase space, on which S is the
+        integral of ``p q' - H``; momenta are varied on their own then.
     t_end
         Time of the end, s; the scene's own if not given. A result has its end.
     rtol
@@ -253,7 +305,8 @@ def action(
     if path is None:
         assembly = assembly_of(scene)
         return action_of_run(simulate(assembly, t_end=t_end, rtol=rtol).run)
-    return _of_path(assembly_of(scene), path, t_end)
+    is_of_both = any(one.startswith("p:") for one in path)
+    return (_of_phase_path if is_of_both else _of_path)(assembly_of(scene), path, t_end)
 
 
 def action_of_run(run: Run) -> Action:
@@ -278,18 +331,46 @@ def _of_path(assembly: Assembly, path: Mapping[str, Any], t_end: float | str | N
     """Return the action of a path; velocities at its ends are those of its polynomials."""
     equations, name = assembly.own_equations, assembly.flat.name
     names = tuple(one.name for one in equations.names)
-    missing = [one for one in names if one not in path]
-    if missing or not rates_are_speeds(equations):
-        if not missing:
-            raise UnsupportedError("its speeds are no derivatives of its coordinates", where=name)
-        raise UsageError(f"the path leaves out {', '.join(missing)}", where=name, advice="Give each coordinate.")
-    begin, end = assembly.flat.t_start, assembly.flat.t_end if t_end is None else float(t_end)
-    check_span(begin, end)
-    points = panels(np.linspace(begin, end, _PANELS + 1))
-    q, v, at_ends = curves_at(path, names, points, name)
+    if not rates_are_speeds(equations) and set(names) <= set(path):
+        raise UnsupportedError("its speeds are no derivatives of its coordinates", where=name)
+    points, (q, v, at_ends) = _curves_of(assembly, names, path, t_end)
+    begin, end = points.edges[[0, -1]]
     piece = _piece(assembly, points, q, v)
     speeds = np.array([points.derivative_at_ends(row) for row in q])
     return _made([piece], [(assembly, np.array([begin, end]), at_ends, speeds)])
+
+
+def _curves_of(
+    assembly: Assembly, names: Sequence[str], path: Mapping[str, Any], t_end: float | str | None
+) -> tuple[Nodes, tuple[FloatArray, FloatArray, FloatArray]]:
+    """Return where a path is looked at, with its values and rates there, and its values at the ends."""
+    missing = [one for one in names if one not in path]
+    if missing:
+        raise UsageError(f"the path leaves out {', '.join(missing)}", where=assembly.flat.name, advice="Give each one.")
+    begin, end = assembly.flat.t_start, assembly.flat.t_end if t_end is None else float(t_end)
+    check_span(begin, end)
+    points = panels(np.linspace(begin, end, _PANELS + 1))
+    return points, curves_at(path, names, points, assembly.flat.name)
+
+
+def _of_phase_path(assembly: Assembly, path: Mapping[str, Any], t_end: float | str | None) -> Action:
+    """Return the action of a path in phase space: that of ``p q' - H`` with q and p for coordinates."""
+    h = read_hamiltonian(assembly)
+    names, n = (*h.paths, *(f"p:{one}" for one in h.paths)), len(h.paths)
+    points, (state, rates, at_ends) = _curves_of(assembly, names, path, t_end)
+    t, (q, p) = points.times.ravel(), (state[:n], state[n:])
+    if h.depends_on_time:
+        energies = np.array([float(h(*one)) for one in zip(q.T, p.T, t, strict=True)])
+        slopes = np.array([np.concatenate(h.gradient(*one)) for one in zip(q.T, p.T, t, strict=True)]).T
+    else:
+        energies, slopes = h(q.T, p.T), np.concatenate(h.gradient(q.T, p.T), axis=1).T
+    pushes = np.concatenate([-slopes[:n], rates[:n] - slopes[n:]])
+    piece = _Piece(points, np.sum(p * rates[:n], axis=0) - energies, pushes, np.concatenate([p, np.zeros(q.shape)]))
+    momenta, begin, end = np.zeros((2, 2 * n)), *points.edges[[0, -1]]
+    momenta[:, :n] = at_ends[n:].T
+    first, last = (float(h(x[:n], x[n:], one)) for x, one in zip(at_ends.T, (begin, end), strict=True))
+    total, rough = points.integral(piece.values), _rougher(piece)
+    return Action(h.name, total, abs(total - rough), (begin, end), names, at_ends.T, momenta, (first, last), (piece,))
 
 
 def _program(assembly: Assembly) -> Program:
@@ -309,6 +390,25 @@ def _program(assembly: Assembly) -> Program:
     return assembly.shared.get(_PROGRAM, make, assembly.form, assembly.orientation.kind)
 
 
+def _seconds(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatArray:
+    """Return the second derivatives of L by coordinates and speeds at times, shape (2n, 2n, times)."""
+
+    def make() -> Program:
+        equations = assembly.own_equations
+        found = lagrangian_along_speeds(assembly, equations)
+        both = [*found.coordinates, *found.velocities]
+        rows = jacobian_by_rows(vjp([found.lagrangian], [found.graph.one], both), both)
+        outputs = (OutputGroup("seconds", tuple(rows)),)
+        return Program(
+            f"{assembly.flat.name} (second variation)", state_groups(equations), assembly.parameters, outputs
+        )
+
+    program = assembly.shared.get(_SECONDS, make, assembly.form, assembly.orientation.kind)
+    [found] = assembly.kernel(program, vectorized=True)(t[None, :], q, u)
+    size = len(q) + len(u)
+    return np.broadcast_to(np.asarray(found, dtype=float), (size * size, len(t))).reshape(size, size, len(t))
+
+
 def _evaluated(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArray) -> list[FloatArray]:
     found = assembly.kernel(_program(assembly), vectorized=True)(t[None, :], q, u)
     sizes = 1, len(q), len(u)
@@ -318,8 +418,9 @@ def _evaluated(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArray) 
 
 
 def _piece(assembly: Assembly, points: Nodes, q: FloatArray, u: FloatArray) -> _Piece:
-    value, slopes, momenta = _evaluated(assembly, points.times.ravel(), q, u)
-    return _Piece(points, value[0], slopes, momenta)
+    t = points.times.ravel()
+    value, slopes, momenta = _evaluated(assembly, t, q, u)
+    return _Piece(points, value[0], slopes, momenta, lambda: _seconds(assembly, t, q, u))
 
 
 _End = tuple[Assembly, FloatArray, FloatArray, FloatArray]
@@ -381,10 +482,15 @@ class Nodes:
     edges: FloatArray
     times: FloatArray
 
+    @property
+    def weights(self) -> FloatArray:
+        """What the values at the points count in integrals, in one row."""
+        weights = legendre.leggauss(self.times.shape[1])[1]
+        return np.asarray((0.5 * np.diff(self.edges)[:, None] * weights).ravel())
+
     def integral(self, values: FloatArray) -> float:
         """Return the integral of what has these values at the points, of any shape with as many of them."""
-        weights = legendre.leggauss(self.times.shape[1])[1]
-        return float(np.sum(0.5 * np.diff(self.edges)[:, None] * weights * values.reshape(self.times.shape)))
+        return float(values.ravel() @ self.weights)
 
     def derivative(self, values: FloatArray) -> FloatArray:
         """Return the derivative of the polynomials that have these values at the points between two edges."""

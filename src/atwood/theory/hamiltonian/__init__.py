@@ -1,5 +1,6 @@
 """Hamiltonian mechanics: the Legendre transform, Poisson brackets, canonical and point transformations."""
 
+from atwood.theory.hamiltonian.conjugate import Conjugate, legendre_transform
 from atwood.theory.hamiltonian.flow import Algebra, Flow, bracket_algebra, flow_of
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian
 from atwood.theory.hamiltonian.point_transformations import PointTransformation, point_transformation
@@ -16,6 +17,7 @@ from atwood.theory.hamiltonian.transformations import (
 __all__ = [
     "Algebra",
     "CanonicalTransformation",
+    "Conjugate",
     "Flow",
     "Hamiltonian",
     "PointTransformation",
@@ -25,6 +27,7 @@ __all__ = [
     "fundamental_brackets",
     "generated_transformation",
     "hamiltonian",
+    "legendre_transform",
     "point_transformation",
     "poisson_bracket",
     "poisson_brackets",

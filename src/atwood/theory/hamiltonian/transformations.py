@@ -352,14 +352,14 @@ def _solved(equations: Sequence[Sympy], unknowns: Sequence[Sympy]) -> dict[Sympy
         return {}
     try:
         found = sympy.solve(list(equations), list(unknowns), dict=True, simplify=False, check=False)
-    except _UNSOLVED:
+    except UNSOLVED:
         return {}
     whole = [one for one in found if set(one) == set(unknowns)]
     chosen = next((one for one in reversed(whole) if _is_real(one.values())), None)
     return {} if chosen is None else {key: short(value) for key, value in chosen.items()}
 
 
-_UNSOLVED = (ArithmeticError, AttributeError, LookupError, NotImplementedError, RecursionError, TypeError, ValueError)
+UNSOLVED = (ArithmeticError, AttributeError, LookupError, NotImplementedError, RecursionError, TypeError, ValueError)
 """What sympy raises where it finds no solution, as of an integral by its end."""
 
 
