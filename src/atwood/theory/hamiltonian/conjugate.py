@@ -19,6 +19,7 @@ from atwood.theory.formulas.described import Described
 from atwood.theory.formulas.printers import Sympy
 from atwood.theory.formulas.reading import text_of
 from atwood.theory.hamiltonian.phase_space import EXPRESSION, SYMBOLS, as_expression, as_symbol, short, vanishes
+from atwood.theory.hamiltonian.tidied import length
 from atwood.theory.hamiltonian.transformations import UNSOLVED
 
 
@@ -37,7 +38,7 @@ class Conjugate(Described):
     ranges
         From where to where each p goes, in words, where that follows from its own variable.
     hessian
-        The determinant of the second derivatives of f, which is nowhere zero within.
+        The determinant of the second derivatives of f; beyond where it is zero, slopes belong to other places, too.
     verdict
         Whether ``dF/dp = x`` and ``df/dx = p``, in words.
     """
@@ -96,11 +97,14 @@ def legendre_transform(
     UnsupportedError
         If slopes are not solved for the variables.
     """
-    x = tuple(variables)
+    x, given = tuple(variables), between or {}
     p = tuple(slopes) or tuple(sympy.Symbol(f"p_{one.name}") for one in x)
     if not x or len({*x, *p}) != 2 * len(x):
         raise UsageError(f"{len(p)} slopes for {len(x)} variables", where=str(function)[:80])
-    bounds = {one for pair in (between or {}).values() for end in pair if end is not None for one in end.free_symbols}
+    stray = [one for one in given if one not in x]
+    if stray:
+        raise UsageError("it is none of the variables", where=str(stray[0]), advice=f"There are {x}.")
+    bounds = {one for pair in given.values() for end in pair if end is not None for one in end.free_symbols}
     others = sorted((function.free_symbols | bounds) - {*x, *p}, key=str)
     positive = {one: sympy.Symbol(one.name, positive=True) for one in others}
     real = {one: sympy.Symbol(one.name, real=True) for one in (*x, *p)}
@@ -114,45 +118,47 @@ def legendre_transform(
             where=str(function)[:80],
             advice="Take fewer variables: of those in which it is linear there is no transform.",
         )
-    ends = dict.fromkeys(own, (-sympy.oo, sympy.oo))
-    for one, pair in (between or {}).items():
-        if one not in x:
-            raise UsageError("it is none of the variables", where=str(one), advice=f"There are {x}.")
-        given = (
-            far if end is None else end.xreplace(positive) for end, far in zip(pair, (-sympy.oo, sympy.oo), strict=True)
+    low, high = ({v: given.get(one, (None, None))[side] for one, v in zip(x, own, strict=True)} for side in (0, 1))
+    ends = {
+        v: (
+            -sympy.oo if low[v] is None else low[v].xreplace(positive),
+            sympy.oo if high[v] is None else high[v].xreplace(positive),
         )
-        ends[real[one]] = tuple(given)
+        for v in own
+    }
     at = {one: sympy.Rational(7 + 2 * k, 5 + k) for k, one in enumerate(positive.values())}
-    apart = second.is_diagonal()
-    told = {text_of(q): _range(f.diff(v), v, ends[v], at) for v, q in zip(own, to, strict=True)} if apart else {}
-    try:
-        found = sympy.solve([f.diff(v) - q for v, q in zip(own, to, strict=True)], own, dict=True)
-    except UNSOLVED:
-        found = []
-    starts = [{v: _inside(*ends[v], side).xreplace(at) for v in own} for side in (1, 2)]
-    slopes_at = {q: f.diff(v).xreplace(at) for v, q in zip(own, to, strict=True)}
-    whole_ones = [one for one in found if set(one) == set(own)]
-    fits = [
-        one
-        for one in whole_ones
-        if all(_leads_back({v: y.xreplace(at) for v, y in one.items()}, slopes_at, place) for place in starts)
-    ]
-    if not fits:
-        wanted = ", ".join(f"{text_of(q)} = {text_of(f.diff(v))}" for v, q in zip(own, to, strict=True))
-        raise UnsupportedError(
-            f"no formula solves these for {', '.join(map(str, x))} everywhere: {wanted}",
-            where=str(function)[:80],
-            advice="Give a smaller range, as between={'x': (0, None)}." if whole_ones else "",
-        )
-    solved = {v: short(one) for v, one in fits[0].items()}
-    whole = short(sympy.Add(*(q * solved[v] for v, q in zip(own, to, strict=True)), -f.xreplace(solved)))
-    whole = min(whole, sympy.factor(whole), sympy.powsimp(whole), key=lambda one: int(one.count_ops()))
-    off = [whole.diff(q) - solved[v] for v, q in zip(own, to, strict=True)]
-    verdict = vanishes([*off, *(f.diff(v).xreplace(solved) - q for v, q in zip(own, to, strict=True))])
+    pairs = list(zip(own, to, strict=True))
+    told = {text_of(q): _range(f.diff(v), v, ends[v], at) for v, q in pairs} if second.is_diagonal() else {}
+    solved = _solved(f, dict(pairs), [{v: _inside(*ends[v], side).xreplace(at) for v in own} for side in (1, 2)], at)
+    whole = short(sympy.Add(*(q * solved[v] for v, q in pairs), -f.xreplace(solved)))
+    whole = min(whole, sympy.factor(whole), sympy.powsimp(whole), key=length)
+    off = [one for v, q in pairs for one in (whole.diff(q) - solved[v], f.diff(v).xreplace(solved) - q)]
+    verdict = vanishes(off)
     if not verdict.holds:
         raise UnsupportedError(f"no branch of its slopes is found: {verdict.sentence}", where=str(function)[:80])
     made = {one: solved[real[one]].xreplace(back) for one in x}
     return Conjugate(x, p, whole.xreplace(back), made, told, hessian.xreplace(back), verdict.sentence)
+
+
+def _solved(
+    f: Sympy, slopes: Mapping[Sympy, Sympy], places: Sequence[Mapping[Sympy, Sympy]], at: Mapping[Sympy, Sympy]
+) -> dict[Sympy, Sympy]:
+    """Return variables in terms of slopes, as they are at some places."""
+    try:
+        found = sympy.solve([f.diff(v) - q for v, q in slopes.items()], [*slopes], dict=True)
+    except UNSOLVED:
+        found = []
+    known = {q: f.diff(v).xreplace(at) for v, q in slopes.items()}
+    every = [one for one in found if set(one) == set(slopes)]
+    for one in every:
+        if all(_leads_back({v: y.xreplace(at) for v, y in one.items()}, known, place) for place in places):
+            return {v: short(y) for v, y in one.items()}
+    wanted = ", ".join(f"{text_of(q)} = {text_of(f.diff(v))}" for v, q in slopes.items())
+    raise UnsupportedError(
+        f"no formula solves these for {', '.join(map(str, slopes))} everywhere: {wanted}",
+        where=str(f)[:80],
+        advice="Give a smaller range, as between={'x': (0, None)}." if every else "",
+    )
 
 
 def _leads_back(solved: Mapping[Sympy, Sympy], slopes: Mapping[Sympy, Sympy], start: Mapping[Sympy, Sympy]) -> bool:
