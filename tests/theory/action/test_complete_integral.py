@@ -13,12 +13,13 @@ import sympy
 from atwood import Scene, UnsupportedError, equations, hamiltonian, separation, simulate
 from atwood.theory.action import Separation
 from atwood.theory.hamiltonian.phase_space import vanishes
-from atwood_library import Charge, PointMass, Potential
+from atwood_library import Charge, Ground, PointMass, PointOnSurface, Potential
 from atwood_library.scenes import SCENES
 
 POLAR = {"x": "r*cos(phi)", "z": "r*sin(phi)"}
 PARABOLIC = {"x": "xi*eta", "z": "(xi**2 - eta**2)/2"}
 ELLIPTIC = {"x": "cosh(u)*cos(v)", "z": "sinh(u)*sin(v)"}
+PROLATE = {"x": "sinh(u)*sin(v)*cos(phi)", "y": "sinh(u)*sin(v)*sin(phi)", "z": "cosh(u)*cos(v)"}
 SPHERE = {"x": "r*sin(theta)*cos(phi)", "y": "r*sin(theta)*sin(phi)", "z": "r*cos(theta)"}
 
 
@@ -31,11 +32,17 @@ def elliptic(place: Mapping[str, float]) -> dict[str, float]:
     return {"u": float(w.real), "v": float(w.imag)}
 
 
+def prolate(place: Mapping[str, float]) -> dict[str, float]:
+    w = np.arccosh(place["z"] + 1j * np.hypot(place["x"], place["y"]))
+    return {"u": float(w.real), "v": float(w.imag), "phi": float(np.arctan2(place["y"], place["x"]))}
+
+
 BACK: dict[str, Callable[[Mapping[str, float]], dict[str, float]]] = {
     "own": dict,
     "polar": lambda at: {"r": np.hypot(at["x"], at["z"]), "phi": np.arctan2(at["z"], at["x"])},
     "parabolic": lambda at: (lambda xi: {"xi": xi, "eta": at["x"] / xi})(np.sqrt(np.hypot(at["x"], at["z"]) + at["z"])),
     "elliptic": elliptic,
+    "prolate": prolate,
     "sphere": lambda at: (lambda r: {"r": r, "theta": np.arccos(at["z"] / r), "phi": np.arctan2(at["y"], at["x"])})(
         np.sqrt(at["x"] ** 2 + at["y"] ** 2 + at["z"] ** 2)
     ),
@@ -55,13 +62,15 @@ def field(law: str, space: str = "plane", **options: Any) -> Scene:
     return scene
 
 
-def two_centres() -> Scene:
-    scene = Scene(gravity=0.0)
+def two_centres(space: str = "plane") -> Scene:
+    scene = Scene(gravity=0.0, space=space)
     body = scene.add("body", PointMass(mass=1.1))
     for k, (place, strength) in enumerate(((1, 1), (-1, 2))):
-        law = f"-{strength}/sqrt((x - {place})**2 + z**2)"
-        held = scene.add(f"centre{k}", Potential(energy_function=law))
+        square = f"(x - {place})**2 + z**2" if space == "plane" else f"x**2 + y**2 + (z - {place})**2"
+        held = scene.add(f"centre{k}", Potential(energy_function=f"-{strength}/sqrt({square})"))
         scene.connect(held.point, body.point)
+    if space == "space":
+        return moving(scene, {"x": 0.5, "y": 0.4, "z": 0.7}, {"x": -0.3, "y": 0.9, "z": 0.4})
     return moving(scene, {"x": 0.9, "z": 0.7}, {"x": -1.1, "z": 1.5})
 
 
@@ -79,6 +88,7 @@ CASES: dict[str, tuple[Callable[[], Scene], str, dict[str, str], int]] = {
     "a hyperbola": (lambda: kepler(eccentricity=1.5), "polar", POLAR, 0),
     "stark": (lambda: kepler(gravity=0.4), "parabolic", PARABOLIC, 2),
     "two centres": (two_centres, "elliptic", ELLIPTIC, 2),
+    "two centres in space": (lambda: two_centres("space"), "prolate", PROLATE, 2),
     "oscillators": (
         lambda: moving(field("0.7*x**2 + 1.1*z**2"), {"x": 0.5, "z": 0.3}, {"x": 0.4, "z": 0.7}),
         "own",
@@ -120,6 +130,7 @@ def along(name: str) -> tuple[Separation, list[dict[Any, float]], Scene]:
     return found, states, scene
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", CASES)
 def test_constants_and_betas_stay_along_a_run(name: str) -> None:
     found, states, _ = along(name)
@@ -163,6 +174,7 @@ def difference(function: Any, q: Any, start: float, end: float) -> float:
     return total
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", CASES)
 def test_the_equation_of_hamilton_and_jacobi_holds(name: str) -> None:
     """``H(q, dW/dq) = E``, with W differentiated, at 50 digits."""
@@ -179,6 +191,33 @@ def test_the_equation_of_hamilton_and_jacobi_holds(name: str) -> None:
     h = found.expression
     value = h.xreplace({p: slopes[p].xreplace(exact) for p in found.momenta}).xreplace(exact).evalf(50)
     assert abs(value - complete.energy.xreplace(exact)) < 1e-45 * (1 + abs(value))
+
+
+def test_geodesics_of_a_spheroid() -> None:
+    """``p_u^2 = (2 m E - p_v^2/(a sin u)^2)(a^2 cos^2 u + c^2 sin^2 u)``: along the quadrature beta stays (Jacobi)."""
+    scene = Scene(space="space", gravity=0.0)
+    parts = {"ground": Ground(), "surface": PointOnSurface(scale=1.0), "bead": PointMass(mass=1.3)}
+    for name, part in parts.items():
+        scene.add(name, part)
+    scene.connect(scene.ground.frame, scene.surface.a)
+    scene.connect(scene.surface.b, scene.bead.point)
+    scene.set("surface.surface", ("sin(p)*cos(q)", "sin(p)*sin(q)", "2*cos(p)"))
+    start = {"parameter_1": 1.0, "parameter_2": 0.0, "rate_1": 0.4, "rate_2": 0.8}
+    scene.start.update({f"surface.{one}": value for one, value in start.items()})
+    found = separation(scene)
+    u, _ = found.coordinates
+    E, p_v = sympy.symbols("E p_v")
+    [own] = found.complete.parts
+    a, m = sympy.symbols("a m")
+    book = (2 * m * E * a**2 - p_v**2 / sympy.sin(u) ** 2) * (sympy.cos(u) ** 2 + 4 * sympy.sin(u) ** 2)
+    assert vanishes([own.quadrature.square - book]).holds
+    run = simulate(scene, t_end=0.5, rtol=1e-12, solver="taylor", outputs=5)
+    held = {**found.values, u: run["surface.parameter_1"][0], p_v: 1.3 * 0.8 * np.sin(1.0) ** 2}
+    held[E] = 0.65 * (0.16 * (np.cos(1.0) ** 2 + 4.0 * np.sin(1.0) ** 2) + 0.64 * np.sin(1.0) ** 2)
+    slope = found.betas[p_v].atoms(sympy.Integral).pop().function.xreplace({**held, u: u})
+    for place, azimuth in zip(run["surface.parameter_1"], run["surface.parameter_2"], strict=True):
+        turned = mpmath.quad(sympy.lambdify(u, slope, "mpmath"), [1.0, place])
+        assert azimuth + float(turned) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_the_actions_of_sommerfeld() -> None:

@@ -101,10 +101,12 @@ class Separation(Described):
         The value of each parameter's symbol.
     separates
         Whether all conditions hold at random states, with 40 digits.
-    worst
-        The two coordinates whose condition holds least, and by which share of its terms it is missed.
-    source, places
-        H in the scene's coordinates, and what these are in terms of those of the separation, by path.
+    condition
+        Levi-Civita's condition that is missed most: of which two coordinates, and by which share of its terms.
+    source
+        H in the scene's coordinates.
+    transformation
+        The scene's coordinates in terms of those in which it separates, by path.
     """
 
     name: str
@@ -113,9 +115,9 @@ class Separation(Described):
     expression: Sympy
     values: Mapping[Sympy, float]
     separates: bool
-    worst: tuple[str, str, float]
+    condition: tuple[str, str, float]
     source: Hamiltonian
-    places: Mapping[str, Sympy]
+    transformation: Mapping[str, Sympy]
 
     @property
     def sentence(self) -> str:
@@ -128,7 +130,7 @@ class Separation(Described):
                 f"{self.name} separates in {names}: Levi-Civita's conditions hold at {STATES} random states, to "
                 f"{DIGITS} digits."
             )
-        one, other, miss = self.worst
+        one, other, miss = self.condition
         told = f"the condition of {one} and {other} is missed by {miss:.2g}"
         if self.expression.count_ops() < _PLAIN:
             try:
@@ -147,12 +149,12 @@ class Separation(Described):
         UnsupportedError
             If the equation does not separate, which names the term that is left over.
         """
-        if set(self.places.values()) == set(self.coordinates):
-            state = dict(zip(self.places.values(), self.source.start()[0], strict=True))
+        if set(self.transformation.values()) == set(self.coordinates):
+            state = dict(zip(self.transformation.values(), self.source.start()[0], strict=True))
             letters = dict(zip(self.coordinates, self.momenta, strict=True))
-            state |= {letters[q]: p for q, p in zip(self.places.values(), self.source.start()[1], strict=True)}
+            state |= {letters[q]: p for q, p in zip(self.transformation.values(), self.source.start()[1], strict=True)}
             return complete_integral(self.expression, [*letters.items()], self.values, state, self.name)
-        given = point_transformation_of(self.source, self.places, self.coordinates)
+        given = point_transformation_of(self.source, self.transformation, self.coordinates)
         t, *starts = start_in(given)
         state = dict(zip((*given.coordinates, *given.velocities), np.concatenate(starts), strict=True))
         known = {**self.values, **state, sympy.Symbol("t"): t}
