@@ -125,7 +125,7 @@ def _equations(function: Callable[..., Any], scene: Assembly, asked: dict[str, A
         return _called(function, scene, asked)
     if request.python:
         raise UsageError("--hamiltonian is not written in Python", advice="Give --latex, --markdown or --json.")
-    return read_hamiltonian(scene, asked["parameters"], asked.get("symbols"), asked["by_part"])
+    return read_hamiltonian(scene, asked["parameters"], asked.get("symbols"), asked["by_part"], asked.get("gauge"))
 
 
 def _equilibria(function: Callable[..., Any], scene: Assembly, asked: dict[str, Any], request: Request) -> Any:

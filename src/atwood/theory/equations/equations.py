@@ -29,6 +29,7 @@ from atwood.theory.equations.pages import (
     module_of,
     page_of_equations,
 )
+from atwood.theory.equations.stated import GAUGE, with_gauge
 from atwood.theory.formulas import page
 from atwood.theory.formulas.described import Page, Paged
 from atwood.theory.formulas.notation import SYMBOLS, notation_of
@@ -38,11 +39,15 @@ from atwood.theory.formulas.tree import Sum
 
 
 def read_equations(
-    assembly: Assembly, parameters: Parameters = "symbolic", symbols: Mapping[str, str] | None = None
+    assembly: Assembly,
+    parameters: Parameters = "symbolic",
+    symbols: Mapping[str, str] | None = None,
+    gauge: Any = None,
 ) -> EquationsOfMotion:
-    """Return the equations of motion of an assembly, to be read."""
+    """Return the equations of motion of an assembly, to be read, with the rate of a function added to L."""
     found = lagrangian_of(assembly)
-    return EquationsOfMotion(assembly, found, notation_of(assembly, found, symbols), parameters)
+    notation = notation_of(assembly, found, symbols)
+    return EquationsOfMotion(assembly, with_gauge(assembly, found, notation, gauge), notation, parameters)
 
 
 @dataclass(frozen=True, eq=False)
@@ -405,6 +410,7 @@ PARAMETERS = one_of(("symbolic", "values"))
     by_part=FLAG,
     solved=FLAG,
     quantities=PATHS,
+    gauge=GAUGE,
 )
 def equations(
     scene: Model | Assembly,
@@ -416,6 +422,7 @@ def equations(
     by_part: bool = False,
     solved: bool = False,
     quantities: Iterable[str] | None = None,
+    gauge: Any = None,
 ) -> EquationsOfMotion:
     """Return the equations of motion of a scene, to be read.
 
@@ -448,6 +455,9 @@ def equations(
     quantities
         Paths of quantities of parts that are written as formulas, too, such as ``["rod.tension"]``: what sensors
         measure, energies and reactions; see `EquationsOfMotion.quantity`.
+    gauge
+        A function f of coordinates and time whose rate df/dt is added to L, in the letters of the equations: text such
+        as ``"m*x*t"`` or a sympy expression. It leaves the equations, and changes momenta and H.
 
     Returns
     -------
@@ -463,6 +473,6 @@ def equations(
     """
     assembly = assembly_of(scene, form=form, orientation=orientation)
     chosen: Any = parameters
-    made = read_equations(assembly, chosen, symbols)
+    made = read_equations(assembly, chosen, symbols, gauge)
     paths = tuple(quantities or ())
     return EquationsOfMotion(assembly, made.expressions, made.notation, chosen, by_part, solved, paths)

@@ -30,6 +30,7 @@ from atwood.theory.dynamics.functions import Numbers
 from atwood.theory.equations.equations import PARAMETERS
 from atwood.theory.equations.formulas import EquationFormulas, Parameters
 from atwood.theory.equations.solved import LARGEST_BLOCK, blocks, entries_of
+from atwood.theory.equations.stated import GAUGE, with_gauge
 from atwood.theory.formulas import page
 from atwood.theory.formulas.described import Page, Paged
 from atwood.theory.formulas.notation import SYMBOLS, momentum_symbol, notation_of, with_momenta
@@ -59,15 +60,18 @@ def read_hamiltonian(
     parameters: Parameters = "symbolic",
     symbols: Mapping[str, str] | None = None,
     by_part: bool = False,
+    gauge: Any = None,
 ) -> Hamiltonian:
-    """Return the Hamiltonian of an assembly."""
+    """Return the Hamiltonian of an assembly, with the rate of a function added to L."""
     refuse_without_hamiltonian(assembly)
     if any(one.kind == "quaternion" for one in assembly.reduced.orientation_coordinates):
         assembly = assembly.other_mode(assembly.modes, {}, Orientation(_GOLDSTEIN))
     found = lagrangian_of(assembly)
+    plain = notation_of(assembly, found, symbols)
+    found = with_gauge(assembly, found, plain, gauge)
     transform = LegendreTransform(assembly, found)
     check_mass(transform)
-    notation = with_momenta(notation_of(assembly, found, symbols), found)
+    notation = with_momenta(plain, found)
     formulas = EquationFormulas(assembly, found, notation, parameters, by_part)
     return Hamiltonian(formulas, transform, is_energy(transform))
 
@@ -365,7 +369,9 @@ class Hamiltonian(Paged):
         return f"$\\displaystyle {self.latex()}$"
 
 
-@takes(scene=SCENE, parameters=PARAMETERS, orientation=optional(ORIENTATION), symbols=SYMBOLS, by_part=FLAG)
+@takes(
+    scene=SCENE, parameters=PARAMETERS, orientation=optional(ORIENTATION), symbols=SYMBOLS, by_part=FLAG, gauge=GAUGE
+)
 def hamiltonian(
     scene: Model | Assembly,
     *,
@@ -373,6 +379,7 @@ def hamiltonian(
     orientation: str | None = None,
     symbols: Mapping[str, str] | None = None,
     by_part: bool = False,
+    gauge: Any = None,
 ) -> Hamiltonian:
     """Return the Hamiltonian of a scene, ``H(q, p, t) = p q' - L`` with ``p = dL/dq'``.
 
@@ -393,6 +400,8 @@ def hamiltonian(
         See `atwood.equations`.
     by_part
         Say of each term which parts it comes from: of one in the momenta, those without which it would be another.
+    gauge
+        See `atwood.equations`: with df/dt added to L, ``p + df/dq`` takes the place of p, and ``H - df/dt`` that of H.
 
     Returns
     -------
@@ -409,7 +418,7 @@ def hamiltonian(
     """
     assembly = assembly_of(scene, orientation=orientation)
     chosen: Any = parameters
-    return read_hamiltonian(assembly, chosen, symbols, by_part)
+    return read_hamiltonian(assembly, chosen, symbols, by_part, gauge)
 
 
 def hamiltonian_formula(formulas: EquationFormulas, transform: LegendreTransform) -> Sum | None:

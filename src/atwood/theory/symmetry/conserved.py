@@ -28,6 +28,7 @@ from atwood.simulation.problem.arguments import ORIENTATION
 from atwood.simulation.run.recorder import SegmentRecord
 from atwood.table import Shown, Table, table
 from atwood.theory.equations.formulas import EquationFormulas
+from atwood.theory.equations.stated import GAUGE, with_gauge
 from atwood.theory.formulas.notation import SYMBOLS, notation_of
 from atwood.theory.formulas.page import Line, shared_lines
 from atwood.theory.formulas.printers import Sympy, latex, objects, text
@@ -248,13 +249,14 @@ _ROLLING = "integrals of rolling besides angular momenta"
 SYMMETRIES = Kind("a Symmetry, or a list of them", _listed)
 
 
-@takes(scene=SCENE, symmetries=SYMMETRIES, orientation=optional(ORIENTATION), symbols=SYMBOLS)
+@takes(scene=SCENE, symmetries=SYMMETRIES, orientation=optional(ORIENTATION), symbols=SYMBOLS, gauge=GAUGE)
 def conserved(
     scene: Model | Assembly,
     symmetries: Symmetry | Sequence[Symmetry] = (),
     *,
     orientation: str | None = None,
     symbols: Mapping[str, str] | None = None,
+    gauge: Any = None,
 ) -> Conserved:
     """Return what is conserved along all motions of a scene.
 
@@ -277,6 +279,8 @@ def conserved(
         See `atwood.assemble`. With Euler angles, these can be ignorable coordinates.
     symbols
         See `atwood.equations`.
+    gauge
+        See `atwood.equations`: momenta are those of L + df/dt.
 
     Returns
     -------
@@ -293,6 +297,7 @@ def conserved(
     assembly = assembly_of(scene, orientation=orientation)
     found = lagrangian_of(assembly, "reduced")
     notation = notation_of(assembly, found, symbols)
+    found = with_gauge(assembly, found, notation, gauge)
     quantities = Quantities(assembly, found)
     prover, formulas = Prover(quantities, notation), EquationFormulas(assembly, found, notation)
     every: Any = symmetries

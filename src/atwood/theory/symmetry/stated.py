@@ -10,13 +10,12 @@ import numpy as np
 from atwood.arguments import BY_PATH, NAME, TEXT, Kind, Refused, check_fields, show
 from atwood.errors import UsageError, suggestion
 from atwood.expr import Expression
-from atwood.expr.sympy_bridge import from_sympy
 from atwood.lazy_dataclasses import dataclass
-from atwood.lazy_modules import sympy
 from atwood.mechanics.outputs.totals import add_up
 from atwood.model.values.units import parse_unit
 from atwood.theory.equations.formulas import EquationFormulas
-from atwood.theory.formulas.printers import objects, text
+from atwood.theory.equations.stated import FUNCTION, ExpressionReader
+from atwood.theory.formulas.printers import text
 from atwood.theory.symmetry.find import Finding
 from atwood.theory.symmetry.proof import Prover
 from atwood.theory.symmetry.quantities import Quantities
@@ -28,18 +27,10 @@ _LONGEST = 400
 """Signs of what is left over of a symmetry that is none, beyond which it is not written."""
 
 
-def _readable(value: Any) -> Any:
-    if value is None or isinstance(value, (bool, bytes, type)) or not (value == value):
-        raise Refused
-    if not isinstance(sympy.sympify(value), sympy.Expr):
-        raise Refused
-    return value
-
-
 def _generator(value: Any) -> Mapping[str, Any]:
     for path, one in BY_PATH.read(value).items():
         try:
-            _readable(one)
+            FUNCTION.read(one)
         except Exception:
             raise Refused(f"{path} cannot be displaced by {show(one)}.") from None
     if not value:
@@ -57,7 +48,6 @@ def _unit(value: Any) -> str:
 
 
 _UNIT = Kind("a unit, such as 'kg*m^2/s', or no text where it is not known", _unit)
-_FUNCTION = Kind("a sympy expression or a number", _readable)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,13 +77,13 @@ class Symmetry:
     unit: str = ""
 
     def __post_init__(self) -> None:
-        check_fields(self, generator=_GENERATOR, f=_FUNCTION, name=NAME, unit=_UNIT)
+        check_fields(self, generator=_GENERATOR, f=FUNCTION, name=NAME, unit=_UNIT)
 
 
 def check_symmetry(symmetry: Symmetry, quantities: Quantities, prover: Prover, formulas: EquationFormulas) -> Finding:
     """Return what a stated symmetry conserves."""
     found, scene = quantities.found, quantities.assembly.flat.name
-    reader = _Reader(formulas)
+    reader = ExpressionReader(formulas)
     paths = [one.name if place is None else found.names[place].name for one, place in _named(quantities)]
     generator: dict[int, Expression] = {}
     for path, value in symmetry.generator.items():
@@ -149,42 +139,3 @@ def _state_text(quantities: Quantities, state: State) -> str:
     told += [f"{one.name} = {value:.6g}" for one, value in zip(e.names, state.q, strict=True)]
     told += [f"{one.name} = {value:.6g}" for one, value in zip(e.speed_names, state.u, strict=True)]
     return ", ".join(told[:13]) + (", ..." if len(told) > 13 else "")
-
-
-class _Reader:
-    """Reads sympy expressions in the symbols of a scene's equations."""
-
-    def __init__(self, formulas: EquationFormulas) -> None:
-        notation, self._graph = formulas.notation, formulas.expressions.graph
-        self._known: dict[Any, Expression] = {}
-        for expression, symbol in notation.symbols.items():
-            self._known[objects.letter(symbol, 0)] = expression
-        for expression, (symbol, dots) in notation.velocities.items():
-            self._known[objects.letter(symbol, dots)] = expression
-        self._scene = formulas.name
-
-    def read(self, value: Any, what: str) -> Expression:
-        """Return an expression of the graph."""
-        try:
-            whole = sympy.sympify(value).doit()
-        except (sympy.SympifyError, TypeError, AttributeError):
-            raise UsageError(
-                f"{value!r} is no sympy expression", where=f"{self._scene}: {what}", advice="Give one, or a number."
-            ) from None
-        names = {str(one): one for one in self._known}
-        stand_ins = {one: sympy.Dummy(f"s{k}") for k, one in enumerate(self._known)}
-        # Derivatives hold functions, and these time: the outer ones first.
-        for one in sorted(stand_ins, key=lambda one: (one.is_Symbol, -one.count_ops(), not one.is_Derivative)):
-            whole = whole.xreplace({one: stand_ins[one]})
-        known = set(stand_ins.values())
-        stray = [
-            one for one in (*whole.free_symbols, *whole.atoms(sympy.core.function.AppliedUndef)) if one not in known
-        ]
-        if stray:
-            name = str(stray[0])
-            raise UsageError(
-                f"{name} is no symbol of the scene",
-                where=f"{self._scene}: {what}",
-                advice=suggestion(name, list(names)) or "Take the symbols from `atwood.equations(scene)`.",
-            )
-        return from_sympy(whole, self._graph, {stand_ins[one]: value for one, value in self._known.items()})
