@@ -223,6 +223,7 @@ TOPS = {
 }
 
 
+@pytest.mark.sample(2)
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
     ("name", "size", "height", "off"),

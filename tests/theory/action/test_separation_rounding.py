@@ -11,6 +11,7 @@ from atwood_library import PointMass, Potential
 from atwood_library.scenes import SCENES
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("share", "separates"), [(0.7, True), (0.8, False), (0.7 + 1e-9, False)])
 def test_two_bodies_separate_in_the_centre_of_mass_and_polar_coordinates(share: float, separates: bool) -> None:
     coordinates = {}

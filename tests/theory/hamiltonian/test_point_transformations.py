@@ -45,6 +45,7 @@ def agree(found: PointTransformation, count: int = 4, time: float = 0.0) -> floa
     return worst
 
 
+@pytest.mark.sample(0)
 def test_two_bodies_in_space_in_two_steps() -> None:
     """``P^2/2M + (p_r^2 + p_theta^2/r^2 + p_phi^2/(r^2 sin^2 theta))/2 mu - G m1 m2/r`` (Goldstein, section 3.1)."""
     scene = SCENES["two-body"]()
@@ -95,6 +96,7 @@ def test_momenta_of_both_are_inverse_to_each_other(offset: float) -> None:
     assert agree(found) < 1e-13
 
 
+@pytest.mark.sample(0)
 def test_a_frame_that_turns_and_then_polar_coordinates() -> None:
     """``K = H - omega p_phi``, and the centrifugal energy in L (Goldstein, section 8.2)."""
     scene = SCENES["kepler"]()
@@ -123,6 +125,7 @@ def found_with(scene: Scene, rate: float) -> PointTransformation:
     return point_transformation(scene, old, [r, phi])
 
 
+@pytest.mark.sample(0)
 def test_accelerations_in_a_frame_that_turns_unevenly() -> None:
     """``X'' = 2 w Z' + w^2 X + w' Z``: Coriolis, centrifugal and Euler's (Goldstein, section 4.10)."""
     scene = Scene(gravity=0.0)
@@ -136,6 +139,7 @@ def test_accelerations_in_a_frame_that_turns_unevenly() -> None:
     assert same(second, -2 * rate * vx + rate**2 * Z - a * X)
 
 
+@pytest.mark.sample(0)
 @pytest.mark.parametrize("turning", [0.0, 0.7])
 def test_accelerations_have_the_forces_of_dampers_and_loads(turning: float) -> None:
     """Of a polar chain of transformations, beside the accelerations of the scene itself."""
@@ -180,6 +184,7 @@ def test_a_frame_that_accelerates() -> None:
     assert same(found.hamiltonian, momentum**2 / (2 * m) - a * t * momentum)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("law", ["(x**2 + z**2)**2/3 + x*z", "exp(-x**2)/(1 + z**2)"])
 @pytest.mark.parametrize(
     "new",

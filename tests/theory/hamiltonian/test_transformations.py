@@ -136,6 +136,7 @@ def test_kepler_in_polar_coordinates() -> None:
     assert brackets == sympy.Matrix([[0, 0, 1, 0], [0, 0, 0, 1], [-1, 0, 0, 0], [0, -1, 0, 0]])
 
 
+@pytest.mark.sample(0)
 def test_a_rotating_frame() -> None:
     scene = SCENES["kepler"]()
     X, Z = sympy.symbols("X Z")
@@ -190,6 +191,7 @@ def test_the_action_of_the_oscillator_generates_its_action_and_angle(arc: Any) -
     assert abs(float(found.new_coordinates[0].subs(at)) - (angle if sign == 1 else angle - math.pi / 2.0)) < 1e-14
 
 
+@pytest.mark.sample(0)
 def test_a_generating_function_may_be_an_integral() -> None:
     x = sympy.Symbol("x")
     found = generated_transformation(sympy.Integral(sympy.sqrt(2 * P - x**2), (x, 0, q)), 2, ((q,), (p,)), [Q], [P])

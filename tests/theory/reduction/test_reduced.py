@@ -85,6 +85,7 @@ def cubic(scene: Any, found: Any) -> np.ndarray:
     return (np.polynomial.Polynomial([level, -2.0 * weight]) * np.polynomial.Polynomial([1.0, 0.0, -1.0]) - square).coef
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("motion", ["loops", "cusps", "waves", "steady"])
 def test_lagrange_s_top_in_its_four_motions(motion: str) -> None:
     scene = SCENES["lagrange-top"](motion=motion, inclination=0.7)
@@ -186,6 +187,7 @@ def test_kepler_in_polar_coordinates_and_two_bodies_in_relative_ones() -> None:
 POLAR = {"body.position.x": "r*cos(phi)", "body.position.z": "r*sin(phi)"}
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("e", "strength"), [(0.6, 0.9), (1.5, 0.9), (1.7, -0.8)])
 def test_the_conics_of_kepler_as_formulas(e: float, strength: float) -> None:
     """``r = p/(1 + e cos)``, ``p = L^2/(m k)``, ``e^2 = 1 + 2 E L^2/(m k^2)`` (Goldstein, section 3.7)."""
@@ -260,6 +262,7 @@ def test_routh_s_procedure_of_the_pendulum_on_a_cart() -> None:
     assert equation.has(theta.diff(sympy.Symbol("t"), 2))
 
 
+@pytest.mark.sample(0)
 def test_the_effective_potential_is_the_same_in_symbols_and_numbers() -> None:
     for name, options in (("lagrange-top", {}), ("rotating-hoop-free", {}), ("rotating-hoop-driven", {})):
         scene = SCENES[name](**options)

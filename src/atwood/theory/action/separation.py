@@ -126,8 +126,9 @@ class Separation(Described):
         if len(self.coordinates) == 1:
             return f"{self.name} has one coordinate, {names}, and separates."
         if self.separates:
+            only = "" if self.is_general else ", for these values of the parameters"
             return (
-                f"{self.name} separates in {names}: Levi-Civita's conditions hold at {STATES} random states, to "
+                f"{self.name} separates in {names}{only}: Levi-Civita's conditions hold at {STATES} random states, to "
                 f"{DIGITS} digits."
             )
         one, other, miss = self.condition
@@ -139,6 +140,13 @@ class Separation(Described):
                 left = error.message.rpartition(": ")[2]
                 told = f"{left}; {told}" if "left over" in left else told
         return f"{self.name} does not separate in {names}: {told}."
+
+    @cached_property
+    def is_general(self) -> bool:
+        """Whether the answer is the same for some other values of the parameters."""
+        others = {one: value * (1.0 + 0.3 / (k + 2.0)) for k, (one, value) in enumerate(self.values.items())}
+        found = worst_condition(self.expression, self.coordinates, self.momenta, others, self.name)
+        return (found[2] <= ZERO) == self.separates
 
     @cached_property
     def complete(self) -> CompleteIntegral:

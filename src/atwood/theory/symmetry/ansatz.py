@@ -29,7 +29,7 @@ from atwood.numerics.rank import null_space, ranks
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.start import find_start
-from atwood.theory.symmetry.proof import Generator, Prover, normal_form
+from atwood.theory.symmetry.proof import Generator, Proof, Prover, normal_form
 from atwood.theory.symmetry.quantities import Quantities, row_echelon
 from atwood.theory.symmetry.states import State
 
@@ -71,11 +71,14 @@ class Integral:
         The quantity, and the displacements of its symmetry.
     kind
         ``"first"`` or ``"second"`` order in the momenta, or with coefficients in ``"time"``.
+    proof
+        For which parameters it is proven.
     """
 
     value: Expression
     generator: Generator
     kind: str
+    proof: Proof
 
 
 def find_integrals(
@@ -276,8 +279,11 @@ class _Ansatz:
                 for number, move in parts[k].moves.items():
                     generator[number] = generator.get(number, self.found.graph.zero) + factor * move
             # A function of coordinates and time alone that is conserved is a number.
-            if not all(one.is_zero for one in generator.values()) and self.prover.along(value, generator):
-                return Integral(value, generator, kind)
+            if all(one.is_zero for one in generator.values()):
+                continue
+            proof = self.prover.along(value, generator)
+            if proof:
+                return Integral(value, generator, kind, proof)
         return None
 
     def _solutions(

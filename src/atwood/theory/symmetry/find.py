@@ -21,7 +21,7 @@ from atwood.numerics.matrices import least_norm, or_one
 from atwood.simulation.dynamics.orientation_coordinates import COORDINATE_SWITCH
 from atwood.simulation.events.modes import find_event_functions
 from atwood.theory.symmetry.ansatz import Integral, find_integrals
-from atwood.theory.symmetry.proof import Generator, Prover
+from atwood.theory.symmetry.proof import Generator, Proof, Prover
 from atwood.theory.symmetry.quantities import (
     Quantities,
     about_center,
@@ -179,12 +179,14 @@ class _Search:
         value, found = self.quantities.energy_function, self.found
         kept = is_kept(self.states, number)
         # Of functions that are set free, that and their integrals need not belong together any more.
-        proven = (kept or not is_plain) and self.prover.along(value, dict(enumerate(found.velocities)), with_rates=True)
+        proven = Proof.NONE
+        if kept or not is_plain:
+            proven = self.prover.along(value, dict(enumerate(found.velocities)), with_rates=True)
         if not proven and not kept:
             worst = max(self.states, key=lambda one: abs(one.rates[total]) / (one.terms[total] or 1.0))
             told = "neither the energy function h nor T + V is conserved"
             if is_kept(self.states, total):
-                self._take("T + V", "total energy", "J", "T + V", self.quantities.total_energy, False, total)
+                self._take("T + V", "total energy", "J", "T + V", self.quantities.total_energy, Proof.NONE, total)
                 told = "the energy function h is not conserved, T + V is"
             else:
                 told += f": at t = {worst.t:.3g} s, at a random state, T + V changes at {worst.rates[total]:.3g} W"
@@ -325,7 +327,7 @@ class _Search:
         for state in self.states:
             here = {e.time: state.t, **dict(zip(e.coordinates, state.q, strict=True))}
             numeric += evaluate([value], {**table, **here, **dict(zip(e.speeds, state.u, strict=True))})
-        self._take(name, kind, "", meaning, one.value, True, np.array(numeric))
+        self._take(name, kind, "", meaning, one.value, one.proof, np.array(numeric))
 
     # -- what they share ----------------------------------------------------------------------------------------------
 
@@ -377,7 +379,7 @@ class _Search:
         unit: str,
         meaning: str,
         value: Expression,
-        proven: bool,
+        proven: Proof,
         numeric: FloatArray | int,
         direction: tuple[float, ...] = (),
         point: tuple[float, ...] = (),
@@ -387,12 +389,10 @@ class _Search:
         self._columns.append(numeric - numeric.mean())
         names = {one.name for one in self.items}
         unique = name if name not in names else next(f"{name}_{k}" for k in range(2, 99) if f"{name}_{k}" not in names)
-        checked = f"checked at {len(self.states)} random states"
-        why = self.prover.why_not
         e = self.found.equations
         timely = ", at so many times" if depends_on(add_up([*e.rows]), [e.time]) else ""
-        evidence = "proven on the graph" if proven else f"{checked}{timely} ({why})"
-        self.items.append(Finding(unique, kind, unit, meaning, value, proven, evidence, direction, point))
+        evidence = self.prover.evidence(proven, len(self.states), timely)
+        self.items.append(Finding(unique, kind, unit, meaning, value, bool(proven), evidence, direction, point))
 
     def _caveats(self) -> None:
         if self.assembly.modes:

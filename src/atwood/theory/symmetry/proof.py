@@ -9,6 +9,7 @@ zero identically, up to rounding of the numbers that laws and directions contain
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from enum import IntEnum
 from functools import cached_property
 from typing import Any, TypeAlias
 
@@ -50,6 +51,12 @@ _SHARES = 64
 """Coefficients of displacements are multiples of one over this, where they are as near to them as that."""
 
 
+class Proof(IntEnum):
+    """For which parameters something is proven: for none, for the values of the scene, or for all."""
+
+    NONE, VALUES, ALL = 0, 1, 2
+
+
 @dataclass(frozen=True, eq=False)
 class Prover:
     """Proves identities of one scene.
@@ -83,21 +90,27 @@ class Prover:
         found = self.quantities.found
         return tuple(q for q, one in zip(found.coordinates, found.names, strict=True) if one.unit == "rad")
 
-    def is_zero(self, value: Expression) -> bool:
+    def is_zero(self, value: Expression) -> Proof:
         """Return whether an expression is proven to be zero: for all parameters, or for those of the scene."""
         if value.is_zero:
-            return True
+            return Proof.ALL
         if not self.is_small:
-            return False
+            return Proof.NONE
         merged: dict[Expression, Expression | float] = dict(self.notation.merged)
         if is_proven_zero(substitute([value], merged)[0] if merged else value, self.angles):
-            return True
+            return Proof.ALL
         numbers: dict[Expression, Expression | float] = dict(self.quantities.assembly.mechanism.table.values)
-        return is_proven_zero(substitute([value], numbers)[0], self.angles)
+        return Proof.VALUES if is_proven_zero(substitute([value], numbers)[0], self.angles) else Proof.NONE
 
-    def along(self, value: Expression, generator: Generator, with_rates: bool = False) -> bool:
+    def evidence(self, proof: Proof, states: int, when: str = "") -> str:
+        """Return how a quantity is known, in words: proven, or checked at so many states."""
+        if not proof:
+            return f"checked at {states} random states{when} ({self.why_not})"
+        return "proven on the graph" + (", for these values of the parameters" if proof is Proof.VALUES else "")
+
+    def along(self, value: Expression, generator: Generator, with_rates: bool = False) -> Proof:
         """Return whether a quantity is proven to be conserved."""
-        return generator is not None and self.is_zero(self.rest(value, generator, with_rates))
+        return Proof.NONE if generator is None else self.is_zero(self.rest(value, generator, with_rates))
 
     def rest(self, value: Expression, generator: Mapping[int, Expression], with_rates: bool = False) -> Expression:
         """Return what is left of the rate of a quantity without the equations of motion times displacements."""
@@ -111,10 +124,10 @@ class Prover:
             terms += [-(one.multiplier * one.rate) for one in found.constraints]
         return add_up(terms)
 
-    def of_motion(self, value: Expression, generator: Generator) -> bool:
+    def of_motion(self, value: Expression, generator: Generator) -> Proof:
         """Return whether a quantity is proven to be conserved, with displacements along the speeds of states."""
         if generator is None or not self.is_small:
-            return False
+            return Proof.NONE
         e = self.quantities.found.equations
         [value] = self.quantities.on_speeds([value])
         along: dict[Expression, Expression | float] = {e.time: 1.0}

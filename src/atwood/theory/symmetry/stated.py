@@ -115,8 +115,8 @@ def check_symmetry(symmetry: Symmetry, quantities: Quantities, prover: Prover, f
     meaning = "p . delta q - f of a symmetry that was stated"
     if is_constant_at(states):
         meaning += "; it has one value at all states"
-    evidence = "proven on the graph" if proven else f"checked at {len(states)} random states ({prover.why_not})"
-    return Finding(symmetry.name, "stated symmetry", symmetry.unit, meaning, value, proven, evidence, (), ())
+    evidence = prover.evidence(proven, len(states))
+    return Finding(symmetry.name, "stated symmetry", symmetry.unit, meaning, value, bool(proven), evidence, (), ())
 
 
 def is_constant_at(states: list[State]) -> bool:
