@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from functools import cached_property
 from typing import Any
 
-from atwood.display import fitted
+from atwood.display import data_of, fitted
 from atwood.errors import UnsupportedError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
@@ -52,14 +52,7 @@ class SymbolicEquilibrium:
 
     def to_data(self) -> dict[str, Any]:
         """Return it as plain data, formulas in the words of Python."""
-        return {
-            "values": {path: str(value) for path, value in self.values.items()},
-            "exists": str(self.exists),
-            "stable": None if self.stable is None else str(self.stable),
-            "free": list(self.free),
-            "numbers": dict(self.numbers),
-            "stability": self.stability,
-        }
+        return data_of(self, "values", "exists", "stable", "free", "numbers", "stability")
 
     def __repr__(self) -> str:
         state = ", ".join(f"{path} = {text_of(value)}" for path, value in self.values.items())

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
-from atwood.display import count_of, fitted
+from atwood.display import count_of, data_of, fitted
 from atwood.errors import UnsupportedError, UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
@@ -227,24 +227,7 @@ class SymbolicModes(Shown):
 
     def to_data(self) -> dict[str, Any]:
         """Return it as plain data, formulas in the words of Python."""
-        modes = [
-            {
-                "square": None if one.square is None else str(one.square),
-                "rate": None if one.rate is None else str(one.rate),
-                "shapes": [{path: str(value) for path, value in shape.items()} for shape in one.shapes],
-                "polynomial": str(one.polynomial),
-                "number": [[value.real, value.imag] for value in one.number],
-            }
-            for one in self.modes
-        ]
-        matrices = {name: [[str(x) for x in row] for row in getattr(self, name).tolist()] for name in _MATRICES}
-        return {
-            "scene": self.scene,
-            "rest": self.rest.to_data(),
-            "coordinates": self.coordinates,
-            **matrices,
-            "modes": modes,
-        }
+        return data_of(self, "scene", "rest", "coordinates", "mass", "damping", "stiffness", "modes")
 
     def tables(self) -> tuple[Table, ...]:
         """Return where it rests, both energies to second order, and the modes."""
@@ -266,9 +249,6 @@ class SymbolicModes(Shown):
         return facts(rows, f"{self.scene}: {count_of(len(self), 'mode')} as formulas"), table(headings, shown)
 
     __str__ = Shown.as_text
-
-
-_MATRICES = ("mass", "damping", "stiffness")
 
 
 def _formula(one: SymbolicMode) -> str:

@@ -165,14 +165,8 @@ def of_pencil(pencil: Sympy, symbol: Sympy) -> Iterator[Eigenvalue]:
             yield Eigenvalue(None, (), factor)
         elif modulus.degree() > 0:
             found = _vectors(pencil, modulus, times)
-            a, b, *rest = map(sympy.factor, modulus.all_coeffs())
-            twice = 2 * a if rest else a
-            middle, outside = short(-b / twice), sympy.sqrt((b**2 - 4 * a * rest[0]).factor()) if rest else 0
-            reach = short(sympy.sympify(outside / twice))
-            sign = 1 if reach.could_extract_minus_sign() else -1
-            for one in (sign, -sign) if rest else (0,):
-                told = partial(_with_root, symbol=symbol, middle=middle, share=one * outside, twice=twice)
-                value = sympy.factor_terms(middle + one * reach)
+            for value, middle, share in _roots(modulus):
+                told = partial(_with_root, symbol=symbol, middle=middle, share=share)
                 yield Eigenvalue(value, tuple(vector.applyfunc(told) for vector in found), factor)
 
 
@@ -182,25 +176,30 @@ def of_even(
     """Yield one of each pair of values ``+-s`` at which a matrix is singular, by the factors of a polynomial in s^2."""
     square = sympy.Dummy("square")
     for factor, times in sympy.factor_list(sympy.Poly(coefficients, square).as_expr(), square)[1]:
-        a, *others = map(sympy.factor, sympy.Poly(factor, square).all_coeffs())
-        polynomial, values = factor.xreplace({square: symbol**2}), [short(-others[0] / a)]
-        if len(others) == 2:
-            reach = sympy.sqrt((others[0] ** 2 - 4 * a * others[1]).factor())
-            values = [sympy.factor_terms((-others[0] + sign * reach) / (2 * a)) for sign in (1, -1)]
-        elif len(others) > 2:
+        polynomial = factor.xreplace({square: symbol**2})
+        if sympy.degree(factor, square) > 2:
             yield Eigenvalue(None, (), polynomial)
             continue
-        for value in values:
+        for value, *_ in _roots(sympy.Poly(factor, square)):
             found = _vectors(pencil, sympy.Poly(symbol**2 - value, symbol), times) if times == 1 else ()
             root = sympy.sqrt(value) if number(value).real > 0.0 else sympy.I * sympy.sqrt(-value)
-            told = partial(_with_root, symbol=symbol, middle=sympy.Integer(0), share=root, twice=sympy.Integer(1))
+            told = partial(_with_root, symbol=symbol, middle=sympy.Integer(0), share=root)
             yield Eigenvalue(root, tuple(vector.applyfunc(told) for vector in found), polynomial)
 
 
-def _with_root(entry: Sympy, symbol: Sympy, middle: Sympy, share: Sympy, twice: Sympy) -> Sympy:
-    """Return ``p + q lambda`` at the root ``middle + share / twice``."""
-    slope = entry.diff(symbol)
-    return sympy.factor_terms(short(entry.subs(symbol, middle)) + short(slope / twice) * share)
+def _roots(modulus: Sympy) -> Iterator[tuple[Sympy, Sympy, Sympy]]:
+    """Yield the roots of a polynomial of degree one or two, the smaller first, each with its rational part and rest."""
+    a, b, *rest = map(sympy.factor, modulus.all_coeffs())
+    middle = short(-b / (2 * a if rest else a))
+    reach = short(sympy.sqrt((b**2 - 4 * a * rest[0]).factor()) / (2 * a)) if rest else sympy.Integer(0)
+    sign = 1 if reach.could_extract_minus_sign() else -1
+    for one in (sign, -sign) if rest else (0,):
+        yield sympy.factor_terms(middle + one * reach), middle, one * reach
+
+
+def _with_root(entry: Sympy, symbol: Sympy, middle: Sympy, share: Sympy) -> Sympy:
+    """Return ``p + q lambda`` at the root ``middle + share``."""
+    return sympy.factor_terms(short(entry.subs(symbol, middle)) + short(entry.diff(symbol) * share))
 
 
 def _vectors(pencil: Sympy, modulus: Sympy, times: int) -> tuple[Sympy, ...]:

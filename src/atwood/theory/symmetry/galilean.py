@@ -106,9 +106,12 @@ def _statement(equations: EquationsOfMotion, name: str, told: str, moves: Moves)
     q, u, lagrangian = equations.coordinates, equations.velocities, equations.lagrangian
     rates = {k: along[k].diff(t) for k, place in enumerate(equations.expressions.moves) if place in shifts}
 
+    def explicit(value: Sympy) -> Sympy:
+        return sympy.expand(value.diff(t) - sum(value.diff(x) * x.diff(t) for x in (*u, *q)))
+
     def changed(value: Sympy) -> Sympy:
         if is_time:
-            return _explicit(value, t)
+            return explicit(value)
         terms = [value.diff(q[i]) * by for i, by in shifts.items()]
         return sympy.expand_mul(sympy.Add(*terms, *(value.diff(u[k]) * by for k, by in rates.items())))
 
@@ -121,21 +124,13 @@ def _statement(equations: EquationsOfMotion, name: str, told: str, moves: Moves)
     for k, w in along.items():
         rate += w * (equations.generalized_forces[k] - friction.diff(u[k]) + pulls[k])
     if is_time:
-        rate -= sum(x * _explicit(g, t) for x, g in zip(equations.multipliers, equations.constraints, strict=True))
+        rate -= sum(x * explicit(g) for x, g in zip(equations.multipliers, equations.constraints, strict=True))
     left = sympy.expand_mul(rate) if sympy.expand(rate) != 0 else sympy.Integer(0)
     value = sympy.expand_mul(sympy.Add(*(equations.momenta[k] * w for k, w in along.items())) - f)
     told = f"{told.capitalize()}{'' if left else ': conserved'}"
     heads = sympy.Matrix([sympy.Symbol(one) for one in (name, "delta_T", "delta_L", "f", f"{name}'")])
     gauge = sympy.Integer(0) if is_time else f
     return Statement(name, told, sympy.Matrix([value, changed(equations.kinetic_energy), change, gauge, left]), heads)
-
-
-def _explicit(value: Sympy, t: Sympy) -> Sympy:
-    """Return the derivative by the time that is not in what moves."""
-    frozen: dict[Sympy, Sympy] = {}
-    for kind in (sympy.Derivative, sympy.core.function.AppliedUndef):
-        frozen |= {one: sympy.Dummy() for one in value.xreplace(frozen).atoms(kind)}
-    return value.xreplace(frozen).diff(t).xreplace({plain: one for one, plain in frozen.items()})
 
 
 def _gauge(value: Sympy, q: tuple[Sympy, ...], t: Sympy) -> Sympy:
