@@ -7,6 +7,7 @@ import pytest
 import sympy
 
 import atwood
+from atwood_library import Pivot, PointMass, Rod
 from atwood_library.scenes import DoublePendulum, ElasticPendulum, RotatingHoopDriven, WilberforcePendulum
 
 from .scenes import governor, rotor, torqued, trap, wire
@@ -44,6 +45,19 @@ def test_a_pitchfork_whose_branches_are_unstable_is_subcritical() -> None:
         found = atwood.equilibria(wire(height), symbolic=True)
         assert kinds(found) == [(sense, "pitchfork")]
         assert is_at(found.bifurcations[0].condition, g - a * omega**2)
+
+
+def test_what_is_unstable_beside_does_not_change_the_sense() -> None:
+    """With an inverted pendulum in the scene both branches are unstable, and the pitchfork is what it was."""
+    scene = RotatingHoopDriven()
+    rod, bob = scene.add("rod", Rod(length=0.7)), scene.add("bob", PointMass(mass=1.4))
+    axle = scene.add("axle", Pivot(axis=(0.0, 1.0, 0.0)))
+    scene.connect(scene.ground.frame, axle.a)
+    scene.connect(axle.b, rod.a)
+    scene.connect(rod.b, bob.point)
+    found = atwood.equilibria(scene, symbolic=True)
+    assert set(kinds(found)) == {("supercritical", "pitchfork")}
+    assert len(found.bifurcations) == 2
 
 
 @pytest.mark.sample(1)

@@ -90,14 +90,15 @@ def _kinds(
     plain: PlainEquations, states: Sequence[State], boundary: Sympy, values: Mapping[Sympy, Sympy]
 ) -> Iterator[tuple[str, str, tuple[int, ...]]]:
     """Yield kinds, senses and members of the bifurcations on a boundary near given values of the parameters."""
-    found = next(_crossings(boundary, values), None)
-    if found is None:
+    crossing = next(_crossings(boundary, values), None)
+    if crossing is None:
         return
-    letter, place = found
+    letter, place = crossing
     there, *sides = ({**values, letter: place * (1 + step)} for step in (0, -_ASIDE, _ASIDE))
     present = [tuple(bool(one.exists.xreplace(side)) for side in sides) for one in states]
-    at = [[None if x is None else complex(x.xreplace(there).evalf(_DIGITS)) for x in one.values] for one in states]
-    left = {k for k, sided in enumerate(present) if any(sided)}
+    exact = [[None if x is None else x.xreplace(there).evalf(_DIGITS) for x in one.values] for one in states]
+    left = {k for k, x in enumerate(exact) if any(present[k]) and all(y is None or y.is_finite for y in x)}
+    at = {k: [None if x is None else complex(x) for x in exact[k]] for k in left}
     while left:
         first = min(left)
         group = tuple(sorted(k for k in left if _alike(plain, at[first], at[k])))
@@ -105,18 +106,19 @@ def _kinds(
         through = [k for k in group if all(present[k])]
         begun = [present[k] for k in group if k not in through]
         kind = _MEETINGS.get((len(through), len(begun))) if len(set(begun)) < 2 else None
-        if kind == "pitchfork":
-            side = sides[begun[0].index(True)]
-            stable = [states[k].stable for k in group if k not in through]
-            yields = all(one is not None and bool(one.xreplace(side)) for one in stable)
-            yield kind, "supercritical" if yields else "subcritical", group
-        elif kind:
-            yield kind, "", group
-        elif group == (first,) == (*through,):
-            expansion = states[first].expansion
-            kind = "" if expansion is None else _oscillation(expansion, sides)
+        found = [_rates(states[k].expansion, side) for k in through[:1] for side in sides]
+        if len(through) != 1 or None in found:
             if kind:
                 yield kind, "", group
+            continue
+        less, more = sorted(([one for one in rates or () if one.real > 0.0] for rates in found), key=len)
+        if kind:
+            with_others = found[begun[0].index(True)] or ()
+            is_below = sum(one.real > 0.0 for one in with_others) > len(less)
+            yield kind, "supercritical" if is_below else "subcritical", group
+        elif len(group) == 1 and len(more) == len(less) + 2 and more[0].imag:
+            is_even = all(abs(sum(rates or ()).real) <= _MET * abs(more[0]) for rates in found)
+            yield "Hamiltonian Hopf" if is_even else "Hopf", "", group
 
 
 _MEETINGS = {(1, 2): "pitchfork", (0, 2): "saddle-node", (2, 0): "transcritical"}
@@ -146,18 +148,15 @@ def _alike(plain: PlainEquations, one: Sequence[complex | None], other: Sequence
     return True
 
 
-def _oscillation(one: Expansion, sides: Sequence[Mapping[Sympy, Sympy]]) -> str:
-    """Return by which bifurcation a state that is alone begins to oscillate; nothing if it does not."""
-    growth, size = [], 0.0
-    for side in sides:
-        mass, damping, stiffness = (m.xreplace(dict(side)) for m in (one.mass, one.damping, one.stiffness))
-        polynomial = characteristic(mass, damping, stiffness, sympy.Symbol("s"))
-        if not all(x.is_finite for x in polynomial.all_coeffs()):
-            return ""
-        rates = sorted((complex(x) for x in polynomial.nroots(n=_DIGITS // 2, maxsteps=500)), key=lambda x: x.real)
-        size = max(size, *map(abs, rates))
-        growth.append(rates[-1].real if rates[-1].imag else 0.0)
-    low, high = sorted(growth)
-    if high <= _MET * size or low > _MET * size:
-        return ""
-    return "Hopf" if low < -_MET * size else "Hamiltonian Hopf"
+def _rates(one: Expansion | None, values: Mapping[Sympy, Sympy]) -> list[complex] | None:
+    """Return the rates of small deviations, the fastest growing first, without rounding; None where there are none."""
+    if one is None:
+        return None
+    mass, damping, stiffness = (m.xreplace(dict(values)) for m in (one.mass, one.damping, one.stiffness))
+    polynomial = characteristic(mass, damping, stiffness, sympy.Symbol("s"))
+    if not all(x.is_finite for x in polynomial.all_coeffs()):
+        return None
+    found = [complex(x) for x in polynomial.nroots(n=_DIGITS // 2, maxsteps=500)]
+    least = _MET * max(map(abs, found), default=0.0)
+    rates = [complex(*(0.0 if abs(part) <= least else part for part in (x.real, x.imag))) for x in found]
+    return sorted(rates, key=lambda x: -x.real)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -17,7 +17,7 @@ from atwood.theory.formulas.printers import Sympy
 from atwood.theory.formulas.reading import latex_of, text_of
 from atwood.theory.oscillations.bifurcations import Bifurcation, State, find_bifurcations
 from atwood.theory.oscillations.conditions import NoClosedFormError, Solution, solve_conditions
-from atwood.theory.oscillations.rest import Expansion, PlainEquations, expand, is_singular, plain_equations
+from atwood.theory.oscillations.rest import PlainEquations, expand, is_singular, plain_equations
 from atwood.theory.oscillations.stability import stability_of
 
 
@@ -62,24 +62,14 @@ class SymbolicEquilibrium:
 class SymbolicEquilibria(Shown, list[SymbolicEquilibrium]):
     """The states of rest of a scene as formulas."""
 
-    def __init__(self, found: Iterable[tuple[SymbolicEquilibrium, Expansion | None]], plain: PlainEquations) -> None:
-        every = [*found]
-        super().__init__(state for state, _ in every)
-        self.scene, self._plain, self._expansions = plain.name, plain, [expansion for _, expansion in every]
+    def __init__(self, found: Sequence[tuple[SymbolicEquilibrium, State]], plain: PlainEquations) -> None:
+        super().__init__(one for one, _ in found)
+        self.scene, self._plain, self._states = plain.name, plain, [state for _, state in found]
 
     @cached_property
     def bifurcations(self) -> tuple[Bifurcation, ...]:
         """Where in the parameters states meet, appear, or begin to oscillate, by kind."""
-        plain, own = self._plain, {seen: one for one, seen in self._plain.back.items() if one in self._plain.values}
-        states = []
-        for one, expansion in zip(self, self._expansions, strict=True):
-            *values, exists, stable = (
-                sympy.sympify(value).xreplace(own) if path not in one.free else None
-                for path, value in (*one.values.items(), ("", one.exists), ("", one.stable))
-            )
-            known = [x if x is not None and x.free_symbols <= plain.values.keys() else None for x in values]
-            states.append(State(tuple(known), exists, stable, expansion))
-        return tuple(find_bifurcations(plain, states))
+        return tuple(find_bifurcations(self._plain, self._states))
 
     def to_data(self) -> list[dict[str, Any]]:
         """Return them as plain data, for JSON."""
@@ -134,13 +124,13 @@ def _where(condition: Sympy | None, number: int) -> str:
     return rf"\text{{{('exists for', 'stable for')[number]} }} {said}"
 
 
-def find_symbolic(plain: PlainEquations) -> list[tuple[SymbolicEquilibrium, Expansion | None]]:
+def find_symbolic(plain: PlainEquations) -> list[tuple[SymbolicEquilibrium, State]]:
     """Return the states of rest with what is said of them."""
-    made = ((solution, *described(plain, solution)) for solution in _solutions(plain))
+    every = [(solution, described(plain, solution)) for solution in _solutions(plain)]
     found = [
-        (state, expansion)
-        for solution, state, expansion in made
-        if expansion or (solution.free and not is_singular(plain, solution, of_pole=True))
+        made
+        for solution, made in every
+        if made[1].expansion or (solution.free and not is_singular(plain, solution, of_pole=True))
     ]
     if not found:
         raise UsageError("it stays nowhere at rest", where=plain.name, advice="Look for a steady motion, with `trim`.")
@@ -170,8 +160,8 @@ def _solutions(plain: PlainEquations) -> list[Solution]:
         ) from None
 
 
-def described(plain: PlainEquations, solution: Solution) -> tuple[SymbolicEquilibrium, Expansion | None]:
-    """Return what is said of a state of rest, and the equations near it."""
+def described(plain: PlainEquations, solution: Solution) -> tuple[SymbolicEquilibrium, State]:
+    """Return what is said of a state of rest in the symbols that people see, and in plain ones."""
     exists, expansion = sympy.And(*solution.conditions), expand(plain, solution)
     stable = None if expansion is None else _where_it_exists(stability_of(expansion), exists)
     paths = dict(zip(plain.coordinates, plain.paths, strict=True))
@@ -186,7 +176,8 @@ def described(plain: PlainEquations, solution: Solution) -> tuple[SymbolicEquili
         stability = "undecided" if stable is None else "stable" if plain.holds(stable) else "unstable"
     values = {path: plain.told(solution.values.get(q, q)) for q, path in paths.items()}
     told = None if stable is None else plain.told(stable)
-    return SymbolicEquilibrium(values, plain.told(exists), told, free, numbers, stability), expansion
+    state = State(tuple(map(known.get, plain.coordinates)), exists, stable, expansion)
+    return SymbolicEquilibrium(values, plain.told(exists), told, free, numbers, stability), state
 
 
 def symbolic_equilibria(assembly: Assembly, symbols: Mapping[str, str] | None = None) -> SymbolicEquilibria:

@@ -24,6 +24,7 @@ from atwood.theory.formulas.page import aligned
 from atwood.theory.formulas.printers import Sympy
 from atwood.theory.formulas.reading import latex_of, text_of
 from atwood.theory.formulas.tree import as_fraction, of_pi
+from atwood.theory.oscillations.bifurcations import State
 from atwood.theory.oscillations.conditions import NoClosedFormError, Solution, solve_conditions
 from atwood.theory.oscillations.equilibria import SymbolicEquilibrium, described, find_symbolic, said, state_of
 from atwood.theory.oscillations.rest import Expansion, PlainEquations, plain_equations
@@ -267,7 +268,7 @@ def symbolic_modes(
 ) -> SymbolicModes:
     """Return small oscillations about a state of rest as formulas."""
     plain = plain_equations(assembly, symbols)
-    rest, expansion = _chosen(plain, at)
+    rest, (*_, expansion) = _chosen(plain, at)
     if expansion is None:
         raise UsageError(
             "its coordinates are singular at this state of rest, or its constraints are",
@@ -324,7 +325,7 @@ def _upper(value: complex) -> complex:
 # -- about which state -------------------------------------------------------------------------------------------------
 
 
-def _chosen(plain: PlainEquations, at: Mapping[str, Any] | None) -> tuple[SymbolicEquilibrium, Expansion | None]:
+def _chosen(plain: PlainEquations, at: Mapping[str, Any] | None) -> tuple[SymbolicEquilibrium, State]:
     """Return the state that was asked for: that of given values, the start if it is at rest, or the only stable one."""
     numbers = _start(plain) if at is None else {path: _in_si(plain, path, value) for path, value in at.items()}
     exact = _at_rest(plain, numbers)

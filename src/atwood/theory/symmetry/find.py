@@ -8,7 +8,8 @@ brought to a normal form, rates are looked at at random states.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -215,31 +216,30 @@ class _Search:
             meaning = f"momentum of {name.name}, which is ignorable"
             self._take(f"p:{name.name}", "ignorable coordinate", unit, meaning, value, proven, number)
 
-    def _spins(self, body: str, numbers: Sequence[int], speeds: Sequence[int]) -> None:
+    def _own(self, numbers: Sequence[int], values: Sequence[Expression]) -> Iterator[tuple[Any, Any, Any]]:
+        """Yield the axes about which the angular momentum of a body is kept, with it as a formula and in numbers."""
         kept = conserved_directions(self.states, numbers, np.ones(3))
-        if not kept.shape[1]:
-            return
-        for axis in readable_basis(kept).T:
-            values = [self.quantities.momenta[k] for k in speeds]
+        for axis in readable_basis(kept).T if kept.shape[1] else ():
             value, numeric = self._combined(axis, values, numbers)
-            if self._is_known(numeric):
-                continue
-            weights = dict(zip(speeds, axis, strict=True))
-            proven = self.prover.along(value, {k: self.found.graph.constant(w) for k, w in weights.items()})
+            if not self._is_known(numeric):
+                yield axis, value, numeric
+
+    def _spins(self, body: str, numbers: Sequence[int], speeds: Sequence[int]) -> None:
+        for axis, value, numeric in self._own(numbers, [self.quantities.momenta[k] for k in speeds]):
+            weights = dict(zip(speeds, map(self.found.graph.constant, axis), strict=True))
             meaning = f"angular momentum about the axis {axis_text(axis)} of {body}"
-            name = f"spin:{body}" + axis_name(axis)
+            name, proven = f"spin:{body}" + axis_name(axis), self.prover.along(value, weights)
             self._take(name, "symmetric body", "kg*m^2/s", meaning, value, proven, numeric, tuple(map(float, axis)))
 
     def _rolling(self, body: str, numbers: Sequence[int]) -> None:
-        kept = conserved_directions(self.states, numbers, np.ones(3))
-        for axis in readable_basis(kept).T if kept.shape[1] else ():
-            value, numeric = self._combined(axis, self.quantities.motions.spins[body], numbers)
-            if not self._is_known(numeric):
-                moved = [axis @ one.generators[list(numbers)] for one in self.states]
-                proven = self.prover.of_motion(value, self.prover.fitted(self.states, moved))
-                meaning = f"angular momentum of {body} about {axis_text(axis)} through its own centre"
-                name = f"S:{body}{axis_name(axis)}"
-                self._take(name, "rolling body", "kg*m^2/s", meaning, value, proven, numeric, tuple(map(float, axis)))
+        for axis, value, numeric in self._own(numbers, self.quantities.motions.spins[body]):
+            moved = [axis @ one.generators[list(numbers)] for one in self.states]
+            meaning = f"angular momentum of {body} about {axis_text(axis)} through its own centre"
+            name, proven = (
+                f"S:{body}{axis_name(axis)}",
+                self.prover.of_motion(value, self.prover.fitted(self.states, moved)),
+            )
+            self._take(name, "rolling body", "kg*m^2/s", meaning, value, proven, numeric, tuple(map(float, axis)))
 
     def _totals(self, linear: Sequence[int], angular: Sequence[int], moments: Sequence[int]) -> None:
         motions, n = self.quantities.motions, len(linear)
