@@ -1,7 +1,8 @@
 """Pages of scenes in `docs/scenes/`, each with a picture, its parts, and both forms compared, from the scene itself.
 
-``python -m tests.pages write`` writes them anew, ``python -m tests.pages write kepler`` one of them. What stands in the
-overviews (`docs/scenes/fields-and-curves.md` and its neighbours) of a scene is repeated on its page.
+``python -m tests.pages write`` writes them anew, ``python -m tests.pages write kepler`` one of them, and ``say`` in place
+of ``write`` only the commands that have an answer. What stands in the overviews (`docs/scenes/fields-and-curves.md` and
+its neighbours) of a scene is repeated on its page.
 """
 
 from __future__ import annotations
@@ -11,11 +12,12 @@ import json
 import math
 import re
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import atwood
-from atwood import Model, Scene
+from atwood import AtwoodError, Model, Scene, UsageError
 from atwood_library.scenes import SCENES
 
 HERE = Path(__file__).resolve().parents[1] / "docs" / "scenes"
@@ -113,6 +115,72 @@ def compared(name: str) -> tuple[str, Any]:
     return f"{text}{_power(_gap(runs))} of their sizes.\n", runs["reduced"]
 
 
+def _equations(assembly: Any) -> str:
+    found = atwood.equations(assembly)
+    count = len(found.expressions.velocities)
+    return f"{count} equation{'s' if count > 1 else ''} of motion" + ("" if found.is_readable else ": their structure")
+
+
+def _one_degree(assembly: Any) -> str:
+    reduced = assembly.reduced
+    if len(reduced.speeds) != 1 or len(reduced.coordinates) != 1 or reduced.constraints:
+        raise UsageError("a portrait is of one coordinate")
+    return f"all motions over `{reduced.names[0].name}` and its rate"
+
+
+def _reduced(assembly: Any) -> str:
+    found = atwood.reduced(assembly)
+    return f"the motion of `{found.coordinate}` alone, in its effective potential"
+
+
+def _routhian(assembly: Any) -> str:
+    ignorable = atwood.routhian(assembly).ignorable
+    if not ignorable:
+        raise UsageError("no coordinate is ignorable")
+    return (
+        f"the Routhian: {', '.join(f'`{one}`' for one in ignorable)} {'is' if len(ignorable) == 1 else 'are'} ignorable"
+    )
+
+
+def _free(assembly: Any) -> str:
+    atwood.free_rotation(assembly)
+    return "a free body: its polhode and how it turns, in closed form"
+
+
+QUESTIONS: dict[str, Callable[[Any], str]] = {
+    "equations": _equations,
+    "hamiltonian": lambda assembly: atwood.hamiltonian(assembly).sentence.rstrip("."),
+    "routhian": _routhian,
+    "reduced": _reduced,
+    "phase": _one_degree,
+    "symmetric-top": lambda assembly: f"a heavy symmetric top: {atwood.symmetric_top(assembly).kind}",
+    "free-rotation": _free,
+}
+"""Commands of theory, and what each says of a scene that it has an answer for; `UnsupportedError` or the like else."""
+
+
+def said(name: str) -> str:
+    """Return what can be said of a scene: the commands that have an answer, asked one after another."""
+    assembly = atwood.assemble(make(name))
+    given = "".join(f" --set {path}={value}" for path, value in SETTINGS.get(name, {}).items())
+    rows = []
+    for command, ask in QUESTIONS.items():
+        try:
+            rows.append(f"| `atwood {command} {name}{given}` | {ask(assembly)} |")
+        except AtwoodError:
+            continue
+    rows.append(f"| `atwood conserved {name}{given}` | what is conserved, and how that is known |")
+    rows.append(f"| `atwood compare {name}{given}` | what each form costs for which error |")
+    return "## What can be said of it\n\n| command | says |\n|---|---|\n" + "\n".join(rows) + "\n"
+
+
+def add(name: str) -> None:
+    """Write anew what can be said of a scene, and leave the rest of its page."""
+    file = HERE / f"{name}.md"
+    text = file.read_text(encoding="utf-8").partition("\n## What can be said")[0]
+    file.write_text(f"{text}\n{said(name)}", encoding="utf-8")
+
+
 def _gap(runs: dict[str, Any]) -> float:
     """Return by how much the coordinates of the dae form differ in both runs, relative to their largest values."""
     dae = runs["dae"]
@@ -137,7 +205,7 @@ def write(name: str) -> None:
     from atwood.plotting import plot_mechanism
 
     text, run = compared(name)
-    (HERE / f"{name}.md").write_text(f"{head(name)}\n\n{text}", encoding="utf-8")
+    (HERE / f"{name}.md").write_text(f"{head(name)}\n\n{text}\n{said(name)}", encoding="utf-8")
     figure: Figure = plot_mechanism(run)
     _save_small(figure, HERE / "images" / f"{name}.png")
 
@@ -157,8 +225,8 @@ def _save_small(figure: Any, file: Path) -> None:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] != ["write"]:
+    if sys.argv[1:2] not in (["write"], ["say"]):
         sys.exit(__doc__)
     for scene in sys.argv[2:] or known():
         print(scene, flush=True)
-        write(scene)
+        (write if sys.argv[1] == "write" else add)(scene)

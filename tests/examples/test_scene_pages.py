@@ -29,6 +29,19 @@ def test_a_page_says_what_the_scene_is(name: str) -> None:
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize("name", NAMES)
+def test_a_page_has_the_commands_that_answer(name: str) -> None:
+    text = (pages.HERE / f"{name}.md").read_text(encoding="utf-8")
+    assert text.endswith(f"\n{pages.said(name)}"), f"python -m tests.pages say {name}"
+
+
+def test_every_page_has_commands() -> None:
+    for name in NAMES:
+        text = (pages.HERE / f"{name}.md").read_text(encoding="utf-8")
+        assert f"`atwood equations {name}" in text.partition("## What can be said of it")[2]
+
+
+@pytest.mark.sample(3)
+@pytest.mark.parametrize("name", NAMES)
 def test_code_of_a_page_runs(name: str) -> None:
     (code,) = BLOCK.findall((pages.HERE / f"{name}.md").read_text(encoding="utf-8"))
     exec(compile(code, name, "exec"), {})
