@@ -1,8 +1,8 @@
 """Pages of scenes in `docs/scenes/`, each with a picture, its parts, and both forms compared, from the scene itself.
 
-``python -m tests.pages write`` writes them anew, ``python -m tests.pages write kepler`` one of them, and ``say`` in place
-of ``write`` only the commands that have an answer. What stands in the overviews (`docs/scenes/fields-and-curves.md` and
-its neighbours) of a scene is repeated on its page.
+``python -m tests.pages write`` writes them anew, ``python -m tests.pages write kepler`` one of them, and ``say`` in
+place of ``write`` only the commands that have an answer. What stands in the overviews
+(`docs/scenes/fields-and-curves.md` and its neighbours) of a scene is repeated on its page.
 """
 
 from __future__ import annotations
@@ -143,6 +143,8 @@ def _routhian(assembly: Any) -> str:
 
 
 def _free(assembly: Any) -> str:
+    if not assembly.regular.orientation_coordinates:
+        raise UsageError("no body turns freely")
     atwood.free_rotation(assembly)
     return "a free body: its polhode and how it turns, in closed form"
 
