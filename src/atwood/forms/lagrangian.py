@@ -11,10 +11,10 @@ equation 5.39). Angular velocities are rates of angles where orientations are in
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
-from atwood.errors import UsageError
+from atwood.errors import UsageError, suggestion
 from atwood.expr import Expression, Graph, Scalar, SparseMatrix, depends_on, jacobian, jvp, substitute, vjp
 from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.caches import Key
@@ -422,6 +422,58 @@ def _along_angles(made: Lagrangian) -> Lagrangian:
         rows=on_angles(made.rows),
         constraint_rows=on_angles(made.constraint_rows),
         constraints=tuple(constraints),
+    )
+
+
+def with_signs(found: Lagrangian, paths: Collection[str]) -> Lagrangian:
+    """Return it with the negatives of some coordinates, by path, in their place; their names have the sign, too."""
+    graph, numbers = found.graph, {one.name: i for i, one in enumerate(found.names)}
+    coordinates, velocities, accelerations = map(list, (found.coordinates, found.velocities, found.accelerations))
+    names, moved, signs = list(found.names), dict[Expression, Expression | float](), [1.0] * len(velocities)
+    for path in paths:
+        if path not in numbers or numbers[path] not in found.moves:
+            raise UsageError(
+                "no coordinate whose velocity is its derivative has this path, and only such a one has another sign",
+                where=path,
+                advice=suggestion(path, numbers) or "Give a letter without a sign.",
+            )
+        i, k = numbers[path], found.moves.index(numbers[path])
+        signs[k], names[i] = -1.0, replace(names[i], name=f"-{path}")
+        for values, place, letter in ((coordinates, i, "q"), (velocities, k, "u"), (accelerations, k, "a")):
+            symbol = graph.symbol(f"-{letter}:{path}")
+            moved[values[place]], values[place] = -symbol, symbol
+
+    def put(values: Sequence[Expression]) -> tuple[Expression, ...]:
+        return tuple(substitute(list(values), moved))
+
+    def along(values: Sequence[Expression]) -> tuple[Expression, ...]:
+        return tuple(sign * value for sign, value in zip(signs, put(values), strict=True))
+
+    turned = {numbers[path]: -1.0 for path in paths}
+    return replace(
+        found,
+        coordinates=tuple(coordinates),
+        names=tuple(names),
+        velocities=tuple(velocities),
+        accelerations=tuple(accelerations),
+        rates=tuple(turned.get(i, 1.0) * rate for i, rate in enumerate(put(found.rates))),
+        speeds=put(found.speeds),
+        parts=tuple(
+            Contribution(one.path, *put([one.kinetic, one.potential, one.lagrangian, one.rayleigh]), along(one.forces))
+            for one in found.parts
+        ),
+        inertial=along(found.inertial),
+        rows=along(found.rows),
+        constraint_rows=along(found.constraint_rows),
+        constraints=tuple(
+            replace(
+                held,
+                value=None if held.value is None else put([held.value])[0],
+                rate=put([held.rate])[0],
+                second=put([held.second])[0],
+            )
+            for held in found.constraints
+        ),
     )
 
 

@@ -35,9 +35,11 @@ from atwood_library.scenes import (
     MassSpringChain,
     Oscillators,
     OverheadCrane,
+    PendulumOnCart,
     RotatingFrame,
     RotatingHoopDriven,
     RotatingHoopFree,
+    SimplePendulum,
 )
 
 LETTERS = {"hoop.angle": "theta", "hoop.radius": "a"}
@@ -307,3 +309,51 @@ def test_letters_given_to_a_part_win_over_what_its_value_is_worked_out_from() ->
     eq = equations(Halved(), symbols={"rod2.length": "b", "mass": "M"})
     assert str(eq.symbol("rod2.length")) == "b"
     assert str(eq.symbol("bob1.mass")) == "M/3"
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+@pytest.mark.parametrize(
+    ("kind", "signs"),
+    [
+        (PendulumOnCart, {"rod.angle": "-phi"}),
+        (DoublePendulum, {"rod1.angle": "-phi", "rod2.angle": "-psi"}),
+        (RotatingHoopDriven, {"hoop.angle": "-theta"}),
+        (SimplePendulum, {"bob.position.z": "-h"}),
+    ],
+)
+def test_a_coordinate_with_the_other_sign_is_a_change_of_coordinates(kind: type, signs: dict, form: str) -> None:
+    """T, V, and constraints in ``-q``, with the signs of momenta and equations that belong to it."""
+    plain = equations(kind(), form=form)
+    paths = [one.path for one in plain.legend if one.kind == "coordinate"]
+    signs = {path: letter for path, letter in signs.items() if path in paths}
+    if not signs or not plain.is_readable:
+        return
+    other = equations(kind(), form=form, symbols=signs)
+    by = {q: other.symbol(path) for path, q in zip(paths, plain.coordinates, strict=True)}
+    factors = [-1 if path in signs else 1 for path in paths]
+
+    def moved(value: sympy.Expr) -> sympy.Expr:
+        return value.subs(by).doit()
+
+    for name in ("kinetic_energy", "potential_energy", "lagrangian"):
+        assert sympy.expand(moved(getattr(plain, name)) - getattr(other, name), trig=True) == 0
+    for name in ("rows", "momenta", "rates"):
+        for factor, one, turned in zip(factors, getattr(plain, name), getattr(other, name), strict=True):
+            assert sympy.expand(factor * moved(one) - turned, trig=True) == 0
+    for one, turned in zip(plain.constraints, other.constraints, strict=True):
+        assert sympy.expand(moved(one) - turned, trig=True) == 0
+    assert f"-{next(iter(signs))}" in other.text()
+
+
+def test_a_sign_belongs_to_a_coordinate_of_equations() -> None:
+    turned = equations(PendulumOnCart(), symbols={"rod.angle": "-phi"})
+    assert turned.symbol("rod.angle") == -turned.symbol("-rod.angle") == -turned.coordinates[1]
+    x, phi = turned.coordinates
+    m, l, g = (turned.symbol(path) for path in ("bob.mass", "rod.length", "gravity"))
+    t = sympy.Symbol("t")
+    pull = m * (x.diff(t, 2) * sympy.sin(phi) + l * phi.diff(t) ** 2 + g * sympy.cos(phi))
+    assert sympy.expand(turned.quantity("rod.tension") - pull) == 0
+    with pytest.raises(UsageError, match="only such a one has another sign"):
+        equations(PendulumOnCart(), symbols={"rod.length": "-b"})
+    with pytest.raises(UsageError, match="-b"):
+        hamiltonian(PendulumOnCart(), symbols={"rod.angle": "-b"})

@@ -48,11 +48,12 @@ LETTER = Kind("a letter such as 'theta', 'l_0' or 'θ₁'", _letter, "LETTER")
 OWN_LETTERS = each(LETTER, "a letter, or one for each component")
 
 
-def _letters(value: Any) -> dict[str, str]:
+def _letters(value: Any, signed: bool = False) -> dict[str, str]:
     found = {}
     for path, letter in BY_PATH.read(value).items():
+        sign = "-" if signed and isinstance(letter, str) and letter.strip().startswith("-") else ""
         try:
-            found[path] = LETTER.read(letter)
+            found[path] = sign + LETTER.read(letter.strip().removeprefix("-") if sign else letter)
         except Refused as refused:
             said = f"{path} cannot be {show(letter)}. {refused}".strip()
             raise Refused(said) from None
@@ -61,3 +62,6 @@ def _letters(value: Any) -> dict[str, str]:
 
 LETTERS = replace(BY_PATH, what="letters by path, such as {'hoop.angle': 'theta'}", read=_letters, word="PATH=LETTER")
 """What stands for coordinates, parameters and parts, by path: the argument ``symbols`` of what writes formulas."""
+
+SIGNED_LETTERS = replace(LETTERS, read=lambda value: _letters(value, signed=True))
+"""The same, where a coordinate may have the other sign: ``{"rod.angle": "-theta"}``."""

@@ -13,11 +13,12 @@ from atwood.arguments import FLAG, one_of, optional, takes
 from atwood.errors import UnsupportedError, UsageError, suggestion
 from atwood.expr import Expression, substitute
 from atwood.forms.assembly import Assembly
-from atwood.forms.lagrangian import lagrangian_of, rows_by_part
+from atwood.forms.lagrangian import lagrangian_of, rows_by_part, with_signs
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
 from atwood.model.declare.connectors import PATHS
+from atwood.model.values.letters import SIGNED_LETTERS
 from atwood.pipeline import SCENE, assembly_of
 from atwood.simulation.problem.arguments import FORM, ORIENTATION
 from atwood.theory.equations.formulas import EquationFormulas, Parameters, solve_closures
@@ -32,7 +33,7 @@ from atwood.theory.equations.pages import (
 from atwood.theory.equations.stated import GAUGE, with_gauge
 from atwood.theory.formulas import page
 from atwood.theory.formulas.described import Page, Paged
-from atwood.theory.formulas.notation import SYMBOLS, notation_of
+from atwood.theory.formulas.notation import notation_of
 from atwood.theory.formulas.page import Line, Section
 from atwood.theory.formulas.printers import Sympy, objects
 from atwood.theory.formulas.tree import Sum
@@ -45,8 +46,10 @@ def read_equations(
     gauge: Any = None,
 ) -> EquationsOfMotion:
     """Return the equations of motion of an assembly, to be read, with the rate of a function added to L."""
-    found = lagrangian_of(assembly)
-    notation = notation_of(assembly, found, symbols)
+    turned = [path for path, letter in (symbols or {}).items() if letter.startswith("-")]
+    found = with_signs(lagrangian_of(assembly), turned) if turned else lagrangian_of(assembly)
+    given = {f"-{path}" if path in turned else path: letter.lstrip("-") for path, letter in (symbols or {}).items()}
+    notation = notation_of(assembly, found, given)
     return EquationsOfMotion(assembly, with_gauge(assembly, found, notation, gauge), notation, parameters)
 
 
@@ -113,6 +116,8 @@ class EquationsOfMotion(Paged, EquationFormulas):
         for one in self.legend:
             if one.path == path:
                 return objects.letter(one)
+        if f"-{path}" in [one.path for one in self.legend]:
+            return -self.symbol(f"-{path}")
         merged = {other.name: first for other, first in self.notation.merged.items()}
         if path in merged and self.parameters == "symbolic":
             return objects.formula(self.formula(merged[path]))
@@ -406,7 +411,7 @@ PARAMETERS = one_of(("symbolic", "values"))
     form=optional(FORM),
     parameters=PARAMETERS,
     orientation=optional(ORIENTATION),
-    symbols=SYMBOLS,
+    symbols=optional(SIGNED_LETTERS),
     by_part=FLAG,
     solved=FLAG,
     quantities=PATHS,
@@ -446,7 +451,8 @@ def equations(
         velocities are angular velocities in the axes of the body.
     symbols
         Letters by path, before those of declarations and of `Scene.symbols`: ``{"hoop.angle": "theta"}``. Of a part it
-        is what stands below its letters. Two parameters may share a letter where they are equal.
+        is what stands below its letters. Two parameters may share a letter where they are equal. A coordinate may have
+        the other sign: with ``{"rod.angle": "-theta"}`` theta is counted the other way round.
     by_part
         Say of each term which parts it comes from. A formula is left without where the parts' own terms are not proven
         to add up to it, or the equations are no sum over parts: where rolling is solved, and in quaternions.

@@ -98,6 +98,7 @@ def quantity_of(formulas: EquationFormulas, path: str) -> tuple[Expression, dict
     along |= dict(zip(found.velocities, found.accelerations, strict=True))
     own: dict[Expression, Expression | float] = dict(zip(equations.speeds, found.speeds, strict=True))
     own |= dict(zip(equations.accelerations, jvp(list(found.speeds), along), strict=True))
+    own |= {q: -one for q, one in zip(equations.coordinates, found.coordinates, strict=True) if one is not q}
     reactions = [other for other in assembly.reactions if depends_on(one.value, [other.symbol])]
     if not reactions:
         return substitute([one.value], own)[0], {}
