@@ -11,8 +11,8 @@ equation 5.39). Angular velocities are rates of angles where orientations are in
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any, TypeAlias
 
 from atwood.errors import UsageError, suggestion
 from atwood.expr import Expression, Graph, Scalar, SparseMatrix, depends_on, jacobian, jvp, substitute, vjp
@@ -403,10 +403,6 @@ def _along_angles(made: Lagrangian) -> Lagrangian:
             total[column] = total[column] + entry * there[row]
         return tuple(total)
 
-    parts = []
-    for part in made.parts:
-        kinetic, potential, total, rayleigh = moved([part.kinetic, part.potential, part.lagrangian, part.rayleigh])
-        parts.append(Contribution(part.path, kinetic, potential, total, rayleigh, on_angles(part.forces)))
     levels = iter(moved([level for held in made.constraints for level in (held.rate, held.second)]))
     constraints = [replace(held, rate=next(levels), second=next(levels)) for held in made.constraints]
     return replace(
@@ -417,12 +413,21 @@ def _along_angles(made: Lagrangian) -> Lagrangian:
         rates=tuple(rates),
         moves=tuple(moves),
         speeds=tuple(speeds),
-        parts=tuple(parts),
+        parts=tuple(_moved(one, moved, on_angles) for one in made.parts),
         inertial=on_angles(made.inertial),
         rows=on_angles(made.rows),
         constraint_rows=on_angles(made.constraint_rows),
         constraints=tuple(constraints),
     )
+
+
+_Put: TypeAlias = Callable[[Sequence[Expression]], tuple[Expression, ...]]
+
+
+def _moved(part: Contribution, put: _Put, along: _Put) -> Contribution:
+    """Return what a part contributes in other coordinates, forces along other velocities."""
+    kinetic, potential, total, rayleigh = put([part.kinetic, part.potential, part.lagrangian, part.rayleigh])
+    return Contribution(part.path, kinetic, potential, total, rayleigh, along(part.forces))
 
 
 def with_signs(found: Lagrangian, paths: Collection[str]) -> Lagrangian:
@@ -458,10 +463,7 @@ def with_signs(found: Lagrangian, paths: Collection[str]) -> Lagrangian:
         accelerations=tuple(accelerations),
         rates=tuple(turned.get(i, 1.0) * rate for i, rate in enumerate(put(found.rates))),
         speeds=put(found.speeds),
-        parts=tuple(
-            Contribution(one.path, *put([one.kinetic, one.potential, one.lagrangian, one.rayleigh]), along(one.forces))
-            for one in found.parts
-        ),
+        parts=tuple(_moved(one, put, along) for one in found.parts),
         inertial=along(found.inertial),
         rows=along(found.rows),
         constraint_rows=along(found.constraint_rows),
