@@ -290,3 +290,11 @@ def test_what_cannot_be_reduced_is_refused() -> None:
         routhian(SCENES["pendulum-on-cart"](), ["rod.angle"])
     with pytest.raises(UsageError, match="no coordinate"):
         reduced(SCENES["pendulum-on-cart"](), "cart.x")
+
+
+def test_on_top_of_the_potential_a_separatrix_is_named_and_no_period_is_infinite() -> None:
+    top = reduced(SCENES["simple-pendulum"](release_angle=math.pi))
+    assert top.is_separatrix
+    [told] = [line for line in top.text().splitlines() if line.startswith("period ")]
+    assert "none" in told
+    assert not reduced(SCENES["simple-pendulum"]()).is_separatrix

@@ -6,6 +6,7 @@ properties with the first sentence of theirs.
 
 from __future__ import annotations
 
+import cmath
 import inspect
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -277,4 +278,6 @@ class _Writer:
             return ", ".join(
                 f"[{self.fact(one)}]" if isinstance(one, (tuple, list)) else self.fact(one) for one in value
             )
-        return f"{value:.9g}" if isinstance(value, (float, complex)) else str(value)
+        if isinstance(value, (float, complex)):
+            return f"{value:.9g}" if cmath.isfinite(value) else "none"
+        return str(value)

@@ -118,14 +118,13 @@ def legendre_transform(
             where=str(function)[:80],
             advice="Take fewer variables: of those in which it is linear there is no transform.",
         )
-    low, high = ({v: given.get(one, (None, None))[side] for one, v in zip(x, own, strict=True)} for side in (0, 1))
-    ends = {
-        v: (
-            -sympy.oo if low[v] is None else low[v].xreplace(positive),
-            sympy.oo if high[v] is None else high[v].xreplace(positive),
+    ends: dict[Sympy, tuple[Sympy, Sympy]] = {}
+    for one, v in zip(x, own, strict=True):
+        low, high = given.get(one, (None, None))
+        ends[v] = (
+            -sympy.oo if low is None else low.xreplace(positive),
+            sympy.oo if high is None else high.xreplace(positive),
         )
-        for v in own
-    }
     at = {one: sympy.Rational(7 + 2 * k, 5 + k) for k, one in enumerate(positive.values())}
     pairs = list(zip(own, to, strict=True))
     told = {text_of(q): _range(f.diff(v), v, ends[v], at) for v, q in pairs} if second.is_diagonal() else {}

@@ -107,6 +107,11 @@ class ReducedMotion(Described):
         return self.path.period
 
     @property
+    def is_separatrix(self) -> bool:
+        """Whether its energy is that of a separatrix: it rests on top of its effective potential, without a period."""
+        return self.kind == "rest" and not np.isfinite(self.period)
+
+    @property
     def advance(self) -> dict[str, float]:
         """How far the ignorable coordinates go in a period, by path."""
         return dict(zip(self.ignorable, map(float, self.path.advance), strict=True))
