@@ -10,7 +10,7 @@ import sympy
 
 import atwood
 from atwood import galilean
-from atwood_library import PointMass
+from atwood_library import Ground, Link, Pivot, PointMass
 from atwood_library.scenes import (
     ChargedParticle,
     DoublePendulum,
@@ -18,6 +18,7 @@ from atwood_library.scenes import (
     FreeBody,
     Kepler,
     LagrangeTop,
+    MassSpringChain,
     PendulumOnCart,
     SimplePendulum,
     TwoBody,
@@ -31,13 +32,23 @@ def parts(sheet: atwood.FormulaSheet, name: str) -> tuple[sympy.Expr, ...]:
     return tuple(sheet[name])
 
 
+def hinged() -> atwood.Scene:
+    scene = atwood.Scene()
+    ground, hinge, link = scene.add("ground", Ground()), scene.add("hinge", Pivot()), scene.add("link", Link(mass=1.2))
+    scene.connect(ground.frame, hinge.a)
+    scene.connect(hinge.b, link.a)
+    return scene
+
+
 def falling() -> atwood.Scene:
     scene = atwood.Scene()
     scene.add("body", PointMass(mass=1.3))
     return scene
 
 
-@pytest.mark.parametrize("scene", [Kepler(), ChargedParticle(), SimplePendulum(), PendulumOnCart(), FallingWithDrag()])
+@pytest.mark.parametrize(
+    "scene", [Kepler(), ChargedParticle(), SimplePendulum(), PendulumOnCart(), FallingWithDrag(), hinged()]
+)
 def test_what_is_left_over_is_the_rate(scene: atwood.Scene) -> None:
     """The rate of each quantity less the equations of motion times displacements, identically."""
     sheet, eq = galilean(scene), atwood.equations(scene, form="dae")
@@ -109,6 +120,11 @@ def test_both_forms_are_told_alike_and_constraints_leave_their_forces() -> None:
     sheet = galilean(PendulumOnCart())
     kept = {name for name in sheet if parts(sheet, name)[4] == 0}
     assert kept == {"P_x", "K_x", "h"}
+    line = galilean(MassSpringChain())
+    assert [parts(line, name)[4] == 0 for name in line] == [False, False, True]
+    eq = atwood.equations(MassSpringChain(), form="dae")
+    moment = sum(eq.symbol(f"m{k}.mass") * x for k, x in zip((1, 2), eq.coordinates, strict=True))
+    assert sympy.expand(parts(line, "K_s")[3] - moment) == 0
     with pytest.raises(atwood.UnsupportedError, match="would fill a book"):
         galilean(LagrangeTop())
 

@@ -59,44 +59,42 @@ def _generators(equations: EquationsOfMotion) -> Iterator[tuple[str, str, Moves]
             where=equations.name,
             advice="See `conserved` for what is conserved.",
         )
-    t, q, found = sympy.Symbol("t"), equations.coordinates, equations.expressions
-    place: dict[str, dict[str, int]] = {}
-    for k, one in enumerate(found.names):
-        part, _, last = one.name.rpartition(".")
-        place.setdefault(part, {})[last] = k
-    axes = [a for a in "xyz" if any(a in at for part, at in place.items() if part.endswith(".position"))]
+    t, q, moves = sympy.Symbol("t"), equations.coordinates, equations.expressions.moves
+    forest, space = equations.assembly.maximal.forest, equations.assembly.mechanism.space
+    axes = ("x", "xz", "xyz")[len(space.basis) - 1]
+    free = [one for one in forest.attachments if len(one.coordinates) == len(axes)]
+    angles = [one.coordinate for one in forest.orientations if one.coordinate is not None and space.is_planar]
+    known = {*angles, *(i for one in free for i in (*one.coordinates, *one.orientation))}
+    if known != set(range(len(q))):
+        names = ", ".join(one.name for i, one in enumerate(equations.expressions.names) if i not in known)
+        raise UnsupportedError(f"{names} is no place of a body", where=equations.name, advice="See `conserved`.")
 
     def moved(e: Sympy, n: Sympy) -> Moves:
-        """Return what a body is displaced by along e and a rotation about n."""
-        shifts: dict[int, Sympy] = {}
+        """Return what bodies are displaced by along e and a rotation about n."""
+        shifts: dict[int, Sympy] = dict.fromkeys(angles, -n[1])  # counter-clockwise is about -y
         along: dict[int, Sympy] = {}
-        for part, at in place.items():
-            v = sympy.Matrix([q[at[a]] if a in at else 0 for a in "xyz"])
-            if part.endswith(".position"):
-                shifts |= {at[a]: x for a, x in zip("xyz", e + n.cross(v), strict=True) if a in at}
-            elif part.endswith(".quaternion"):
-                w, body = q[at["w"]], part.rpartition(".")[0]
-                shifts |= {
-                    at["w"]: -n.dot(v) / 2,
-                    **dict(zip((at[a] for a in "xyz"), (w * n + n.cross(v)) / 2, strict=True)),
-                }
-                own = [k for k, one in enumerate(found.velocity_names) if one.name.startswith(f"{body}.spin")]
-                size = w**2 + v.dot(v)  # of quaternions it is one
-                along |= dict(zip(own, (sympy.expand(one * size) for one in in_body([w, *v], list(n))), strict=True))
-            elif "angle" in at:  # counter-clockwise is about -y
-                shifts[at["angle"]] = -n[1]
-        return shifts, along | {k: shifts[i] for k, i in enumerate(found.moves) if i in shifts}
+        for one in free:
+            place = dict(zip(axes, one.coordinates, strict=True))
+            r = sympy.Matrix([q[place[a]] if a in place else 0 for a in "xyz"])
+            shifts |= {place[a]: x for a, x in zip("xyz", e + n.cross(r), strict=True) if a in place}
+            if one.orientation:
+                w, *v = (q[i] for i in one.orientation)
+                turned = [-n.dot(sympy.Matrix(v)) / 2, *((w * n + n.cross(sympy.Matrix(v))) / 2)]
+                shifts |= dict(zip(one.orientation, turned, strict=True))
+                size = sympy.Add(*(x**2 for x in (w, *v)))  # of quaternions it is one
+                along |= dict(zip(one.spin, (sympy.expand(x * size) for x in in_body([w, *v], list(n))), strict=True))
+        return shifts, along | {k: shifts[i] for k, i in enumerate(moves) if i in shifts}
 
-    still = sympy.zeros(3, 1)
-    units = {a: sympy.Matrix([int(a == b) for b in "xyz"]) for a in axes}
+    still, units = sympy.zeros(3, 1), {a: sympy.Matrix([int(a == b) for b in "xyz"]) for a in "xyz"}
+    told = dict(zip(axes, space.axis_names, strict=True))
     for a in axes:
-        yield f"P_{a}", f"translation along {a}", moved(units[a], still)
+        yield f"P_{told[a]}", f"translation along {told[a]}", moved(units[a], still)
     if len(axes) == 2:
-        yield "L", "rotation, counter-clockwise", moved(still, sympy.Matrix([0, -1, 0]))
+        yield "L", "rotation, counter-clockwise", moved(still, -units["y"])
     for a in axes if len(axes) == 3 else ():
         yield f"L_{a}", f"rotation about {a}", moved(still, units[a])
     for a in axes:
-        yield f"K_{a}", f"boost along {a}", moved(t * units[a], still)
+        yield f"K_{told[a]}", f"boost along {told[a]}", moved(t * units[a], still)
     yield "h", "shift in time", ({}, dict(enumerate(equations.velocities)))
 
 
@@ -134,10 +132,12 @@ def _statement(equations: EquationsOfMotion, name: str, told: str, moves: Moves)
 
 
 def _gauge(value: Sympy, q: tuple[Sympy, ...], t: Sympy) -> Sympy:
-    """Return what a value, or those of its terms that are alone a rate, is the rate of."""
-    terms = sympy.Add.make_args(value)
-    every = [_primitive(value, q, t), *(_primitive(one, q, t) for one in terms)]
-    return sympy.expand_mul(every[0] if every[0] is not None else sympy.Add(*(f for f in every[1:] if f is not None)))
+    """Return what a value is the rate of; else what those of its terms with a velocity are that are a rate alone."""
+    whole = _primitive(value, q, t)
+    if whole is None:
+        alone = (_primitive(one, q, t) for one in sympy.Add.make_args(value) if one.has(sympy.Derivative))
+        whole = sympy.Add(*(f for f in alone if f is not None))
+    return sympy.expand_mul(whole)
 
 
 def _primitive(value: Sympy, q: tuple[Sympy, ...], t: Sympy) -> Sympy | None:
