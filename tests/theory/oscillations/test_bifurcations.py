@@ -32,6 +32,7 @@ def test_the_hoop_has_a_pitchfork() -> None:
     assert is_at(one.condition, g - a * omega**2)
     assert len(one.states) == 3
     assert "supercritical pitchfork  a ω² = g" in str(found)
+    assert r"\text{pitchfork} &\quad a \omega^{2} = g" in found.latex()
 
 
 def test_watt_s_governor_has_one_for_each_place_of_the_sleeve() -> None:

@@ -76,12 +76,13 @@ class SymbolicEquilibria(Shown, list[SymbolicEquilibrium]):
         return [one.to_data() for one in self]
 
     def latex(self) -> str:
-        """Return them as an aligned block of LaTeX, a line for each."""
+        """Return them and where they meet as an aligned block of LaTeX, a line for each."""
         rows = []
         for one in self:
             held = ((self._plain.letter(path), value) for path, value in one.values.items() if path not in one.free)
             state = r",\ ".join(latex_of(sympy.Eq(*pair, evaluate=False)) for pair in held)
             rows.append(rf"{state} &\quad {_where(one.exists, 0)} &\quad {_where(one.stable, 1)}")
+        rows += [rf"\text{{{one.kind}}} &\quad {latex_of(one.condition)}" for one in self.bifurcations]
         return aligned(rows)
 
     def tables(self) -> tuple[Table, ...]:
