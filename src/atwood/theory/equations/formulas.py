@@ -8,7 +8,7 @@ linkage).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from itertools import combinations
 from typing import Literal
@@ -19,8 +19,8 @@ from atwood.expr.core import algebra
 from atwood.expr.core.relations import Relation
 from atwood.expr.simplify.polynomial import TooLargeError
 from atwood.forms.assembly import Assembly
-from atwood.forms.lagrangian import Lagrangian, rows_by_part
-from atwood.lazy_dataclasses import dataclass, replace
+from atwood.forms.lagrangian import Contribution, Lagrangian, rows_by_part
+from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
 from atwood.theory.equations.pages import Structure, structure_of
 from atwood.theory.equations.solved import quantity_of, solved_for
@@ -167,21 +167,39 @@ class EquationFormulas:
     @cached_property
     def written(self) -> Written:
         """The formulas."""
+        return self._write(())
+
+    @cached_property
+    def written_by_part(self) -> Written:
+        """The formulas with the parts that each term comes from: where their own terms are proven to be its sum."""
+        return self._write(self.expressions.parts)
+
+    def _write(self, parts: Sequence[Contribution]) -> Written:
+        """Return the formulas; with parts, each term with those that it comes from."""
         found = self.expressions
-        linear = found.lagrangian - found.kinetic + found.potential
+
+        def whole(total: Expression, own: Callable[[Contribution], Expression]) -> Sum:
+            return self._parted(total, {one.path: own(one) for one in parts}, True)
+
+        def each(values: Sequence[Expression], own: Mapping[str, Sequence[Expression]]) -> tuple[Sum, ...]:
+            if not own:
+                return self.formulas(values)
+            shares = ({path: several[k] for path, several in own.items()} for k in range(len(values)))
+            return tuple(map(self._parted, values, shares))
+
+        seed = [found.graph.one]
+        held = [(one.key[0], one.rate if one.value is None else one.value) for one in found.constraints]
         return Written(
-            kinetic=self.formula(found.kinetic, energy=True),
-            potential=self.formula(found.potential, energy=True),
-            linear=self.formula(linear, energy=True),
-            rayleigh=self.formula(found.rayleigh, energy=True),
-            momenta=self.formulas(found.momenta),
-            forces=self.formulas(found.forces),
-            velocity_terms=self.formulas(found.velocity_terms),
-            rows=self.formulas(self.residuals),
-            constraints=tuple(
-                self.formula(one.rate if one.value is None else one.value, energy=True) for one in found.constraints
-            ),
-            rates=self.formulas(found.rates),
+            kinetic=whole(found.kinetic, lambda one: one.kinetic),
+            potential=whole(found.potential, lambda one: one.potential),
+            linear=whole(found.lagrangian - found.kinetic + found.potential, _linear_terms),
+            rayleigh=whole(found.rayleigh, lambda one: one.rayleigh),
+            momenta=each(found.momenta, {one.path: vjp([one.lagrangian], seed, [*found.velocities]) for one in parts}),
+            forces=each(found.forces, {one.path: one.forces for one in parts}),
+            velocity_terms=self.written.velocity_terms if parts else self.formulas(found.velocity_terms),
+            rows=each(self.residuals, rows_by_part(found) if parts else {}),
+            constraints=tuple(self._parted(value, {path: value} if parts else {}, True) for path, value in held),
+            rates=self.written.rates if parts else self.formulas(found.rates),
         )
 
     def _parted(self, total: Expression, own: Mapping[str, Expression], energy: bool = False) -> Sum:
@@ -189,34 +207,6 @@ class EquationFormulas:
         graph = self.expressions.graph
         is_sum = own and self.is_readable and not self.formula(total - sum(own.values(), graph.zero)).terms
         return self.formula(total, own if is_sum else None, energy)
-
-    @cached_property
-    def written_by_part(self) -> Written:
-        """The formulas with the parts that each term comes from: where their own terms are proven to be its sum."""
-        found, parted = self.expressions, self._parted
-        graph, shares = found.graph, rows_by_part(found)
-
-        def of(name: str) -> dict[str, Expression]:
-            return {one.path: getattr(one, name) for one in found.parts}
-
-        linear = {one.path: one.lagrangian - one.kinetic + one.potential for one in found.parts}
-        momenta = {one.path: vjp([one.lagrangian], [graph.one], list(found.velocities)) for one in found.parts}
-        rows = range(len(found.velocities))
-        return replace(
-            self.written,
-            kinetic=parted(found.kinetic, of("kinetic"), True),
-            potential=parted(found.potential, of("potential"), True),
-            linear=parted(found.lagrangian - found.kinetic + found.potential, linear, True),
-            rayleigh=parted(found.rayleigh, of("rayleigh"), True),
-            momenta=tuple(parted(found.momenta[k], {path: one[k] for path, one in momenta.items()}) for k in rows),
-            forces=tuple(parted(found.forces[k], {one.path: one.forces[k] for one in found.parts}) for k in rows),
-            rows=tuple(parted(self.residuals[k], {path: one[k] for path, one in shares.items()}) for k in rows),
-            constraints=tuple(
-                parted(value, {one.key[0]: value}, True)
-                for one in found.constraints
-                for value in (one.rate if one.value is None else one.value,)
-            ),
-        )
 
     @cached_property
     def momenta_shown(self) -> tuple[Sum, ...]:
@@ -288,6 +278,12 @@ class EquationFormulas:
 
 _LONGEST_FRACTION = 250
 """Signs and symbols of an acceleration beyond which none are written down."""
+
+
+def _linear_terms(part: Contribution) -> Expression:
+    """Return what a part adds to L besides T - V."""
+    return part.lagrangian - part.kinetic + part.potential
+
 
 _SUM = 2
 """A momentum of fewer terms is no shorter than what it stands for."""
