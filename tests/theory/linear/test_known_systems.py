@@ -44,6 +44,7 @@ def arm() -> Scene:
     return scene
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("make", "time", "drives"),
     [
