@@ -62,6 +62,9 @@ def values_along(scene: Scene, path: str, form: str = "reduced") -> tuple[np.nda
         ("rotating-frame", "observer.translational_force.x"),
         ("rotating-frame", "observer.centrifugal_force.x"),
         ("chaplygin-sleigh", "blade.side_force"),
+        ("lagrange-top", "ground.force.x"),
+        ("furuta-pendulum", "ground.force.y"),
+        ("swinging-atwood", "ground.force.z"),
     ],
 )
 def test_a_quantity_is_that_of_a_run(name: str, path: str) -> None:
@@ -157,6 +160,9 @@ def test_the_blade_of_a_sleigh_presses_and_does_no_work(form: str) -> None:
 def test_what_would_fill_a_page_and_what_there_is_not_is_refused() -> None:
     with pytest.raises(UnsupportedError, match="hang together, and solved they would fill a page"):
         _ = equations(Strandbeest()).solved
+    for ask in (lambda eq: eq.solved, lambda eq: eq.quantity("ground0.force.x")):
+        with pytest.raises(UnsupportedError, match="too many to be solved"):
+            ask(equations(SCENES["stewart-platform"]()))
     with pytest.raises(ParameterError, match="no such quantity"):
         equations(PendulumOnCart()).quantity("rod.tensio")
 

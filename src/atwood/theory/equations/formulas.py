@@ -234,6 +234,7 @@ class EquationFormulas:
     @cached_property
     def lines_solved(self) -> tuple[Line, ...]:
         """The accelerations and the multipliers as functions of the state."""
+        self._refuse_what_nobody_reads()
         found, notation = self.expressions, self.notation
         names = [Name(*notation.velocities[one]) for one in found.accelerations]
         names += [Name(notation.symbols[one.multiplier]) for one in found.constraints]
@@ -246,8 +247,17 @@ class EquationFormulas:
             )
         return tuple(line_for(name, one) for name, one in zip(names, values, strict=True))
 
+    def _refuse_what_nobody_reads(self) -> None:
+        if not self.is_readable:
+            raise UnsupportedError(
+                "its equations are too many to be solved and read",
+                where=self.name,
+                advice="atwood.dynamics solves them in numbers, and atwood.simulate gives its quantities.",
+            )
+
     def written_quantity(self, path: str) -> Sum:
         """Return a quantity of a part as a formula; see `quantity_of`."""
+        self._refuse_what_nobody_reads()
         total, shares = quantity_of(self, path)
         return self._parted(total, shares)
 
