@@ -59,6 +59,7 @@ from atwood.model.compose.connection_rules import connect
 from atwood.model.compose.scene import Scene
 from atwood.model.declare.component import Component
 from atwood.model.declare.connectors import Connector, Frame, Groove, Point, Shaft, Slide, connector
+from atwood.model.declare.contact_laws import dry_friction, unilateral
 from atwood.model.declare.field_functions import Number, Triple, discrete_state, parameter, signal, state
 from atwood.model.declare.law_results import BodyInertia, CoordinateLoad, Load, Placement, PointInertia
 from atwood.model.declare.laws import (
@@ -328,9 +329,9 @@ __all__ += [
     "FREE", "BodyInertia", "Component", "Connector", "CoordinateLoad", "Expression",
     "ExternalFunction", "Frame", "Groove", "Load", "Number", "Outline", "Placement", "Point", "PointInertia",
     "Rotation", "Scalar", "Shaft", "Slide", "Triple", "Vector", "as_vector", "connector", "constraint",
-    "cross", "derivative", "discrete_state", "dissipation", "dot", "event", "external", "force", "inertia",
+    "cross", "derivative", "discrete_state", "dissipation", "dot", "dry_friction", "event", "external", "force", "inertia",
     "is_zero", "joint", "lagrangian", "norm", "normals", "observable", "parameter", "potential", "select", "signal",
-    "solve_linear", "state", "turn", "update",
+    "solve_linear", "state", "turn", "unilateral", "update",
 ]  # fmt: skip
 
 # Errors

@@ -24,7 +24,7 @@ from atwood.forms.program import rates_are_speeds, state_groups
 from atwood.forms.residuals import keep_constraints
 from atwood.lazy_dataclasses import dataclass, names_of
 from atwood.mechanics.dynamics.augmented import SymmetricSystem, back_substitute, eliminate, fill_of
-from atwood.mechanics.dynamics.equations import Equations
+from atwood.mechanics.dynamics.equations import Constraint, Equations
 
 _LARGEST_FILL = 60_000
 """More products than these are left to a loop when the program runs."""
@@ -93,7 +93,7 @@ def _accelerations(
     at_rest = dict.fromkeys(equations.accelerations, 0.0)
     mass = jacobian(list(rows), list(equations.accelerations))
     entries = {(r, c): e for r, c, e in mass.triples if r <= c}
-    slopes = _slopes(equations, range(len(constraints)))
+    slopes = _slopes(equations, constraints)
     bias = substitute(list(rows), at_rest)
     gamma = substitute([one.second for one in constraints], at_rest)
     bare = set(light)
@@ -106,10 +106,9 @@ def _accelerations(
     return _solved(SymmetricSystem({**entries, **places}, right, signs))[:n]
 
 
-def _slopes(equations: Equations, rows: Sequence[int]) -> list[dict[int, Expression]]:
+def _slopes(equations: Equations, rows: Sequence[Constraint]) -> list[dict[int, Expression]]:
     """Return the rows of the constraint Jacobian by column."""
-    chosen = [equations.constraints[k].rate for k in rows]
-    found = jacobian(chosen, list(equations.speeds))
+    found = jacobian([one.rate for one in rows], list(equations.speeds))
     slopes: list[dict[int, Expression]] = [{} for _ in rows]
     for row, column, entry in found.triples:
         if not entry.is_zero:
@@ -154,24 +153,29 @@ def _projection(equations: Equations, sizes: Sequence[Expression]) -> list[Expre
 
     Speeds are projected with the slopes of the place before the step: what that leaves is of second order.
     """
-    holding = [k for k, one in enumerate(equations.constraints) if one.holonomic]
-    everything = list(range(len(equations.constraints)))
-    values = [value for k in holding if (value := equations.constraints[k].value) is not None]
-    moved = _nearest(_slopes(equations, holding), values, sizes)
+    one = equations.graph.one
+    rows = [*((held, one) for held in equations.constraints), *((held.row, held.mask) for held in equations.contacts)]
+    holding = [(held, mask) for held, mask in rows if held.holonomic and held.value is not None]
+    values = [held.value for held, _ in holding if held.value is not None]
+    moved = _nearest(_slopes(equations, [held for held, _ in holding]), values, sizes, [mask for _, mask in holding])
     coordinates = _moved(equations, [-one * size for one, size in zip(moved, sizes, strict=True)])
     there = dict(zip(equations.coordinates, coordinates, strict=True))
-    misses = substitute([one.rate for one in equations.constraints], there)
-    changed = _nearest(_slopes(equations, everything), misses, sizes)
+    misses = substitute([held.rate for held, _ in rows], there)
+    changed = _nearest(_slopes(equations, [held for held, _ in rows]), misses, sizes, [mask for _, mask in rows])
     speeds = [u - one * size for u, one, size in zip(equations.speeds, changed, sizes, strict=True)]
     return [*coordinates, *speeds, *moved]
 
 
 def _nearest(
-    slopes: Sequence[Mapping[int, Expression]], right: Sequence[Expression], sizes: Sequence[Expression]
+    slopes: Sequence[Mapping[int, Expression]],
+    right: Sequence[Expression],
+    sizes: Sequence[Expression],
+    masks: Sequence[Expression],
 ) -> list[Expression]:
-    """Return the shortest solution of ``G d = right``, in units of the sizes."""
+    """Return the shortest solution of ``G d = right``, in units of the sizes; of rows whose mask is one, not zero."""
     zero = sizes[0].graph.zero
-    scaled = [{c: e * sizes[c] for c, e in row.items()} for row in slopes]
+    scaled = [{c: mask * (e * sizes[c]) for c, e in row.items()} for row, mask in zip(slopes, masks, strict=True)]
+    right = [mask * one for one, mask in zip(right, masks, strict=True)]
     by_column: dict[int, list[int]] = {}
     for k, row in enumerate(scaled):
         for column in row:
@@ -181,6 +185,9 @@ def _nearest(
         for a, i in enumerate(met):
             for j in met[a:]:
                 entries[i, j] = entries.get((i, j), zero) + scaled[i][column] * scaled[j][column]
+    for k, mask in enumerate(masks):
+        if not (mask - 1.0).is_zero:
+            entries[k, k] = entries.get((k, k), zero) + (1.0 - mask)
     found = _solved(SymmetricSystem(entries, right, [1] * len(right))) if right else []
     moved = [zero] * len(sizes)
     for row, multiplier in zip(scaled, found, strict=True):

@@ -18,7 +18,14 @@ from atwood.mechanics.constraints.knots import balance_knots, linear_knots
 from atwood.mechanics.constraints.massless_spins import IDLE_SPIN
 from atwood.mechanics.constraints.read_multipliers import known_multipliers, with_known
 from atwood.mechanics.constraints.rolling import Taken, integrated, take_up, without_idle_spins
-from atwood.mechanics.constraints.values import Values, constraint_values, find_constraints, levels, velocity_levels
+from atwood.mechanics.constraints.values import (
+    Values,
+    constraint_values,
+    contact_rows,
+    find_constraints,
+    levels,
+    velocity_levels,
+)
 from atwood.mechanics.dynamics.augmented import difference
 from atwood.mechanics.dynamics.equations import Equations, force_rows, motion_rows
 from atwood.mechanics.dynamics.forces import Site, in_joint_coordinates, place_part
@@ -91,6 +98,7 @@ def build_equations(mechanism: Mechanism, forest: SpanningForest) -> Equations:
         states=parts,
         decisions=tuple(derivation.decided),
         constants=dict(derivation.found),
+        contacts=contact_rows(derivation, site, state, signals),
     )
     read = _read_multipliers(derivation, signals) if derivation.can_read_multipliers else []
     if forest.form == "reduced":

@@ -20,7 +20,7 @@ from atwood.errors import AtwoodError, UnsupportedError
 from atwood.expr import Expression, absolute, depends_on, jacobian, select, solve, sqrt, substitute
 from atwood.lazy_dataclasses import replace
 from atwood.mechanics.dynamics.augmented import SymmetricSystem, back_substitute, eliminate, fill_of, minimum_degree
-from atwood.mechanics.dynamics.equations import Constraint, Equations
+from atwood.mechanics.dynamics.equations import Constraint, ContactRow, Equations
 from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.model.local.parts import multiplier_symbol
 
@@ -40,10 +40,11 @@ _LARGEST_FILL = 20_000
 """Beyond so many products the system is solved in numbers."""
 
 
-def _check_reads(mechanism: Mechanism, read: Sequence[Expression], constraints: Sequence[Constraint]) -> None:
+def _check_reads(mechanism: Mechanism, read: Sequence[Expression], equations: Equations) -> None:
     """Refuse a law of force that reads a multiplier which nothing determines."""
     graph = mechanism.table.graph
-    known = {one.multiplier for one in constraints}
+    known = {one.multiplier for one in equations.constraints}
+    known |= {symbol for one in equations.contacts for symbol in (one.row.multiplier, one.read)}
     known |= {multiplier_symbol(graph, *key) for key in mechanism.bodies.idle}
     for symbol in read:
         if symbol not in known:
@@ -58,24 +59,45 @@ def _check_reads(mechanism: Mechanism, read: Sequence[Expression], constraints: 
 def known_multipliers(
     mechanism: Mechanism, equations: Equations, read: Sequence[Expression]
 ) -> dict[Expression, Expression]:
-    """Return the multipliers that forces read, in terms of time, coordinates and speeds."""
-    _check_reads(mechanism, read, equations.constraints)
+    """Return the multipliers that forces read, in terms of time, coordinates and speeds.
+
+    Those of gaps and slips are among the unknowns, and not among the forces: only limits of friction read them there.
+    """
+    _check_reads(mechanism, read, equations)
     rows, speeds, accelerations = equations.rows, equations.speeds, equations.accelerations
-    constraints = equations.constraints
+    constraints, contacts = equations.constraints, equations.contacts
     graph, n = equations.graph, len(speeds)
-    number = {one.multiplier: n + i for i, one in enumerate(constraints)}
-    wanted = [symbol for symbol in read if symbol in number]
+    number = {one.multiplier: n + i for i, one in enumerate((*constraints, *(one.row for one in contacts)))}
+    own = {one.row.multiplier: graph.zero for one in contacts}
+    number |= {one.read: number[one.row.multiplier] for one in contacts}
     known: dict[Expression, Expression] = {symbol: graph.zero for symbol in read if symbol not in number}
-    if not wanted:
+    if len(known) == len(read):
         return known
     at_rest = dict.fromkeys(accelerations, graph.zero)
-    bias = substitute(list(rows), {**at_rest, **known})
+    bias = substitute(list(rows), {**at_rest, **known, **own})
+    wanted = [symbol for symbol in read if symbol in number and symbol not in own]
     stand_ins = {i: graph.symbol(f"force row {i}") for i, row in enumerate(bias) if depends_on(row, wanted)}
     right = [-stand_ins.get(i, row) for i, row in enumerate(bias)]
     right += [-one for one in substitute([one.second for one in constraints], at_rest)]
-    system = _System(rows, speeds, accelerations, constraints, right)
-    solved = _without_choice(system, speeds) if _close_loops(mechanism, constraints) else _solve_system(system)
-    found = [solved[number[symbol]] for symbol in wanted]
+    seconds = substitute([one.row.second for one in contacts], at_rest)
+    right += [-(one.mask * second) for one, second in zip(contacts, seconds, strict=True)]
+    system = _System(rows, speeds, accelerations, constraints, right, contacts)
+    can_repeat = _close_loops(mechanism, [*constraints, *(one.row for one in contacts)])
+    solved = _without_choice(system, speeds) if can_repeat else _solve_system(system)
+    if wanted:
+        known |= _forces_met(wanted, [solved[number[symbol]] for symbol in wanted], stand_ins, bias)
+    placed = dict(zip(stand_ins.values(), substitute([bias[i] for i in stand_ins], known), strict=True))
+    return {**known, **dict(zip(own, substitute([solved[number[symbol]] for symbol in own], placed), strict=True))}
+
+
+def _forces_met(
+    wanted: Sequence[Expression],
+    found: Sequence[Expression],
+    stand_ins: Mapping[int, Expression],
+    bias: Sequence[Expression],
+) -> dict[Expression, Expression]:
+    """Return the multipliers that forces read, from what they are in terms of the rows of these forces."""
+    graph = bias[0].graph
     forces, values = list(stand_ins.values()), [bias[i] for i in stand_ins]
     slopes = jacobian(found, forces)
     shares = slopes.by_place
@@ -88,7 +110,7 @@ def known_multipliers(
             where=wanted[0].name.removeprefix("lambda:").partition("[")[0],
             advice="Round off the law there, as sqrt(n*n + a*a) instead of sqrt(n*n) with a small force a.",
         ) from error
-    return {**known, **dict(zip(wanted, found, strict=True))}
+    return dict(zip(wanted, found, strict=True))
 
 
 class _System:
@@ -101,7 +123,7 @@ class _System:
     right
         The right-hand side.
     diagonal
-        The diagonal of C; empty where it is zero.
+        The diagonal of C; empty where it is zero. Rows of gaps and slips that do not hold say that a multiplier is zero.
     masses
         Number of accelerations.
     """
@@ -113,14 +135,20 @@ class _System:
         accelerations: Sequence[Expression],
         constraints: Sequence[Constraint],
         right: Sequence[Expression],
+        contacts: Sequence[ContactRow],
     ) -> None:
         self.masses, self.right = len(speeds), list(right)
         mass = jacobian(list(rows), list(accelerations))
-        held = jacobian([one.rate for one in constraints], list(speeds))
+        rates = [*(one.rate for one in constraints), *(one.row.rate for one in contacts)]
+        held = jacobian(rates, list(speeds))
         self.mass = mass.by_place
-        places = held.triples
-        self.slopes = {(self.masses + r, c): e for r, c, e in places}
+        count, zero = len(constraints), speeds[0].graph.zero
+        self.slopes = {
+            (self.masses + r, c): e if r < count else contacts[r - count].mask * e for r, c, e in held.triples
+        }
         self.diagonal: list[Expression] = []
+        if contacts:
+            self.diagonal = [*([zero] * count), *(1.0 - one.mask for one in contacts)]
 
 
 def _close_loops(mechanism: Mechanism, constraints: Sequence[Constraint]) -> bool:
@@ -149,7 +177,9 @@ def _without_choice(system: _System, speeds: Sequence[Expression]) -> list[Expre
     for (r, c), entry in system.slopes.items():
         if (c, c) in system.mass:
             diagonal[r - n] = diagonal[r - n] + entry * entry / system.mass[c, c]
-    system.diagonal = [_ADDED * one if not one.is_zero else graph.constant(_ADDED) for one in diagonal]
+    added = [_ADDED * one if not one.is_zero else graph.constant(_ADDED) for one in diagonal]
+    masked = system.diagonal or [graph.zero] * len(added)
+    system.diagonal = [more if one.is_zero else one + more for one, more in zip(masked, added, strict=True)]
     right = list(system.right)
     solved = _solve_system(system)
     for _ in range(_TIMES - 1):
@@ -164,7 +194,7 @@ def _solve_system(system: _System) -> list[Expression]:
     n, size, full, right = system.masses, len(system.right), system.mass, system.right
     graph = right[0].graph
     upper = {(r, c): e for (r, c), e in full.items() if r <= c} | {(c, r): e for (r, c), e in system.slopes.items()}
-    upper |= {(n + i, n + i): one for i, one in enumerate(system.diagonal)}
+    upper |= {(n + i, n + i): one for i, one in enumerate(system.diagonal) if not one.is_zero}
     order = [*range(n), *(i for i in minimum_degree(_after(list(upper), n, size), size) if i >= n)]
     if all((i, i) in full for i in range(n)) and fill_of(list(upper), order) <= _LARGEST_FILL:
         try:
@@ -259,4 +289,8 @@ def with_known(equations: Equations, read: Mapping[Expression, Expression]) -> E
     known = substitute([*equations.rows, *equations.rates], dict(read))
     rows, rates = tuple(known[: len(equations.rows)]), tuple(known[len(equations.rows) :])
     made = replace(equations, rows=rows, rates=rates, read=dict(read))
-    return replace(made, rows_with_multipliers=equations.rows, rates_with_multipliers=equations.rates)
+    own = {x: read[x] for one in equations.contacts for x in (one.row.multiplier, one.read) if x in read}
+    left = substitute([*equations.rows, *equations.rates], own) if own else [*equations.rows, *equations.rates]
+    return replace(
+        made, rows_with_multipliers=tuple(left[: len(rows)]), rates_with_multipliers=tuple(left[len(rows) :])
+    )

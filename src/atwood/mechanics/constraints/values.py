@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from atwood.errors import UnsupportedError
 from atwood.expr import Expression, depends_on, jvp, live
 from atwood.lazy_dataclasses import dataclass, replace
-from atwood.mechanics.dynamics.equations import Constraint, Integral, constraint_levels
+from atwood.mechanics.dynamics.equations import Constraint, ContactRow, Integral, constraint_levels
 from atwood.mechanics.dynamics.forces import (
     PlacedPart,
     Site,
@@ -135,6 +135,32 @@ def velocity_levels(
         value = None if integral is None else integral.value
         found.append(Constraint(key, one.reaction, one.sign, value, rate, second, multiplier, integral is not None))
     return found
+
+
+def contact_rows(
+    mechanism: Mechanism, site: Site, state: Movement, signals: Mapping[Expression, Expression]
+) -> tuple[ContactRow, ...]:
+    """Return the gaps and slips of all parts where these are."""
+    found: list[ContactRow] = []
+    for path, local in mechanism.locals_.items():
+        part = place_part(site, local, state.kinematics, signals) if local.contacts else None
+        for one in local.contacts:
+            assert part is not None
+            held = in_coordinates(local, one.row, state.kinematics.placements)
+            if one.is_slip:
+                (row,) = velocity_levels(mechanism, site, state, [(path, held, one.multiplier)], signals, {})
+            else:
+                placed = part.put([held.value])
+                (row,) = levels(mechanism, site, state, [(path, held, one.multiplier)], placed)
+            limits = (one.direction, one.limit, one.static_limit, one.restitution)
+            given = [one.mask, one.force, *(x for x in limits if x is not None)]
+            values, _ = in_joint_coordinates(local, state.kinematics, given)
+            mask, force, *more = part.put(values)
+            rest = iter(more)
+            found.append(
+                ContactRow(row, one.read, mask, force, one.law, *(None if x is None else next(rest) for x in limits))
+            )
+    return tuple(found)
 
 
 def _check_affine(path: str, local: LocalPart, one: LocalConstraint) -> None:

@@ -17,6 +17,7 @@ from atwood.mechanics.kinematics.mechanism import Constant, Decision
 from atwood.mechanics.kinematics.orientation import inertial_torque, torque_components
 from atwood.mechanics.kinematics.positions import BodyShape, Kinematics, body_point_of
 from atwood.model.declare.law_results import BodyInertia
+from atwood.model.declare.laws import Law
 from atwood.model.local.parts import LocalConstraint, LocalPart, LocalState
 from atwood.model.values.space import cross
 from atwood.topology.orientation_coordinates import OrientationCoordinates
@@ -62,6 +63,46 @@ class Constraint:
         path, law, number = self.key
         is_one_of_several = "." in self.reaction or self.reaction.endswith(f"_{number + 1}")
         return f"{path}.{law}" + (f"[{number}]" if is_one_of_several else "")
+
+
+@dataclass(frozen=True)
+class ContactRow:
+    """A gap, or a slip, where its part is.
+
+    Attributes
+    ----------
+    row
+        What stays zero where the mask is one: the value of a gap with its derivatives, or a slip as a rate.
+    read
+        What stands for the multiplier in limits of friction.
+    mask
+        1 where the row holds, else 0.
+    force
+        The force along the gap or the slip, in terms of multipliers.
+    law
+        The law that declares it.
+    direction
+        The sign of a slip that goes on, else 0; None for a gap.
+    limit, static_limit
+        The largest force of friction, and that while it sticks; None for a gap.
+    restitution
+        Of a gap.
+    """
+
+    row: Constraint
+    read: Expression
+    mask: Expression
+    force: Expression
+    law: Law
+    direction: Expression | None
+    limit: Expression | None
+    static_limit: Expression | None
+    restitution: Expression | None
+
+    @property
+    def is_slip(self) -> bool:
+        """Whether it is a slip, and not a gap."""
+        return self.limit is not None
 
 
 @dataclass(frozen=True)
@@ -138,6 +179,8 @@ class Equations:
         What was decided by the size of numbers on the way.
     constants
         Parameters that have their values from the start of the scene.
+    contacts
+        Gaps and slips; `read` gives the multipliers in them.
     """
 
     graph: Graph
@@ -168,6 +211,7 @@ class Equations:
     states: tuple[LocalState, ...] = ()
     decisions: tuple[Decision, ...] = ()
     constants: Mapping[Expression, Constant] = field(default_factory=dict)
+    contacts: tuple[ContactRow, ...] = ()
 
     @property
     def placing(self) -> int:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from atwood.expr import Expression, Graph
+from atwood.expr import Expression, Graph, substitute
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Mechanism
@@ -18,6 +18,12 @@ from atwood.model.declare.laws import Law
 
 UPDATE = "update"
 """Target of an event that changes states of its part, and no mode."""
+
+CLOSES, OPENS, YIELDS, STOPS, FREES = "contact closes", "contact opens", "contact yields", "contact stops", "contact frees"
+"""Targets of events of gaps and slips: a gap closes, its force vanishes, what sticks reaches its limit, what slips comes
+to rest, and the limit of friction passes zero."""
+
+CONTACT = (CLOSES, OPENS, YIELDS, STOPS, FREES)
 
 
 @dataclass(frozen=True)
@@ -42,6 +48,8 @@ class EventFunction:
         Whether velocities jump.
     is_there
         What must be positive for a zero to count; all count if not given.
+    rate
+        Of a gap, its rate: where it starts at zero and opens, it has no margin.
     """
 
     part: str
@@ -53,6 +61,7 @@ class EventFunction:
     unit: str
     impact: bool
     is_there: Expression | None = None
+    rate: Expression | None = None
 
     @property
     def is_noted(self) -> bool:
@@ -89,7 +98,38 @@ def list_event_functions(
                     path, law.name, value, options.direction, target, options.message, options.unit, options.impact
                 )
             )
-    return tuple(found)
+    return (*found, *_of_contacts(equations))
+
+
+def _of_contacts(equations: Equations) -> list[EventFunction]:
+    """Return what tells that gaps and slips go over into another state; what cannot happen in a state is positive."""
+    found: list[EventFunction] = []
+    for one in equations.contacts:
+        (part, law, _), unit = one.row.key, one.law.options.unit
+        along = {"N": "m", "N*m": "rad"}[unit]
+
+        def watch(target: str, value: Expression, unit: str, message: str, rate: Expression | None = None) -> None:
+            (placed,) = substitute([value], dict(equations.read))
+            found.append(EventFunction(part, law, placed, -1, target, message, unit, False, rate=rate))  # noqa: B023
+
+        if one.direction is None:
+            assert one.row.value is not None
+            rest = 1.0 - one.mask
+            watch(CLOSES, rest * one.row.value + one.mask, along, "the gap closes", one.row.rate)
+            watch(OPENS, one.mask * one.row.multiplier + rest, unit, "the gap opens")
+            continue
+        assert one.limit is not None
+        assert one.static_limit is not None
+        loose = 1.0 - one.mask
+        for sign in (1.0, -1.0):
+            reserve = one.static_limit - sign * one.row.multiplier
+            watch(YIELDS, one.mask * reserve + loose, unit, "what sticks begins to slip")
+        turned = one.direction * one.row.rate + (1.0 - one.direction * one.direction)
+        watch(STOPS, turned, f"{along}/s", "what slips comes to rest")
+        if not one.law.options.at:
+            held = 1.0 - (1.0 - one.mask) * (1.0 - one.direction * one.direction)
+            watch(FREES, (2.0 * held - 1.0) * one.limit, unit, "the limit of friction passes zero")
+    return found
 
 
 def _evaluated(graph: Graph, bound: Any, law: Law) -> Expression:

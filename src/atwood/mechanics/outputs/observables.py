@@ -12,7 +12,7 @@ from typing import Any
 
 from atwood.display import count_of
 from atwood.errors import AtwoodError, MissingNameError
-from atwood.expr import Expression, Scalar, is_zero, jvp, live
+from atwood.expr import Expression, Scalar, is_zero, jvp, live, substitute
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
@@ -357,9 +357,15 @@ class Reader:
         path = local.part.path
         known, zero = self._known.get(path, {}), self._mechanism.table.graph.zero
         across = {name: zero for name, value in local.binding.reactions.items() if is_zero(value)}  # of a plane
-        own = {**across, **self._reactions.get(path, {})}
+        own = {**across, **self._reactions.get(path, {}), **self._pressing(path)}
         energies: Mapping[str, Any] = self._around_part(local) if with_energies else {}
         return make_binding(self._mechanism, self._equations, local, own, known, energies, self._signals)
+
+    def _pressing(self, path: str) -> Mapping[str, Expression]:
+        """Return the forces of gaps and slips of a part, by the name of the reaction."""
+        rows = [one for one in self._equations.contacts if one.row.key[0] == path]
+        forces = substitute([one.force for one in rows], dict(self._equations.read)) if rows else []
+        return dict(zip((one.row.reaction for one in rows), forces, strict=True))
 
     def _around_part(self, local: LocalPart) -> Mapping[str, Any]:
         owner = local.part.component._parent

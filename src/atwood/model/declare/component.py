@@ -67,6 +67,7 @@ class Component(metaclass=ComponentType):
     _connectors: ClassVar[dict[str, ConnectorSpec]] = {}
     _states: ClassVar[dict[str, StateSpec]] = {}
     _laws: ClassVar[dict[str, Law]] = {}
+    _contacts: ClassVar[dict[str, Law]] = {}
 
     _parent: Component | None
     _name: str
@@ -342,6 +343,11 @@ class Component(metaclass=ComponentType):
     def laws(cls, kind: Kind) -> list[Law]:
         """Return the laws of one kind, in the order in which they are declared."""
         return [law for law in cls._laws.values() if law.kind == kind]
+
+    @classmethod
+    def contact_laws(cls) -> Mapping[str, Law]:
+        """Return the declared gaps and slips by name."""
+        return cls._contacts
 
     @classmethod
     def parameter_specs(cls) -> Mapping[str, ParameterSpec]:

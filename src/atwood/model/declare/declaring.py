@@ -14,6 +14,7 @@ from atwood.arguments import NAME, check, each, one_of, show
 from atwood.display import field_text
 from atwood.errors import DeclarationError, MissingNameError, ParameterError, near_matches, suggestion
 from atwood.model.declare.connectors import ConnectorSpec
+from atwood.model.declare.contact_laws import ContactLaw
 from atwood.model.declare.field_functions import StateSpec
 from atwood.model.declare.fields import MISSING, Field, ParameterSpec, SignalSpec
 from atwood.model.declare.laws import Law, ObservableOptions
@@ -74,6 +75,8 @@ def collect_declarations(cls: Any) -> None:
         if name in vars(cls):
             setattr(cls, name, check(kind, vars(cls)[name], name, cls.__name__, DeclarationError))
     for name, value in list(vars(cls).items()):
+        if isinstance(value, ContactLaw):
+            _declare_beside(cls, value)
         if hasattr(getattr(value, "fget", None) or getattr(value, "func", None), "_atwood_law"):
             advice = "A law is a method: leave out the property."
             raise DeclarationError("a property is no law", where=f"{cls.__name__}.{name}", advice=advice)
@@ -103,6 +106,27 @@ def collect_declarations(cls: Any) -> None:
     _check_reactions(cls)
 
 
+def _declare_beside(cls: Any, law: ContactLaw) -> None:
+    """Declare a one-sided law with its reaction and its state."""
+    cls._contacts[law.contact.name] = law.contact
+    for name, made in law.beside().items():
+        if name in vars(cls):
+            raise DeclarationError(
+                f"{name!r} is declared twice, once by {law.contact.name!r}",
+                where=cls.__name__,
+                advice="Give one of the two another name.",
+            )
+        check_reserved(cls, name)
+        setattr(cls, name, made)
+        if isinstance(made, StateSpec):
+            made.__set_name__(cls, name)
+            cls._states[name] = made
+            seen = ObservableOptions(made.unit.text, made.doc, False, "", law.contact.options.spaces)
+            cls._laws[name] = Law("observable", name, seen)
+        else:
+            cls._laws[name] = made._atwood_law
+
+
 def _check_reactions(cls: Any) -> None:
     """Refuse reactions with the name of a parameter, an input or a connector."""
     taken = {**cls._parameters, **cls._signals, **cls._connectors}
@@ -118,7 +142,7 @@ def _check_reactions(cls: Any) -> None:
 
 def _merge_inherited(cls: type) -> None:
     """Give a class what all its bases declare, in the order in which Python looks names up."""
-    for table in ("_parameters", "_signals", "_connectors", "_states", "_laws"):
+    for table in ("_parameters", "_signals", "_connectors", "_states", "_laws", "_contacts"):
         merged: dict[str, Any] = {}
         for base in reversed(cls.__mro__[1:]):
             merged.update(vars(base).get(table, {}))

@@ -52,6 +52,8 @@ Kind = Literal[
     "event",
     "derivative",
     "update",
+    "unilateral",
+    "friction",
 ]
 
 

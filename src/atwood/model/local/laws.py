@@ -31,6 +31,7 @@ from atwood.model.declare.law_results import (
 )
 from atwood.model.declare.laws import Law, scalars
 from atwood.model.local.bound import ParameterTable, bind_part
+from atwood.model.local.contacts import LocalContact, local_contacts, powers
 from atwood.model.local.flatten import FlatScene, Part
 from atwood.model.local.joint_coordinates import (
     JointCoordinateUse,
@@ -96,9 +97,12 @@ class _Laws:
     mode: str
     graph: Graph
 
+    def hold(self, law: Law) -> bool:
+        """Return whether a law holds here."""
+        return law.holds_in(self.space.name) and law.acts_in(self.mode)
+
     def of(self, kind: Any) -> list[Law]:
-        laws = self.part.component.laws(kind)
-        return [law for law in laws if law.holds_in(self.space.name) and law.acts_in(self.mode)]
+        return [law for law in self.part.component.laws(kind) if self.hold(law)]
 
     def scalars(self, bound: Any, kind: Any, only_in_modes: bool = False) -> tuple[Expression, ...]:
         """Return what laws give that return one number, where that is not zero."""
@@ -139,8 +143,10 @@ def _localize_part(
     formulas = formulas_of(part, bound, coordinates, graph) if space.is_spatial else {}
     # Only forces may read reactions: they are solved for together with the accelerations.
     binding = replace(binding, reactions=_readable_reactions(part, constraints, mode, space, graph))
+    contacts, pressing = local_contacts(part, binding, connectors, graph, laws.hold)
+    binding = replace(binding, reactions={**binding.reactions, **pressing})
     acting = bind(component, binding)
-    given = _forces_of(laws, acting)
+    given = _forces_of(laws, acting, contacts)
     acted = [*potentials, *lagrangians, *(graph.convert(one) for one in given.values)]
     acted += _linked_outputs(part, flat, acting, graph) if formulas else []
     turns = turns_read(part, formulas, acted)
@@ -164,10 +170,11 @@ def _localize_part(
         turns=turns,
         lagrangians=lagrangians,
         varying=find_varying(part.path, inertias, own, linked, graph),
-        reads=_multipliers_read(part, constraints, given.values, graph),
+        reads=_multipliers_read(part, constraints, contacts, given.values, graph),
         stand_ins=given.stand_ins,
         states=given.states,
         discrete_states=discrete_states(part, graph),
+        contacts=contacts,
     )
 
 
@@ -198,13 +205,14 @@ class _Forces(NamedTuple):
     values: list[Scalar]
 
 
-def _forces_of(laws: _Laws, acting: Any) -> _Forces:
-    """Evaluate the laws of a part that may read its reactions."""
+def _forces_of(laws: _Laws, acting: Any, contacts: Sequence[LocalContact]) -> _Forces:
+    """Evaluate the laws of a part that may read its reactions, with the forces of its gaps and slips."""
     part, graph = laws.part, laws.graph
     dissipations, given = laws.scalars(acting, "dissipation"), laws.listed(acting, "force")
     loads = tuple(one for one in given if isinstance(one, Load))
     stand_ins, along = _coordinate_loads(part, [one for one in given if isinstance(one, CoordinateLoad)], graph)
-    dissipations = (*dissipations, *along)
+    dissipations = (*dissipations, *along, *powers(contacts))
+    stand_ins |= {one.stand_in: one.force for one in contacts}
     states = local_states(part, laws.of("derivative"), acting, graph)
     values: list[Scalar] = [*dissipations, *(c for one in loads for c in one.components), *(x.rate for x in states)]
     return _Forces(dissipations, loads, stand_ins, states, [*values, *stand_ins.values()])
@@ -252,14 +260,19 @@ def _readable_reactions(
 
 
 def _multipliers_read(
-    part: Part, constraints: Sequence[LocalConstraint], forces: Sequence[Scalar], graph: Graph
+    part: Part,
+    constraints: Sequence[LocalConstraint],
+    contacts: Sequence[LocalContact],
+    forces: Sequence[Scalar],
+    graph: Graph,
 ) -> tuple[Expression, ...]:
-    """Return the multipliers of a part that its forces depend on."""
-    if not constraints or not forces:
+    """Return the multipliers of a part that its forces depend on, and those of its gaps and slips."""
+    if not (constraints or contacts) or not forces:
         return ()
     used = {node.index for node in live([graph.convert(one) for one in forces])}
-    own = (multiplier_symbol(graph, part.path, one.law.name, one.index) for one in constraints)
-    return tuple(symbol for symbol in own if symbol.index in used)
+    own = [multiplier_symbol(graph, part.path, one.law.name, one.index) for one in constraints]
+    own += [one.read for one in contacts]
+    return (*(symbol for symbol in own if symbol.index in used), *(one.multiplier for one in contacts))
 
 
 def _scalar(bound: Any, law: Law, graph: Graph) -> Expression:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from atwood.errors import DeclarationError, suggestion
 from atwood.expr import Expression, Graph
@@ -25,6 +25,9 @@ from atwood.model.declare.laws import Law, scalars
 from atwood.model.local.flatten import Part
 from atwood.model.values.rotation import Axes
 from atwood.model.values.space import Vector
+
+if TYPE_CHECKING:
+    from atwood.model.local.contacts import LocalContact
 
 
 @dataclass(frozen=True)
@@ -147,6 +150,8 @@ class LocalPart:
         Those of its inertias that change with time.
     switched
         Those of its potentials that act in some of its modes only.
+    contacts
+        Its gaps and slips.
     """
 
     part: Part
@@ -170,6 +175,7 @@ class LocalPart:
     stand_ins: Mapping[Expression, Expression] = field(default_factory=dict)
     states: tuple[LocalState, ...] = ()
     discrete_states: tuple[DiscreteState, ...] = ()
+    contacts: tuple[LocalContact, ...] = ()
 
     @property
     def asks(self) -> list[str]:

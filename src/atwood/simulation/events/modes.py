@@ -17,7 +17,7 @@ from atwood.forms.caches import Key
 from atwood.forms.quantities import known_program
 from atwood.integrators.protocol import StepResult
 from atwood.lazy_dataclasses import dataclass, replace
-from atwood.mechanics.outputs.event_functions import UPDATE, EventFunction, list_event_functions
+from atwood.mechanics.outputs.event_functions import CLOSES, CONTACT, UPDATE, EventFunction, list_event_functions
 from atwood.simulation.dynamics.orientation_coordinates import (
     COORDINATE_SWITCH,
     switch_functions,
@@ -35,6 +35,7 @@ _EVENT_FUNCTIONS: Key[tuple[EventFunction, ...]] = Key("event functions")
 _NEEDS: Key[_Needs] = Key("what event functions read")
 _EVENTS: Key[Program] = Key("events")
 _EVENT_CODE: Key[EventCode | None] = Key("machine code of events")
+_RATES: Key[Program] = Key("rates of gaps")
 _IS_THERE: Key[Program] = Key("whether an event is there")
 
 
@@ -54,6 +55,9 @@ class EventRecord:
         The mode it led to, or ``"stop"``; empty where no mode changed.
     impact
         Whether velocities jumped.
+    kind
+        ``"event"`` for one that a part declares. Of gaps and slips ``"impact"``, ``"closes"``, ``"opens"``, ``"slips"``,
+        ``"sticks"``, ``"reverses"`` (of a slip), ``"rests"`` (impacts have accumulated) or ``"jams"``.
     """
 
     time: float
@@ -62,6 +66,7 @@ class EventRecord:
     message: str
     target: str
     impact: bool
+    kind: str = "event"
 
     def describe(self) -> str:
         """Return what happened, where and when."""
@@ -171,7 +176,22 @@ class EventProbe:
         sided = np.array([one.target == SIDE for one in self.event_functions], dtype=np.bool_)
         # What has just passed zero, or will soon, is off by rounding.
         self.shift = np.where(sided & (values <= 0.0), 2.0 * np.abs(values) + _TINY, self.shift)
+        opening = self._opening(t, q, u, small) & (np.abs(values) <= small)
+        self.shift = np.where(opening, np.where(values > 0.0, 0.0, 2.0 * np.abs(values) + _TINY), self.shift)
+        happened &= ~opening
         self.broken = next((one for one, has in zip(self.event_functions, happened, strict=True) if has), None)
+
+    def _opening(self, t: float, q: FloatArray, u: FloatArray, small: FloatArray) -> BoolArray:
+        """Return which gaps are at zero and open with a speed: they need no margin."""
+        found = np.zeros(len(self.event_functions), dtype=np.bool_)
+        gaps = [(i, one.rate) for i, one in enumerate(self.event_functions) if one.target == CLOSES and one.rate is not None]
+        if gaps:
+            program = known_program(self.assembly, _RATES, lambda: [rate for _, rate in gaps])
+            idle = [0.0] * len(self.assembly.reactions)
+            rates = self.assembly.kernel(program)([t], q, u, np.zeros_like(u), idle)[0]
+            for (i, _), rate in zip(gaps, rates, strict=True):
+                found[i] = rate * self.plan.scales.time > small[i]
+        return found
 
     def follow(self, handed: tuple[int, ...]) -> None:
         """Take what the session before hands on; an event whose value has jumped has the sign that it has now.
@@ -277,7 +297,7 @@ class EventProbe:
     def changing(self, step: StepResult) -> list[EventRecord]:
         """Return what changes something when the driver reports events: the first, and further updates of states."""
         found = [self._record(step.t, one) for one in self._fired(step) if one.target]
-        return [one for i, one in enumerate(found) if i == 0 or one.target == UPDATE]
+        return [one for i, one in enumerate(found) if i == 0 or one.target in (UPDATE, *CONTACT)]
 
     def noted(self, step: StepResult) -> list[EventRecord]:
         """Return what changes nothing among what the driver reports."""

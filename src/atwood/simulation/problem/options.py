@@ -79,6 +79,8 @@ class RunOptions:
         The error of the motion that was asked for; tolerances are chosen for it.
     nominal
         Sizes of quantities by path, in place of the scene's own: their errors are relative to these.
+    impacts
+        ``"together"`` or ``"one_by_one"``: how several impacts at once are solved.
     """
 
     t_end: float
@@ -100,6 +102,7 @@ class RunOptions:
     accuracy: float | None = None
     nominal: Mapping[str, float] = field(default_factory=dict)
     first_step: float | None = None
+    impacts: str = "together"
 
     def out_of_time(self, t: float) -> str:
         """Return what is said of a run that its limit of time ended, at a time of its own."""

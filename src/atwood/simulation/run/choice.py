@@ -120,6 +120,8 @@ def choose(plan: SceneProblem, options: RunOptions, t: float, q: FloatArray, u: 
     assembly = plan.assembly
     if not len(q):
         return Choice(t, implicit_solver(), "nothing is free to move")
+    if assembly.own_equations.contacts:
+        return Choice(t, EXPLICIT.key, "gaps and slips hold and let go, on which its steps end", True)
     if assembly.form == "dae":
         return _choose_on_constraints(plan, options, t, q, u, "the dae form keeps constraints")
     if plan.balance.constraints:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Shared
 from atwood.integrators.protocol import Statistics
-from atwood.mechanics.outputs.event_functions import UPDATE
+from atwood.mechanics.outputs.event_functions import CLOSES, CONTACT, UPDATE
 from atwood.simulation.dynamics.numerical_failure import is_numerical, named, numerical_failure
 from atwood.simulation.dynamics.orientation_coordinates import (
     COORDINATE_SWITCH,
@@ -42,8 +43,8 @@ from atwood.simulation.run.stall_diagnosis import allowed, failed
 from atwood.stages import stage
 from atwood.topology.orientation_coordinates import Orientation
 
-_CHATTER = 50
-"""So many changes of mode without time passing end a run."""
+_CHATTER, _MOST_CONTACTS = 50, 2000
+"""So many changes of mode without time passing end a run, and so many of gaps and slips."""
 
 
 def run(
@@ -103,6 +104,10 @@ def _again(
     return _prepared(assembly, start, reassemble, options, between, log).go()
 
 
+_LEFT = 0.1
+"""Of the root of the tolerance, in units of the scene's time: so long may impacts still go on that are summed."""
+
+
 class _Walk:
     """The way of a run through its modes."""
 
@@ -137,6 +142,8 @@ class _Walk:
         self._handed: tuple[int, ...] = ()
         self.plan: SceneProblem | None = None
         self.ended: EventRecord | None = None
+        self._unsettled: tuple[EventRecord, ...] | None = ()
+        self._impacts: list[float] = []
         self.probe: EventProbe | None = None
         self.choice: Choice
 
@@ -176,11 +183,11 @@ class _Walk:
                 return self._finished_run(outcome.status, outcome.message, outcome)
             target = outcome.event.target
             self._sides.change(outcome.sides if target == SIDE else (), is_short)
-            if target not in (SIDE, COORDINATE_SWITCH):
+            if target not in (SIDE, COORDINATE_SWITCH, *CONTACT):
                 self.events += (outcome.event, *outcome.together)
             if target == "stop":
                 return self._finished_run("stopped", outcome.event.describe(), outcome)
-            if chatter > _CHATTER and target != SIDE:
+            if chatter > (_MOST_CONTACTS if target in CONTACT else _CHATTER) and target != SIDE:
                 endless = f"{outcome.event.part} changes its mode endlessly at t = {self.t:.9g}"
                 return self._finished_run("failed", endless, outcome)
             is_switch = target == COORDINATE_SWITCH
@@ -202,8 +209,8 @@ class _Walk:
         if self.ended is not None:
             assert self.plan is not None
             return Recorder(self.plan), Outcome(self.t, "event", "", self.statistics, (self.choice,), self.ended)
-        t, q, u = self.t, self.q, self.u
         self.prepare()
+        t, q, u = self.t, self.q, self.u
         assert self.plan is not None
         assert self.probe is not None
         limit = min(schedule.next(t, options.t_end), self.sampler.next(t, options.t_end))
@@ -244,7 +251,9 @@ class _Walk:
             if not self.segments and not options.structure and not has_states:
                 refuse_immobile(self.assembly, len(plan.assembly.own_equations.speeds) - plan.finding.rank, self.start)
             self._plans, self.probe, self._handed = {}, None, ()
-            self.choice = choose(plan, options, t, q, u)
+            plan = self._settled(plan, is_new=True)
+            self.choice = choose(plan, options, t, q, self.u)
+        plan, u = self._settled(plan), self.u
         sided = self._sides.on(self.assembly, plan, t, q, u)
         if sided is None:  # a relation stays where it changes
             self.plan = None
@@ -257,6 +266,58 @@ class _Walk:
         self.plan = plan
         self.probe.follow(self._handed)
         return None
+
+    def _settled(self, plan: SceneProblem, is_new: bool = False) -> SceneProblem:
+        """Return a plan with the states that gaps and slips have from now on, after impacts if there are any."""
+        triggers, self._unsettled = self._unsettled, None
+        if not plan.assembly.own_equations.contacts or (triggers is None and not is_new):
+            return plan
+        from atwood.simulation.contacts.changes import resolve
+
+        options, is_start = self.options, not self.segments
+        state, rests = (self.t, self.q, self.u), self._accumulates(triggers or (), plan.scales.time)
+        changed = resolve(
+            self.assembly,
+            state,
+            self.start.length,
+            plan.scales,
+            options.relative_tolerance,
+            triggers or (),
+            options.impacts == "one_by_one",
+            rests is not None,
+            is_start,
+        )
+        events = list(changed.events)
+        hit = next((one for one in events if one.kind == "impact"), None)
+        if hit is not None and rests is None:
+            self._impacts = [*self._impacts[-3:], self.t]
+        elif hit is not None and rests is not None:
+            said = "impacts have accumulated: it rests"
+            events = [one for one in events if one.kind not in ("impact", "closes")]
+            events.append(EventRecord(self.t + rests, hit.part, hit.law, said, "", True, "rests"))
+            self._impacts = []
+        self.events += events if not is_start else [one for one in events if one.impact]
+        self.impact |= any(one.impact for one in events)
+        self.u, self.held = changed.speeds, changed.held
+        self.assembly = self.assembly.with_held(self.held)
+        self.probe, self._plans, self._handed = None, {}, ()
+        return plan.in_piece(self._sides.like(self.assembly, plan))
+
+    def _accumulates(self, triggers: Sequence[EventRecord], time: float) -> float | None:
+        """Return in how long impacts that follow each other ever faster have come to an end; None if they do not.
+
+        Intervals that shrink by a factor r are a geometric series: what is left of it is the last one times r/(1 - r).
+        Places change by the square of that time, which is to be less than the tolerance.
+        """
+        times = [*self._impacts, self.t]
+        if len(times) < 4 or not any(one.target == CLOSES for one in triggers):
+            return None
+        first, second, third = (later - earlier for earlier, later in pairwise(times[-4:]))
+        if not first > second > third > 0.0:
+            return 0.0 if third == 0.0 else None
+        share = third / second
+        left = third * share / (1.0 - share)
+        return left if left < _LEFT * self.options.relative_tolerance**0.5 * time else None
 
     def _plan(self) -> SceneProblem:
         assembly = self._sides.in_pieces(self.assembly, self.t, self.q, self.u)
@@ -289,7 +350,7 @@ class _Walk:
 
     def _pass_time_event(self) -> None:
         """Go on with the relations of functions of time that hold after a time event."""
-        self._piece_start, before = self.t, self.assembly
+        self._piece_start, before, self._unsettled = self.t, self.assembly, ()
         self.assembly = self._in_piece(before)
         self.show = self.samples.shows(self.t)
         self._jump(before, show_both=True)
@@ -302,7 +363,7 @@ class _Walk:
 
     def _update(self, due: Sequence[int]) -> None:
         """Go on with what updates make of the state."""
-        before = self.assembly
+        before, self._unsettled = self.assembly, ()
         if self._known is not None and len(self.log) < len(self._known):
             made = self._known[len(self.log)]
         else:
@@ -345,7 +406,11 @@ class _Walk:
         event = outcome.event
         assert event is not None
         self.impact, self.show = event.impact, event.target != SIDE
-        if event.target in (UPDATE, SIDE):
+        self._unsettled = ()
+        if event.target in CONTACT:
+            self.q, self.u, self.probe = q, u, None
+            self._unsettled = tuple(one for one in (event, *outcome.together) if one.target in CONTACT)
+        elif event.target in (UPDATE, SIDE):
             self.q, self.u, self.probe = q, u, self.probe if event.target == UPDATE else None
         else:
             from atwood.simulation.events.mode_change import enter_mode

@@ -113,7 +113,9 @@ def open_session(
         solved = solved_loops(plan, t, *plan.program.split(y))
         if solved is not None:
             return ClosedLoopSession(request, method, t, y, solved, on_stiff, on_dead_centre)
-    if method.keeps_constraints and (plan.balance.constraints or plan.assembly.form == "dae"):
+    if method.keeps_constraints and (
+        plan.balance.constraints or plan.assembly.form == "dae" or plan.assembly.own_equations.contacts
+    ):
         session = method.open(_constrained_task(request, method, t, y, on_stiff))
     else:
         session = _open_tree(request, method, t, y, on_stiff)

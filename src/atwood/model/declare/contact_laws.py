@@ -1,0 +1,184 @@
+"""One-sided laws: what cannot be passed, and dry friction.
+
+A gap that must not be negative comes with a force that must not be negative, and one of both is zero (Signorini's law).
+What slides is held back by a force of the size of its limit, and what sticks by any force within it (Coulomb's law); see
+F. Pfeiffer and C. Glocker, *Multibody Dynamics with Unilateral Contacts* (1996), chapters 5 and 8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+from atwood.arguments import DOC, NAME, TEXT, each, either, number, one_of, takes
+from atwood.errors import DeclarationError, suggestion
+from atwood.lazy_dataclasses import dataclass
+from atwood.model.declare.field_functions import discrete_state
+from atwood.model.declare.laws import REACTION, Law, ObservableLaw, ObservableOptions
+from atwood.model.values.units import parse_si_unit
+
+if TYPE_CHECKING:
+    from atwood.model.declare.component import Component
+
+_SPACES = each(one_of(("line", "plane", "space")), "some of 'line', 'plane' and 'space'", 1)
+_NAMES = each(NAME, "names, as texts")
+_ALONG = {"N": "m", "N*m": "rad"}
+"""What a force of each unit acts along."""
+
+
+@dataclass(frozen=True)
+class UnilateralOptions:
+    """See `unilateral`."""
+
+    reaction: str
+    unit: str
+    restitution: str | float
+    impact_law: str
+    doc: str
+    modes: tuple[str, ...]
+    spaces: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class FrictionOptions:
+    """See `dry_friction`."""
+
+    reaction: str
+    unit: str
+    limit: str
+    static_limit: str
+    at: str
+    doc: str
+    modes: tuple[str, ...]
+    spaces: tuple[str, ...]
+
+
+class ContactLaw(ObservableLaw[Any]):
+    """A one-sided law in a class body: within a law its method, elsewhere the quantity that it returns."""
+
+    def __init__(self, function: Callable[[Any], Any], contact: Law, unit: str) -> None:
+        doc = (function.__doc__ or contact.options.doc).strip().partition("\n")[0]
+        seen = ObservableOptions(unit, doc, False, "", contact.options.spaces)
+        super().__init__(function, Law("observable", contact.name, seen))
+        self.contact = contact
+
+    def beside(self) -> dict[str, Any]:
+        """Return what a class gets besides: its reaction as a quantity, and its state."""
+        options, name = self.contact.options, self.contact.name
+        reaction = options.reaction
+
+        def read(component: Component) -> Any:
+            return component.reaction(reaction)
+
+        seen = ObservableOptions(options.unit, options.doc, False, "", options.spaces)
+        found: dict[str, Any] = {reaction: ObservableLaw(read, Law("observable", reaction, seen))}
+        if self.contact.kind == "unilateral":
+            return {**found, f"{name}_state": discrete_state(doc=f"1 where {name} is closed, else 0.")}
+        says = f"0 where nothing rubs, 1 where {name} goes on, 2 where it sticks."
+        along = f"Sign of {name} where it goes on, or of the way it goes next; else 0."
+        states = {f"{name}_state": discrete_state(doc=says), f"{name}_direction": discrete_state(doc=along)}
+        return {**found, **states}
+
+
+def _along(unit: str, rate: str) -> str:
+    parse_si_unit(unit)
+    if unit not in _ALONG:
+        raise DeclarationError(
+            f"a reaction is in {' or '.join(_ALONG)}, and {unit!r} is neither", advice=suggestion(unit, _ALONG)
+        )
+    return _ALONG[unit] + rate
+
+
+@takes(
+    DeclarationError,
+    reaction=REACTION,
+    unit=TEXT,
+    doc=DOC,
+    restitution=either(NAME, number("a number from 0 to 1", least=0.0, most=1.0)),
+    impact_law=one_of(("newton", "poisson")),
+    modes=_NAMES,
+    spaces=_SPACES,
+)
+def unilateral(
+    *,
+    reaction: str,
+    unit: str = "N",
+    doc: str,
+    restitution: str | float = 0.0,
+    impact_law: Literal["newton", "poisson"] = "newton",
+    modes: Sequence[str] = (),
+    spaces: Sequence[str] = ("line", "plane", "space"),
+) -> Callable[[Callable[[Any], Any]], ContactLaw]:
+    """Mark a method that returns a gap: what never becomes negative, from positions, angles and time.
+
+    Where the gap is zero a force keeps it so, which only pushes; where it opens there is none. Where it closes with a
+    speed, velocities jump. The gap, the force and `<name>_state` are quantities of the component.
+
+    Parameters
+    ----------
+    reaction
+        Name of the quantity that the force along the gap is reported as; it is never negative.
+    unit
+        Unit of the reaction: ``"N"`` for a gap in m, ``"N*m"`` for one in rad.
+    doc
+        One line of what the reaction is.
+    restitution
+        Share of the approach with which a gap opens again after an impact, a number or the name of a parameter.
+    impact_law
+        What restitution is a share of: of the speed of approach (Newton), or of the impulse until it has ended
+        (Poisson).
+    modes, spaces
+        The modes of the component and the spaces in which it holds; all modes when empty.
+    """
+    given = str(restitution) if isinstance(restitution, str) else float(restitution)
+    options = UnilateralOptions(reaction, unit, given, impact_law, doc, tuple(modes), tuple(spaces))
+    return lambda function: ContactLaw(function, Law("unilateral", function.__name__, options), _along(unit, ""))
+
+
+@takes(
+    DeclarationError,
+    reaction=REACTION,
+    unit=TEXT,
+    doc=DOC,
+    limit=NAME,
+    static_limit=TEXT,
+    at=TEXT,
+    modes=_NAMES,
+    spaces=_SPACES,
+)
+def dry_friction(
+    *,
+    reaction: str,
+    limit: str,
+    unit: str = "N",
+    doc: str,
+    static_limit: str = "",
+    at: str = "",
+    modes: Sequence[str] = (),
+    spaces: Sequence[str] = ("line", "plane", "space"),
+) -> Callable[[Callable[[Any], Any]], ContactLaw]:
+    """Mark a method that returns a slip: a speed that dry friction takes away, and then holds at zero.
+
+    Where it goes on, a force of the size of the limit acts against it. Where it is zero, it stays so as long as a force
+    within the limit can hold it. The slip, the force and `<name>_state` are quantities of the component.
+
+    Parameters
+    ----------
+    reaction
+        Name of the quantity that the force along the slip is reported as.
+    limit
+        Name of a method, or a parameter, that gives the largest force: from positions, velocities, states, inputs,
+        time and reactions of the component. Where it is zero or less nothing rubs.
+    unit
+        Unit of the reaction: ``"N"`` for a slip in m/s, ``"N*m"`` for one in rad/s.
+    doc
+        One line of what the reaction is.
+    static_limit
+        The same while it sticks; the limit when empty.
+    at
+        Name of the gap that must be closed for it to act; it acts always when empty.
+    modes, spaces
+        The modes of the component and the spaces in which it holds; all modes when empty.
+    """
+    options = FrictionOptions(reaction, unit, limit, static_limit, at, doc, tuple(modes), tuple(spaces))
+    return lambda function: ContactLaw(function, Law("friction", function.__name__, options), _along(unit, "/s"))

@@ -1,0 +1,174 @@
+"""One-sided laws of a part on its symbols: gaps and slips, their forces, and what switches these.
+
+A row ``g'' >= 0`` (a gap) or ``s' = 0`` (a slip that sticks) holds where its mask is one, and its multiplier is a force
+then; where the mask is zero so is the multiplier. What slides is an applied force, the limit times a sign. Masks and
+signs are discrete states, so that equations are derived once for all of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from atwood.errors import DeclarationError, UnsupportedError, suggestion
+from atwood.expr import Expression, Graph, Scalar, depends_on, jvp
+from atwood.lazy_dataclasses import dataclass, replace
+from atwood.model.declare.component import Binding, bind
+from atwood.model.declare.contact_laws import FrictionOptions
+from atwood.model.declare.law_results import call_law, finite_scalar
+from atwood.model.declare.laws import Law
+from atwood.model.local.flatten import Part
+from atwood.model.local.parts import LocalConnector, LocalConstraint, multiplier_symbol
+from atwood.model.values.space import cross
+
+
+@dataclass(frozen=True)
+class LocalContact:
+    """A gap, or a slip, on the symbols of its part.
+
+    Attributes
+    ----------
+    row
+        What stays zero where the mask is one.
+    multiplier, read
+        The symbol of the multiplier of that row, and what stands for it in limits.
+    mask
+        1 where the row holds, else 0.
+    force
+        The force along the gap or the slip.
+    rate
+        The rate of the gap; the slip itself.
+    stand_in
+        What stands for the force in the part's Rayleigh function ``-stand_in * rate``.
+    direction
+        The sign of a slip that goes on, else 0; None for a gap.
+    limit, static_limit
+        The largest force of friction, and that while it sticks; None for a gap.
+    restitution
+        Of a gap.
+    """
+
+    row: LocalConstraint
+    multiplier: Expression
+    read: Expression
+    mask: Expression
+    force: Expression
+    rate: Expression
+    stand_in: Expression
+    direction: Expression | None = None
+    limit: Expression | None = None
+    static_limit: Expression | None = None
+    restitution: Expression | None = None
+
+    @property
+    def law(self) -> Law:
+        """The law that declares it."""
+        return self.row.law
+
+    @property
+    def is_slip(self) -> bool:
+        """Whether it is a slip, and not a gap."""
+        return self.limit is not None
+
+
+def local_contacts(
+    part: Part,
+    binding: Binding,
+    connectors: Mapping[str, LocalConnector],
+    graph: Graph,
+    holds: Callable[[Law], bool],
+) -> tuple[tuple[LocalContact, ...], dict[str, Scalar]]:
+    """Return the gaps and slips of a part, and their reactions by name as other laws of the part read them."""
+    laws = [law for law in part.component.contact_laws().values() if holds(law)]
+    gaps = [_gap(part, law, binding, connectors, graph) for law in laws if law.kind == "unilateral"]
+    pressing = {one.row.reaction: one.mask * one.read for one in gaps}
+    bound = bind(part.component, replace(binding, reactions={**binding.reactions, **pressing}))
+    slips = [_slip(part, law, bound, connectors, graph) for law in laws if law.kind == "friction"]
+    return (*gaps, *slips), {one.row.reaction: one.force for one in (*gaps, *slips)}
+
+
+def _value(part: Part, law: Law, bound: Any, name: str, graph: Graph) -> Expression:
+    def evaluated() -> Expression:
+        given = getattr(bound, name)
+        return finite_scalar(graph, given() if callable(given) else given)
+
+    found: Expression = call_law(part.path, law, evaluated)
+    return found
+
+
+def _gap(
+    part: Part, law: Law, binding: Binding, connectors: Mapping[str, LocalConnector], graph: Graph
+) -> LocalContact:
+    bound = bind(part.component, binding)
+    value = _value(part, law, bound, law.name, graph)
+    if depends_on(value, [symbol for one in connectors.values() for symbol in (*one.velocity, *one.spin)]):
+        raise UnsupportedError(
+            "a gap is read from positions, angles and time, and this one reads velocities",
+            where=f"{part.path}.{law.name}",
+            advice="Return the gap itself; its rate is found by differentiation.",
+        )
+    given = law.options.restitution
+    share = graph.convert(given) if not isinstance(given, str) else _named(part, law, bound, given, graph)
+    mask = graph.convert(getattr(bound, f"{law.name}_state"))
+    multiplier, read, stand_in = _symbols(part, law, graph)
+    (rate,) = jvp([value], _rates_of_places(connectors, graph.convert(binding.time)))
+    row = LocalConstraint(law, 0, value, law.options.reaction, 1.0)
+    return LocalContact(row, multiplier, read, mask, mask * multiplier, rate, stand_in, restitution=share)
+
+
+def _slip(
+    part: Part, law: Law, bound: Any, connectors: Mapping[str, LocalConnector], graph: Graph
+) -> LocalContact:
+    options: FrictionOptions = law.options
+    value = _value(part, law, bound, law.name, graph)
+    limit = _named(part, law, bound, options.limit, graph)
+    static = _named(part, law, bound, options.static_limit, graph) if options.static_limit else limit
+    if options.at and options.at not in part.component.contact_laws():
+        raise DeclarationError(
+            f"it acts at {options.at!r}, which is no gap of the component",
+            where=f"{part.path}.{law.name}",
+            advice=suggestion(options.at, [x.name for x in part.component.contact_laws().values() if x is not law]),
+        )
+    state, sign = (graph.convert(getattr(bound, f"{law.name}_{word}")) for word in ("state", "direction"))
+    mask = 0.5 * state * (state - 1.0)  # 1 for the state 2, in which it sticks
+    multiplier, read, stand_in = _symbols(part, law, graph)
+    force = mask * multiplier - sign * limit
+    row = LocalConstraint(law, 0, value, options.reaction, 1.0)
+    return LocalContact(row, multiplier, read, mask, force, value, stand_in, sign, limit, static)
+
+
+def _named(part: Part, law: Law, bound: Any, name: str, graph: Graph) -> Expression:
+    """Return what a method, or a parameter, of the component gives that a law names."""
+    if not hasattr(type(part.component), name):
+        known = [*part.component.parameter_specs(), *(x for x in vars(type(part.component)) if not x.startswith("_"))]
+        raise DeclarationError(
+            f"it names {name!r}, which the component does not have",
+            where=f"{part.path}.{law.name}",
+            advice=suggestion(name, known),
+        )
+    return _value(part, law, bound, name, graph)
+
+
+def _symbols(part: Part, law: Law, graph: Graph) -> tuple[Expression, Expression, Expression]:
+    multiplier = multiplier_symbol(graph, part.path, law.name, 0)
+    return multiplier, graph.symbol(f"read:{multiplier.name}"), graph.symbol(f"contact:{part.path}.{law.name}")
+
+
+def _rates_of_places(
+    connectors: Mapping[str, LocalConnector], time: Expression
+) -> dict[Expression, Expression | float]:
+    """Return the rate of each symbol that says where connectors are, and of time."""
+    along: dict[Expression, Expression | float] = {time: 1.0}
+    for one in connectors.values():
+        along.update(zip(one.position, one.velocity, strict=True))
+        if one.angle is not None and one.angular_speed is not None:
+            along[one.angle] = one.angular_speed
+        if one.axes is not None and one.angular_velocity is not None:
+            for axis in one.axes:
+                along.update(zip(axis, cross(one.angular_velocity, axis), strict=True))
+    return along
+
+
+def powers(contacts: Sequence[LocalContact]) -> tuple[Expression, ...]:
+    """Return the Rayleigh functions whose derivatives by velocities are the forces, with stand-ins for their sizes."""
+    return tuple(-(one.stand_in * one.rate) for one in contacts)

@@ -1,0 +1,220 @@
+"""Gaps and slips of a scene in numbers, in maximal coordinates, in which every joint has its forces.
+
+A unit force along a row i makes accelerations ``X_i``, with the joints holding: ``M X_i - G^T y_i = J_i^T``,
+``G X_i = 0``. So the rows move by ``b + A f`` with ``A = J X`` (C. Glocker, *Set-Valued Force Laws*, 2001, section 5.3).
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from atwood.arrays import BoolArray, FloatArray
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, substitute
+from atwood.forms.assembly import Assembly
+from atwood.forms.caches import Key
+from atwood.forms.program import state_groups
+from atwood.lazy_dataclasses import dataclass
+from atwood.mechanics.dynamics.equations import ContactRow
+from atwood.numerics.matrices import least_norm, to_array
+from atwood.numerics.contact_sets import Rows
+from atwood.simulation.dynamics.balance import balance_of, bordered
+from atwood.simulation.dynamics.reactions import maximal_state
+from atwood.simulation.dynamics.scales import motion_scales
+
+_PROGRAM: Key[_Program] = Key("gaps and slips")
+_LIGHT = 1e-12
+"""A body that is lighter than the heaviest one by more is rounding of its mass matrix."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Program:
+    """The program of (t, q, u, multipliers that limits read), and the pattern of its matrices."""
+
+    program: Program
+    rows: tuple[int, ...]
+    columns: tuple[int, ...]
+    read: tuple[Expression, ...]
+    shares: tuple[tuple[tuple[int, int], ...], tuple[tuple[int, int], ...]]
+
+
+def contacts_of(assembly: Assembly) -> tuple[ContactRow, ...]:
+    """Return the gaps and slips of a scene."""
+    return assembly.own_equations.contacts
+
+
+def _program(assembly: Assembly) -> _Program:
+    equations, graph = assembly.maximal, assembly.maximal.graph
+    contacts = equations.contacts
+    rates = [one.row.rate for one in contacts]
+    slopes = jacobian(rates, list(equations.speeds))
+    at_rest = dict.fromkeys(equations.accelerations, graph.zero)
+    seconds = substitute([one.row.second for one in contacts], at_rest)
+    none = graph.zero
+    limits = [none if one.limit is None else one.limit for one in contacts]
+    static = [none if one.static_limit is None else one.static_limit for one in contacts]
+    own = [one.read for one in contacts]
+    read = tuple(x for x in (*own, *equations.multipliers) if depends_on_any([*limits, *static], x))
+    found = [jacobian(some, list(read)) for some in (limits, static)]
+    values = [none if one.row.value is None else one.row.value for one in contacts]
+    outputs = (
+        OutputGroup("values", tuple(values)),
+        OutputGroup("rates", tuple(rates)),
+        OutputGroup("slopes", tuple(slopes.entries)),
+        OutputGroup("seconds", tuple(seconds)),
+        OutputGroup("limits", tuple(limits)),
+        OutputGroup("static limits", tuple(static)),
+        OutputGroup("shares", tuple(found[0].entries)),
+        OutputGroup("static shares", tuple(found[1].entries)),
+        OutputGroup("restitution", tuple(none if one.restitution is None else one.restitution for one in contacts)),
+    )
+    groups = (*state_groups(equations), InputGroup("read", read))
+    places = tuple(tuple(zip(one.rows, one.columns, strict=True)) for one in found)
+    program = Program("gaps and slips", groups, assembly.parameters, outputs)
+    return _Program(program, slopes.rows, slopes.columns, read, (places[0], places[1]))
+
+
+def depends_on_any(values: list[Expression], symbol: Expression) -> bool:
+    """Return whether one of some values depends on a symbol."""
+    return any(depends_on(value, [symbol]) for value in values)
+
+
+class ContactValues:
+    """Gaps and slips at a state.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    t, q, u
+        The state in the coordinates of its form.
+    length
+        Extent of the scene, m.
+    """
+
+    def __init__(self, assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length: float) -> None:
+        self.assembly, self.t = assembly, t
+        self.contacts = assembly.maximal.contacts
+        self.q, self.u = (x[:, 0] for x in maximal_state(assembly, np.array([t]), q[:, None], u[:, None]))
+        self.sizes = motion_scales(assembly.maximal, length)
+        self._made = assembly.shared.get(_PROGRAM, lambda: _program(assembly))
+        self._kernel = assembly.kernel(self._made.program)
+        self.read = np.zeros(len(self._made.read))
+        self._take(self.u)
+
+    def _take(self, u: FloatArray) -> None:
+        found = [np.asarray(x, dtype=float) for x in self._kernel([self.t], self.q, u, self.read)]
+        self.values, self.rates, slopes, self.seconds, self.limits, self.static_limits, *_ = found
+        self.restitution = found[8]
+        self.slopes = np.zeros((len(self.contacts), len(u)))
+        self.slopes[self._made.rows, self._made.columns] = slopes
+        self._shares = found[6], found[7]
+
+    @property
+    def is_slip(self) -> BoolArray:
+        """Whether each row is a slip."""
+        return np.array([one.is_slip for one in self.contacts], dtype=np.bool_)
+
+    @cached_property
+    def gap_of(self) -> tuple[int, ...]:
+        """For each slip the row of its gap; -1 for what has none."""
+        places = {one.row.key[:2]: i for i, one in enumerate(self.contacts)}
+        found = []
+        for one in self.contacts:
+            at = one.law.options.at if one.is_slip else ""
+            found.append(places.get((one.row.key[0], at), -1) if at else -1)
+        return tuple(found)
+
+    @cached_property
+    def _solved(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Accelerations without these forces, those by a unit of each, and the multipliers of joints likewise."""
+        assembly = self.assembly
+        held = dict(zip((one.path for one in assembly.discrete_states), _held(assembly), strict=True))
+        for one in self.contacts:
+            held |= dict.fromkeys(state_paths(one), 0.0)
+        loose = assembly.with_held([held[one.path] for one in assembly.discrete_states])
+        now = balance_of(loose, "dae").at(self.t, self.q, self.u)
+        mass, held_by = to_array(now.mass), to_array(now.jacobian)
+        n, m = len(self.u), len(held_by)
+        rows = np.max(np.abs(held_by * self.sizes), axis=1, initial=0.0)
+        rows = np.where(rows > 0.0, rows, 1.0)
+        heavy = self.sizes[:, None] * mass * self.sizes
+        unit = float(np.max(np.abs(heavy), initial=0.0)) or 1.0
+        matrix = bordered(heavy / unit, held_by * self.sizes / rows[:, None])
+        right = np.zeros((n + m, 1 + len(self.contacts)))
+        right[:n, 0], right[n:, 0] = -now.bias * self.sizes / unit, -now.gamma / rows
+        right[:n, 1:] = (self.slopes * self.sizes).T / unit
+        found = least_norm(matrix, right, errors=_LIGHT)
+        moved, borne = found[:n] * self.sizes[:, None], found[n:] * unit / rows[:, None]
+        return moved[:, 0], moved[:, 1:], borne[:, 0], borne[:, 1:]
+
+    @property
+    def response(self) -> FloatArray:
+        """A: how the rows move by a unit of each force."""
+        return self.slopes @ self._solved[1]
+
+    def accelerations(self) -> FloatArray:
+        """Return how the rows accelerate without these forces."""
+        return self.slopes @ self._solved[0] + self.seconds
+
+    def speeds_by(self, forces: FloatArray) -> FloatArray:
+        """Return the change of speeds, or the accelerations, that impulses, or forces, make."""
+        return self._solved[1] @ forces
+
+    def limits_at(self, forces: FloatArray) -> tuple[FloatArray, ...]:
+        """Return limits, static limits and their derivatives by the forces, where the rows have some forces.
+
+        Limits are ``L(f) = L_0 + P f`` near these: L_0 and P of both.
+        """
+        contacts, borne, by = self.contacts, self._solved[2], self._solved[3]
+        count = len(contacts)
+        own = {one.read: i for i, one in enumerate(contacts)}
+        number = {symbol: i for i, symbol in enumerate(self.assembly.maximal.multipliers)}
+        ways, rest = np.zeros((len(self._made.read), count)), np.zeros(len(self._made.read))
+        for k, symbol in enumerate(self._made.read):
+            if symbol in own:
+                ways[k, own[symbol]] = 1.0
+            else:
+                ways[k], rest[k] = by[number[symbol]], borne[number[symbol]]
+        self.read = rest + ways @ forces
+        self._take(self.u)
+        found: list[FloatArray] = []
+        for limits, entries, places in zip(
+            (self.limits, self.static_limits), self._shares, self._made.shares, strict=True
+        ):
+            slopes = np.zeros((count, len(self.read)))
+            for (r, c), entry in zip(places, entries, strict=True):
+                slopes[r, c] = entry
+            shares = slopes @ ways
+            found += [limits - shares @ forces, shares]
+        return tuple(found)
+
+    def rows(self, chosen: list[int], free: FloatArray, given: FloatArray, limits: tuple[FloatArray, ...]) -> Rows:
+        """Return what is asked of some rows."""
+        place = {row: i for i, row in enumerate(chosen)}
+        inside = np.ix_(chosen, chosen)
+        first, shares, static, static_shares = limits
+        return Rows(
+            self.response[inside],
+            free[chosen],
+            first[chosen],
+            shares[inside],
+            static[chosen],
+            static_shares[inside],
+            self.is_slip[chosen],
+            given[chosen],
+            tuple(place.get(self.gap_of[row], -1) for row in chosen),
+        )
+
+
+def _held(assembly: Assembly) -> tuple[float, ...]:
+    return assembly.held_at_start if assembly.held is None else assembly.held
+
+
+def state_paths(one: ContactRow) -> tuple[str, ...]:
+    """Return the paths of the discrete states of a gap, or of a slip."""
+    part, law, _ = one.row.key
+    return (f"{part}.{law}_state", f"{part}.{law}_direction") if one.is_slip else (f"{part}.{law}_state",)
+
+
