@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from atwood.expr import Expression, Graph, substitute
+from atwood.expr import Expression, Graph, sqrt, substitute
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Mechanism
@@ -106,7 +106,7 @@ def _of_contacts(equations: Equations) -> list[EventFunction]:
     found: list[EventFunction] = []
     for one in equations.contacts:
         (part, law, _), unit = one.row.key, one.law.options.unit
-        along = {"N": "m", "N*m": "rad"}[unit]
+        of = {"N": "m", "N*m": "rad"}[unit]
 
         def watch(target: str, value: Expression, unit: str, message: str, rate: Expression | None = None) -> None:
             (placed,) = substitute([value], dict(equations.read))
@@ -115,21 +115,34 @@ def _of_contacts(equations: Equations) -> list[EventFunction]:
         if one.direction is None:
             assert one.row.value is not None
             rest = 1.0 - one.mask
-            watch(CLOSES, rest * one.row.value + one.mask, along, "the gap closes", one.row.rate)
+            watch(CLOSES, rest * one.row.value + one.mask, of, "the gap closes", one.row.rate)
             watch(OPENS, one.mask * one.row.multiplier + rest, unit, "the gap opens")
             continue
         assert one.limit is not None
         assert one.static_limit is not None
-        loose = 1.0 - one.mask
-        for sign in (1.0, -1.0):
-            reserve = one.static_limit - sign * one.row.multiplier
+        if one.row.key[2]:
+            continue  # the second of two directions
+        loose, pair = 1.0 - one.mask, [x for x in equations.contacts if x.row.key[:2] == one.row.key[:2]]
+        sides = [x.direction for x in pair if x.direction is not None]
+        if len(pair) == 1:
+            reserves = [one.static_limit - one.row.multiplier, one.static_limit + one.row.multiplier]
+        else:
+            reserves = [one.static_limit - norm_of([x.row.multiplier for x in pair])]
+        for reserve in reserves:
             watch(YIELDS, one.mask * reserve + loose, unit, "what sticks begins to slip")
-        turned = one.direction * one.row.rate + (1.0 - one.direction * one.direction)
-        watch(STOPS, turned, f"{along}/s", "what slips comes to rest")
+        zero = one.mask.graph.zero
+        acts = sum((side * side for side in sides), zero)
+        along = sum((side * x.row.rate for side, x in zip(sides, pair, strict=True)), zero)
+        watch(STOPS, acts * along + (1.0 - acts), f"{of}/s", "what slips comes to rest")
         if not one.law.options.at:
-            held = 1.0 - (1.0 - one.mask) * (1.0 - one.direction * one.direction)
+            held = 1.0 - (1.0 - one.mask) * (1.0 - acts)
             watch(FREES, (2.0 * held - 1.0) * one.limit, unit, "the limit of friction passes zero")
     return found
+
+
+def norm_of(values: Sequence[Expression]) -> Expression:
+    """Return the root of the sum of squares."""
+    return sqrt(sum((one * one for one in values[1:]), values[0] * values[0]))
 
 
 def _evaluated(graph: Graph, bound: Any, law: Law) -> Expression:

@@ -30,7 +30,7 @@ _ALONG = {"N": "m", "N*m": "rad"}
 class UnilateralOptions:
     """See `unilateral`."""
 
-    reaction: str
+    reactions: tuple[str, ...]
     unit: str
     restitution: str | float
     impact_law: str
@@ -43,7 +43,7 @@ class UnilateralOptions:
 class FrictionOptions:
     """See `dry_friction`."""
 
-    reaction: str
+    reactions: tuple[str, ...]
     unit: str
     limit: str
     static_limit: str
@@ -57,27 +57,44 @@ class ContactLaw(ObservableLaw[Any]):
     """A one-sided law in a class body: within a law its method, elsewhere the quantity that it returns."""
 
     def __init__(self, function: Callable[[Any], Any], contact: Law, unit: str) -> None:
-        doc = (function.__doc__ or contact.options.doc).strip().partition("\n")[0]
-        seen = ObservableOptions(unit, doc, False, "", contact.options.spaces)
-        super().__init__(function, Law("observable", contact.name, seen))
+        self.unit, self.says = unit, (function.__doc__ or contact.options.doc).strip().partition("\n")[0]
+        super().__init__(function, Law("observable", contact.name, self._seen(unit, self.says, contact)))
         self.contact = contact
 
+    @staticmethod
+    def _seen(unit: str, doc: str, contact: Law) -> ObservableOptions:
+        return ObservableOptions(unit, doc, False, "", contact.options.spaces)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of its values: numbered where there are two."""
+        name, count = self.contact.name, len(self.contact.options.reactions)
+        return (name,) if count == 1 else tuple(f"{name}_{i + 1}" for i in range(count))
+
     def beside(self) -> dict[str, Any]:
-        """Return what a class gets besides: its reaction as a quantity, and its state."""
+        """Return what a class gets besides: its reactions and values as quantities, and its states."""
         options, name = self.contact.options, self.contact.name
-        reaction = options.reaction
-
-        def read(component: Component) -> Any:
-            return component.reaction(reaction)
-
-        seen = ObservableOptions(options.unit, options.doc, False, "", options.spaces)
-        found: dict[str, Any] = {reaction: ObservableLaw(read, Law("observable", reaction, seen))}
+        found: dict[str, Any] = {}
+        for reaction in options.reactions:
+            law = Law("observable", reaction, self._seen(options.unit, options.doc, self.contact))
+            found[reaction] = ObservableLaw(_reaction_of(reaction), law)
+        if len(self.names) > 1:
+            for i, one in enumerate(self.names):
+                law = Law("observable", one, self._seen(self.unit, self.says, self.contact))
+                found[one] = ObservableLaw(_element(name, i), law)
         if self.contact.kind == "unilateral":
             return {**found, f"{name}_state": discrete_state(doc=f"1 where {name} is closed, else 0.")}
-        says = f"0 where nothing rubs, 1 where {name} goes on, 2 where it sticks."
-        along = f"Sign of {name} where it goes on, or of the way it goes next; else 0."
-        states = {f"{name}_state": discrete_state(doc=says), f"{name}_direction": discrete_state(doc=along)}
-        return {**found, **states}
+        found[f"{name}_state"] = discrete_state(doc=f"0 where nothing rubs, 1 where {name} goes on, 2 where it sticks.")
+        says = f"Direction in which {name} goes on; 0 where it does not."
+        return {**found, **{f"{one}_direction": discrete_state(doc=says) for one in self.names}}
+
+
+def _reaction_of(name: str) -> Callable[[Component], Any]:
+    return lambda component: component.reaction(name)
+
+
+def _element(name: str, number: int) -> Callable[[Component], Any]:
+    return lambda component: getattr(component, name)()[number]
 
 
 def _along(unit: str, rate: str) -> str:
@@ -131,13 +148,13 @@ def unilateral(
         The modes of the component and the spaces in which it holds; all modes when empty.
     """
     given = str(restitution) if isinstance(restitution, str) else float(restitution)
-    options = UnilateralOptions(reaction, unit, given, impact_law, doc, tuple(modes), tuple(spaces))
+    options = UnilateralOptions((reaction,), unit, given, impact_law, doc, tuple(modes), tuple(spaces))
     return lambda function: ContactLaw(function, Law("unilateral", function.__name__, options), _along(unit, ""))
 
 
 @takes(
     DeclarationError,
-    reaction=REACTION,
+    reaction=each(REACTION, "one or two names of letters, digits and _", 1),
     unit=TEXT,
     doc=DOC,
     limit=NAME,
@@ -148,7 +165,7 @@ def unilateral(
 )
 def dry_friction(
     *,
-    reaction: str,
+    reaction: str | Sequence[str],
     limit: str,
     unit: str = "N",
     doc: str,
@@ -157,7 +174,7 @@ def dry_friction(
     modes: Sequence[str] = (),
     spaces: Sequence[str] = ("line", "plane", "space"),
 ) -> Callable[[Callable[[Any], Any]], ContactLaw]:
-    """Mark a method that returns a slip: a speed that dry friction takes away, and then holds at zero.
+    """Mark a method that returns a slip: a speed, or two, that dry friction takes away, and then holds at zero.
 
     Where it goes on, a force of the size of the limit acts against it. Where it is zero, it stays so as long as a force
     within the limit can hold it. The slip, the force and `<name>_state` are quantities of the component.
@@ -165,7 +182,8 @@ def dry_friction(
     Parameters
     ----------
     reaction
-        Name of the quantity that the force along the slip is reported as.
+        Name of the quantity that the force along the slip is reported as; two where the method returns two speeds, in
+        directions that are square to each other: the size of both together is limited then (a cone).
     limit
         Name of a method, or a parameter, that gives the largest force: from positions, velocities, states, inputs,
         time and reactions of the component. Where it is zero or less nothing rubs.
@@ -180,5 +198,8 @@ def dry_friction(
     modes, spaces
         The modes of the component and the spaces in which it holds; all modes when empty.
     """
-    options = FrictionOptions(reaction, unit, limit, static_limit, at, doc, tuple(modes), tuple(spaces))
+    names = (reaction,) if isinstance(reaction, str) else tuple(reaction)
+    if len(names) > 2:
+        raise DeclarationError(f"a slip has one direction or two, not {len(names)}", advice="Declare several slips.")
+    options = FrictionOptions(names, unit, limit, static_limit, at, doc, tuple(modes), tuple(spaces))
     return lambda function: ContactLaw(function, Law("friction", function.__name__, options), _along(unit, "/s"))

@@ -75,8 +75,6 @@ def collect_declarations(cls: Any) -> None:
         if name in vars(cls):
             setattr(cls, name, check(kind, vars(cls)[name], name, cls.__name__, DeclarationError))
     for name, value in list(vars(cls).items()):
-        if isinstance(value, ContactLaw):
-            _declare_beside(cls, value)
         if hasattr(getattr(value, "fget", None) or getattr(value, "func", None), "_atwood_law"):
             advice = "A law is a method: leave out the property."
             raise DeclarationError("a property is no law", where=f"{cls.__name__}.{name}", advice=advice)
@@ -95,6 +93,8 @@ def collect_declarations(cls: Any) -> None:
             cls._connectors[name] = value
         elif isinstance(law, Law):
             cls._laws[name] = law
+            if isinstance(value, ContactLaw):
+                _declare_beside(cls, value)
         elif name in cls._parameters:
             changed = _with_checked_default(cls._parameters[name].with_default(value), cls)
             cls._parameters[name] = changed
@@ -109,6 +109,8 @@ def collect_declarations(cls: Any) -> None:
 def _declare_beside(cls: Any, law: ContactLaw) -> None:
     """Declare a one-sided law with its reaction and its state."""
     cls._contacts[law.contact.name] = law.contact
+    if len(law.names) > 1:
+        del cls._laws[law.contact.name]  # its values are quantities, each by itself
     for name, made in law.beside().items():
         if name in vars(cls):
             raise DeclarationError(

@@ -11,12 +11,12 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from atwood.errors import DeclarationError, UnsupportedError, suggestion
-from atwood.expr import Expression, Graph, Scalar, depends_on, jvp
+from atwood.expr import Expression, Graph, Scalar, absolute, depends_on, jvp, select, sqrt
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.declare.component import Binding, bind
 from atwood.model.declare.contact_laws import FrictionOptions
-from atwood.model.declare.law_results import call_law, finite_scalar
-from atwood.model.declare.laws import Law
+from atwood.model.declare.law_results import call_law, finite_scalar, one_scalar
+from atwood.model.declare.laws import Law, scalars
 from atwood.model.local.flatten import Part
 from atwood.model.local.parts import LocalConnector, LocalConstraint, multiplier_symbol
 from atwood.model.values.space import cross
@@ -83,7 +83,7 @@ def local_contacts(
     gaps = [_gap(part, law, binding, connectors, graph) for law in laws if law.kind == "unilateral"]
     pressing = {one.row.reaction: one.mask * one.read for one in gaps}
     bound = bind(part.component, replace(binding, reactions={**binding.reactions, **pressing}))
-    slips = [_slip(part, law, bound, connectors, graph) for law in laws if law.kind == "friction"]
+    slips = [one for law in laws if law.kind == "friction" for one in _slip(part, law, bound, graph)]
     return (*gaps, *slips), {one.row.reaction: one.force for one in (*gaps, *slips)}
 
 
@@ -112,15 +112,20 @@ def _gap(
     mask = graph.convert(getattr(bound, f"{law.name}_state"))
     multiplier, read, stand_in = _symbols(part, law, graph)
     (rate,) = jvp([value], _rates_of_places(connectors, graph.convert(binding.time)))
-    row = LocalConstraint(law, 0, value, law.options.reaction, 1.0)
+    row = LocalConstraint(law, 0, value, law.options.reactions[0], 1.0)
     return LocalContact(row, multiplier, read, mask, mask * multiplier, rate, stand_in, restitution=share)
 
 
-def _slip(
-    part: Part, law: Law, bound: Any, connectors: Mapping[str, LocalConnector], graph: Graph
-) -> LocalContact:
+def _slip(part: Part, law: Law, bound: Any, graph: Graph) -> list[LocalContact]:
     options: FrictionOptions = law.options
-    value = _value(part, law, bound, law.name, graph)
+    names = options.reactions
+    values = call_law(
+        part.path, law, lambda: [one_scalar(graph, one) for one in scalars(getattr(bound, law.name)())]
+    )
+    if len(values) != len(names):
+        raise DeclarationError(
+            f"it returns {len(values)} scalars and names {len(names)} reactions", where=f"{part.path}.{law.name}"
+        )
     limit = _named(part, law, bound, options.limit, graph)
     static = _named(part, law, bound, options.static_limit, graph) if options.static_limit else limit
     if options.at and options.at not in part.component.contact_laws():
@@ -129,12 +134,38 @@ def _slip(
             where=f"{part.path}.{law.name}",
             advice=suggestion(options.at, [x.name for x in part.component.contact_laws().values() if x is not law]),
         )
-    state, sign = (graph.convert(getattr(bound, f"{law.name}_{word}")) for word in ("state", "direction"))
+    state = graph.convert(getattr(bound, f"{law.name}_state"))
+    numbered = [law.name] if len(names) == 1 else [f"{law.name}_{i + 1}" for i in range(len(names))]
+    held = [graph.convert(getattr(bound, f"{one}_direction")) for one in numbered]
     mask = 0.5 * state * (state - 1.0)  # 1 for the state 2, in which it sticks
-    multiplier, read, stand_in = _symbols(part, law, graph)
-    force = mask * multiplier - sign * limit
-    row = LocalConstraint(law, 0, value, options.reaction, 1.0)
-    return LocalContact(row, multiplier, read, mask, force, value, stand_in, sign, limit, static)
+    found = []
+    for i, (name, value, way) in enumerate(zip(names, values, _ways(values, held), strict=True)):
+        multiplier, read, stand_in = _symbols(part, law, graph, i)
+        force = mask * multiplier - way * limit
+        row = LocalConstraint(law, i, value, name, 1.0)
+        found.append(LocalContact(row, multiplier, read, mask, force, value, stand_in, held[i], limit, static))
+    return found
+
+
+_TINY = 1e-150
+"""Of the direction that is held: where nothing goes on yet, friction is against the way it goes next."""
+
+
+def _ways(values: Sequence[Expression], held: Sequence[Expression]) -> list[Expression]:
+    """Return the unit vector of a slip, which goes on smoothly where the slip passes zero against what is held.
+
+    One that comes to rest does so along the direction that is held, and the step in which it does goes beyond: there
+    the direction is mirrored, so that the force is as smooth as before.
+    """
+    if len(values) == 1:
+        return list(held)
+    zero = values[0].graph.zero
+    along = sum((v * e for v, e in zip(values, held, strict=True)), zero)
+    back = absolute(along) - along
+    turned = [v + (back + _TINY) * e for v, e in zip(values, held, strict=True)]
+    size = sqrt(sum((one * one for one in turned), zero))
+    acts = sum((e * e for e in held), zero)
+    return [acts * select(size > 0.0, one / select(size > 0.0, size, 1.0), e) for one, e in zip(turned, held, strict=True)]
 
 
 def _named(part: Part, law: Law, bound: Any, name: str, graph: Graph) -> Expression:
@@ -149,9 +180,9 @@ def _named(part: Part, law: Law, bound: Any, name: str, graph: Graph) -> Express
     return _value(part, law, bound, name, graph)
 
 
-def _symbols(part: Part, law: Law, graph: Graph) -> tuple[Expression, Expression, Expression]:
-    multiplier = multiplier_symbol(graph, part.path, law.name, 0)
-    return multiplier, graph.symbol(f"read:{multiplier.name}"), graph.symbol(f"contact:{part.path}.{law.name}")
+def _symbols(part: Part, law: Law, graph: Graph, number: int = 0) -> tuple[Expression, Expression, Expression]:
+    multiplier = multiplier_symbol(graph, part.path, law.name, number)
+    return multiplier, graph.symbol(f"read:{multiplier.name}"), graph.symbol(f"contact:{multiplier.name}")
 
 
 def _rates_of_places(

@@ -6,6 +6,7 @@ closes with a speed, and the states are found anew such that no inequality is co
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,16 +14,27 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError, StartError
 from atwood.forms.assembly import Assembly
-from atwood.lazy_dataclasses import dataclass
-from atwood.mechanics.dynamics.equations import ContactRow
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.outputs.event_functions import OPENS, YIELDS
-from atwood.numerics.contact_sets import GOES_ON, OPEN, STICKS, Found, all_states, find_states
+from atwood.numerics.contact_sets import (
+    GOES_ON,
+    OPEN,
+    STICKS,
+    Found,
+    Limits,
+    State,
+    all_states,
+    find_states,
+)
 from atwood.numerics.matrices import least_norm
 from atwood.simulation.contacts.values import ContactValues, state_paths
 from atwood.simulation.dynamics.orientation_coordinates import to_regular
 from atwood.simulation.dynamics.scales import Scales
 from atwood.simulation.events.mode_change import generalized_speeds
 from atwood.simulation.events.modes import EventRecord
+
+_ALONG = {"N": "m", "N*m": "rad"}
+"""What a force of each unit acts along."""
 
 _NEAR = 10.0
 """Times the relative tolerance, in sizes of the scene: what is nearer to zero is there."""
@@ -54,58 +66,59 @@ class Changed:
 
 
 class _Moment:
-    """Gaps and slips at one moment, while it is worked out what becomes of them."""
+    """Gaps and slips at one moment, while it is worked out what becomes of them; each is a unit of one or two rows."""
 
     def __init__(
         self, values: ContactValues, scales: Scales, relative: float, triggers: Sequence[EventRecord], rests: bool
     ) -> None:
         self.values, self.rests = values, rests
-        self.contacts, self.t = values.contacts, values.t
+        self.contacts, self.units, self.t = values.contacts, values.units, values.t
+        self.first = [self.contacts[rows[0]] for rows in self.units]
         self.u = values.u.copy()
-        paths = {one.path: i for i, one in enumerate(values.assembly.discrete_states)}
         assembly = values.assembly
+        paths = {one.path: i for i, one in enumerate(assembly.discrete_states)}
         self.held = list(assembly.held_at_start if assembly.held is None else assembly.held)
-        self.places = [tuple(paths[path] for path in state_paths(one)) for one in self.contacts]
-        self.states = [int(self.held[place[0]]) for place in self.places]
-        self.before = [self._state(i) for i in range(len(self.contacts))]
-        units = [{"N": "m", "N*m": "rad"}[one.law.options.unit] for one in self.contacts]
+        self.places = [tuple(paths[path] for path in state_paths(self.contacts, rows)) for rows in self.units]
+        self.before = [self._state(k) for k in range(len(self.units))]
         near = _NEAR * max(relative, 1e-13)
-        self.small = near * np.array([scales.of(unit) for unit in units])
+        self.small = near * np.array([scales.of(_ALONG[one.law.options.unit]) for one in self.first])
         self.slow = self.small / scales.time
-        self.triggers = {one.part + "." + one.law: one.target for one in triggers}
+        self.triggers = {(one.part, one.law): one.target for one in triggers}
         self.events: list[EventRecord] = []
 
-    def _state(self, i: int) -> tuple[int, float]:
-        state = int(self.held[self.places[i][0]])
-        if self.contacts[i].is_slip:
-            return state, float(self.held[self.places[i][1]])
-        return (STICKS if state else OPEN), 0.0
+    def _state(self, k: int) -> State:
+        state, *way = (self.held[place] for place in self.places[k])
+        if self.first[k].is_slip:
+            return int(state), tuple(way)
+        return (STICKS if state else OPEN), (0.0,)
 
-    def trigger(self, i: int) -> str:
-        """Return the target of the event of a row; empty where it has none now."""
-        part, law, _ = self.contacts[i].row.key
-        return self.triggers.get(f"{part}.{law}", "")
+    def trigger(self, k: int) -> str:
+        """Return the target of the event of a unit; empty where it has none now."""
+        return self.triggers.get(self.first[k].row.key[:2], "")
 
     @property
     def touching(self) -> list[int]:
         """The gaps that are closed."""
-        values = self.values
         return [
-            i
-            for i, one in enumerate(self.contacts)
-            if not one.is_slip and (self.before[i][0] == STICKS or values.values[i] <= self.small[i])
+            k
+            for k, one in enumerate(self.first)
+            if not one.is_slip
+            and (self.before[k][0] == STICKS or self.values.values[self.units[k][0]] <= self.small[k])
         ]
 
     def rates(self) -> FloatArray:
         """Return the rates of all rows now."""
         return self.values.rates + self.values.slopes @ (self.u - self.values.u)
 
+    def rate(self, k: int, rates: FloatArray) -> float:
+        """Return the rate of a gap, or the size of a slip."""
+        own = rates[list(self.units[k])]
+        return math.hypot(*own) if self.first[k].is_slip else float(own[0])
+
     def slips_at(self, gaps: Sequence[int]) -> list[int]:
         """Return the slips that may rub where some gaps are closed."""
         at, places = self.values.gap_of, set(gaps)
-        return [
-            i for i, one in enumerate(self.contacts) if one.is_slip and (at[i] in places or not one.law.options.at)
-        ]
+        return [k for k, one in enumerate(self.first) if one.is_slip and (at[k] in places or not one.law.options.at)]
 
     # -- impacts --------------------------------------------------------------------------------------------------
 
@@ -113,204 +126,204 @@ class _Moment:
         """Let what approaches collide, until nothing does."""
         for _ in range(_MOST_IMPACTS):
             rates, touching = self.rates(), self.touching
-            coming = [i for i in touching if rates[i] < -self.slow[i]]
+            speeds = {k: self.rate(k, rates) for k in touching}
+            coming = [k for k in touching if speeds[k] < -self.slow[k]]
             if not coming:
                 return
             if one_by_one:
-                fastest = min(rates[i] for i in coming)
-                coming = [i for i in coming if rates[i] <= fastest * (1.0 - 1e-9)]
-                touching = coming
+                fastest = min(speeds[k] for k in coming)
+                touching = [k for k in coming if speeds[k] <= fastest * (1.0 - 1e-9)]
             self._impact(touching, rates)
         raise SolveError(
             f"at t = {self.t:.9g} impacts follow each other without end",
-            where=self.contacts[0].row.key[0],
+            where=self.first[0].row.key[0],
             advice="With impacts='together' they are solved at once.",
         )
 
     def _impact(self, touching: list[int], rates: FloatArray) -> None:
-        values = self.values
+        values, count = self.values, len(self.contacts)
         chosen = [*touching, *self.slips_at(touching)]
-        share = np.zeros(len(self.contacts)) if self.rests else values.restitution
-        poisson = [i for i in touching if self.contacts[i].law.options.impact_law == "poisson"]
+        share = np.zeros(count) if self.rests else values.restitution
+        gaps = [self.units[k][0] for k in touching]
+        poisson = [i for i in gaps if self.contacts[i].law.options.impact_law == "poisson"]
         free = rates.copy()
-        for i in touching:
+        for i in gaps:
             if i not in poisson:
                 free[i] -= share[i] * max(-rates[i], 0.0)  # it opens with this speed, or faster
         impulses = self._impulses(chosen, free)
         if any(share[i] * impulses[i] > 0.0 for i in poisson):
-            again = np.where(np.isin(np.arange(len(free)), poisson), share * impulses, 0.0)
-            free = free + values.response @ (impulses + again)
-            impulses = impulses + again + self._impulses(chosen, free)
+            again = np.zeros(count)
+            again[poisson] = share[poisson] * impulses[poisson]
+            impulses = impulses + again
+            impulses = impulses + self._impulses(chosen, free + values.response @ impulses)
         after = rates + values.response @ impulses
         work, size = 0.5 * impulses * (rates + after), 0.5 * np.abs(impulses) * (np.abs(rates) + np.abs(after))
         if float(np.sum(work)) > 1e-9 * float(np.sum(size)):
-            worst = max(touching, key=lambda i: float(work[i]))
+            worst = max(touching, key=lambda k: float(work[self.units[k][0]]))
             raise SolveError(
-                f"at t = {self.t:.9g} Newton's law of impact would make energy of {float(np.sum(work)):.3g} J",
-                where=self.contacts[worst].row.key[0],
-                advice="Declare the gap with impact_law='poisson', or choose that law of the part.",
+                f"at t = {self.t:.9g} Newton's law of impact would make energy, {float(np.sum(work)):.3g} J",
+                where=self.first[worst].row.key[0],
+                advice="Choose Poisson's law of impact for the part, or declare its gap with impact_law='poisson'.",
             )
         self.u = self.u + values.speeds_by(impulses)
-        for i in touching:
-            if rates[i] < -self.slow[i]:
-                part, law, _ = self.contacts[i].row.key
-                said = f"an impact at {-rates[i]:.6g} {'m/s' if self.contacts[i].law.options.unit == 'N' else 'rad/s'}"
-                self.events.append(EventRecord(self.t, part, law, said, "", True, "impact"))
+        for k in touching:
+            speed = -self.rate(k, rates)
+            if speed > self.slow[k]:
+                said = f"an impact at {speed:.6g} {_ALONG[self.first[k].law.options.unit]}/s"
+                self._tell(k, said, "impact")
 
     def _impulses(self, chosen: list[int], free: FloatArray) -> FloatArray:
-        """Return the impulses of all rows, with velocities in place of accelerations: only limits by forces count."""
-        values, count = self.values, len(self.contacts)
-        found = np.zeros(count)
+        """Return the impulses of all rows, with velocities in place of accelerations: of limits only what forces give."""
+        values, found = self.values, np.zeros(len(self.contacts))
+        rows = [row for k in chosen for row in self.units[k]]
         for _ in range(_MOST_TURNS):
-            _, shares, _, static_shares = values.limits_at(found)
-            none = np.zeros(count)
-            rows = values.rows(chosen, free, none, (none, shares, none, static_shares))
-            solved = find_states(rows, [STICKS] * len(chosen), [0.0] * len(chosen))
+            near = values.limits_at(found)
+            none = np.zeros(len(self.units))
+            limits = Limits(none, near.shares, none, near.static_shares)
+            still = [(STICKS, (0.0,) * len(self.units[k])) for k in chosen]
+            solved = find_states(values.chosen(chosen, free, {}, limits), still)
             if solved is None:
                 raise self._contradiction("no impulses satisfy the laws of impact and friction", chosen)
-            last, found = found, np.zeros(count)
-            found[chosen] = solved.forces
-            if float(np.max(np.abs(found - last), initial=0.0)) <= 1e-12 * float(np.max(np.abs(found), initial=0.0)):
+            last, found = found, np.zeros(len(found))
+            found[rows] = solved.forces
+            if _is_same(last, found):
                 break
         return found
 
     # -- accelerations --------------------------------------------------------------------------------------------
 
-    def settle(self, past: bool) -> None:
+    def settle(self) -> None:
         """Find the states that hold from now on."""
         values, rates = self.values, self.rates()
-        gaps = [i for i in self.touching if abs(rates[i]) <= self.slow[i] and self.trigger(i) != OPENS]
+        gaps = [k for k in self.touching if abs(self.rate(k, rates)) <= self.slow[k] and self.trigger(k) != OPENS]
         slips = self.slips_at(gaps)
-        given = np.zeros(len(self.contacts))
-        for i in slips:
-            if abs(rates[i]) > self.slow[i]:
-                given[i] = np.sign(rates[i])
-            elif self.trigger(i) == YIELDS:
-                given[i] = self._yielding(i)
+        given = {k: self._way(k, rates) for k in slips if self.rate(k, rates) > self.slow[k]}
+        given |= {k: self._yielding(k) for k in slips if k not in given and self.trigger(k) == YIELDS}
         chosen = [*gaps, *slips]
-        found = self._found(chosen, given)
+        states = [(STICKS, (0.0,)) if k in gaps else self.before[k] for k in chosen]
+        found = self._found(chosen, states, given)
         if found is None:
-            found = self._jammed(chosen, given)
-        self._take(chosen, found, given, rates)
-        held = [i for k, i in enumerate(chosen) if found.states[k] == STICKS and found.forces is not None]
+            found = self._jammed(chosen)
+        self._take(chosen, found)
+        held = [row for k, one in zip(chosen, found.states, strict=True) if one[0] == STICKS for row in self.units[k]]
         if held:  # what holds from now on holds to rounding
-            now = self.rates()
             push = np.zeros(len(self.contacts))
-            push[held] = least_norm(values.response[np.ix_(held, held)], -now[held])
+            push[held] = least_norm(values.response[np.ix_(held, held)], -self.rates()[held])
             self.u = self.u + values.speeds_by(push)
 
-    def _found(self, chosen: list[int], given: FloatArray) -> Found | None:
+    def _way(self, k: int, rates: FloatArray) -> tuple[float, ...]:
+        """Return the direction in which a slip goes on."""
+        own = rates[list(self.units[k])]
+        return tuple(float(x) / math.hypot(*own) for x in own)
+
+    def _found(self, chosen: list[int], states: list[State], given: dict[int, tuple[float, ...]]) -> Found | None:
+        """Return states that contradict nothing at accelerations; limits may be curved in the forces."""
         values, free = self.values, self.values.accelerations()
-        forces, found, states = np.zeros(len(self.contacts)), None, [self.before[i] for i in chosen]
+        forces, found = np.zeros(len(self.contacts)), None
+        rows = [row for k in chosen for row in self.units[k]]
         for _ in range(_MOST_TURNS):
-            limits = values.limits_at(forces)
-            found = find_states(values.rows(chosen, free, given, limits), *self._split(states, chosen))
+            found = find_states(values.chosen(chosen, free, given, values.limits_at(forces)), states)
             if found is None:
                 return None
-            last, forces = forces, np.zeros(len(self.contacts))
-            forces[chosen] = found.forces
-            states = list(zip(found.states, found.directions, strict=True))
-            if float(np.max(np.abs(forces - last), initial=0.0)) <= 1e-12 * float(
-                np.max(np.abs(forces), initial=0.0)
-            ):
+            last, forces = forces, np.zeros(len(forces))
+            forces[rows] = found.forces
+            states = list(found.states)
+            if _is_same(last, forces):
                 break
-        self.forces = forces
         return found
 
-    def _split(self, states: list[tuple[int, float]], chosen: list[int]) -> tuple[list[int], list[float]]:
-        """Return states and directions; a gap that has just come to rest is closed, to begin with."""
-        first = [
-            STICKS if not self.contacts[i].is_slip and s == OPEN and abs(self.rates()[i]) <= self.slow[i] else s
-            for i, (s, _) in zip(chosen, states, strict=True)
-        ]
-        return first, [d for _, d in states]
-
-    def _yielding(self, i: int) -> float:
+    def _yielding(self, k: int) -> tuple[float, ...]:
         """Return the direction in which what sticks begins to slip: against the force that could hold it no longer."""
-        closed = [k for k, one in enumerate(self.contacts) if self.before[k][0] == STICKS]
         values, free = self.values, self.values.accelerations()
-        forces, fixed = np.zeros(len(self.contacts)), [k for k in range(len(self.contacts)) if self.before[k][0] == GOES_ON]
+        forces, count = np.zeros(len(self.contacts)), len(self.contacts)
         for _ in range(_MOST_TURNS):
-            limits, shares, _, _ = values.limits_at(forces)
-            matrix, right = np.eye(len(forces)), np.zeros(len(forces))
-            for k in closed:
-                matrix[k], right[k] = values.response[k], -free[k]
-            for k in fixed:
-                matrix[k] += self.before[k][1] * shares[k]
-                right[k] = -self.before[k][1] * limits[k]
+            limits = values.limits_at(forces)
+            matrix, right = np.eye(count), np.zeros(count)
+            for number, (rows, (state, way)) in enumerate(zip(self.units, self.before, strict=True)):
+                for row, part in zip(rows, way, strict=True):
+                    if state == STICKS:
+                        matrix[row], right[row] = values.response[row], -free[row]
+                    elif state == GOES_ON:
+                        matrix[row] = matrix[row] + part * limits.shares[number]
+                        right[row] = -part * limits.free[number]
             last, forces = forces, least_norm(matrix, right)
-            if float(np.max(np.abs(forces - last))) <= 1e-9 * float(np.max(np.abs(forces))):
+            if _is_same(last, forces):
                 break
-        return -1.0 if forces[i] > 0.0 else 1.0
+        own = forces[list(self.units[k])]
+        return tuple(-float(x) / (math.hypot(*own) or 1.0) for x in own)
 
-    def _jammed(self, chosen: list[int], given: FloatArray) -> Found:
+    def _jammed(self, chosen: list[int]) -> Found:
         """Where no accelerations contradict nothing an impulse acts (Painleve's paradox); then states are found."""
         values, count = self.values, len(self.contacts)
-        none, rates = np.zeros(count), self.rates()
-        _, shares, _, static_shares = values.limits_at(none)
-        rows = values.rows(chosen, rates, none, (none, shares, none, static_shares))
-        best = max(all_states(rows), key=lambda one: float(np.sum(np.abs(one.forces))), default=None) if count < 9 else None
+        none, near = np.zeros(len(self.units)), values.limits_at(np.zeros(count))
+        limits = Limits(none, near.shares, none, near.static_shares)
+        rows = [row for k in chosen for row in self.units[k]]
+        every = all_states(values.chosen(chosen, self.rates(), {}, limits))
+        best = max(every, key=lambda one: float(np.sum(np.abs(one.forces))), default=None)
         if best is None or not float(np.sum(np.abs(best.forces))) > 0.0:
             raise self._contradiction("no accelerations and no impulses satisfy contact and friction", chosen)
         push = np.zeros(count)
-        push[chosen] = best.forces
+        push[rows] = best.forces
         self.u = self.u + values.speeds_by(push)
-        gaps = [i for i in chosen if push[i] > 0.0 and not self.contacts[i].is_slip]
-        part, law, _ = self.contacts[gaps[0]].row.key
-        self.events.append(EventRecord(self.t, part, law, "friction jams it: an impulse", "", True, "jams"))
-        moved = self.rates()
-        given = np.where(np.abs(moved) > self.slow, np.sign(moved), 0.0)
-        found = self._found(chosen, np.where(values.is_slip, given, 0.0))
+        pressed = [k for k in chosen if not self.first[k].is_slip and push[self.units[k][0]] > 0.0]
+        self._tell(pressed[0] if pressed else chosen[0], "friction jams it: an impulse", "jams")
+        rates = self.rates()
+        gaps = [k for k in self.touching if abs(self.rate(k, rates)) <= self.slow[k]]
+        slips = self.slips_at(gaps)
+        given = {k: self._way(k, rates) for k in slips if self.rate(k, rates) > self.slow[k]}
+        left = [k for k in chosen if k in gaps or k in slips]
+        found = self._found(left, [(STICKS, (0.0,) * len(self.units[k])) for k in left], given)
         if found is None:
             raise self._contradiction("no accelerations satisfy contact and friction after an impulse", chosen)
-        return found
+        known = dict(zip(left, found.states, strict=True))
+        states = tuple(known.get(k, (OPEN, (0.0,) * len(self.units[k]))) for k in chosen)
+        return replace(found, states=states)
 
-    def _take(self, chosen: list[int], found: Found, given: FloatArray, rates: FloatArray) -> None:
+    def _take(self, chosen: list[int], found: Found) -> None:
         """Take the states over, and tell what has changed."""
-        states = dict(zip(chosen, zip(found.states, found.directions, strict=True), strict=True))
-        for i, one in enumerate(self.contacts):
-            state, direction = states.get(i, (OPEN, 0.0))
-            if one.is_slip:
-                at = self.values.gap_of[i]
-                if at >= 0 and states.get(at, (OPEN, 0.0))[0] == OPEN:
-                    state, direction = OPEN, 0.0
-                self.held[self.places[i][0]], self.held[self.places[i][1]] = float(state), direction
-            else:
-                state = 1 if state == STICKS else 0
-                self.held[self.places[i][0]] = float(state)
-            self._tell(i, one, (STICKS if state and not one.is_slip else state, direction))
+        states = dict(zip(chosen, found.states, strict=True))
+        for k, one in enumerate(self.first):
+            state, way = states.get(k, (OPEN, (0.0,) * len(self.units[k])))
+            at = self.values.gap_of[k]
+            if one.is_slip and at >= 0 and states.get(at, (OPEN, (0.0,)))[0] == OPEN:
+                state, way = OPEN, (0.0,) * len(way)
+            values = (float(state), *way) if one.is_slip else (1.0 if state == STICKS else 0.0,)
+            for place, value in zip(self.places[k], values, strict=True):
+                self.held[place] = value
+            was, name = self.before[k], one.row.key[1]
+            if not one.is_slip and state != was[0]:
+                self._tell(k, *((f"{name} closes", "closes") if state else (f"{name} opens", "opens")))
+            elif one.is_slip and state == was[0] == GOES_ON and float(np.dot(way, was[1])) < 0.0:
+                self._tell(k, f"{name} reverses", "reverses")
+            elif one.is_slip and state != was[0] and state:
+                self._tell(k, *((f"{name} sticks", "sticks") if state == STICKS else (f"{name} goes on", "slips")))
 
-    def _tell(self, i: int, one: ContactRow, now: tuple[int, float]) -> None:
-        was, kind = self.before[i], ""
-        if not one.is_slip:
-            kind = "closes" if now[0] > was[0] else "opens" if now[0] < was[0] else ""
-            said = f"{one.row.key[1]} {kind}"
-        elif now != was:
-            kind = {STICKS: "sticks", GOES_ON: "slips"}.get(now[0], "")
-            kind = "reverses" if now[0] == was[0] == GOES_ON else kind
-            said = f"{one.row.key[1]} {kind}"
-        if kind:
-            part, law, _ = one.row.key
-            self.events.append(EventRecord(self.t, part, law, said, "", False, kind))
+    def _tell(self, k: int, said: str, kind: str) -> None:
+        part, law, _ = self.first[k].row.key
+        self.events.append(EventRecord(self.t, part, law, said, "", kind in ("impact", "jams"), kind))
 
     def _contradiction(self, what: str, chosen: list[int]) -> SolveError:
-        names = ", ".join(dict.fromkeys(self.contacts[i].row.key[0] for i in chosen))
+        names = ", ".join(dict.fromkeys(self.first[k].row.key[0] for k in chosen))
         return SolveError(
             f"at t = {self.t:.9g} {what} ({names})",
-            where=self.contacts[chosen[0]].row.key[0] if chosen else "",
+            where=self.first[chosen[0]].row.key[0] if chosen else "",
             advice="Contacts contradict each other here: look at what moves them, and at their friction.",
         )
 
     def check_start(self) -> None:
         """Refuse a start inside of something."""
-        for i, one in enumerate(self.contacts):
-            if not one.is_slip and self.values.values[i] < -self.small[i]:
-                unit = "m" if one.law.options.unit == "N" else "rad"
+        for k, one in enumerate(self.first):
+            value = self.values.values[self.units[k][0]]
+            if not one.is_slip and value < -self.small[k]:
                 raise StartError(
-                    f"it starts inside, by {-self.values.values[i]:.6g} {unit}",
+                    f"it starts inside, by {-value:.6g} {_ALONG[one.law.options.unit]}",
                     where=one.row.key[0],
                     advice="Start where the gap is zero or positive.",
                 )
+
+
+def _is_same(last: FloatArray, now: FloatArray) -> bool:
+    return float(np.max(np.abs(now - last), initial=0.0)) <= 1e-12 * float(np.max(np.abs(now), initial=0.0))
 
 
 def resolve(
@@ -350,7 +363,7 @@ def resolve(
     if is_start:
         moment.check_start()
     moment.collide(one_by_one)
-    moment.settle(not is_start)
+    moment.settle()
     if np.array_equal(moment.u, moment.values.u):
         speeds = u
     elif assembly.form == "dae":

@@ -6,19 +6,20 @@ A unit force along a row i makes accelerations ``X_i``, with the joints holding:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 
-from atwood.arrays import BoolArray, FloatArray
+from atwood.arrays import FloatArray
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.program import state_groups
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import ContactRow
+from atwood.numerics.contact_sets import Contacts, Limits, Unit
 from atwood.numerics.matrices import least_norm, to_array
-from atwood.numerics.contact_sets import Rows
 from atwood.simulation.dynamics.balance import balance_of, bordered
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.scales import motion_scales
@@ -111,28 +112,31 @@ class ContactValues:
         self.slopes[self._made.rows, self._made.columns] = slopes
         self._shares = found[6], found[7]
 
-    @property
-    def is_slip(self) -> BoolArray:
-        """Whether each row is a slip."""
-        return np.array([one.is_slip for one in self.contacts], dtype=np.bool_)
+    @cached_property
+    def units(self) -> tuple[tuple[int, ...], ...]:
+        """The rows of each gap and each slip."""
+        found: dict[tuple[str, str], list[int]] = {}
+        for i, one in enumerate(self.contacts):
+            found.setdefault(one.row.key[:2], []).append(i)
+        return tuple(map(tuple, found.values()))
 
     @cached_property
     def gap_of(self) -> tuple[int, ...]:
-        """For each slip the row of its gap; -1 for what has none."""
-        places = {one.row.key[:2]: i for i, one in enumerate(self.contacts)}
-        found = []
-        for one in self.contacts:
-            at = one.law.options.at if one.is_slip else ""
-            found.append(places.get((one.row.key[0], at), -1) if at else -1)
-        return tuple(found)
+        """For each unit that is a slip the number of its gap; -1 for what has none."""
+        first = [self.contacts[rows[0]] for rows in self.units]
+        places = {one.row.key[:2]: k for k, one in enumerate(first)}
+        return tuple(
+            places.get((one.row.key[0], one.law.options.at), -1) if one.is_slip and one.law.options.at else -1
+            for one in first
+        )
 
     @cached_property
     def _solved(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Accelerations without these forces, those by a unit of each, and the multipliers of joints likewise."""
         assembly = self.assembly
         held = dict(zip((one.path for one in assembly.discrete_states), _held(assembly), strict=True))
-        for one in self.contacts:
-            held |= dict.fromkeys(state_paths(one), 0.0)
+        for rows in self.units:
+            held |= dict.fromkeys(state_paths(self.contacts, rows), 0.0)
         loose = assembly.with_held([held[one.path] for one in assembly.discrete_states])
         now = balance_of(loose, "dae").at(self.t, self.q, self.u)
         mass, held_by = to_array(now.mass), to_array(now.jacobian)
@@ -162,11 +166,8 @@ class ContactValues:
         """Return the change of speeds, or the accelerations, that impulses, or forces, make."""
         return self._solved[1] @ forces
 
-    def limits_at(self, forces: FloatArray) -> tuple[FloatArray, ...]:
-        """Return limits, static limits and their derivatives by the forces, where the rows have some forces.
-
-        Limits are ``L(f) = L_0 + P f`` near these: L_0 and P of both.
-        """
+    def limits_at(self, forces: FloatArray) -> Limits:
+        """Return the limits of all units near some forces of the rows: ``L(f) = L_0 + P f``."""
         contacts, borne, by = self.contacts, self._solved[2], self._solved[3]
         count = len(contacts)
         own = {one.read: i for i, one in enumerate(contacts)}
@@ -180,6 +181,7 @@ class ContactValues:
         self.read = rest + ways @ forces
         self._take(self.u)
         found: list[FloatArray] = []
+        heads = [rows[0] for rows in self.units]
         for limits, entries, places in zip(
             (self.limits, self.static_limits), self._shares, self._made.shares, strict=True
         ):
@@ -187,34 +189,40 @@ class ContactValues:
             for (r, c), entry in zip(places, entries, strict=True):
                 slopes[r, c] = entry
             shares = slopes @ ways
-            found += [limits - shares @ forces, shares]
-        return tuple(found)
+            found += [(limits - shares @ forces)[heads], shares[heads]]
+        return Limits(*found)
 
-    def rows(self, chosen: list[int], free: FloatArray, given: FloatArray, limits: tuple[FloatArray, ...]) -> Rows:
-        """Return what is asked of some rows."""
-        place = {row: i for i, row in enumerate(chosen)}
-        inside = np.ix_(chosen, chosen)
-        first, shares, static, static_shares = limits
-        return Rows(
-            self.response[inside],
-            free[chosen],
-            first[chosen],
-            shares[inside],
-            static[chosen],
-            static_shares[inside],
-            self.is_slip[chosen],
-            given[chosen],
-            tuple(place.get(self.gap_of[row], -1) for row in chosen),
+    def chosen(self, chosen: list[int], free: FloatArray, given: dict[int, tuple[float, ...]], limits: Limits) -> Contacts:
+        """Return what is asked of some units."""
+        rows = [row for k in chosen for row in self.units[k]]
+        place = {row: i for i, row in enumerate(rows)}
+        number = {k: i for i, k in enumerate(chosen)}
+        units = tuple(
+            Unit(
+                tuple(place[row] for row in self.units[k]),
+                self.contacts[self.units[k][0]].is_slip,
+                given.get(k, (0.0,) * len(self.units[k])),
+                number.get(self.gap_of[k], -1),
+            )
+            for k in chosen
         )
+        few = Limits(
+            limits.free[chosen],
+            limits.shares[np.ix_(chosen, rows)],
+            limits.static_free[chosen],
+            limits.static_shares[np.ix_(chosen, rows)],
+        )
+        return Contacts(self.response[np.ix_(rows, rows)], free[rows], units, few)
 
 
 def _held(assembly: Assembly) -> tuple[float, ...]:
     return assembly.held_at_start if assembly.held is None else assembly.held
 
 
-def state_paths(one: ContactRow) -> tuple[str, ...]:
-    """Return the paths of the discrete states of a gap, or of a slip."""
-    part, law, _ = one.row.key
-    return (f"{part}.{law}_state", f"{part}.{law}_direction") if one.is_slip else (f"{part}.{law}_state",)
-
-
+def state_paths(contacts: Sequence[ContactRow], rows: Sequence[int]) -> tuple[str, ...]:
+    """Return the paths of the discrete states of a gap, or of a slip: its state, then its direction."""
+    part, law, _ = contacts[rows[0]].row.key
+    if not contacts[rows[0]].is_slip:
+        return (f"{part}.{law}_state",)
+    names = [law] if len(rows) == 1 else [f"{law}_{i + 1}" for i in range(len(rows))]
+    return (f"{part}.{law}_state", *(f"{part}.{name}_direction" for name in names))
