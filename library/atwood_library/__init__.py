@@ -25,6 +25,16 @@ if TYPE_CHECKING:
     from atwood_library.blocks.signal_function import SignalFunction as SignalFunction
     from atwood_library.blocks.state_space import StateSpace as StateSpace
     from atwood_library.blocks.transfer_function import TransferFunction as TransferFunction
+    from atwood_library.contacts.ball_contact import BallContact as BallContact
+    from atwood_library.contacts.box_contact import BoxContact as BoxContact
+    from atwood_library.contacts.distance_contact import DistanceContact as DistanceContact
+    from atwood_library.contacts.point_contact import PointContact as PointContact
+    from atwood_library.contacts.rotational_friction import RotationalFriction as RotationalFriction
+    from atwood_library.contacts.rotational_stop import RotationalStop as RotationalStop
+    from atwood_library.contacts.surface_contact import SurfaceContact as SurfaceContact
+    from atwood_library.contacts.translational_friction import TranslationalFriction as TranslationalFriction
+    from atwood_library.contacts.translational_stop import TranslationalStop as TranslationalStop
+    from atwood_library.contacts.vertex_contact import VertexContact as VertexContact
     from atwood_library.drives.inertia import Inertia as Inertia
     from atwood_library.drives.rotational_coupling import RotationalCoupling as RotationalCoupling
     from atwood_library.drives.rotational_gap import RotationalGap as RotationalGap
@@ -129,9 +139,11 @@ if TYPE_CHECKING:
 _MODULES = {
     "Add": "blocks.add",
     "AngleSensor": "sensors.angle_sensor",
+    "BallContact": "contacts.ball_contact",
     "Bar": "parts.bar",
     "Blade": "joints.blade",
     "Box": "parts.box",
+    "BoxContact": "contacts.box_contact",
     "Bushing": "forces.bushing",
     "CentralGravity": "forces.central_gravity",
     "Charge": "fields.charge",
@@ -143,6 +155,7 @@ _MODULES = {
     "Damper": "forces.damper",
     "DeadZone": "blocks.dead_zone",
     "Disc": "parts.disc",
+    "DistanceContact": "contacts.distance_contact",
     "Drag": "forces.drag",
     "Drive": "joints.drive",
     "ElasticRope": "ropes.elastic_rope",
@@ -173,6 +186,7 @@ _MODULES = {
     "Pivot": "joints.pivot",
     "Planar": "joints.planar",
     "PlanetaryGear": "joints.planetary_gear",
+    "PointContact": "contacts.point_contact",
     "PointMass": "parts.point_mass",
     "PointOnCircle": "joints.point_on_circle",
     "PointOnCurve": "joints.point_on_curve",
@@ -199,6 +213,7 @@ _MODULES = {
     "Rope": "ropes.rope",
     "RotaryDrive": "joints.rotary_drive",
     "RotationalCoupling": "drives.rotational_coupling",
+    "RotationalFriction": "contacts.rotational_friction",
     "RotationalGap": "drives.rotational_gap",
     "RotationalMaxwell": "drives.rotational_maxwell",
     "RotationalMotion": "drives.rotational_motion",
@@ -206,6 +221,7 @@ _MODULES = {
     "RotationalSensor": "drives.rotational_sensor",
     "RotationalSource": "drives.rotational_source",
     "RotationalSpringDamper": "drives.rotational_spring_damper",
+    "RotationalStop": "contacts.rotational_stop",
     "Rotor": "drives.rotor",
     "SampleAndHold": "blocks.sample_and_hold",
     "SampleDelay": "blocks.sample_delay",
@@ -222,6 +238,7 @@ _MODULES = {
     "Spring": "forces.spring",
     "StateSpace": "blocks.state_space",
     "Step": "sources.step",
+    "SurfaceContact": "contacts.surface_contact",
     "Table": "sources.table",
     "TimeFunction": "sources.time_function",
     "Torque": "forces.torque",
@@ -230,6 +247,7 @@ _MODULES = {
     "TotalsSensor": "sensors.totals_sensor",
     "TransferFunction": "blocks.transfer_function",
     "TranslationalCoupling": "drives.translational_coupling",
+    "TranslationalFriction": "contacts.translational_friction",
     "TranslationalGap": "drives.translational_gap",
     "TranslationalMaxwell": "drives.translational_maxwell",
     "TranslationalMotion": "drives.translational_motion",
@@ -237,8 +255,10 @@ _MODULES = {
     "TranslationalSensor": "drives.translational_sensor",
     "TranslationalSource": "drives.translational_source",
     "TranslationalSpringDamper": "drives.translational_spring_damper",
+    "TranslationalStop": "contacts.translational_stop",
     "Tube": "parts.tube",
     "Universal": "joints.universal",
+    "VertexContact": "contacts.vertex_contact",
     "Weld": "joints.weld",
     "Wheel": "parts.wheel",
     "WoundRope": "ropes.wound_rope",

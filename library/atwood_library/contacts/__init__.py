@@ -1,0 +1,1 @@
+"""Contact and dry friction: parts that touch, slip, stick and collide."""

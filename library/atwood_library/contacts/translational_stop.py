@@ -1,0 +1,51 @@
+"""TranslationalStop: rigid ends of the play between two displacements."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from atwood import Component, Number, ParameterError, Scalar, Slide, connector, observable, parameter, unilateral
+from atwood_library.interfaces.along_coordinates import between
+
+__all__ = ["TranslationalStop"]
+
+
+class TranslationalStop(Component):
+    """Rigid ends of the play between two displacements, or from one to the ground: backlash, a hard stop.
+
+    Nothing goes beyond an end. Where one is reached with a speed velocities jump.
+    """
+
+    synonyms: ClassVar[tuple[str, ...]] = ("Hard stop", "Backlash", "Stop", "End stop", "Play")
+    spaces: ClassVar[tuple[str, ...]] = ("plane", "space")
+
+    lower: Number | None = parameter(None, unit="m", doc="Where it ends below; nowhere if not given.")
+    upper: Number | None = parameter(None, unit="m", doc="Where it ends above; nowhere if not given.")
+    restitution: Number = parameter(
+        0.0, minimum=0.0, maximum=1.0, doc="Share of the speed with which an end is reached that is left after it."
+    )
+    against: str = parameter("flange", choices=("flange", "ground"), doc="What it acts against.")
+    a: Slide = connector(Slide, "The displacement that it acts against.", when={"against": ("flange",)})
+    b: Slide = connector(Slide, "The displacement that it acts on.")
+
+    def check_values(self) -> None:
+        """Refuse ends the wrong way round."""
+        if self.lower is not None and self.upper is not None and not self.lower < self.upper:
+            raise ParameterError(
+                f"the lower end {self.lower:g} is not below the upper one, {self.upper:g}", where=f"{self.path}.lower"
+            )
+
+    @observable(unit="m", doc="By how much b is ahead of a.")
+    def extension(self) -> Scalar:
+        """Return the extension."""
+        return between(self)[0]
+
+    @unilateral(reaction="lower_force", unit="N", restitution="restitution", doc="What the lower end exerts on b.")
+    def above_lower(self) -> Scalar:
+        """Play above the lower end; 1 where there is none."""
+        return 1.0 if self.lower is None else between(self)[0] - self.lower
+
+    @unilateral(reaction="upper_force", unit="N", restitution="restitution", doc="What the upper end exerts, against b.")
+    def below_upper(self) -> Scalar:
+        """Play below the upper end; 1 where there is none."""
+        return 1.0 if self.upper is None else self.upper - between(self)[0]
