@@ -24,7 +24,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
-from atwood.arguments import instance, number, optional, takes
+from atwood.arguments import instance, number, one_of, optional, takes
 from atwood.clock import GRACE, Clock, TimeIsUp
 from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
@@ -156,6 +156,7 @@ def assembly_of(scene: Model | Assembly, name: str | None = None, **asked: str |
     outputs=OUTPUTS,
     max_step=optional(number("a number of seconds above 0", above=0.0)),
     first_step=optional(number("a number of seconds above 0", above=0.0)),
+    impacts=one_of(("together", "one_by_one")),
     solver=SOLVER,
     order=ORDER,
     step=optional(number("a number of seconds above 0", above=0.0)),
@@ -194,6 +195,7 @@ def simulate(
     monitor: Any = None,
     nominal: Mapping[str, Any] | None = None,
     first_step: float | None = None,
+    impacts: str = "together",
 ) -> Result:
     """Simulate a scene from its start to its end.
 
@@ -260,6 +262,8 @@ def simulate(
         Sizes of quantities by path, such as ``{"slider.displacement": "1 mm"}``, in place of the scene's own. `atol` is
         a share of them for coordinates, and what is linear in these, and their rates; errors are relative to them in
         `accuracy`, in which other quantities, such as forces, then count too.
+    impacts
+        How several gaps that close at once collide: ``"together"``, or ``"one_by_one"``, the fastest first.
 
     Returns
     -------
@@ -302,6 +306,7 @@ def simulate(
                 structure=structure,
                 conditions=conditions_of(until, record),
                 nominal=sizes_of(assembly, nominal),
+                impacts=impacts,
             )
             made, second, said = _solve_to(accuracy, assembly, options, clock)
     if said:

@@ -23,7 +23,10 @@ CLOSES, OPENS, YIELDS, STOPS, FREES = "contact closes", "contact opens", "contac
 """Targets of events of gaps and slips: a gap closes, its force vanishes, what sticks reaches its limit, what slips comes
 to rest, and the limit of friction passes zero."""
 
-CONTACT = (CLOSES, OPENS, YIELDS, STOPS, FREES)
+RESTS, RUNS = "contact comes to rest", "contact runs"
+"""The same of slips in two directions, which need not pass zero: they are slower than what is small, and faster again."""
+
+CONTACT = (CLOSES, OPENS, YIELDS, STOPS, FREES, RESTS, RUNS)
 
 
 @dataclass(frozen=True)
@@ -132,8 +135,12 @@ def _of_contacts(equations: Equations) -> list[EventFunction]:
             watch(YIELDS, one.mask * reserve + loose, unit, "what sticks begins to slip")
         zero = one.mask.graph.zero
         acts = sum((side * side for side in sides), zero)
-        along = sum((side * x.row.rate for side, x in zip(sides, pair, strict=True)), zero)
-        watch(STOPS, acts * along + (1.0 - acts), f"{of}/s", "what slips comes to rest")
+        if len(pair) == 1:
+            watch(STOPS, one.direction * one.row.rate + (1.0 - acts), f"{of}/s", "what slips comes to rest")
+        else:
+            for target in (RESTS, RUNS):
+                size = acts * norm_of([x.row.rate for x in pair]) + (1.0 - acts)
+                watch(target, size if target == RESTS else -size, f"{of}/s", "what slips comes to rest, or runs")
         if not one.law.options.at:
             held = 1.0 - (1.0 - one.mask) * (1.0 - acts)
             watch(FREES, (2.0 * held - 1.0) * one.limit, unit, "the limit of friction passes zero")

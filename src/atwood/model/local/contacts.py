@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from atwood.errors import DeclarationError, UnsupportedError, suggestion
-from atwood.expr import Expression, Graph, Scalar, absolute, depends_on, jvp, select, sqrt
+from atwood.expr import Expression, Graph, Scalar, depends_on, jvp, sqrt
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.declare.component import Binding, bind
 from atwood.model.declare.contact_laws import FrictionOptions
@@ -81,7 +81,7 @@ def local_contacts(
     """Return the gaps and slips of a part, and their reactions by name as other laws of the part read them."""
     laws = [law for law in part.component.contact_laws().values() if holds(law)]
     gaps = [_gap(part, law, binding, connectors, graph) for law in laws if law.kind == "unilateral"]
-    pressing = {one.row.reaction: one.mask * one.read for one in gaps}
+    pressing = {one.row.reaction: one.read for one in gaps}  # zero where the gap is open
     bound = bind(part.component, replace(binding, reactions={**binding.reactions, **pressing}))
     slips = [one for law in laws if law.kind == "friction" for one in _slip(part, law, bound, graph)]
     return (*gaps, *slips), {one.row.reaction: one.force for one in (*gaps, *slips)}
@@ -152,20 +152,13 @@ _TINY = 1e-150
 
 
 def _ways(values: Sequence[Expression], held: Sequence[Expression]) -> list[Expression]:
-    """Return the unit vector of a slip, which goes on smoothly where the slip passes zero against what is held.
-
-    One that comes to rest does so along the direction that is held, and the step in which it does goes beyond: there
-    the direction is mirrored, so that the force is as smooth as before.
-    """
+    """Return the direction of a slip: the sign that is held, or the unit vector of two speeds."""
     if len(values) == 1:
         return list(held)
     zero = values[0].graph.zero
-    along = sum((v * e for v, e in zip(values, held, strict=True)), zero)
-    back = absolute(along) - along
-    turned = [v + (back + _TINY) * e for v, e in zip(values, held, strict=True)]
-    size = sqrt(sum((one * one for one in turned), zero))
-    acts = sum((e * e for e in held), zero)
-    return [acts * select(size > 0.0, one / select(size > 0.0, size, 1.0), e) for one, e in zip(turned, held, strict=True)]
+    turned = [v + _TINY * e for v, e in zip(values, held, strict=True)]
+    share = sum((e * e for e in held), zero) / (sqrt(sum((one * one for one in turned), zero)) + _TINY * _TINY)
+    return [share * one for one in turned]
 
 
 def _named(part: Part, law: Law, bound: Any, name: str, graph: Graph) -> Expression:

@@ -17,7 +17,15 @@ from atwood.forms.caches import Key
 from atwood.forms.quantities import known_program
 from atwood.integrators.protocol import StepResult
 from atwood.lazy_dataclasses import dataclass, replace
-from atwood.mechanics.outputs.event_functions import CLOSES, CONTACT, UPDATE, EventFunction, list_event_functions
+from atwood.mechanics.outputs.event_functions import (
+    CLOSES,
+    CONTACT,
+    RESTS,
+    RUNS,
+    UPDATE,
+    EventFunction,
+    list_event_functions,
+)
 from atwood.simulation.dynamics.orientation_coordinates import (
     COORDINATE_SWITCH,
     switch_functions,
@@ -107,6 +115,9 @@ MARGIN = 10.0
 _TINY = 1e-300
 """Makes zero positive."""
 
+_RUNS = 1000.0
+"""Times what is small: slips in two directions that are faster than this may come to rest again."""
+
 _PASSED = 0.9
 """What has passed zero by this share of its margin at the start of a mode happens there.
 
@@ -179,7 +190,17 @@ class EventProbe:
         opening = self._opening(t, q, u, small) & (np.abs(values) <= small)
         self.shift = np.where(opening, np.where(values > 0.0, 0.0, 2.0 * np.abs(values) + _TINY), self.shift)
         happened &= ~opening
+        self._arm(values, small, happened)
         self.broken = next((one for one, has in zip(self.event_functions, happened, strict=True) if has), None)
+
+    def _arm(self, values: FloatArray, small: FloatArray, happened: BoolArray) -> None:
+        """Look for slips in two directions to fall below what is small; of those that begin, first to rise above it."""
+        for i, one in enumerate(self.event_functions):
+            if one.target in (RESTS, RUNS):
+                runs = abs(values[i]) > _RUNS * small[i]
+                is_off = runs == (one.target == RUNS)
+                self.shift[i] = (2.0 * abs(values[i]) + 2.0) if is_off else -small[i] if runs else _RUNS * small[i]
+                happened[i] = False
 
     def _opening(self, t: float, q: FloatArray, u: FloatArray, small: FloatArray) -> BoolArray:
         """Return which gaps are at zero and open with a speed: they need no margin."""

@@ -118,8 +118,11 @@ def _find(assembly: Assembly, equations: Equations, more: frozenset[str]) -> Ite
 
 
 def _laws_of(local: LocalPart) -> list[Expression]:
-    """Return what the laws of a part give."""
-    found: list[Scalar] = [*local.potentials, *local.dissipations, *local.lagrangians, *local.stand_ins.values()]
+    """Return what the laws of a part give; of friction the limit, since where its direction turns is an event."""
+    of_contacts = {one.stand_in for one in local.contacts}
+    found: list[Scalar] = [*local.potentials, *local.dissipations, *local.lagrangians]
+    found += [value for symbol, value in local.stand_ins.items() if symbol not in of_contacts]
+    found += [one.limit for one in local.contacts if one.limit is not None]
     found += [c for load in local.loads for c in (*load.force, *load.torque)]
     found += [one.rate for one in local.states]
     return [one for one in found if isinstance(one, Expression)]
