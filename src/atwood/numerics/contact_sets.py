@@ -222,7 +222,8 @@ def _misses(
         yield math.hypot(*a), (GOES_ON, way)  # rows that depend on each other cannot all stick
         return
     if state[0] == GOES_ON:
-        yield -limit, (OPEN, none)
+        if unit.at < 0:  # at a gap it is negative only where the gap pulls, which is said there
+            yield -limit, (OPEN, none)
         if unit.is_given:
             return
         along = float(np.dot(a, state[1]))
@@ -233,4 +234,4 @@ def _misses(
         across = math.hypot(*(x - along * d for x, d in zip(a, state[1], strict=True)))
         yield across, (GOES_ON, tuple(float(x / size) for x in a))
         return
-    yield limit, (STICKS, none)
+    yield limit, (GOES_ON, unit.given) if unit.is_given else (STICKS, none)

@@ -39,6 +39,9 @@ _ALONG = {"N": "m", "N*m": "rad"}
 _NEAR = 10.0
 """Times the relative tolerance, in sizes of the scene: what is nearer to zero is there."""
 
+_NEAR_REST = 100.0
+"""The same where impacts have accumulated: what still bounces is as near as that."""
+
 _MOST_TURNS = 50
 """Limits that are curved in the forces are met in so many turns at most."""
 
@@ -58,11 +61,14 @@ class Changed:
         Values of the discrete states.
     events
         What has happened.
+    touching
+        The same as `held` with every gap closed that was at zero then, and nothing that rubs; empty where none was.
     """
 
     speeds: FloatArray
     held: tuple[float, ...]
     events: tuple[EventRecord, ...]
+    touching: tuple[float, ...] = ()
 
 
 class _Moment:
@@ -80,7 +86,7 @@ class _Moment:
         self.held = list(assembly.held_at_start if assembly.held is None else assembly.held)
         self.places = [tuple(paths[path] for path in state_paths(self.contacts, rows)) for rows in self.units]
         self.before = [self._state(k) for k in range(len(self.units))]
-        near = _NEAR * max(relative, 1e-13)
+        near = (_NEAR_REST if rests else _NEAR) * max(relative, 1e-13)
         self.small = near * np.array([scales.of(_ALONG[one.law.options.unit]) for one in self.first])
         self.slow = self.small / scales.time
         self.triggers = {(one.part, one.law): one.target for one in triggers}
@@ -105,6 +111,17 @@ class _Moment:
             if not one.is_slip
             and (self.before[k][0] == STICKS or self.values.values[self.units[k][0]] <= self.small[k])
         ]
+
+    def all_closed(self) -> tuple[float, ...]:
+        """Return the states with every gap closed that is at zero, and nothing that rubs; empty where there is none."""
+        closed = self.touching
+        if not closed:
+            return ()
+        found = list(self.held)
+        for k, places in enumerate(self.places):
+            for place in places:
+                found[place] = 1.0 if k in closed else 0.0
+        return tuple(found)
 
     def rates(self) -> FloatArray:
         """Return the rates of all rows now."""
@@ -362,6 +379,7 @@ def resolve(
     moment = _Moment(ContactValues(assembly, t, q, u, length), scales, relative, triggers, rests)
     if is_start:
         moment.check_start()
+    touching = moment.all_closed()
     moment.collide(one_by_one)
     moment.settle()
     if np.array_equal(moment.u, moment.values.u):
@@ -370,4 +388,4 @@ def resolve(
         speeds = moment.u
     else:
         speeds = generalized_speeds(assembly, t, to_regular(assembly, q), moment.u, moment.values.sizes)
-    return Changed(speeds, tuple(moment.held), tuple(moment.events))
+    return Changed(speeds, tuple(moment.held), tuple(moment.events), touching)

@@ -145,6 +145,14 @@ def constrained_problem(
     )
 
 
+def nearest_place(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
+    """Return the coordinates nearest to others at which the constraints, and the gaps that are closed, are met."""
+    y = np.concatenate([q, u])
+    values = np.concatenate([plan.assembly.parameter_values, plan.sizes])
+    nearer = plan.assembly.compiled(_program(plan, t, y).projection).bind(values)
+    return _projected(nearer, t, y, len(q))[: len(q)]
+
+
 def _program(plan: SceneProblem, t: float, y: FloatArray) -> ConstrainedProgram:
     assembly, kept = plan.assembly, plan.finding.kept
     light = assembly.kept.get(_LIGHT, lambda: _light_speeds(plan, t, y))

@@ -104,8 +104,11 @@ def _again(
     return _prepared(assembly, start, reassemble, options, between, log).go()
 
 
-_LEFT = 0.1
-"""Of the root of the tolerance, in units of the scene's time: so long may impacts still go on that are summed."""
+_LEFT = 1.0
+"""Times the root of the tolerance, in units of the scene's time: so long may impacts still go on that are summed.
+
+What still rises in that time rises by less than the tolerance.
+"""
 
 
 class _Walk:
@@ -273,6 +276,7 @@ class _Walk:
         if not plan.assembly.own_equations.contacts or (triggers is None and not is_new):
             return plan
         from atwood.simulation.contacts.changes import resolve
+        from atwood.simulation.problem.explicit_scene import nearest_place
 
         options, is_start = self.options, not self.segments
         state, rests = (self.t, self.q, self.u), self._accumulates(triggers or (), plan.scales.time)
@@ -299,6 +303,9 @@ class _Walk:
         self.events += events if not is_start else [one for one in events if one.impact]
         self.impact |= any(one.impact for one in events)
         self.u, self.held = changed.speeds, changed.held
+        if changed.touching and not is_start:  # where it is found that a gap is zero, all that are closed are so to rounding
+            met = self._sides.like(self.assembly.with_held(changed.touching), plan)
+            self.q = nearest_place(plan.in_piece(met), self.t, self.q, self.u)
         self.assembly = self.assembly.with_held(self.held)
         self.probe, self._plans, self._handed = None, {}, ()
         return plan.in_piece(self._sides.like(self.assembly, plan))
