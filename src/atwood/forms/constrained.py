@@ -29,6 +29,9 @@ from atwood.mechanics.dynamics.equations import Constraint, Equations
 _LARGEST_FILL = 60_000
 """More products than these are left to a loop when the program runs."""
 
+_ADDED = 1e-9
+"""Of the diagonal of gaps and slips, which may repeat each other: what they miss shrinks by that in a step."""
+
 _NOT_READ = ("locals_", "site", "masses", "shapes", "decisions", "constants")
 """What equations were made of; their derivation reads what was made."""
 
@@ -187,7 +190,7 @@ def _nearest(
                 entries[i, j] = entries.get((i, j), zero) + scaled[i][column] * scaled[j][column]
     for k, mask in enumerate(masks):
         if not (mask - 1.0).is_zero:
-            entries[k, k] = entries.get((k, k), zero) + (1.0 - mask)
+            entries[k, k] = (1.0 + _ADDED) * entries.get((k, k), zero) + (1.0 - mask)
     found = _solved(SymmetricSystem(entries, right, [1] * len(right))) if right else []
     moved = [zero] * len(sizes)
     for row, multiplier in zip(scaled, found, strict=True):

@@ -39,7 +39,7 @@ _ALONG = {"N": "m", "N*m": "rad"}
 _NEAR = 10.0
 """Times the relative tolerance, in sizes of the scene: what is nearer to zero is there."""
 
-_NEAR_REST = 100.0
+_NEAR_REST = 1000.0
 """The same where impacts have accumulated: what still bounces is as near as that."""
 
 _MOST_TURNS = 50
@@ -77,7 +77,7 @@ class _Moment:
     def __init__(
         self, values: ContactValues, scales: Scales, relative: float, triggers: Sequence[EventRecord], rests: bool
     ) -> None:
-        self.values, self.rests = values, rests
+        self.values = values
         self.contacts, self.units, self.t = values.contacts, values.units, values.t
         self.first = [self.contacts[rows[0]] for rows in self.units]
         self.u = values.u.copy()
@@ -157,10 +157,18 @@ class _Moment:
             advice="With impacts='together' they are solved at once.",
         )
 
+    def stop(self) -> None:
+        """Stop whatever touches: impacts have accumulated, and nothing opens any more."""
+        held, push = [self.units[k][0] for k in self.touching], np.zeros(len(self.contacts))
+        push[held] = least_norm(self.values.response[np.ix_(held, held)], -self.rates()[held])
+        self.u = self.u + self.values.speeds_by(push)
+        for k in self.touching[:1]:
+            self._tell(k, "impacts have accumulated: it rests", "rests")
+
     def _impact(self, touching: list[int], rates: FloatArray) -> None:
         values, count = self.values, len(self.contacts)
         chosen = [*touching, *self.slips_at(touching)]
-        share = np.zeros(count) if self.rests else values.restitution
+        share = values.restitution
         gaps = [self.units[k][0] for k in touching]
         poisson = [i for i in gaps if self.contacts[i].law.options.impact_law == "poisson"]
         free = rates.copy()
@@ -317,7 +325,7 @@ class _Moment:
 
     def _tell(self, k: int, said: str, kind: str) -> None:
         part, law, _ = self.first[k].row.key
-        self.events.append(EventRecord(self.t, part, law, said, "", kind in ("impact", "jams"), kind))
+        self.events.append(EventRecord(self.t, part, law, said, "", kind in ("impact", "jams", "rests"), kind))
 
     def _contradiction(self, what: str, chosen: list[int]) -> SolveError:
         names = ", ".join(dict.fromkeys(self.first[k].row.key[0] for k in chosen))
@@ -380,7 +388,10 @@ def resolve(
     if is_start:
         moment.check_start()
     touching = moment.all_closed()
-    moment.collide(one_by_one)
+    if rests:
+        moment.stop()
+    else:
+        moment.collide(one_by_one)
     moment.settle()
     if np.array_equal(moment.u, moment.values.u):
         speeds = u

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from itertools import pairwise
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from atwood.clock import GRACE, Clock, TimeIsUp
 from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Shared
+from atwood.lazy_dataclasses import replace
 from atwood.integrators.protocol import Statistics
 from atwood.mechanics.outputs.event_functions import CLOSES, CONTACT, UPDATE
 from atwood.simulation.dynamics.numerical_failure import is_numerical, named, numerical_failure
@@ -104,10 +104,13 @@ def _again(
     return _prepared(assembly, start, reassemble, options, between, log).go()
 
 
-_LEFT = 1.0
+_SPANS = 12
+"""So many intervals between impacts say how fast these follow each other."""
+
+_LEFT = 100.0
 """Times the root of the tolerance, in units of the scene's time: so long may impacts still go on that are summed.
 
-What still rises in that time rises by less than the tolerance.
+What still rises in one interval rises by some tolerances, and rounding does not tell in its intervals yet.
 """
 
 
@@ -292,14 +295,11 @@ class _Walk:
             is_start,
         )
         events = list(changed.events)
-        hit = next((one for one in events if one.kind == "impact"), None)
-        if hit is not None and rests is None:
-            self._impacts = [*self._impacts[-3:], self.t]
-        elif hit is not None and rests is not None:
-            said = "impacts have accumulated: it rests"
-            events = [one for one in events if one.kind not in ("impact", "closes")]
-            events.append(EventRecord(self.t + rests, hit.part, hit.law, said, "", True, "rests"))
+        if any(one.kind == "impact" for one in events):
+            self._impacts = [*self._impacts[1 - _SPANS :], self.t]
+        if rests is not None:
             self._impacts = []
+            events = [replace(one, time=self.t + rests) if one.kind == "rests" else one for one in events]
         self.events += events if not is_start else [one for one in events if one.impact]
         self.impact |= any(one.impact for one in events)
         self.u, self.held = changed.speeds, changed.held
@@ -319,11 +319,13 @@ class _Walk:
         times = [*self._impacts, self.t]
         if len(times) < 4 or not any(one.target == CLOSES for one in triggers):
             return None
-        first, second, third = (later - earlier for earlier, later in pairwise(times[-4:]))
-        if not first > second > third > 0.0:
-            return 0.0 if third == 0.0 else None
-        share = third / second
-        left = third * share / (1.0 - share)
+        spans = np.diff(times)
+        if spans[-1] == 0.0:
+            return 0.0
+        if not np.all(spans[1:] < spans[:-1]):
+            return None
+        share = float(spans[-1] / spans[0]) ** (1.0 / (len(spans) - 1))
+        left = float(spans[-1]) * share / (1.0 - share)
         return left if left < _LEFT * self.options.relative_tolerance**0.5 * time else None
 
     def _plan(self) -> SceneProblem:
