@@ -40,6 +40,10 @@ if TYPE_CHECKING:
     from atwood.simulation.problem.closed_loops import Solved
 
 
+_OF_CONTACTS = 0.01
+"""Of the tolerance, where gaps and slips decide how the motion goes on."""
+
+
 @dataclass(frozen=True, eq=False)
 class SolverRequest:
     """What is to be solved.
@@ -81,6 +85,8 @@ class SolverRequest:
         """Return the options of a solver that starts at a time, with no looser tolerance than it can hold."""
         options = self.options
         relative = min(options.relative_tolerance, loosest)
+        if self.plan.assembly.own_equations.contacts:  # errors add up over impacts, and decide when the next one is
+            relative, loosest = _OF_CONTACTS * relative, _OF_CONTACTS * loosest
         return SolverOptions(
             relative_tolerance=max(relative * self.plan.relative_share, LEAST),
             absolute_tolerances=self.plan.tolerances(
