@@ -36,9 +36,13 @@ class BoxContact(Model):
         """Give each corner its contact."""
         half = 0.5 * self.length, 0.5 * self.width, 0.5 * self.height
         signs = product((-1, 1), (-1, 1) if self.corners == 8 else (0,), (-1, 1))
-        common = {name: getattr(self, name) for name in ("restitution", "friction", "static_friction", "surface_velocity")}
+        common = {
+            name: getattr(self, name) for name in ("restitution", "friction", "static_friction", "surface_velocity")
+        }
         corners = [
-            VertexContact(place=tuple(sign * one for sign, one in zip(some, half, strict=True)), normal=self.normal, **common)
+            VertexContact(
+                place=tuple(sign * one for sign, one in zip(some, half, strict=True)), normal=self.normal, **common
+            )
             for some in signs
         ]
         for one in self.add("corner", corners):

@@ -45,7 +45,9 @@ class TranslationalStop(Component):
         """Play above the lower end; 1 where there is none."""
         return 1.0 if self.lower is None else between(self)[0] - self.lower
 
-    @unilateral(reaction="upper_force", unit="N", restitution="restitution", doc="What the upper end exerts, against b.")
+    @unilateral(
+        reaction="upper_force", unit="N", restitution="restitution", doc="What the upper end exerts, against b."
+    )
     def below_upper(self) -> Scalar:
         """Play below the upper end; 1 where there is none."""
         return 1.0 if self.upper is None else self.upper - between(self)[0]

@@ -50,10 +50,12 @@ class Touching(Component):
         raise NotImplementedError
 
     def directions_in_world(self) -> tuple[Vector, Vector]:
-        """Return two directions across the normal, in world axes; in a plane the first is to the right of the normal."""
+        """Return two directions across the normal, in world axes; in a plane the first is to its right."""
         raise NotImplementedError
 
-    @unilateral(reaction="normal_force", unit="N", restitution="restitution", doc="Force along the normal; it only pushes.")
+    @unilateral(
+        reaction="normal_force", unit="N", restitution="restitution", doc="Force along the normal; it only pushes."
+    )
     def gap(self) -> Scalar:
         """Distance of the two bodies."""
         return self.apart()
@@ -99,7 +101,9 @@ class Touching(Component):
     def force(self) -> Vector:
         """Return the force: the normal force and friction."""
         first, second = self.directions_in_world()
-        pressed: Vector = self.normal_in_world() * self.reaction("normal_force")
+        total: Vector = self.normal_in_world() * self.reaction("normal_force")
         if not self.in_space:
-            return pressed + first * self.reaction("friction_force")
-        return pressed + first * self.reaction("friction_1") + second * self.reaction("friction_2")
+            total = total + first * self.reaction("friction_force")
+        else:
+            total = total + first * self.reaction("friction_1") + second * self.reaction("friction_2")
+        return total

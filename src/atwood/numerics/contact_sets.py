@@ -1,9 +1,9 @@
 """Which one-sided rows hold: linear complementarity with friction, for accelerations and for impulses.
 
-Rows move by ``a = b + A f``. A gap has ``f >= 0``, ``a >= 0`` and ``f a = 0``. A slip, of one row or of two that are square to
-each other, sticks with ``a = 0`` and ``|f|`` within its static limit, or goes on in a direction d with ``f = -L d`` and
-``a = |a| d``; its limits are ``L = L_0 + P f`` (F. Pfeiffer and C. Glocker, *Multibody Dynamics with Unilateral Contacts*,
-1996, sections 6.3 and 8.3).
+Rows move by ``a = b + A f``. A gap has ``f >= 0``, ``a >= 0`` and ``f a = 0``. A slip, of one row or of two that are
+square to each other, sticks with ``a = 0`` and ``|f|`` within its static limit, or goes on in a direction d with
+``f = -L d`` and ``a = |a| d``; its limits are ``L = L_0 + P f`` (F. Pfeiffer and C. Glocker, *Multibody Dynamics with
+Unilateral Contacts*, 1996, chapters 6 and 8).
 
 A set of states is tried, and the state that contradicts most is changed, until none does; where that does not end, all
 sets of few rows are looked through.
@@ -187,7 +187,8 @@ def _contradiction(
     contacts: Contacts, states: Sequence[State], forces: FloatArray, motions: FloatArray
 ) -> tuple[int, State]:
     """Return the unit whose state contradicts most, and the state it has then; -1 where none does."""
-    worst, number, better = SLACK, -1, (OPEN, (0.0,))
+    better: State = (OPEN, (0.0,))
+    worst, number = SLACK, -1
     if not contacts.units:
         return number, better
     limits = contacts.limits.free + contacts.limits.shares @ forces

@@ -123,7 +123,7 @@ class _System:
     right
         The right-hand side.
     diagonal
-        The diagonal of C; empty where it is zero. Rows of gaps and slips that do not hold say that a multiplier is zero.
+        The diagonal of C; empty where it is zero. A row of a gap that is open says that its multiplier is zero.
     masses
         Number of accelerations.
     """

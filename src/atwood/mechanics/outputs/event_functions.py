@@ -19,12 +19,18 @@ from atwood.model.declare.laws import Law
 UPDATE = "update"
 """Target of an event that changes states of its part, and no mode."""
 
-CLOSES, OPENS, YIELDS, STOPS, FREES = "contact closes", "contact opens", "contact yields", "contact stops", "contact frees"
-"""Targets of events of gaps and slips: a gap closes, its force vanishes, what sticks reaches its limit, what slips comes
-to rest, and the limit of friction passes zero."""
+CLOSES, OPENS, YIELDS, STOPS, FREES = (
+    "contact closes",
+    "contact opens",
+    "contact yields",
+    "contact stops",
+    "contact frees",
+)
+"""Targets of events of gaps and slips: a gap closes, its force vanishes, what sticks reaches its limit, what slips
+comes to rest, and the limit of friction passes zero."""
 
 RESTS, RUNS = "contact comes to rest", "contact runs"
-"""The same of slips in two directions, which need not pass zero: they are slower than what is small, and faster again."""
+"""The same of slips in two directions, which need not pass zero: they fall below what is small, and rise above it."""
 
 CONTACT = (CLOSES, OPENS, YIELDS, STOPS, FREES, RESTS, RUNS)
 
@@ -149,7 +155,10 @@ def _of_contacts(equations: Equations) -> list[EventFunction]:
 
 def norm_of(values: Sequence[Expression]) -> Expression:
     """Return the root of the sum of squares."""
-    return sqrt(sum((one * one for one in values[1:]), values[0] * values[0]))
+    total = values[0] * values[0]
+    for one in values[1:]:
+        total = total + one * one
+    return values[0].graph.convert(sqrt(total))
 
 
 def _evaluated(graph: Graph, bound: Any, law: Law) -> Expression:

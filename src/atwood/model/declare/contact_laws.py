@@ -1,8 +1,8 @@
 """One-sided laws: what cannot be passed, and dry friction.
 
-A gap that must not be negative comes with a force that must not be negative, and one of both is zero (Signorini's law).
-What slides is held back by a force of the size of its limit, and what sticks by any force within it (Coulomb's law); see
-F. Pfeiffer and C. Glocker, *Multibody Dynamics with Unilateral Contacts* (1996), chapters 5 and 8.
+A gap that must not be negative comes with a force that must not be negative, and one of both is zero (Signorini's
+law). What slides is held back by a force of the size of its limit, and what sticks by any force within it (Coulomb's
+law); see F. Pfeiffer and C. Glocker, *Multibody Dynamics with Unilateral Contacts* (1996), chapters 5 to 8.
 """
 
 from __future__ import annotations

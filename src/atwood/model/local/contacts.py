@@ -119,9 +119,7 @@ def _gap(
 def _slip(part: Part, law: Law, bound: Any, graph: Graph) -> list[LocalContact]:
     options: FrictionOptions = law.options
     names = options.reactions
-    values = call_law(
-        part.path, law, lambda: [one_scalar(graph, one) for one in scalars(getattr(bound, law.name)())]
-    )
+    values = call_law(part.path, law, lambda: [one_scalar(graph, one) for one in scalars(getattr(bound, law.name)())])
     if len(values) != len(names):
         raise DeclarationError(
             f"it returns {len(values)} scalars and names {len(names)} reactions", where=f"{part.path}.{law.name}"

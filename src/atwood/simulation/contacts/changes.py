@@ -1,7 +1,7 @@
 """What gaps and slips do at a moment: impacts, and which of them hold from then on.
 
-Between two moments the states of gaps and slips are parameters of the equations. At a moment velocities jump where a gap
-closes with a speed, and the states are found anew such that no inequality is contradicted at accelerations.
+Between two moments the states of gaps and slips are parameters of the equations. At a moment velocities jump where a
+gap closes with a speed, and the states are found anew such that no inequality is contradicted at accelerations.
 """
 
 from __future__ import annotations
@@ -198,7 +198,7 @@ class _Moment:
                 self._tell(k, said, "impact")
 
     def _impulses(self, chosen: list[int], free: FloatArray) -> FloatArray:
-        """Return the impulses of all rows, with velocities in place of accelerations: of limits only what forces give."""
+        """Return the impulses of all rows: velocities take the place of accelerations, and limits are what forces give."""
         values, found = self.values, np.zeros(len(self.contacts))
         rows = [row for k in chosen for row in self.units[k]]
         for _ in range(_MOST_TURNS):

@@ -1,7 +1,7 @@
 """Gaps and slips of a scene in numbers, in maximal coordinates, in which every joint has its forces.
 
 A unit force along a row i makes accelerations ``X_i``, with the joints holding: ``M X_i - G^T y_i = J_i^T``,
-``G X_i = 0``. So the rows move by ``b + A f`` with ``A = J X`` (C. Glocker, *Set-Valued Force Laws*, 2001, section 5.3).
+``G X_i = 0``. So the rows move by ``b + A f`` with ``A = J X`` (C. Glocker, *Set-Valued Force Laws*, 2001).
 """
 
 from __future__ import annotations
@@ -192,7 +192,9 @@ class ContactValues:
             found += [(limits - shares @ forces)[heads], shares[heads]]
         return Limits(*found)
 
-    def chosen(self, chosen: list[int], free: FloatArray, given: dict[int, tuple[float, ...]], limits: Limits) -> Contacts:
+    def chosen(
+        self, chosen: list[int], free: FloatArray, given: dict[int, tuple[float, ...]], limits: Limits
+    ) -> Contacts:
         """Return what is asked of some units."""
         rows = [row for k in chosen for row in self.units[k]]
         place = {row: i for i, row in enumerate(rows)}

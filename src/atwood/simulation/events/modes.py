@@ -64,8 +64,8 @@ class EventRecord:
     impact
         Whether velocities jumped.
     kind
-        ``"event"`` for one that a part declares. Of gaps and slips ``"impact"``, ``"closes"``, ``"opens"``, ``"slips"``,
-        ``"sticks"``, ``"reverses"`` (of a slip), ``"rests"`` (impacts have accumulated) or ``"jams"``.
+        ``"event"`` for one that a part declares. Of gaps and slips ``"impact"``, ``"closes"``, ``"opens"``,
+        ``"slips"``, ``"sticks"``, ``"reverses"`` (of a slip), ``"rests"`` (impacts have accumulated) or ``"jams"``.
     """
 
     time: float
@@ -205,7 +205,9 @@ class EventProbe:
     def _opening(self, t: float, q: FloatArray, u: FloatArray, small: FloatArray) -> BoolArray:
         """Return which gaps are at zero and open with a speed: they need no margin."""
         found = np.zeros(len(self.event_functions), dtype=np.bool_)
-        gaps = [(i, one.rate) for i, one in enumerate(self.event_functions) if one.target == CLOSES and one.rate is not None]
+        gaps = [
+            (i, one.rate) for i, one in enumerate(self.event_functions) if one.target == CLOSES and one.rate is not None
+        ]
         if gaps:
             program = known_program(self.assembly, _RATES, lambda: [rate for _, rate in gaps])
             idle = [0.0] * len(self.assembly.reactions)

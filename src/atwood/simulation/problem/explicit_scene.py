@@ -213,7 +213,11 @@ def _compiled_on_constraints(
     if plan.not_compilable:
         return None
     code = plan.assembly.shared.get(_COMPILED_ON_CONSTRAINTS, lambda: _code(program), program)
-    return None if code is None else _once(lambda: code.bind(values, projects=bool(plan.finding.kept or plan.assembly.own_equations.contacts)))
+    return (
+        None
+        if code is None
+        else _once(lambda: code.bind(values, projects=bool(plan.finding.kept or plan.assembly.own_equations.contacts)))
+    )
 
 
 def _code(program: ConstrainedProgram) -> CompiledAccelerations | None:

@@ -12,8 +12,8 @@ from atwood.clock import GRACE, Clock, TimeIsUp
 from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Shared
-from atwood.lazy_dataclasses import replace
 from atwood.integrators.protocol import Statistics
+from atwood.lazy_dataclasses import replace
 from atwood.mechanics.outputs.event_functions import CLOSES, CONTACT, UPDATE
 from atwood.simulation.dynamics.numerical_failure import is_numerical, named, numerical_failure
 from atwood.simulation.dynamics.orientation_coordinates import (
@@ -303,7 +303,9 @@ class _Walk:
         self.events += events if not is_start else [one for one in events if one.impact]
         self.impact |= any(one.impact for one in events)
         self.u, self.held = changed.speeds, changed.held
-        if changed.touching and not is_start:  # where it is found that a gap is zero, all that are closed are so to rounding
+        if (
+            changed.touching and not is_start
+        ):  # where it is found that a gap is zero, all that are closed are so to rounding
             met = self._sides.like(self.assembly.with_held(changed.touching), plan)
             self.q = nearest_place(plan.in_piece(met), self.t, self.q, self.u)
         self.assembly = self.assembly.with_held(self.held)
