@@ -37,7 +37,7 @@ TABLE = {
     "Rotational.Components": """
         Fixed RotationalMotion; Inertia Inertia; Disc RotationalCoupling; Spring RotationalSpringDamper;
         Damper RotationalSpringDamper; SpringDamper RotationalSpringDamper; ElastoBacklash RotationalGap;
-        ElastoBacklash2 RotationalGap; BearingFriction RotationalResistance; Brake RotationalResistance;
+        ElastoBacklash2 RotationalGap; BearingFriction RotationalFriction; Brake RotationalFriction;
         IdealGear Gear; LossyGear Gear; IdealPlanetary PlanetaryGear; Gearbox Gear; IdealGearR2T
         RackAndPinion; IdealRollingWheel RackAndPinion; RelativeStates RotationalSensor;
         AngleToTorqueAdaptor RotationalMotion; TorqueToAngleAdaptor RotationalSource""",
@@ -55,9 +55,9 @@ TABLE = {
     "Translational.Components": """
         Fixed TranslationalMotion; Mass Mass1D; Rod TranslationalCoupling; Spring TranslationalSpringDamper;
         Damper TranslationalSpringDamper; SpringDamper TranslationalSpringDamper; ElastoGap
-        TranslationalGap; SupportFriction TranslationalResistance; Brake TranslationalResistance;
-        IdealGearR2T RackAndPinion; IdealRollingWheel RackAndPinion; MassWithStopAndFriction Mass1D
-        TranslationalGap; RelativeStates TranslationalSensor""",
+        TranslationalGap; SupportFriction TranslationalFriction; Brake TranslationalFriction;
+        IdealGearR2T RackAndPinion; IdealRollingWheel RackAndPinion; MassWithStopAndFriction
+        TranslationalStop; RelativeStates TranslationalSensor""",
     "Translational.Sensors": """
         PositionSensor TranslationalSensor; SpeedSensor TranslationalSensor; AccSensor TranslationalSensor;
         RelPositionSensor TranslationalSensor; RelSpeedSensor TranslationalSensor; RelAccSensor

@@ -24,7 +24,7 @@ from atwood.model.values.units import parse_si_unit
 
 ROOT = Path(atwood_library.__file__).parent
 TETRAHEDRON = Path(__file__).parent / "tetrahedron.stl"
-GROUPS = ("blocks", "drives", "fields", "forces", "joints", "parts", "ropes", "sensors", "sources")
+GROUPS = ("blocks", "contacts", "drives", "fields", "forces", "joints", "parts", "ropes", "sensors", "sources")
 
 
 def library_modules() -> list:
@@ -201,6 +201,8 @@ def binding_of(component: aw.Component, space_name: str, numbers: Numbers) -> Bi
 
 def reaction_names(component: aw.Component) -> Iterator[str]:
     for law in component.laws("constraint"):
+        yield from law.options.reactions
+    for law in component.contact_laws().values():
         yield from law.options.reactions
 
 

@@ -18,8 +18,8 @@ class RotationalFriction(Component):
     """
 
     synonyms: ClassVar[tuple[str, ...]] = (
-        *("Clutch", "Brake", "BearingFriction", "Bearing friction", "Dry friction", "Coulomb friction", "Stick-slip"),
-        *("Rotational.Components.Brake", "SupportFriction", "MassWithStopAndFriction"),
+        *("Clutch", "BearingFriction", "Bearing friction", "Dry friction", "Coulomb friction"),
+        *("Rotational.Components.Brake", "Rotational.Components.Clutch"),
     )
     spaces: ClassVar[tuple[str, ...]] = ("plane", "space")
 

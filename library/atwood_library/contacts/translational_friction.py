@@ -18,8 +18,7 @@ class TranslationalFriction(Component):
     """
 
     synonyms: ClassVar[tuple[str, ...]] = (
-        *("Clutch", "Brake", "BearingFriction", "Bearing friction", "Dry friction", "Coulomb friction", "Stick-slip"),
-        *("Translational.Components.Brake", "SupportFriction", "MassWithStopAndFriction"),
+        *("SupportFriction", "Translational.Components.Brake", "Guide friction", "Stick-slip"),
     )
     spaces: ClassVar[tuple[str, ...]] = ("plane", "space")
 

@@ -23,7 +23,7 @@ class RotationalGap(Gap):
     """
 
     synonyms = (
-        *("ElastoBacklash", "ElastoBacklash2", "Backlash", "Stop"),
+        *("ElastoBacklash", "ElastoBacklash2", "Elastic backlash", "Elastic stop"),
         "Rotational.Components.ElastoBacklash",
     )
     spaces = ("plane", "space")

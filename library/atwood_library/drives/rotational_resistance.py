@@ -19,7 +19,6 @@ class RotationalResistance(Component):
     synonyms = (
         *("LinearSpeedDependentTorque", "QuadraticSpeedDependentTorque"),
         *("InverseSpeedDependentTorque", "SignTorque", "Rotational.Sources.EddyCurrentTorque"),
-        *("BearingFriction", "Rotational.Components.Brake"),
     )
     spaces = ("plane", "space")
 

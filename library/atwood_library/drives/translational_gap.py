@@ -22,7 +22,7 @@ class TranslationalGap(Gap):
     contact begins and ends is found exactly.
     """
 
-    synonyms = ("ElastoGap", "Backlash", "Stop", "MassWithStopAndFriction")
+    synonyms = ("ElastoGap", "Elastic backlash", "Elastic stop")
 
     stiffness: Number = parameter(1e4, unit="N/m", above=0.0, doc="Force for a unit beyond the play.")
     damping: Number = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force for a unit of the rate in contact.")

@@ -19,7 +19,6 @@ class TranslationalResistance(Component):
     synonyms = (
         *("LinearSpeedDependentForce", "QuadraticSpeedDependentForce", "InverseSpeedDependentForce"),
         *("SignForce", "RollingResistance", "Translational.Sources.EddyCurrentForce"),
-        *("SupportFriction", "Translational.Components.Brake"),
     )
 
     linear: Number = parameter(0.0, unit="N*s/m", minimum=0.0, doc="Force for a unit of speed.", symbol="b")

@@ -32,7 +32,7 @@ class Mass1D(Component):
     one-dimensional and planar parts can meet.
     """
 
-    synonyms = ("Mass on a line", "Translational.Components.Mass", "MassWithStopAndFriction")
+    synonyms = ("Mass on a line", "Translational.Components.Mass")
 
     mass: Number = parameter(1.0, unit="kg", minimum=0.0, doc="Mass.")
     origin: Triple = parameter(

@@ -77,16 +77,21 @@ class ContactLaw(ObservableLaw[Any]):
         found: dict[str, Any] = {}
         for reaction in options.reactions:
             law = Law("observable", reaction, self._seen(options.unit, options.doc, self.contact))
-            found[reaction] = ObservableLaw(_reaction_of(reaction), law)
+            found[reaction] = ObservableLaw(_says(_reaction_of(reaction), options.doc), law)
         if len(self.names) > 1:
             for i, one in enumerate(self.names):
                 law = Law("observable", one, self._seen(self.unit, self.says, self.contact))
-                found[one] = ObservableLaw(_element(name, i), law)
+                found[one] = ObservableLaw(_says(_element(name, i), self.says), law)
         if self.contact.kind == "unilateral":
             return {**found, f"{name}_state": discrete_state(doc=f"1 where {name} is closed, else 0.")}
         found[f"{name}_state"] = discrete_state(doc=f"0 where nothing rubs, 1 where {name} goes on, 2 where it sticks.")
         says = f"Direction in which {name} goes on; 0 where it does not."
         return {**found, **{f"{one}_direction": discrete_state(doc=says) for one in self.names}}
+
+
+def _says(read: Callable[[Component], Any], doc: str) -> Callable[[Component], Any]:
+    read.__doc__ = doc
+    return read
 
 
 def _reaction_of(name: str) -> Callable[[Component], Any]:

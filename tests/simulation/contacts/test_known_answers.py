@@ -1,0 +1,357 @@
+"""Contact, impact and dry friction against answers that are known: by hand, or from an analysis that is named."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import atwood as aw
+from atwood import Scene, simulate
+from atwood_library import (
+    BallContact,
+    Box,
+    BoxContact,
+    DistanceContact,
+    Ground,
+    Inertia,
+    Link,
+    Mass1D,
+    Pivot,
+    PointContact,
+    PointMass,
+    RotationalFriction,
+    RotationalStop,
+    Sphere,
+    Spring,
+    SurfaceContact,
+    VertexContact,
+)
+
+G = 9.81
+FORMS = pytest.mark.parametrize("form", ["reduced", "dae"])
+
+
+def run(scene: Scene, form: str, end: float, **options: object) -> aw.Result:
+    return simulate(scene, form=form, t_end=end, rtol=1e-10, outputs=[0.0, end], **options)
+
+
+def times(result: aw.Result, kind: str) -> list[float]:
+    return [one.time for one in result.events if one.kind == kind]
+
+
+def on_plane(part: aw.Component, contact: aw.Component, **space: str) -> Scene:
+    """Return a scene with a part, called m, on a plane, called c."""
+    scene = Scene(**space)
+    ground, m, c = scene.add("ground", Ground()), scene.add("m", part), scene.add("c", contact)
+    scene.connect(ground.frame, c.plane)
+    ends = {"PointContact": "point", "BallContact": "ball", "VertexContact": "body", "BoxContact": "box"}
+    own = m.point if isinstance(part, PointMass) else m.a if isinstance(part, Link) else m.frame
+    scene.connect(own, getattr(c, ends[type(contact).__name__]))
+    return scene
+
+
+def start_at(scene: Scene, x: float, z: float, vx: float, vz: float) -> None:
+    scene.start.update({"m.position.x": x, "m.position.z": z, "m.velocity.x": vx, "m.velocity.z": vz})
+
+
+@FORMS
+@pytest.mark.parametrize("size", [1.0, 1e3, 1e-3])
+def test_a_ball_bounces_and_comes_to_rest(form: str, size: float) -> None:
+    scene = on_plane(PointMass(mass=2.0), PointContact(restitution=0.9))
+    start_at(scene, 0.0, size, 0.0, 0.0)
+    unit = math.sqrt(size)
+    result = run(scene, form, 10.0 * unit)
+    assert times(result, "impact")[9] == pytest.approx(5.4302180026 * unit, abs=1e-9 * unit)
+    assert times(result, "rests")[-1] == pytest.approx(8.5789491787 * unit, abs=1e-9 * unit)
+    assert result["m.position.z"][-1] == pytest.approx(0.0, abs=1e-12 * size)
+    assert result["c.normal_force"][-1] == pytest.approx(2.0 * G)
+    assert result["c.gap_state"][-1] == 1.0
+
+
+@FORMS
+def test_a_ball_in_a_box_is_reflected_as_light_is(form: str) -> None:
+    """Unfolded, its way is straight: after 432.1 s the place is that of a triangle wave of each coordinate."""
+    scene = Scene(gravity=0.0)
+    m = scene.add("m", PointMass(mass=1.0))
+    for name, place, normal in (
+        ("a", (0, 0, 0), (1, 0, 0)),
+        ("b", (1, 0, 0), (-1, 0, 0)),
+        ("c", (0, 0, 0), (0, 0, 1)),
+        ("d", (0, 0, 0.7), (0, 0, -1)),
+    ):
+        ground = scene.add(f"ground_{name}", Ground(position=place))
+        wall = scene.add(name, PointContact(normal=normal, radius=0.05, restitution=1.0))
+        scene.connect(ground.frame, wall.plane)
+        scene.connect(m.point, wall.point)
+    start_at(scene, 0.3, 0.2, 1.1, 0.7)
+    end = 43.21
+
+    def folded(start: float, speed: float, width: float) -> tuple[float, int]:
+        way = start - 0.05 + speed * end
+        _, rest = divmod(way, 2.0 * width)
+        return 0.05 + (rest if rest < width else 2.0 * width - rest), int(way // width)
+
+    (x, x_hits), (z, z_hits) = folded(0.3, 1.1, 0.9), folded(0.2, 0.7, 0.6)
+    result = run(scene, form, end)
+    assert len(times(result, "impact")) == x_hits + z_hits
+    assert result["m.position.x"][-1] == pytest.approx(x, abs=1e-9)
+    assert result["m.position.z"][-1] == pytest.approx(z, abs=1e-9)
+
+
+def on_slope(angle: float, speed: float, across: float | None = None, friction: float = 0.4) -> Scene:
+    normal = (-math.sin(angle), 0.0, math.cos(angle))
+    scene = on_plane(
+        PointMass(mass=2.0),
+        PointContact(normal=normal, friction=friction),
+        space="plane" if across is None else "space",
+    )
+    start_at(scene, 0.0, 0.0, speed * math.cos(angle), speed * math.sin(angle))
+    if across is not None:
+        scene.start.update({"m.position.y": 0.0, "m.velocity.y": across})
+    return scene
+
+
+def along(result: aw.Result, angle: float, quantity: str) -> float:
+    x, z = (float(result[f"m.{quantity}.{axis}"][-1]) for axis in "xz")
+    return x * math.cos(angle) + z * math.sin(angle)
+
+
+@FORMS
+def test_a_block_slides_up_a_slope_and_stays(form: str) -> None:
+    result = run(on_slope(0.3, 1.0), form, 10.0)
+    slowing = G * (math.sin(0.3) + 0.4 * math.cos(0.3))
+    assert along(result, 0.3, "position") == pytest.approx(0.5 / slowing, abs=1e-11)
+    assert times(result, "sticks") == [pytest.approx(1.0 / slowing, abs=1e-10)]
+    assert result["c.friction_force"][-1] == pytest.approx(2.0 * G * math.sin(0.3))
+    assert result["c.slip_state"][-1] == 2.0
+
+
+@FORMS
+def test_a_block_slides_up_a_slope_and_back(form: str) -> None:
+    result = run(on_slope(0.6, 1.0), form, 0.3364573836)
+    assert along(result, 0.6, "position") == pytest.approx(0.0, abs=1e-9)
+    assert along(result, 0.6, "velocity") == pytest.approx(-0.5119431119, abs=1e-9)
+    assert len(times(result, "reverses")) == 1
+
+
+@FORMS
+def test_a_block_that_slides_across_a_slope_is_turned_down(form: str) -> None:
+    """With tan(angle) as friction, speed and its part downwards always add up to the same (a puck on a slope)."""
+    result = run(on_slope(0.3, 0.0, 2.0, math.tan(0.3)), form, 1.0)
+    assert math.hypot(along(result, 0.3, "velocity"), result["m.velocity.y"][-1]) == pytest.approx(
+        1.0081781882, abs=1e-9
+    )
+
+
+@FORMS
+def test_a_mass_on_a_spring_stops_where_friction_holds_it(form: str) -> None:
+    scene = on_plane(PointMass(mass=2.0), PointContact(friction=0.3))
+    spring = scene.add("spring", Spring(stiffness=50.0))
+    scene.connect(scene.ground.frame, spring.a)
+    scene.connect(scene.m.point, spring.b)
+    start_at(scene, 1.0, 0.0, 0.0, 0.0)
+    result = run(scene, form, 5.0)
+    assert times(result, "sticks")[-1] == pytest.approx(2.5132741229, abs=1e-9)
+    assert result["m.position.x"][-1] == pytest.approx(0.05824, abs=1e-9)
+
+
+@FORMS
+def test_a_mass_on_a_belt_sticks_and_slips(form: str) -> None:
+    contact = PointContact(friction=0.4, static_friction=0.6, surface_velocity=0.2)
+    scene = on_plane(PointMass(mass=1.0), contact)
+    wall, spring = (
+        scene.add("wall", Ground(position=(-5.0, 0.0, 0.0))),
+        scene.add("spring", Spring(stiffness=100.0, natural_length=5.0)),
+    )
+    scene.connect(wall.frame, spring.a)
+    scene.connect(scene.m.point, spring.b)
+    start_at(scene, 0.0, 0.0, 0.2, 0.0)
+    periods = np.diff(times(run(scene, form, 3.0), "slips"))
+    assert periods == pytest.approx(np.full(len(periods), 0.6693570623), abs=1e-9)
+
+
+@FORMS
+def test_a_sliding_ball_comes_to_roll(form: str) -> None:
+    scene = on_plane(Sphere(mass=1.0, radius=0.1), BallContact(friction=0.2, radius=0.1))
+    start_at(scene, 0.0, 0.1, 8.0, 0.0)
+    scene.start["m.angular_velocity.y"] = 0.0
+    result = run(scene, form, 2.0)
+    assert times(result, "sticks") == [pytest.approx(1.1649919907, abs=1e-9)]
+    assert result["m.velocity.x"][-1] == pytest.approx(5.0 / 7.0 * 8.0, abs=1e-9)
+
+
+@FORMS
+def test_a_cue_ball_with_spin_comes_to_roll(form: str) -> None:
+    """Friction keeps its direction while it slips: it rolls after 2 u/(7 mu g), u the slip at first."""
+    scene = on_plane(Sphere(mass=1.0, radius=0.0286), BallContact(friction=0.25, radius=0.0286), space="space")
+    start_at(scene, 0.0, 0.0286, 2.0, 0.0)
+    scene.start.update({"m.position.y": 0.0, "m.velocity.y": 0.0})
+    scene.start.update({f"m.angular_velocity.{axis}": value for axis, value in zip("xyz", (30, 40, 10), strict=True)})
+    result = run(scene, form, 0.5)
+    assert times(result, "sticks") == [pytest.approx(0.1411949146, abs=1e-9)]
+    assert result["m.velocity.x"][-1] == pytest.approx(1.7554285714, abs=1e-9)
+    assert result["m.velocity.y"][-1] == pytest.approx(-0.2451428571, abs=1e-9)
+
+
+@FORMS
+def test_a_ladder_leaves_the_wall(form: str) -> None:
+    scene = Scene()
+    ground, m = scene.add("ground", Ground()), scene.add("m", Link(length=2.0, mass=1.0))
+    for name, normal, end in (("floor", (0, 0, 1), m.a), ("wall", (1, 0, 0), m.b)):
+        contact = scene.add(name, VertexContact(normal=normal))
+        scene.connect(ground.frame, contact.plane)
+        scene.connect(end, contact.body)
+    scene.start.update({"m.angle": 0.5 * math.pi + 0.3, "m.angular_velocity": 0.0, "floor.gap": 0.0, "wall.gap": 0.0})
+    result = run(scene, form, 0.7)
+    assert [(one.part, one.kind) for one in result.events] == [("wall", "opens")]
+    assert result.events[0].time == pytest.approx(0.6505624421, abs=1e-9)
+
+
+@FORMS
+def test_a_bead_leaves_a_sphere(form: str) -> None:
+    scene = Scene()
+    ground, m = scene.add("ground", Ground()), scene.add("m", PointMass(mass=1.0))
+    contact = scene.add("c", SurfaceContact(function="x**2 + z**2 - 1"))
+    scene.connect(ground.frame, contact.a)
+    scene.connect(m.point, contact.b)
+    start_at(scene, 0.0, 1.0, 0.5, 0.0)
+    assert times(run(scene, form, 1.0), "opens") == [pytest.approx(0.7542388380, abs=1e-9)]
+
+
+@FORMS
+def test_a_stick_that_falls_slips(form: str) -> None:
+    scene = on_plane(Link(length=1.0, mass=1.0), VertexContact(friction=0.25))
+    scene.start.update({"m.angle": 0.5 * math.pi + 0.1, "m.angular_velocity": 0.0, "c.gap": 0.0, "c.slip": 0.0})
+    assert times(run(scene, form, 0.6), "slips") == [pytest.approx(0.4962296185, abs=1e-9)]
+
+
+@FORMS
+def test_a_block_rocks(form: str) -> None:
+    """G. Housner's block (Bull. Seism. Soc. Am. 53, 1963): each impact leaves 1 - 3/2 sin^2(alpha) of the rate."""
+    box = BoxContact(length=0.5, height=2.0, friction=10.0)
+    scene = on_plane(Box(mass=1.0, length_x=0.5, length_z=2.0), box)
+    scene.start.update({"m.angle": 0.15, "m.angular_velocity.y": 0.0, "c.corner[0].gap": 0.0, "c.corner[0].slip": 0.0})
+    result = run(scene, form, 9.0)
+    found = times(result, "impact")
+    assert found[0] == pytest.approx(0.5999358452, abs=1e-9)
+    assert found[3] == pytest.approx(2.9278155896, abs=1e-9)
+    assert times(result, "rests") == [pytest.approx(8.6907773166, abs=1e-7)]
+    assert result["m.angle"][-1] == pytest.approx(0.0, abs=1e-9)
+
+
+@FORMS
+@pytest.mark.parametrize(
+    ("impacts", "speeds"), [("together", [-0.6, 0.4, 0.4, 0.4, 0.4]), ("one_by_one", [0, 0, 0, 0, 1])]
+)
+def test_newton_s_cradle(form: str, impacts: str, speeds: list[float]) -> None:
+    scene = Scene(space="line")
+    balls = [scene.add(f"m{i}", Mass1D(mass=1.0)) for i in range(5)]
+    for i in range(4):
+        contact = scene.add(f"c{i}", DistanceContact(lower=0.1, restitution=1.0))
+        scene.connect(balls[i].flange, contact.a)
+        scene.connect(balls[i + 1].flange, contact.b)
+    for i in range(5):
+        scene.start.update({f"m{i}.displacement": 0.1 * i - 0.5 * (i == 0), f"m{i}.speed": float(i == 0)})
+    result = run(scene, form, 1.0, impacts=impacts)
+    assert [float(result[f"m{i}.speed"][-1]) for i in range(5)] == pytest.approx(speeds, abs=1e-12)
+
+
+@FORMS
+def test_an_engine_runs_into_ten_wagons(form: str) -> None:
+    scene = Scene(space="line")
+    wagons = [scene.add(f"m{i}", Mass1D(mass=1.0)) for i in range(11)]
+    for i in range(10):
+        contact = scene.add(f"c{i}", DistanceContact(lower=1.0))
+        scene.connect(wagons[i].flange, contact.a)
+        scene.connect(wagons[i + 1].flange, contact.b)
+    for i in range(11):
+        scene.start.update({f"m{i}.displacement": 1.1 * i, f"m{i}.speed": 3.0 * (i == 0)})
+    result = run(scene, form, 2.0)
+    assert times(result, "impact")[-1] == pytest.approx(sum(0.1 * k / 3.0 for k in range(1, 11)), abs=1e-9)
+    assert result["m10.speed"][-1] == pytest.approx(3.0 / 11.0)
+
+
+@FORMS
+def test_two_rotors_with_play(form: str) -> None:
+    scene = Scene()
+    a, b = scene.add("a", Inertia(moment=1.0)), scene.add("b", Inertia(moment=2.0))
+    play = scene.add("play", RotationalStop(lower=-0.1, upper=0.1, restitution=0.6))
+    scene.connect(a.flange, play.a)
+    scene.connect(b.flange, play.b)
+    scene.start.update({"a.angle": 0.0, "b.angle": 0.0, "a.angular_velocity": 5.0, "b.angular_velocity": 0.0})
+    assert times(run(scene, form, 1.3), "impact")[5] == pytest.approx(1.2060082305, abs=1e-9)
+
+
+@FORMS
+def test_a_pendulum_with_friction_in_its_hinge_stays(form: str) -> None:
+    scene = Scene()
+    ground, pivot, link = (
+        scene.add("ground", Ground()),
+        scene.add("pivot", Pivot()),
+        scene.add("link", Link(length=1.0, mass=0.0)),
+    )
+    bob, rub = (
+        scene.add("bob", PointMass(mass=1.0)),
+        scene.add("rub", RotationalFriction(sliding="0.5", against="ground")),
+    )
+    scene.connect(ground.frame, pivot.a)
+    scene.connect(pivot.b, link.a)
+    scene.connect(link.b, bob.point)
+    scene.connect(pivot.shaft, rub.b)
+    scene.start.update({"pivot.angle": 1.5 - 0.5 * math.pi, "pivot.angular_velocity": 0.0})
+    result = run(scene, form, 15.0)
+    assert (result.events[-1].kind, result.events[-1].time) == ("sticks", pytest.approx(13.6445534015, abs=1e-9))
+
+
+@FORMS
+def test_a_ball_bounces_in_a_circle(form: str) -> None:
+    scene = Scene()
+    ground, m = scene.add("ground", Ground()), scene.add("m", PointMass(mass=1.0))
+    contact = scene.add("c", SurfaceContact(function="0.25 - x**2 - z**2", restitution=0.9))
+    scene.connect(ground.frame, contact.a)
+    scene.connect(m.point, contact.b)
+    start_at(scene, 0.1, 0.0, 0.3, 0.0)
+    assert times(run(scene, form, 2.2), "impact")[5] == pytest.approx(2.1345199766, abs=1e-9)
+
+
+@FORMS
+def test_painleve_s_rod_jams(form: str) -> None:
+    scene = on_plane(Link(length=2.0, mass=1.0), VertexContact(friction=1.6))
+    scene.start.update({"m.angle": 1.0, "m.angular_velocity": 0.0, "c.gap": 0.0, "c.slip": -1.0})
+    result = run(scene, form, 0.01)
+    assert times(result, "jams") == [0.0]
+
+
+def test_a_start_inside_is_refused_with_the_part_and_the_depth() -> None:
+    scene = on_plane(PointMass(mass=1.0), PointContact())
+    start_at(scene, 0.0, -0.25, 0.0, 0.0)
+    with pytest.raises(aw.StartError, match=r"c: it starts inside, by 0\.25 m"):
+        simulate(scene, t_end=1.0)
+
+
+def turned_run(turned: float) -> tuple[float, list[float]]:
+    """Return how far a mass has slid that a spring pulls onto a plane, and its impacts, with all turned by an angle."""
+    normal, tangent = (-math.sin(turned), math.cos(turned)), (math.cos(turned), math.sin(turned))
+    contact = PointContact(normal=(normal[0], 0.0, normal[1]), friction=0.3, restitution=0.5)
+    scene = on_plane(PointMass(mass=1.0), contact)
+    scene.gravity = 0.0
+    anchor = scene.add("anchor", Ground(position=(-2.0 * normal[0], 0.0, -2.0 * normal[1])))
+    spring = scene.add("spring", Spring(stiffness=20.0))
+    scene.connect(anchor.frame, spring.a)
+    scene.connect(scene.m.point, spring.b)
+    place = [0.4 * tangent[i] + 0.3 * normal[i] for i in (0, 1)]
+    speed = [0.2 * tangent[i] - 0.1 * normal[i] for i in (0, 1)]
+    start_at(scene, *place, *speed)
+    result = run(scene, "reduced", 2.0)
+    end = [float(result[f"m.position.{axis}"][-1]) for axis in "xz"]
+    return end[0] * tangent[0] + end[1] * tangent[1], times(result, "impact")[:3]
+
+
+@pytest.mark.parametrize("turned", [0.7, 2.5])
+def test_contacts_are_the_same_however_a_scene_is_turned(turned: float) -> None:
+    (place, impacts), (known, known_impacts) = turned_run(turned), turned_run(0.0)
+    assert len(known_impacts) == 3
+    assert place == pytest.approx(known, abs=1e-9)
+    assert impacts == pytest.approx(known_impacts, abs=1e-9)
