@@ -158,8 +158,10 @@ class _Moment:
         )
 
     def stop(self) -> None:
-        """Stop whatever touches: impacts have accumulated, and nothing opens any more."""
-        held, push = [self.units[k][0] for k in self.touching], np.zeros(len(self.contacts))
+        """Stop whatever touches: impacts have accumulated, and nothing opens any more; what has stuck goes on to."""
+        still = [k for k, one in enumerate(self.first) if one.is_slip and self.before[k][0] == STICKS]
+        held = [row for k in (*self.touching, *still) for row in self.units[k]]
+        push = np.zeros(len(self.contacts))
         push[held] = least_norm(self.values.response[np.ix_(held, held)], -self.rates()[held])
         self.u = self.u + self.values.speeds_by(push)
         for k in self.touching[:1]:
