@@ -152,6 +152,7 @@ FORGED = [
 ]
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("content", FORGED, ids=range(len(FORGED)))
 def test_forged_derivations_are_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes) -> None:
     store = disk.Cache(tmp_path)

@@ -67,6 +67,7 @@ def library(request: pytest.FixtureRequest) -> list[tuple[Assembly, tuple[Any, .
     return [(assembly, decisions(assembly)) for assembly in assemblies]
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize("factor", [0.1, 10.0])
 @pytest.mark.parametrize("name", NAMES)
 def test_library_scenes_are_the_same_with_ten_times_and_a_tenth(

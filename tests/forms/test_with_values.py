@@ -67,7 +67,7 @@ def moved(scene: Scene) -> dict[str, float]:
     return {name: 1.03 * value for name, value in numbers(scene).items()}
 
 
-@pytest.mark.sample(36)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("solver", ["ida", "explicit", "auto"])
 @pytest.mark.parametrize("name", GENERAL)
 @pytest.mark.parametrize("form", ["reduced", "dae"])
@@ -86,7 +86,7 @@ def test_other_values_compile_nothing(name: str, form: str, solver: str, monkeyp
     assert other.shared is first.shared
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", GENERAL)
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 def test_answers_are_those_of_a_scene_made_so(name: str, form: str) -> None:

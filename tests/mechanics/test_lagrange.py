@@ -122,7 +122,7 @@ def _drive_force(prepared: Prepared, q: FloatArray, u: FloatArray, path: str) ->
     return float(values[index, 0])
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", GENERAL)
 def test_reduced_and_maximal_accelerations_are_the_same_motion(name: str) -> None:
     prepared = prepare(SCENES[name](), "reduced")

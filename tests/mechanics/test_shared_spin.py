@@ -74,6 +74,7 @@ def round_leg(guide: str, turned: float) -> np.ndarray:
     return motion(leg(guide, turned, 1e-3))
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(("form", "solver"), EVERY)
 @pytest.mark.parametrize(("guide", "turned"), [("slider", 0.0), ("cylindrical", 0.7)])
 def test_a_slender_leg_moves_as_a_round_one_that_does_not_spin(

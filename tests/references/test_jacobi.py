@@ -37,7 +37,7 @@ def test_the_first_kind_is_the_inverse(mc):
         assert first_kind(float(sn), float(cn), mc) == pytest.approx(u, rel=1e-14)
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("mc", [1.0, 0.5, 1e-3])
 @pytest.mark.parametrize("n", [-5000.0, -50.0, -1.0, -0.1, 0.3, 0.99])
 def test_the_third_kind_is_its_integral(mc, n):

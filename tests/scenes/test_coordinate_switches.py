@@ -213,7 +213,7 @@ def test_loops_and_modes_have_any_coordinates(kind: str) -> None:
         assert other.energy.max_drift < 1e-5
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("kind", FEW)
 @pytest.mark.parametrize("name", ["rolling-ball", "rolling-disc", "stewart-platform"])
 def test_scenes_that_roll_and_stand_on_legs_have_any_coordinates(name: str, kind: str) -> None:

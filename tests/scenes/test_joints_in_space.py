@@ -45,7 +45,7 @@ def build(name: str) -> tuple[Scene, int]:
     return scene, 3 + freedom
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", JOINTS)
 def test_both_forms_agree(name: str) -> None:
     scene, freedom = build(name)

@@ -87,7 +87,7 @@ def on_carrier(name: str) -> Scene:
     return scene
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", LOADS)
 def test_both_forms_agree_and_the_energy_ledger_closes(name: str) -> None:
     scene = on_carrier(name)

@@ -64,6 +64,7 @@ def gap(one: Result, other: Result) -> dict[str, float]:
     return found
 
 
+@pytest.mark.sample(20)
 @pytest.mark.parametrize("name", SCENES)
 def test_each_form_is_right_and_both_agree(name: str) -> None:
     end = span(name)
@@ -105,6 +106,7 @@ def test_bricard_says_which_reactions_are_not_unique() -> None:
     assert "not unique; those of least norm are reported" in said
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("make", [Bricard, lambda: FourBarRow(space="space")])
 def test_reactions_of_redundant_constraints_are_those_of_least_size(make: type[Scene]) -> None:
     # Every other solution differs by something that pulls nothing; that of least size is at right angles to all such.
@@ -142,6 +144,7 @@ def test_what_redundant_reactions_have_in_common_is_unique(form: str) -> None:
         assert abs(carried - rate - weight) < 1e-7
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_unique_reactions_of_a_row_in_space_are_those_in_the_plane(form: str) -> None:
     flat, deep = (

@@ -68,6 +68,7 @@ def _rates(state: Any) -> tuple[float, float, float]:
 # -- the disc ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("form", "solver", "rtol", "error"),
     [
@@ -219,6 +220,7 @@ def on_a_raft(part: Any, rolling: Any) -> Scene:
     return scene
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("kind", ["disc", "ball"])
 def test_both_forms_agree_on_a_plane_that_swings(kind: str) -> None:
     def build() -> Scene:

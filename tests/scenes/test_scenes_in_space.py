@@ -81,6 +81,7 @@ def test_every_scene_in_space_is_here() -> None:
     assert set(SIZES) == {name for name, make in SCENES.items() if make().space == "space"}
 
 
+@pytest.mark.sample(11)
 @pytest.mark.parametrize("name", SIZES)
 def test_as_few_states_as_by_hand(name: str) -> None:
     coordinates, speeds, _, freedom = SIZES[name]

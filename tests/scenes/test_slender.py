@@ -84,6 +84,7 @@ def linkage(coupler: Component) -> Scene:
     return scene
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("make", [lambda: Link(length=2.0, mass=3.0), lambda: Bar(length=2.0, mass=3.0, axis="z")])
 def test_a_slender_coupler_on_two_balls_moves_as_a_rod_of_points(form: str, make: Callable[[], Component]) -> None:
@@ -109,6 +110,7 @@ def test_the_report_drops_the_spin_from_the_freedom() -> None:
     assert alone.states == {"reduced": 6, "dae": 20}
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("solver", ["explicit", "taylor"])
 @pytest.mark.parametrize("orientation", ["quaternion", "euler-xyz", "euler-zyx"])
 def test_no_constraint_is_left_where_there_is_no_loop(solver: str, orientation: str) -> None:

@@ -90,7 +90,7 @@ def seen(scene: Scene, form: str) -> Seen:
     return Seen(len(u) - finding.rank, redundant, forces)
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("base", BASES[1:], ids=lambda base: f"{base[0]:.3g}")
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("name", MAKE)

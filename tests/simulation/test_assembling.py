@@ -83,6 +83,7 @@ def test_fixed_values_that_keep_a_loop_open_say_by_how_much() -> None:
         find_start(assemble(SpatialSliderCrank(rod_length=0.1)))
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("space", ["plane", "space"])
 @pytest.mark.parametrize(("apart", "miss"), [(3.1, 0.1), (0.9, 0.1)])
 def test_rods_that_do_not_meet(space: str, apart: float, miss: float) -> None:
@@ -246,6 +247,7 @@ def test_a_guess_that_a_fixed_value_contradicts_is_said() -> None:
     assert off["rod2.angle"] == pytest.approx(math.asin(0.5 - math.sin(0.3)) - 0.4, abs=1e-9)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_results_know_what_was_moved_in_both_forms(form: str) -> None:
     result = simulate(StewartPlatform(), form=form, t_end=1e-3, outputs=2, rtol=1e-6)

@@ -235,6 +235,7 @@ UNEVEN = {
 }
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("solver", ["gauss", "composition"])
 @pytest.mark.parametrize("potential", UNEVEN)
 def test_steps_of_fixed_length_see_corners_and_waves_farther_on(solver: str, potential: str) -> None:
@@ -291,6 +292,7 @@ LARGE = {
 }
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize("solver", ["auto", "explicit", "ida", "gauss", "composition"])
 @pytest.mark.parametrize("potential", LARGE)
 def test_a_divisor_or_a_factor_too_large_for_a_number_is_no_bar(solver: str, potential: str) -> None:

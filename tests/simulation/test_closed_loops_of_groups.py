@@ -83,6 +83,7 @@ def check_swinging_block(result: Result, ground: tuple[float, float], offset: fl
     assert_allclose(turned, 1.0, atol=1e-13)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("space", SPACES)
 @pytest.mark.parametrize(
     ("ground", "offset", "guess"), [((1.0, 0.2), 0.0, 2.9), ((1.0, 0.2), 0.15, 2.9), ((0.0, -0.15), 0.0, 0.9)]

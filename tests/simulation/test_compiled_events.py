@@ -77,6 +77,7 @@ CASES: dict[str, tuple[Callable[[], Scene], str]] = {
 }
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("solver", ["ida", "auto"])
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 @pytest.mark.parametrize("case", CASES)
@@ -101,6 +102,7 @@ def test_compiled_events_happen_when_those_in_python_do(
             assert compiled.array(path) == pytest.approx(python.array(path), abs=1e-10)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("solver", ["ida", "explicit"])
 def test_no_python_looks_at_steps_in_which_nothing_happens(solver: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = bouncer()

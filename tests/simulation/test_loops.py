@@ -88,6 +88,7 @@ def test_loops_that_share_nothing_are_solved_apart() -> None:
     assert choice_lists(program, first)[at["blocks"]] == 1
 
 
+@pytest.mark.sample(2)
 @needs_sundials
 @pytest.mark.parametrize("make", [FourBar, SliderCrank, rocking, double_four_bar, two_four_bars])
 def test_compiled_and_plain_rows_take_a_mechanism_to_the_same_place(make: Any) -> None:

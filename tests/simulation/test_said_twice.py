@@ -34,6 +34,7 @@ def four_bar(speed: float) -> Scene:
     return scene
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("speed", [2.0, 0.0])
 def test_speeds_of_rounding_are_none(form: str, speed: float) -> None:

@@ -136,6 +136,7 @@ def test_a_state_alone_follows_its_rate(form: str, solver: str) -> None:
     assert_allclose(result["three.total"], sum(np.exp(-k * result.time) for k in (1, 2, 3)), atol=1e-7)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(("form", "solver"), SOLVERS)
 @pytest.mark.parametrize("space", ["plane", "space"])
 def test_states_and_mechanics_act_on_each_other_alike_everywhere(form: str, solver: str, space: str) -> None:

@@ -41,6 +41,7 @@ def guards(monkeypatch: pytest.MonkeyPatch) -> list[SingularityMonitor]:
     return made
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(
     "scene", [fast_slider_crank(), FourBar(), Bricard()], ids=["slider-crank", "four-bar", "bricard"]

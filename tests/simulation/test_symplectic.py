@@ -188,6 +188,7 @@ def test_backwards_in_time_it_comes_to_its_start():
     assert back["rod.angle"][-1] == pytest.approx(1.0, abs=1e-13)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("order", [2, 4, 6])
 @pytest.mark.parametrize(
     "scene", [FourBar(), FourBar(space="space"), SliderCrank()], ids=["four-bar", "in space", "slider-crank"]

@@ -165,6 +165,7 @@ FORCES: dict[str, tuple[Function, Callable[[np.ndarray], np.ndarray]]] = {
 }
 
 
+@pytest.mark.sample(24)
 @pytest.mark.parametrize(("form", "solver"), SOLVERS)
 @pytest.mark.parametrize("name", FORCES)
 def test_a_switch_is_exact_in_every_solver(name: str, form: str, solver: str) -> None:
@@ -318,6 +319,7 @@ def test_a_motor_that_stops_at_once_is_the_same_impact_in_every_form_and_size(
         np.testing.assert_allclose(momentum[after], momentum[before], rtol=1e-7)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("space", "jump"), [("plane", 0.1), ("plane", math.pi), ("space", 0.1), ("space", math.pi)])
 def test_a_motor_that_jumps_is_refused_also_by_half_a_turn(form: str, space: str, jump: float) -> None:

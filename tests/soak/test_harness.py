@@ -33,6 +33,7 @@ def test_no_damper_has_axes_that_point_against_each_other(seed: int) -> None:
     assert np.all(np.isfinite(oracle.accelerations(place, speeds, 0.0)[0]))
 
 
+@pytest.mark.sample(0)
 def test_a_crank_that_is_driven_beyond_its_reach_comes_to_a_singular_position() -> None:
     oracle = Oracle(draw(1159, own=False))
     assert oracle.is_singular_on_the_way(np.linspace(0.0, 0.3, 31))

@@ -15,6 +15,7 @@ from .trial import Discarded
 WAYS = Way("reduced", solver="ida-sundae"), Way("dae", solver="ida-sundae")
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("seed", [1, 2, 10, 16, 23])
 def test_scenes_agree_with_the_oracle(seed: int) -> None:
     trial = check_mechanism(draw(seed, own=False), WAYS)
@@ -23,6 +24,7 @@ def test_scenes_agree_with_the_oracle(seed: int) -> None:
     assert not trial.findings, trial.findings[0].detail
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("seed", "sorts"),
     [
@@ -41,6 +43,7 @@ def test_own_components_stops_and_feedback_agree_with_the_oracle(seed: int, sort
     assert not trial.findings, trial.findings[0].detail
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("seed", [1, 5, 6, 10, 13, 22])
 def test_relations_hold(seed: int) -> None:
     trial = metamorphic.check(seed)
@@ -48,6 +51,7 @@ def test_relations_hold(seed: int) -> None:
     assert not trial.findings, trial.findings[0].detail
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("seed", [0, 1, 5])
 def test_methods_agree(seed: int) -> None:
     trial = methods.check(seed)
@@ -55,6 +59,7 @@ def test_methods_agree(seed: int) -> None:
     assert not trial.findings, trial.findings[0].detail
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     ("kind", "seed"),
     [(kind, seed) for kind in ("levels", "stiff", "claims") for seed in (1, 3, 4)] + [("rest", 12)],
@@ -65,12 +70,14 @@ def test_closed_forms_are_met(kind: str, seed: int) -> None:
     assert not trial.findings, trial.findings[0].detail
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("seed", [101, 103, 110, 117, 131, 175])
 def test_tables_agree_with_scipy(seed: int) -> None:
     trial = tables.check(seed)
     assert not trial.findings, trial.findings[0].detail
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("kind", [hostile, poles], ids=["hostile", "poles"])
 def test_files_and_poles(kind) -> None:
     for seed in range(6):

@@ -47,6 +47,7 @@ def pendulum() -> Comparison:
     return compare(Pendulum(), rtols=(1e-4, 1e-6, 1e-8), name="pendulum")
 
 
+@pytest.mark.sample(0)
 def test_every_form_and_level_has_its_rows(pendulum: Comparison) -> None:
     ida, explicit, gauss = "SUNDIALS IDA", "Dormand-Prince 8(5,3)", "Gauss, symplectic"
     kinds = {(row.form, row.level, row.solver) for row in pendulum.rows}

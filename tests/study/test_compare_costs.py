@@ -154,6 +154,7 @@ def test_page_needs_nothing_but_itself(found, tmp_path):
     assert (tmp_path / "page" / "comparisons.csv").is_file()
 
 
+@pytest.mark.sample(0)
 def test_all_scenes_make_one_page(monkeypatch, tmp_path):
     """Scenes that fail are on it with the reason, and the others are not lost."""
     wanted = ["simple-pendulum", "free-symmetric-body"]

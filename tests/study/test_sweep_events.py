@@ -104,6 +104,7 @@ CASES: dict[str, tuple[Callable[[], Scene], dict[str, Any]]] = {
 }
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", CASES)
 def test_many_at_a_time_is_one_by_one(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scene, given = CASES[name]

@@ -18,7 +18,7 @@ VARIED = {
 }
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", VARIED)
 def test_each_run_is_that_of_a_scene_made_so(name: str) -> None:
     scene, varied = SCENES[name](), VARIED[name]

@@ -59,6 +59,7 @@ def balance(length: float, mass: float, form: str) -> tuple[np.ndarray, np.ndarr
     return found.accelerations[turning, 0], np.array(torques) / (mass * length**2)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("length", "mass"), [(1e-6, 1.0), (1e6, 1e-6), (1e-3, 1e6)])
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 def test_a_planetary_gear_of_any_size(form: str, length: float, mass: float) -> None:

@@ -73,6 +73,7 @@ def test_bushes_bear_the_weight_between_them(form: str, count: int, angle: float
     assert np.linalg.norm(total) == pytest.approx(across, rel=1e-9)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("kind", list(MAKE))
 @pytest.mark.parametrize("form", FORMS)
 def test_shares_are_of_least_size_however_a_scene_is_turned(form: str, kind: str) -> None:

@@ -56,6 +56,7 @@ def same(one: Result, other: Result, path: str) -> None:
     assert_allclose(one.energy.total, other.energy.total, rtol=0.0, atol=1e-11)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", SCENES)
 def test_runs_with_other_options_and_values_are_those_of_new_assemblies(name: str) -> None:
     make, parameter, values, path = SCENES[name]

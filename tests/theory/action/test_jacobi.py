@@ -96,6 +96,7 @@ def test_the_separated_momentum_in_symbols():
     assert float(there.subs({"r": 1.0})) == pytest.approx(0.25)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("amplitude", [0.5, 1.0, 2.5, 3.1])
 def test_the_pendulum_that_swings(amplitude):
     """``T = 4 K(k)/w`` and ``J = 16 w (E(k) - (1 - k^2) K(k))`` with ``k = sin(amplitude/2)`` for m = l = 1."""

@@ -460,6 +460,7 @@ def test_values_in_place_of_symbols() -> None:
     assert same(eq.mass_matrix[0, 1].subs(theta, 0), sympy.Float(0.7))
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("name", "form", "orientation"),
     [

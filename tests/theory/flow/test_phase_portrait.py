@@ -29,6 +29,7 @@ TURN = round(math.pi, 9)
 KINDS = {"free": [], "harmonic": ["centre"], "inverted": ["saddle"], "pendulum": ["saddle", "centre", "saddle"]}
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("kind", ENERGIES)
 def test_curves_keep_the_energy_of_textbook_oscillators(kind: str) -> None:
     found = phase_portrait(Oscillators(kind=kind))

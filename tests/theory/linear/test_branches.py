@@ -32,6 +32,7 @@ class Hoop(Scene):
     ]
 
 
+@pytest.mark.sample(0)
 def test_a_bead_leaves_the_bottom_of_its_hoop() -> None:
     found = equilibrium_branches(Hoop(), "rate", (1.0, 6.0))
     (crossing,) = found.crossings

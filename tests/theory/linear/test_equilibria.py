@@ -48,6 +48,7 @@ WELLS: dict[str, tuple[Callable[[Any, Any], Any], str, int]] = {
 }
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(("name", "size"), [*((name, 1.0) for name in WELLS), ("x^4 + z^2", 1e-6), ("x^3 + z^2", 1e6)])
 def test_what_the_linear_model_does_not_decide_higher_derivatives_do(name: str, size: float) -> None:
     energy, stability, family = WELLS[name]
@@ -99,6 +100,7 @@ def test_a_narrow_well_and_the_tail_of_a_force_that_dies_away() -> None:
     assert max(map(abs, one.values.values())) < 1e-10
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("ratio", [0.9, 1.0 - 1e-9, 1.0, 1.0 + 1e-9, 1.0001, 1.1])
 def test_hoop_about_its_critical_rate(ratio: float) -> None:
     """``cos(theta) = -g/(omega^2 a)``, where that is; the lowest point is stable up to the critical rate."""

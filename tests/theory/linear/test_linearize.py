@@ -77,6 +77,7 @@ def test_weave_and_capsize_speeds_of_the_bicycle() -> None:
     assert capsize == pytest.approx(6.024262015, abs=1e-9)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("hole", "factor"), [(0.0, 1.0 / 3.0), (0.2, 0.25)])
 @pytest.mark.parametrize("heading", [0.0, 1.1])
 def test_a_disc_that_rolls_falls_below_its_critical_speed(hole: float, factor: float, heading: float) -> None:
@@ -159,6 +160,7 @@ def test_a_bead_on_a_driven_hoop(rate: float) -> None:
     assert bottom.about == "rest"
 
 
+@pytest.mark.sample(0)
 def test_forms_agree_and_reactions_are_outputs() -> None:
     scenes = [
         (PendulumOnCart(), {"rod.angle": math.pi}, ["rail.actuator"], ["rod.tension", "bob.position.x"]),
@@ -194,6 +196,7 @@ def test_of_a_drive_the_acceleration_is_the_input() -> None:
     assert model.B[-1, 0] == 1.0
 
 
+@pytest.mark.sample(0)
 def test_closed_loops_in_space_against_differences() -> None:
     """Of the platform on six legs, driven accelerations are compared with differences of them, leg by leg."""
     platform = StewartPlatform()

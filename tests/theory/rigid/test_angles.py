@@ -28,6 +28,7 @@ def is_zero(value: sympy.Matrix) -> bool:
     return all(abs(one) < sympy.Float("1e-45", 50) for one in value)
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("turns", ["moving", "fixed"])
 @pytest.mark.parametrize("angles", SEQUENCES)
 def test_matrix_angular_velocity_and_rates_belong_together(angles: str, turns: str) -> None:

@@ -24,6 +24,7 @@ SOLIDS = {
 }
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("shape", SOLIDS)
 def test_as_solids(shape: str) -> None:
     found = np.array(inertia_tensor(shape)["I"].subs(NUMBERS), dtype=float)

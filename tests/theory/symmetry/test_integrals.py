@@ -198,6 +198,7 @@ def test_a_force_with_the_inverse_cube_is_dilated_in_time() -> None:
     kept(scene, found)
 
 
+@pytest.mark.sample(0)
 def test_the_spin_of_a_rolling_ball() -> None:
     scene = SCENES["rolling-ball"]()
     found = conserved(scene)

@@ -12,6 +12,7 @@ from atwood_library import Ground, PointMass, Rod
 from atwood_library.scenes import SCENES
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 @pytest.mark.parametrize("name", ["pendulum-on-cart", "lagrange-top", "four-bar", "rotating-hoop-driven"])
 def test_they_stay_along_runs_of_both_forms(name: str, form: str) -> None:

@@ -41,6 +41,7 @@ LAWS: dict[str, tuple[Callable[..., Any], set[str]]] = {
 }
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", LAWS)
 def test_what_a_law_breaks_is_not_claimed_wherever_and_whenever_it_acts(name: str) -> None:
     law, expected = LAWS[name]
@@ -57,6 +58,7 @@ def test_what_is_claimed_stays_along_a_run_through_the_push() -> None:
         assert abs(values - values[0]).max() < 1e-12
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("inclination", [0.0, 1e-14, 1e-6, 1e-3, math.pi])
 def test_a_top_keeps_three_in_euler_angles_wherever_it_starts(inclination: float) -> None:
     found = conserved(LagrangeTop(inclination=inclination), orientation="euler-zxz")
