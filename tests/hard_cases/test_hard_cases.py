@@ -10,7 +10,7 @@ from .cases import CASES
 WAYS = [pytest.param(case, way, id=f"{case.name}, {way}") for case in CASES if case.quick for way in case.ways]
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(12)
 @pytest.mark.parametrize(("case", "way"), WAYS)
 def test_it_meets_what_is_asked(case: Case, way: str) -> None:
     reached = solve(case, way)

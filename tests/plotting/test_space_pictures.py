@@ -102,7 +102,7 @@ def mixed() -> Result:
 # -- every scene ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(10)
 @pytest.mark.parametrize("view", [(0.0, 0.0), (90.0, 0.0), (0.0, 90.0), (200.0, -35.0)])
 @pytest.mark.parametrize("name", IN_SPACE)
 def test_every_scene_is_drawn_from_every_side(

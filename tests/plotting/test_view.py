@@ -31,7 +31,7 @@ def results() -> dict[str, Result]:
     return {name: simulate(kind(), t_end=0.5, rtol=1e-6, outputs=41) for name, kind in SCENES.items() if name in DRAWN}
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("name", DRAWN)
 def test_every_scene_can_be_drawn(results: dict[str, Result], name: str, tmp_path: Path) -> None:
     file = tmp_path / "picture.png"

@@ -97,7 +97,7 @@ def solvers(result: Result) -> list[str]:
     return [one.solver for one in result.run.choices]
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("name", SCENES)
 def test_each_scene_is_given_to_what_suits_it(name: str) -> None:
     scene = SCENES[name]()
