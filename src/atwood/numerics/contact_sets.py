@@ -19,7 +19,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.lazy_dataclasses import dataclass
-from atwood.numerics.matrices import least_norm
+from atwood.numerics.matrices import least_norm, or_one
 
 OPEN, GOES_ON, STICKS = 0, 1, 2
 """States: a gap is open or sticks (is closed); a slip is free, goes on or sticks."""
@@ -140,7 +140,8 @@ def _choices(unit: Unit) -> list[State]:
         return [(OPEN, none), (STICKS, none)]
     if unit.is_given:
         return [(GOES_ON, unit.given)]
-    ways: list[Direction] = [(1.0,), (-1.0,)] if len(none) == 1 else [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)]
+    turns = [0.25 * math.pi * i for i in range(8)]
+    ways: list[Direction] = [(1.0,), (-1.0,)] if len(none) == 1 else [(math.cos(x), math.sin(x)) for x in turns]
     return [(STICKS, none), *((GOES_ON, way) for way in ways)]
 
 
@@ -177,8 +178,7 @@ def _solve(contacts: Contacts, states: Sequence[State]) -> tuple[FloatArray, Flo
             elif state == GOES_ON:
                 matrix[row] = matrix[row] + part * contacts.limits.shares[k]
                 right[row] = -part * contacts.limits.free[k]
-    size = np.max(np.abs(matrix), axis=1)
-    size = np.where(size > 0.0, size, 1.0)
+    size = or_one(np.max(np.abs(matrix), axis=1))
     forces = least_norm(matrix / size[:, None], right / size)
     return forces, contacts.free + contacts.response @ forces
 
@@ -216,6 +216,9 @@ def _misses(
         if state[0] == STICKS:
             yield -float(a[0]), (STICKS, none)
         return
+    if unit.at < 0 and max(limit, static) <= 0.0:  # nothing is pressed
+        yield (0.0 if state[0] == OPEN else 1.0), (OPEN, none)
+        return
     if state[0] == STICKS:
         size = math.hypot(*f)
         way = tuple(float(-x / size) for x in f) if size else (1.0, *none[1:])
@@ -233,6 +236,7 @@ def _misses(
             return
         size = math.hypot(*a)
         across = math.hypot(*(x - along * d for x, d in zip(a, state[1], strict=True)))
-        yield across, (GOES_ON, tuple(float(x / size) for x in a))
+        turned = [float(x / size + d) for x, d in zip(a, state[1], strict=True)]  # half the way, lest it swings
+        yield across, (GOES_ON, tuple(x / math.hypot(*turned) for x in turned))
         return
-    yield limit, (GOES_ON, unit.given) if unit.is_given else (STICKS, none)
+    yield max(limit, static), (GOES_ON, unit.given) if unit.is_given else (STICKS, none)

@@ -22,6 +22,7 @@ from atwood_library import (
     PointContact,
     PointMass,
     RotationalFriction,
+    RotationalSource,
     RotationalStop,
     Sphere,
     Spring,
@@ -303,6 +304,29 @@ def test_a_pendulum_with_friction_in_its_hinge_stays(form: str) -> None:
     scene.start.update({"pivot.angle": 1.5 - 0.5 * math.pi, "pivot.angular_velocity": 0.0})
     result = run(scene, form, 15.0)
     assert (result.events[-1].kind, result.events[-1].time) == ("sticks", pytest.approx(13.6445534015, abs=1e-9))
+
+
+@FORMS
+def test_modelica_s_coupled_clutches(form: str) -> None:
+    """Modelica.Mechanics.Rotational.Examples.CoupledClutches: times at which its clutches stick and slip."""
+    scene, turn = Scene(), 2.0 * math.pi
+    rotors = [scene.add(f"J{i}", Inertia(moment=1.0)) for i in range(4)]
+    motor = scene.add("motor", RotationalSource(value=lambda t: 10.0 * aw.sin(turn * 5.0 * t), against="ground"))
+    scene.connect(rotors[0].flange, motor.b)
+    levels = [
+        lambda t: aw.sin(turn * 0.2 * t + 0.5 * math.pi),
+        lambda t: aw.select(t < 0.4, 0.0, 1.0),
+        lambda t: aw.select(t < 0.9, 0.0, 1.0),
+    ]
+    for i, level in enumerate(levels):
+        clutch = scene.add(f"clutch{i}", RotationalFriction(sliding="10", peak=1.1, level=level))
+        scene.connect(rotors[i].flange, clutch.a)
+        scene.connect(rotors[i + 1].flange, clutch.b)
+    for i in range(4):
+        scene.start.update({f"J{i}.angle": 0.0, f"J{i}.angular_velocity": 10.0 * (i == 0)})
+    known = [0.7096214747, 0.7916623592, 0.8311085061, 0.9068501928, 1.0002958599, 1.1439674925]
+    found = [one.time for one in run(scene, form, 1.2).events if one.time > 0.5 and one.time != 0.9]
+    assert found == pytest.approx(known, abs=1e-9)
 
 
 @FORMS

@@ -19,7 +19,7 @@ from atwood.forms.program import state_groups
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import ContactRow
 from atwood.numerics.contact_sets import Contacts, Limits, Unit
-from atwood.numerics.matrices import least_norm, to_array
+from atwood.numerics.matrices import least_norm, or_one, to_array
 from atwood.simulation.dynamics.balance import balance_of, bordered
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.scales import motion_scales
@@ -141,22 +141,22 @@ class ContactValues:
         now = balance_of(loose, "dae").at(self.t, self.q, self.u)
         mass, held_by = to_array(now.mass), to_array(now.jacobian)
         n, m = len(self.u), len(held_by)
-        rows = np.max(np.abs(held_by * self.sizes), axis=1, initial=0.0)
-        rows = np.where(rows > 0.0, rows, 1.0)
+        each = or_one(np.max(np.abs(held_by * self.sizes), axis=1, initial=0.0))
         heavy = self.sizes[:, None] * mass * self.sizes
         unit = float(np.max(np.abs(heavy), initial=0.0)) or 1.0
-        matrix = bordered(heavy / unit, held_by * self.sizes / rows[:, None])
+        matrix = bordered(heavy / unit, held_by * self.sizes / each[:, None])
         right = np.zeros((n + m, 1 + len(self.contacts)))
-        right[:n, 0], right[n:, 0] = -now.bias * self.sizes / unit, -now.gamma / rows
+        right[:n, 0], right[n:, 0] = -now.bias * self.sizes / unit, -now.gamma / each
         right[:n, 1:] = (self.slopes * self.sizes).T / unit
         found = least_norm(matrix, right, errors=_LIGHT)
-        moved, borne = found[:n] * self.sizes[:, None], found[n:] * unit / rows[:, None]
+        moved, borne = found[:n] * self.sizes[:, None], found[n:] * unit / each[:, None]
         return moved[:, 0], moved[:, 1:], borne[:, 0], borne[:, 1:]
 
     @property
     def response(self) -> FloatArray:
         """A: how the rows move by a unit of each force."""
-        return self.slopes @ self._solved[1]
+        found: FloatArray = self.slopes @ self._solved[1]
+        return found
 
     def accelerations(self) -> FloatArray:
         """Return how the rows accelerate without these forces."""

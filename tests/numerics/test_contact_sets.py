@@ -1,0 +1,76 @@
+"""Sets of contacts against every set: what is found contradicts nothing, and nothing is refused that has a solution."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from atwood.numerics.contact_sets import GOES_ON, OPEN, STICKS, Contacts, Limits, Unit, all_states, find_states
+
+
+def random_contacts(seed: int, gaps: int, in_space: bool) -> Contacts:
+    """Return gaps with friction on a few bodies at random."""
+    chance = np.random.default_rng(seed)
+    width = 3 if in_space else 2
+    rows = gaps * width
+    slopes = chance.normal(size=(rows, rows + 2))
+    mass = np.diag(chance.uniform(0.5, 2.0, size=rows + 2))
+    shares, units = np.zeros((2 * gaps, rows)), []
+    for k in range(gaps):
+        first = k * width
+        units.append(Unit((first,), False, (0.0,), -1))
+        units.append(Unit(tuple(range(first + 1, first + width)), True, (0.0,) * (width - 1), 2 * k))
+        shares[2 * k + 1, first] = chance.uniform(0.0, 0.5)
+    none = np.zeros(2 * gaps)
+    response = slopes @ np.linalg.solve(mass, slopes.T)
+    return Contacts(response, chance.normal(size=rows), tuple(units), Limits(none, shares, none, shares))
+
+
+def laws_hold(contacts: Contacts, states, forces, motions) -> None:
+    """Check Signorini's and Coulomb's laws by their own words."""
+    size, pace = np.max(np.abs(forces)) or 1.0, np.max(np.abs(contacts.free))
+    assert motions == pytest.approx(contacts.free + contacts.response @ forces)
+    for k, (unit, (state, _)) in enumerate(zip(contacts.units, states, strict=True)):
+        f, a = forces[list(unit.rows)], motions[list(unit.rows)]
+        if not unit.is_slip:
+            assert f[0] >= -1e-8 * size
+            assert a[0] >= -1e-8 * pace
+            assert abs(f[0] * a[0]) <= 1e-8 * size * pace
+            continue
+        limit = float(contacts.limits.shares[k] @ forces)
+        assert np.linalg.norm(f) <= limit + 1e-7 * size
+        if state == GOES_ON and np.linalg.norm(a) > 1e-7 * pace:
+            assert np.linalg.norm(f) == pytest.approx(limit, abs=1e-7 * size)
+            assert f @ a == pytest.approx(-np.linalg.norm(f) * np.linalg.norm(a), abs=1e-6 * size * pace)
+        elif state == STICKS and states[unit.at][0] != OPEN:
+            assert np.linalg.norm(a) <= 1e-7 * pace
+
+
+@pytest.mark.parametrize("in_space", [False, True])
+@pytest.mark.parametrize("gaps", [1, 2, 3])
+def test_states_obey_the_laws(gaps: int, in_space: bool) -> None:
+    solved = 0
+    for seed in range(40):
+        contacts = random_contacts(seed, gaps, in_space)
+        none = [(OPEN, (0.0,) * len(unit.rows)) for unit in contacts.units]
+        found = find_states(contacts, none)
+        if found is None:
+            assert not list(all_states(contacts))
+            continue
+        solved += 1
+        laws_hold(contacts, found.states, found.forces, found.motions)
+    assert solved >= 35  # with friction there need be no solution
+
+
+def test_what_was_there_before_is_kept_where_several_sets_fit() -> None:
+    """A rod that slides under much friction may stay on the floor or leave it: it goes on as it did."""
+    response = np.array([[1.0, -0.9], [-0.9, 1.0]])
+    shares = np.array([[0.0, 0.0], [1.6, 0.0]])
+    units = (Unit((0,), False, (0.0,), -1), Unit((1,), True, (-1.0,), 0))
+    contacts = Contacts(response, np.array([1.0, 0.2]), units, Limits(np.zeros(2), shares, np.zeros(2), shares))
+    every = list(all_states(contacts))
+    assert len(every) == 2
+    for one in every:
+        found = find_states(contacts, one.states)
+        assert found is not None
+        assert found.states == one.states
