@@ -330,8 +330,8 @@ __all__ += [
     "ExternalFunction", "Frame", "Groove", "Load", "Number", "Outline", "Placement", "Point", "PointInertia",
     "Rotation", "Scalar", "Shaft", "Slide", "Triple", "Vector", "as_vector", "connector", "constraint",
     "cross", "derivative", "discrete_state", "dissipation", "dot", "dry_friction", "event", "external", "force",
-    "inertia", "is_zero", "joint", "lagrangian", "norm", "normals", "observable", "parameter", "potential", "select", "signal",
-    "solve_linear", "state", "turn", "unilateral", "update",
+    "inertia", "is_zero", "joint", "lagrangian", "norm", "normals", "observable", "parameter", "potential",
+    "select", "signal", "solve_linear", "state", "turn", "unilateral", "update",
 ]  # fmt: skip
 
 # Errors

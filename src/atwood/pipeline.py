@@ -311,11 +311,10 @@ def simulate(
             made, second, said = _solve_to(accuracy, assembly, options, clock)
     if said:
         warnings.warn(f"{flat.name}: {said}", stacklevel=3)
-    made = replace(made, timings=stopwatch.in_order())
-    result = Result(made, second=second)
-    if monitor is not None and made.segments:
-        result = Result(made, monitor.along(result), second)
-    return result
+    result = Result(replace(made, timings=stopwatch.in_order()), second=second)
+    if monitor is None or not made.segments:
+        return result
+    return Result(result.run, monitor.along(result), second)
 
 
 def _solve(assembly: Assembly, options: RunOptions, clock: Clock) -> Run:

@@ -77,8 +77,8 @@ def local_contacts(
     connectors: Mapping[str, LocalConnector],
     graph: Graph,
     holds: Callable[[Law], bool],
-) -> tuple[tuple[LocalContact, ...], dict[str, Scalar]]:
-    """Return the gaps and slips of a part, and their reactions by name as other laws of the part read them."""
+) -> tuple[tuple[LocalContact, ...], Binding]:
+    """Return the gaps and slips of a part, and a binding with their reactions as other laws of the part read them."""
     laws = [law for law in part.component.contact_laws().values() if holds(law)]
     found = [_gap(part, law, binding, connectors, graph) for law in laws if law.kind == "unilateral"]
     gaps = [one for one in found if not one.row.value.is_parametric]  # what never changes never closes
@@ -86,7 +86,8 @@ def local_contacts(
     pressing = {one.row.reaction: one.read for one in gaps}  # zero where the gap is open
     bound = bind(part.component, replace(binding, reactions={**binding.reactions, **never, **pressing}))
     slips = [one for law in laws if law.kind == "friction" for one in _slip(part, law, bound, graph)]
-    return (*gaps, *slips), {**never, **{one.row.reaction: one.force for one in (*gaps, *slips)}}
+    forces = {one.row.reaction: one.force for one in (*gaps, *slips)}
+    return (*gaps, *slips), replace(binding, reactions={**binding.reactions, **never, **forces})
 
 
 def _value(part: Part, law: Law, bound: Any, name: str, graph: Graph) -> Expression:

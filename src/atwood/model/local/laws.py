@@ -143,8 +143,7 @@ def _localize_part(
     formulas = formulas_of(part, bound, coordinates, graph) if space.is_spatial else {}
     # Only forces may read reactions: they are solved for together with the accelerations.
     binding = replace(binding, reactions=_readable_reactions(part, constraints, mode, space, graph))
-    contacts, pressing = local_contacts(part, binding, connectors, graph, laws.hold)
-    binding = replace(binding, reactions={**binding.reactions, **pressing})
+    contacts, binding = local_contacts(part, binding, connectors, graph, laws.hold)
     acting = bind(component, binding)
     given = _forces_of(laws, acting, contacts)
     acted = [*potentials, *lagrangians, *(graph.convert(one) for one in given.values)]

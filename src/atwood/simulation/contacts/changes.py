@@ -200,7 +200,7 @@ class _Moment:
                 self._tell(k, said, "impact")
 
     def _impulses(self, chosen: list[int], free: FloatArray) -> FloatArray:
-        """Return the impulses of all rows: velocities take the place of accelerations, and limits are what forces give."""
+        """Return the impulses of all rows: velocities take the place of accelerations, and limits are of impulses."""
         values, found = self.values, np.zeros(len(self.contacts))
         rows = [row for k in chosen for row in self.units[k]]
         for _ in range(_MOST_TURNS):
