@@ -286,9 +286,8 @@ def simulate(
     refuse_two_accuracies(accuracy, rtol, atol, step)
     with watching() as stopwatch:
         assembly = assembly_of(scene, form=form, level=level, orientation=orientation)
-        flat = assembly.flat
-        end = flat.t_end if t_end is None else float(t_end)
-        with told(progress, flat.name, partial(_share, flat.t_start, end)) as watch:
+        end = assembly.flat.t_end if t_end is None else float(t_end)
+        with told(progress, assembly.flat.name, partial(_share, assembly.flat.t_start, end)) as watch:
             options = RunOptions(
                 t_end=end,
                 relative_tolerance=rtol,
@@ -310,7 +309,7 @@ def simulate(
             )
             made, second, said = _solve_to(accuracy, assembly, options, clock)
     if said:
-        warnings.warn(f"{flat.name}: {said}", stacklevel=3)
+        warnings.warn(f"{assembly.flat.name}: {said}", stacklevel=3)
     result = Result(replace(made, timings=stopwatch.in_order()), second=second)
     if monitor is None or not made.segments:
         return result

@@ -164,7 +164,8 @@ class ContactValues:
 
     def speeds_by(self, forces: FloatArray) -> FloatArray:
         """Return the change of speeds, or the accelerations, that impulses, or forces, make."""
-        return self._solved[1] @ forces
+        found: FloatArray = self._solved[1] @ forces
+        return found
 
     def limits_at(self, forces: FloatArray) -> Limits:
         """Return the limits of all units near some forces of the rows: ``L(f) = L_0 + P f``."""
