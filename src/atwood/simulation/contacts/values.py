@@ -160,7 +160,8 @@ class ContactValues:
 
     def accelerations(self) -> FloatArray:
         """Return how the rows accelerate without these forces."""
-        return self.slopes @ self._solved[0] + self.seconds
+        found: FloatArray = self.slopes @ self._solved[0] + self.seconds
+        return found
 
     def speeds_by(self, forces: FloatArray) -> FloatArray:
         """Return the change of speeds, or the accelerations, that impulses, or forces, make."""
