@@ -26,7 +26,7 @@ from typing import Any
 
 from atwood.arguments import instance, number, one_of, optional, takes
 from atwood.clock import GRACE, Clock, TimeIsUp
-from atwood.errors import UsageError
+from atwood.errors import UnsupportedError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.forms.other_values import Source
 from atwood.forms.reassembly import assembled
@@ -143,6 +143,24 @@ def assembly_of(scene: Model | Assembly, name: str | None = None, **asked: str |
         return assemble(scene, name=name, **given)
     _refuse_contradictions(scene, given)
     return scene
+
+
+def smooth_assembly_of(scene: Model | Assembly, name: str | None = None, **asked: str | None) -> Assembly:
+    """Return the same for what reads equations that hold everywhere; see `refuse_contacts`."""
+    assembly = assembly_of(scene, name, **asked)
+    refuse_contacts(assembly)
+    return assembly
+
+
+def refuse_contacts(assembly: Assembly) -> None:
+    """Refuse a scene whose equations depend on which gaps are closed and on what sticks."""
+    part = next((path for path, local in assembly.mechanism.locals_.items() if local.contacts), None)
+    if part is not None:
+        raise UnsupportedError(
+            "its gap or its dry friction makes other equations of the scene where it opens, closes, slips or sticks",
+            where=part,
+            advice="Ask this of the scene without that part, or with a joint in its place; runs have it as it is.",
+        )
 
 
 @takes(

@@ -111,6 +111,12 @@ def open_session(
 ) -> Session:
     """Start a method."""
     plan = request.plan
+    if plan.assembly.own_equations.contacts and (method.is_implicit or not method.keeps_constraints):
+        raise UsageError(
+            f"{method.title} does not end its steps on gaps that are closed and on what sticks",
+            where=plan.assembly.own_equations.contacts[0].row.key[0],
+            advice=advise(EXPLICIT),
+        )
     if method.is_implicit:
         return method.open(_implicit_task(request, method, t, y, yp))
     if plan.balance.constraints and not keeps_constraints:

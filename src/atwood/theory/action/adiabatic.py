@@ -16,7 +16,7 @@ from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
-from atwood.pipeline import SCENE, assembly_of, simulate
+from atwood.pipeline import SCENE, simulate, smooth_assembly_of
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.arguments import RTOL, T_END
@@ -95,7 +95,7 @@ def adiabatic_invariant(
     SolveError
         If at some time its curve is not closed, or it is on a separatrix.
     """
-    assembly = assembly_of(scene)
+    assembly = smooth_assembly_of(scene)
     h, begun = read_hamiltonian(assembly), find_start(assembly)
     if len(h.paths) != 1 or h.other_forces:
         told = h.sentence if h.other_forces else f"it has {len(h.paths)} degrees of freedom"

@@ -19,7 +19,7 @@ from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import scipy
 from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
-from atwood.pipeline import SCENE, assembly_of
+from atwood.pipeline import SCENE, smooth_assembly_of
 from atwood.result.result import Result
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.arguments import T_END, check_span
@@ -119,7 +119,7 @@ def boundary_value_motions(
     UnsupportedError
         If the coordinates are tied by constraints, or the equations switch on the way.
     """
-    assembly = assembly_of(scene)
+    assembly = smooth_assembly_of(scene)
     refuse_tied(assembly)
     begun = find_start(assembly)
     last = assembly.flat.t_end if t_end is None else float(t_end)

@@ -20,7 +20,7 @@ from atwood.forms.program import rates_are_speeds, state_groups
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
-from atwood.pipeline import assembly_of, simulate
+from atwood.pipeline import simulate, smooth_assembly_of
 from atwood.result.result import Result
 from atwood.result.work import joined_times
 from atwood.simulation.problem.arguments import RTOL, T_END, check_span
@@ -303,10 +303,10 @@ def action(
             raise UsageError("a result has its motion and its end", advice="Give the scene, with a path or an end.")
         return action_of_run(scene.run)
     if path is None:
-        assembly = assembly_of(scene)
+        assembly = smooth_assembly_of(scene)
         return action_of_run(simulate(assembly, t_end=t_end, rtol=rtol).run)
     is_of_both = any(one.startswith("p:") for one in path)
-    return (_of_phase_path if is_of_both else _of_path)(assembly_of(scene), path, t_end)
+    return (_of_phase_path if is_of_both else _of_path)(smooth_assembly_of(scene), path, t_end)
 
 
 def action_of_run(run: Run) -> Action:

@@ -33,7 +33,7 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.model.compose.composite import Model
 from atwood.numerics.rank import independent_rows
-from atwood.pipeline import SCENE, assembly_of
+from atwood.pipeline import SCENE, smooth_assembly_of
 from atwood.simulation.dynamics.balance import BalanceValues, balance_of, mass_at, solve_balance
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.start import Start, find_start
@@ -408,7 +408,7 @@ def dynamics(scene: Model | Assembly, *, form: str | None = None, orientation: s
     Dynamics
         Its functions.
     """
-    return Dynamics(assembly_of(scene, form=form, orientation=orientation))
+    return Dynamics(smooth_assembly_of(scene, form=form, orientation=orientation))
 
 
 def velocity_jacobian(assembly: Assembly, equations: Equations, path: str) -> tuple[list[Expression], tuple[int, ...]]:

@@ -20,7 +20,7 @@ from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.numerics.matrices import or_one
 from atwood.numerics.newton import Missing, newton
-from atwood.pipeline import SCENE, assembly_of
+from atwood.pipeline import SCENE, smooth_assembly_of
 from atwood.theory.dynamics.dynamics import Dynamics
 from atwood.theory.dynamics.functions import Function
 from atwood.tolerances import tolerances
@@ -84,7 +84,7 @@ def solve_initial_values(
     SolveError
         If no values near by make the scene start so.
     """
-    first = assembly_of(scene, form=None, orientation=None)
+    first = smooth_assembly_of(scene, form=None, orientation=None)
     if len(unknowns) != len(conditions) or len(set(unknowns)) != len(unknowns):
         raise UsageError(
             f"{len(set(unknowns))} unknowns have {len(conditions)} conditions",

@@ -19,7 +19,7 @@ from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
 from atwood.model.declare.connectors import PATHS
 from atwood.model.values.letters import SIGNED_LETTERS
-from atwood.pipeline import SCENE, assembly_of
+from atwood.pipeline import SCENE, smooth_assembly_of
 from atwood.simulation.problem.arguments import FORM, ORIENTATION
 from atwood.theory.equations.formulas import EquationFormulas, Parameters, solve_closures
 from atwood.theory.equations.pages import (
@@ -477,7 +477,7 @@ def equations(
         If orientations are in three coordinates that are no Euler angles, nothing has the path of a letter, or one
         letter would stand for two things.
     """
-    assembly = assembly_of(scene, form=form, orientation=orientation)
+    assembly = smooth_assembly_of(scene, form=form, orientation=orientation)
     chosen: Any = parameters
     made = read_equations(assembly, chosen, symbols, gauge)
     paths = tuple(quantities or ())

@@ -19,7 +19,7 @@ from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import scipy, sympy
 from atwood.model.compose.composite import Model
-from atwood.pipeline import SCENE, assembly_of
+from atwood.pipeline import SCENE, smooth_assembly_of
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.arguments import T_END, check_span
 from atwood.theory.formulas.described import Described
@@ -114,7 +114,7 @@ def phase_cloud(
     SolveError
         If a motion does not get to its end.
     """
-    assembly = assembly_of(scene)
+    assembly = smooth_assembly_of(scene)
     h = read_hamiltonian(assembly)
     if coordinate is not None and coordinate not in h.paths:
         raise UsageError("no coordinate has this path", where=coordinate, advice=suggestion(coordinate, h.paths))

@@ -17,7 +17,7 @@ from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
-from atwood.pipeline import SCENE, assemble, simulate
+from atwood.pipeline import SCENE, simulate, smooth_assembly_of
 from atwood.ranges import range_of
 from atwood.simulation.dynamics.scales import scene_length
 from atwood.simulation.events.modes import find_event_functions
@@ -206,7 +206,7 @@ def phase_portrait(
     UsageError
         If the scene has not one degree of freedom, depends on time, or changes its mode.
     """
-    assembly = scene if isinstance(scene, Assembly) else assemble(scene)
+    assembly = smooth_assembly_of(scene)
     functions = Dynamics(assembly)
     _refuse(assembly, functions)
 
@@ -515,7 +515,7 @@ def poincare_section(
     SolveError
         If a motion does not get to its end.
     """
-    assembly = scene if isinstance(scene, Assembly) else assemble(scene)
+    assembly = smooth_assembly_of(scene)
     own = [assembly] if starts is None else [assembly.with_values(start=dict(one)) for one in starts]
     times, numbers, units = list[FloatArray](), list[int](), dict[str, str]()
     found: dict[str, list[FloatArray]] = {path: [] for path in quantities}

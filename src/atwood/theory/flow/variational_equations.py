@@ -22,7 +22,7 @@ from atwood.forms.assembly import Assembly
 from atwood.integrators.symplectic.gauss import tableau
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
-from atwood.pipeline import assemble, simulate
+from atwood.pipeline import simulate, smooth_assembly_of
 from atwood.result.result import Result
 from atwood.simulation.dynamics.balance import solve_determined
 from atwood.simulation.dynamics.orientation_coordinates import to_regular
@@ -380,7 +380,7 @@ class SmoothMotion:
     """
 
     def __init__(self, scene: Model | Assembly, outputs: Any, options: Mapping[str, Any]) -> None:
-        self.assembly = scene if isinstance(scene, Assembly) else assemble(scene)
+        self.assembly = smooth_assembly_of(scene)
         self._options = dict(options)
         if self.assembly.form != "reduced":
             raise UsageError(

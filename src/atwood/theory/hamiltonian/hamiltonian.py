@@ -21,7 +21,7 @@ from atwood.forms.lagrangian import Lagrangian, lagrangian_of
 from atwood.forms.quantities import known_program
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.compose.composite import Model
-from atwood.pipeline import SCENE, assembly_of
+from atwood.pipeline import SCENE, smooth_assembly_of
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.arguments import ORIENTATION
@@ -416,7 +416,7 @@ def hamiltonian(
     UsageError
         If an assembly is in the dae form.
     """
-    assembly = assembly_of(scene, orientation=orientation)
+    assembly = smooth_assembly_of(scene, orientation=orientation)
     chosen: Any = parameters
     return read_hamiltonian(assembly, chosen, symbols, by_part, gauge)
 

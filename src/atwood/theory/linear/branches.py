@@ -24,7 +24,7 @@ from atwood.model.compose.composite import Model
 from atwood.numerics.matrices import or_one
 from atwood.numerics.newton import Missing, largest, newton
 from atwood.numerics.rank import decompose
-from atwood.pipeline import SCENE, assemble
+from atwood.pipeline import SCENE, smooth_assembly_of
 from atwood.ranges import range_of
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.table import Shown, Table, table
@@ -169,7 +169,7 @@ def equilibrium_branches(
     ParameterError
         If there is no such parameter.
     """
-    base = scene if isinstance(scene, Assembly) else assemble(scene)
+    base = smooth_assembly_of(scene)
     family = _Family(base, path, *span)
     curves: list[Curve] = []
     waiting: list[tuple[FloatArray, float, FloatArray]] = []

@@ -18,7 +18,7 @@ from atwood.lazy_modules import scipy
 from atwood.mechanics.kinematics.mechanism import extent
 from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
-from atwood.pipeline import SCENE, assembly_of
+from atwood.pipeline import SCENE, smooth_assembly_of
 from atwood.ranges import range_of
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.table import Shown, Table, table
@@ -178,7 +178,7 @@ def equilibria(
     if symbolic:
         if region is not None:
             raise UsageError("`symbolic` finds all states of rest", where="equilibria", advice="Leave out the region.")
-        return symbolic_equilibria(assembly_of(scene, form=None, orientation=None), symbols)
+        return symbolic_equilibria(smooth_assembly_of(scene, form=None, orientation=None), symbols)
     if symbols is not None:
         raise UsageError("numbers have no letters", where="equilibria", advice="Give symbolic=True.")
     return numeric_equilibria(scene, region)

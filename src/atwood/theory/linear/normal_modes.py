@@ -22,7 +22,7 @@ from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import scipy
 from atwood.model.compose.composite import Model
 from atwood.numerics.rank import null_space
-from atwood.pipeline import SCENE, assemble, assembly_of
+from atwood.pipeline import SCENE, smooth_assembly_of
 from atwood.ranges import values_of
 from atwood.result.result import Result
 from atwood.simulation.dynamics.balance import balance_of
@@ -213,7 +213,7 @@ def normal_modes(
     if symbolic:
         if isinstance(at, tuple):
             raise UsageError("formulas are about states of rest", where="normal_modes", advice="Give values by path.")
-        return symbolic_modes(assembly_of(scene, form=None, orientation=None), at, symbols)
+        return symbolic_modes(smooth_assembly_of(scene, form=None, orientation=None), at, symbols)
     if symbols is not None:
         raise UsageError("numbers have no letters", where="normal_modes", advice="Give symbolic=True.")
     point = find_operating_point(scene, at, ())
@@ -477,7 +477,7 @@ def root_locus(
     AtwoodError
         As `linearize` does.
     """
-    base = scene if isinstance(scene, Assembly) else assemble(scene)
+    base = smooth_assembly_of(scene)
     numbers = np.asarray(values, dtype=float)
     is_state = path in base.start_observables
     rows: list[ComplexArray] = []

@@ -18,7 +18,7 @@ from atwood.model.local.bound import variation_names
 from atwood.model.local.flatten import FlatScene
 from atwood.numerics.matrices import to_array
 from atwood.numerics.rank import decompose, lost_rank
-from atwood.pipeline import assemble, assemble_flat
+from atwood.pipeline import assemble, assemble_flat, refuse_contacts
 from atwood.result.result import Result
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.orientation_coordinates import to_regular
@@ -105,6 +105,7 @@ def find_operating_point(scene: Model | Assembly, at: At, inputs: Sequence[str])
         base = scene if scene.form == "reduced" else assemble(_scene_of(scene), name=scene.flat.name)
     else:
         base = assemble(_scene_of(scene) if isinstance(scene, Assembly) else scene)
+    refuse_contacts(base)
     found = input_paths(base.flat, inputs)
     if isinstance(at, tuple):
         return _at_time(base, *at, found)

@@ -26,7 +26,7 @@ from atwood.forms.lagrangian import Lagrangian, lagrangian_of
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
-from atwood.pipeline import SCENE, assembly_of
+from atwood.pipeline import SCENE, smooth_assembly_of
 from atwood.theory.equations.formulas import EquationFormulas
 from atwood.theory.formulas.described import Described
 from atwood.theory.formulas.notation import SYMBOLS, notation_of
@@ -202,7 +202,7 @@ def ignorable_of(scene: Model | Assembly, orientation: str | None) -> tuple[Asse
     """Return a scene in coordinates with momenta, its Lagrangian, and the paths of its ignorable coordinates."""
     from atwood.theory.hamiltonian.legendre import refuse_without_hamiltonian
 
-    assembly = assembly_of(scene, orientation=orientation)
+    assembly = smooth_assembly_of(scene, orientation=orientation)
     refuse_without_hamiltonian(assembly)
     if any(one.kind == "quaternion" for one in assembly.reduced.orientation_coordinates):
         assembly = assembly.other_mode(assembly.modes, {}, Orientation(_EULER))

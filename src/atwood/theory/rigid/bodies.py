@@ -17,7 +17,7 @@ from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import sympy
 from atwood.mechanics.dynamics.inertia import CarriedInertia
 from atwood.model.compose.composite import Model
-from atwood.pipeline import SCENE, assembly_of
+from atwood.pipeline import SCENE, smooth_assembly_of
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
 from atwood.solids.properties import MassProperties
@@ -165,7 +165,7 @@ def rigid_body(
         ``T``, ``L``, ``euler``: the rates of the angular velocity under a torque N; ``T_angles`` and ``momenta`` in
         angles; ``energy`` and ``total``: of the whole motion. `FormulaSheet.numbers` are those of the scene's body.
     """
-    own = None if scene is None else principal_body(assembly_of(scene), body)
+    own = None if scene is None else principal_body(smooth_assembly_of(scene), body)
     if own is not None:
         are_equal = bool(abs(own.moments[0] - own.moments[1]) <= 1e-9 * max(own.moments))
         if symmetric and not are_equal:

@@ -20,7 +20,7 @@ from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import scipy
 from atwood.model.compose.composite import Model
-from atwood.pipeline import assembly_of
+from atwood.pipeline import smooth_assembly_of
 from atwood.simulation.initialization.start import find_start
 from atwood.theory.formulas.notation import SYMBOLS
 from atwood.theory.formulas.sheet import FormulaSheet, statements_of
@@ -286,7 +286,7 @@ def free_rotation(
         if spin is None or min(moments or ()) <= 0.0:
             raise UsageError("its moments and its spin do not say a motion", where="free_rotation", advice="Give both.")
         return FreeRotation(np.array(moments), np.array(spin))
-    assembly = assembly_of(scene)
+    assembly = smooth_assembly_of(scene)
     own = principal_body(assembly, body)
     check_free(assembly, own.part)
     began = own.spin if spin is None else np.array(spin)

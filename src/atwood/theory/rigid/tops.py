@@ -15,7 +15,7 @@ from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import scipy
 from atwood.model.compose.composite import Model
-from atwood.pipeline import SCENE, assembly_of
+from atwood.pipeline import SCENE, smooth_assembly_of
 from atwood.theory.formulas.notation import SYMBOLS
 from atwood.theory.formulas.sheet import FormulaSheet, statements_of
 from atwood.theory.reduction import reduced
@@ -220,7 +220,7 @@ def symmetric_top(scene: Model | Assembly) -> SymmetricTop:
     if set(named) != {"phi", "psi"} or not angle.endswith("theta"):
         told = f"it has {angle} with the momenta of {', '.join(motion.momenta) or 'nothing'}"
         raise UnsupportedError(f"it is no top on a fixed tip: {told}", where=where, advice="See `reduced`.")
-    along = float(principal_body(assembly_of(scene)).moments[2])
+    along = float(principal_body(smooth_assembly_of(scene)).moments[2])
     theta = np.linspace(0.2, 2.9, 12)
     at = motion.radial.at(theta)
     one, two, u = named["phi"], named["psi"], np.cos(theta)

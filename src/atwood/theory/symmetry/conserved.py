@@ -18,7 +18,7 @@ from atwood.forms.lagrangian import lagrangian_of
 from atwood.forms.program import state_groups
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
-from atwood.pipeline import SCENE, assembly_of
+from atwood.pipeline import SCENE, smooth_assembly_of
 from atwood.result.energy import ConservedLedger, ConservedValues
 from atwood.result.result import Result
 from atwood.simulation.dynamics.orientation_coordinates import from_regular, to_regular
@@ -294,7 +294,7 @@ def conserved(
     UsageError
         If a symmetry that is stated is none; the error has a state at which it fails.
     """
-    assembly = assembly_of(scene, orientation=orientation)
+    assembly = smooth_assembly_of(scene, orientation=orientation)
     found = lagrangian_of(assembly, "reduced")
     notation = notation_of(assembly, found, symbols)
     found = with_gauge(assembly, found, notation, gauge)

@@ -10,7 +10,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import lagrangian_of
 from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
-from atwood.pipeline import SCENE, assembly_of
+from atwood.pipeline import SCENE, smooth_assembly_of
 from atwood.theory.equations.equations import EquationsOfMotion
 from atwood.theory.formulas.notation import SYMBOLS, notation_of
 from atwood.theory.formulas.printers import Sympy
@@ -43,7 +43,7 @@ def galilean(scene: Model | Assembly, *, symbols: Mapping[str, str] | None = Non
         For each generator, such as ``"P_x"``, ``"L_z"``, ``"K_x"`` and the energy function ``"h"``, one below the
         other: its quantity, the changes of T and of L, the gauge term, and the rate of the quantity: what is left over.
     """
-    assembly = assembly_of(scene)
+    assembly = smooth_assembly_of(scene)
     whole = lagrangian_of(assembly, "dae")
     equations = EquationsOfMotion(assembly, whole, notation_of(assembly, whole, symbols), "symbolic")
     return FormulaSheet(
