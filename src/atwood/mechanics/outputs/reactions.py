@@ -75,7 +75,8 @@ def _counted(torque_W: Vector, axis: int, space: Space) -> Scalar:
 def _all_forces(mechanism: Mechanism, equations: Equations) -> Forces:
     """Return inertia less all other forces, with the sign reversed, node by node."""
     site, kinematics = equations.site, equations.kinematics
-    pressing = {x: equations.read[x] for one in equations.contacts for x in (one.row.multiplier, one.read)}
+    of_contacts = (symbol for one in equations.contacts for symbol in (one.row.multiplier, one.read))
+    pressing = {symbol: equations.read[symbol] for symbol in of_contacts if symbol in equations.read}
     signals = resolve_signals(mechanism, site, kinematics, pressing)
     forces = Forces(equations.graph)
     multipliers = multipliers_by_part(equations)
