@@ -15,7 +15,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import SolveError, StartError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, replace
-from atwood.mechanics.outputs.event_functions import OPENS, YIELDS
+from atwood.mechanics.outputs.event_functions import CLOSES, OPENS, YIELDS
 from atwood.numerics.contact_sets import (
     GOES_ON,
     OPEN,
@@ -38,6 +38,15 @@ _ALONG = {"N": "m", "N*m": "rad"}
 
 _NEAR = 10.0
 """Times the relative tolerance, in sizes of the scene: what is nearer to zero is there."""
+
+_SPANS = 3, 12
+"""At least and at most so many intervals between impacts say how fast these follow each other."""
+
+_LEFT = 100.0
+"""Times the root of the tolerance, in units of the scene's time: so long may impacts still go on that are summed.
+
+What still rises in one interval rises by some tolerances, and rounding does not tell in its intervals yet.
+"""
 
 _NEAR_REST = 1000.0
 """The same where impacts have accumulated: what still bounces is as near as that."""
@@ -74,9 +83,7 @@ class Changed:
 class _Moment:
     """Gaps and slips at one moment, while it is worked out what becomes of them; each is a unit of one or two rows."""
 
-    def __init__(
-        self, values: ContactValues, scales: Scales, relative: float, triggers: Sequence[EventRecord], rests: bool
-    ) -> None:
+    def __init__(self, values: ContactValues, scales: Scales, relative: float, triggers: Sequence[EventRecord]) -> None:
         self.values = values
         self.contacts, self.units, self.t = values.contacts, values.units, values.t
         self.first = [self.contacts[rows[0]] for rows in self.units]
@@ -86,7 +93,7 @@ class _Moment:
         self.held = list(assembly.held_at_start if assembly.held is None else assembly.held)
         self.places = [tuple(paths[path] for path in state_paths(self.contacts, rows)) for rows in self.units]
         self.before = [self._state(k) for k in range(len(self.units))]
-        near = (_NEAR_REST if rests else _NEAR) * max(relative, 1e-13)
+        near = _NEAR * max(relative, 1e-13)
         self.small = near * np.array([scales.of(_ALONG[one.law.options.unit]) for one in self.first])
         self.slow = self.small / scales.time
         self.triggers = {(one.part, one.law): one.target for one in triggers}
@@ -157,15 +164,42 @@ class _Moment:
             advice="With impacts='together' they are solved at once.",
         )
 
-    def stop(self) -> None:
+    def left_of(self, impacts: Sequence[tuple[float, str]], unit: float) -> float | None:
+        """Return in how long impacts that follow each other ever faster have come to an end; None if they do not.
+
+        Intervals that shrink by a factor r are a geometric series: what is left of it is the last one times r/(1 - r).
+        It counts what moves together with the gap that closes now.
+        """
+        closing = [k for k, one in enumerate(self.first) if self.triggers.get(one.row.key[:2]) == CLOSES]
+        if not closing or len(impacts) < _SPANS[0]:
+            return None
+        response = np.abs(self.values.response[self.units[closing[0]][0]])
+        moved = response > 1e-12 * float(np.max(response))
+        parts = {one.row.key[0] for one, is_moved in zip(self.contacts, moved, strict=True) if is_moved}
+        spans = np.diff([*dict.fromkeys(time for time, part in impacts if part in parts), self.t])[-_SPANS[1] :]
+        shrinks = spans[1:] < spans[:-1]
+        first = 0 if np.all(shrinks) else int(np.flatnonzero(~shrinks)[-1]) + 1
+        spans = spans[first:]
+        if len(spans) < _SPANS[0] or spans[-1] <= 0.0:
+            return None
+        share = float(spans[-1] / spans[0]) ** (1.0 / (len(spans) - 1))
+        left = float(spans[-1]) * share / (1.0 - share)
+        if not left < _LEFT * unit:
+            return None
+        self.small, self.slow = _NEAR_REST / _NEAR * self.small, _NEAR_REST / _NEAR * self.slow
+        return left
+
+    def stop(self, left: float) -> None:
         """Stop whatever touches: impacts have accumulated, and nothing opens any more; what has stuck goes on to."""
         still = [k for k, one in enumerate(self.first) if one.is_slip and self.before[k][0] == STICKS]
         held = [row for k in (*self.touching, *still) for row in self.units[k]]
         push = np.zeros(len(self.contacts))
         push[held] = least_norm(self.values.response[np.ix_(held, held)], -self.rates()[held])
         self.u = self.u + self.values.speeds_by(push)
+        self.slow = _NEAR / _NEAR_REST * self.slow
         for k in self.touching[:1]:
             self._tell(k, "impacts have accumulated: it rests", "rests")
+            self.events[-1] = replace(self.events[-1], time=self.t + left)
 
     def _impact(self, touching: list[int], rates: FloatArray) -> None:
         values, count = self.values, len(self.contacts)
@@ -221,7 +255,8 @@ class _Moment:
 
     def settle(self) -> None:
         """Find the states that hold from now on."""
-        values, rates = self.values, self.rates()
+        self.values = values = self.values.with_speeds(self.u)
+        rates = self.rates()
         gaps = [k for k in self.touching if abs(self.rate(k, rates)) <= self.slow[k] and self.trigger(k) != OPENS]
         slips = self.slips_at(gaps)
         given = {k: self._way(k, rates) for k in slips if self.rate(k, rates) > self.slow[k]}
@@ -361,7 +396,7 @@ def resolve(
     relative: float,
     triggers: Sequence[EventRecord] = (),
     one_by_one: bool = False,
-    rests: bool = False,
+    impacts: Sequence[tuple[float, str]] = (),
     is_start: bool = False,
 ) -> Changed:
     """Return what becomes of gaps and slips at a moment.
@@ -380,22 +415,24 @@ def resolve(
         The events that have led here.
     one_by_one
         Whether of several impacts the fastest comes first.
-    rests
-        Whether impacts have accumulated, so that nothing rebounds.
+    impacts
+        Time and part of the impacts before, in order.
     is_start
         Whether the run begins here.
     """
     t, q, u = state
-    moment = _Moment(ContactValues(assembly, t, q, u, length), scales, relative, triggers, rests)
+    moment = _Moment(ContactValues(assembly, t, q, u, length), scales, relative, triggers)
+    before = moment.values.u
+    left = moment.left_of(impacts, relative**0.5 * scales.time)
     if is_start:
         moment.check_start()
     touching = moment.all_closed()
-    if rests:
-        moment.stop()
+    if left is not None:
+        moment.stop(left)
     else:
         moment.collide(one_by_one)
     moment.settle()
-    if np.array_equal(moment.u, moment.values.u):
+    if np.array_equal(moment.u, before):
         speeds = u
     elif assembly.form == "dae":
         speeds = moment.u

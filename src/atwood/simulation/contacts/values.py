@@ -7,6 +7,7 @@ A unit force along a row i makes accelerations ``X_i``, with the joints holding:
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from functools import cached_property
 
 import numpy as np
@@ -103,6 +104,16 @@ class ContactValues:
         self._kernel = assembly.kernel(self._made.program)
         self.read = np.zeros(len(self._made.read))
         self._take(self.u)
+
+    def with_speeds(self, u: FloatArray) -> ContactValues:
+        """Return the same at other speeds of the maximal coordinates."""
+        if np.array_equal(u, self.u):
+            return self
+        made = copy(self)
+        made.__dict__.pop("_solved", None)
+        made.u = u.copy()
+        made._take(made.u)
+        return made
 
     def _take(self, u: FloatArray) -> None:
         found = [np.asarray(x, dtype=float) for x in self._kernel([self.t], self.q, u, self.read)]

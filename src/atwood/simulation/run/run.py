@@ -13,8 +13,7 @@ from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Shared
 from atwood.integrators.protocol import Statistics
-from atwood.lazy_dataclasses import replace
-from atwood.mechanics.outputs.event_functions import CLOSES, CONTACT, UPDATE
+from atwood.mechanics.outputs.event_functions import CONTACT, UPDATE
 from atwood.simulation.dynamics.numerical_failure import is_numerical, named, numerical_failure
 from atwood.simulation.dynamics.orientation_coordinates import (
     COORDINATE_SWITCH,
@@ -104,14 +103,8 @@ def _again(
     return _prepared(assembly, start, reassemble, options, between, log).go()
 
 
-_SPANS = 12
-"""So many intervals between impacts say how fast these follow each other."""
-
-_LEFT = 100.0
-"""Times the root of the tolerance, in units of the scene's time: so long may impacts still go on that are summed.
-
-What still rises in one interval rises by some tolerances, and rounding does not tell in its intervals yet.
-"""
+_IMPACTS = 1000
+"""So many impacts are remembered, to see whether they follow each other ever faster."""
 
 
 class _Walk:
@@ -149,7 +142,7 @@ class _Walk:
         self.plan: SceneProblem | None = None
         self.ended: EventRecord | None = None
         self._unsettled: tuple[EventRecord, ...] | None = ()
-        self._impacts: list[float] = []
+        self._impacts: list[tuple[float, str]] = []
         self.probe: EventProbe | None = None
         self.choice: Choice
 
@@ -282,24 +275,19 @@ class _Walk:
         from atwood.simulation.problem.explicit_scene import nearest_place
 
         options, is_start = self.options, not self.segments
-        state, rests = (self.t, self.q, self.u), self._accumulates(triggers or (), plan.scales.time)
         changed = resolve(
             self.assembly,
-            state,
+            (self.t, self.q, self.u),
             self.start.length,
             plan.scales,
             options.relative_tolerance,
             triggers or (),
             options.impacts == "one_by_one",
-            rests is not None,
+            self._impacts,
             is_start,
         )
         events = list(changed.events)
-        if any(one.kind == "impact" for one in events):
-            self._impacts = [*self._impacts[1 - _SPANS :], self.t]
-        if rests is not None:
-            self._impacts = []
-            events = [replace(one, time=self.t + rests) if one.kind == "rests" else one for one in events]
+        self._impacts = [*self._impacts[-_IMPACTS:], *((one.time, one.part) for one in events if one.kind == "impact")]
         self.events += events if not is_start else [one for one in events if one.impact]
         self.impact |= any(one.impact for one in events)
         self.u, self.held = changed.speeds, changed.held
@@ -311,24 +299,6 @@ class _Walk:
         self.assembly = self.assembly.with_held(self.held)
         self.probe, self._plans, self._handed = None, {}, ()
         return plan.in_piece(self._sides.like(self.assembly, plan))
-
-    def _accumulates(self, triggers: Sequence[EventRecord], time: float) -> float | None:
-        """Return in how long impacts that follow each other ever faster have come to an end; None if they do not.
-
-        Intervals that shrink by a factor r are a geometric series: what is left of it is the last one times r/(1 - r).
-        Places change by the square of that time, which is to be less than the tolerance.
-        """
-        times = [*self._impacts, self.t]
-        if len(times) < 4 or not any(one.target == CLOSES for one in triggers):
-            return None
-        spans = np.diff(times)
-        if spans[-1] == 0.0:
-            return 0.0
-        if not np.all(spans[1:] < spans[:-1]):
-            return None
-        share = float(spans[-1] / spans[0]) ** (1.0 / (len(spans) - 1))
-        left = float(spans[-1]) * share / (1.0 - share)
-        return left if left < _LEFT * self.options.relative_tolerance**0.5 * time else None
 
     def _plan(self) -> SceneProblem:
         assembly = self._sides.in_pieces(self.assembly, self.t, self.q, self.u)
