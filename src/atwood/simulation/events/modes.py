@@ -227,6 +227,9 @@ class EventProbe:
         self.handed = tuple(
             0 if one.target == SIDE or (abs(sign) == 1 and sign * side < 0.0) else sign for sign, side, one in found
         )
+        if not self.handed and any(one.target in CONTACT for one in self.event_functions):
+            # What a state of a contact watches is positive in it, also where that is less than rounding.
+            self.handed = tuple(int(one.target in CONTACT) for one in self.event_functions)
 
     @property
     def directions(self) -> tuple[int, ...]:
