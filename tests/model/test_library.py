@@ -204,6 +204,9 @@ def reaction_names(component: aw.Component) -> Iterator[str]:
         yield from law.options.reactions
     for law in component.contact_laws().values():
         yield from law.options.reactions
+    if any(law.options.rigid and law.options.reaction_doc for law in component.laws("joint")):
+        yield from (f"{kind}.{axis}" for kind in ("force", "torque") for axis in "xyz")
+        yield "torque"
 
 
 def flat_values(made) -> list:
@@ -247,6 +250,7 @@ def law_values(cls: type[aw.Component], space: str, kind: str) -> Mapping[str, l
     return found
 
 
+@pytest.mark.sample(60)
 @pytest.mark.parametrize("space", ["line", "plane", "space"])
 @pytest.mark.parametrize("cls", COMPONENTS, ids=lambda cls: cls.__name__)
 def test_laws_mean_the_same_on_floats_expressions_and_sympy(cls, space):

@@ -91,6 +91,7 @@ def _runs() -> Iterator[Call]:
             "outputs": "times",
             "max_step": "optional positive",
             "first_step": "optional positive",
+            "impacts": "word",
             "samples": "whole",
             "structure": "flag",
             "atol": "optional positive",

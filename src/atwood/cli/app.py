@@ -38,6 +38,10 @@ _FUNCTION = re.compile(
 """A public function with a table of kinds, as it is written."""
 
 
+_OF_SCENE = re.compile(r"scene=|=HAMILTONIAN|=PHASE_SPACE")
+"""What is asked of a scene, or of its Hamiltonian: others take formulas alone, and are no commands."""
+
+
 class TheoryFunction(NamedTuple):
     """A function of theory as a command.
 
@@ -65,6 +69,8 @@ def theory_functions() -> dict[str, TheoryFunction]:
     for file in sorted(_THEORY.rglob("*.py")):
         module = ".".join(("atwood", *file.relative_to(_THEORY.parent).with_suffix("").parts))
         for one in _FUNCTION.finditer(file.read_text(encoding="utf-8")):
+            if not _OF_SCENE.search(one[0].partition("\ndef ")[0]):
+                continue
             name = one["name"] or one["function"].replace("_", "-")
             summary = re.sub("^Return ", "Show ", one["summary"].replace("`", "").strip())
             found[name] = TheoryFunction(module, one["function"], summary)

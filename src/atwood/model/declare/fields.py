@@ -274,7 +274,10 @@ class SignalSpec(Field):
 
 
 def _check_text(value: Any, where: str) -> str:
-    text = fspath(value) if isinstance(value, PathLike) else value
+    try:
+        text = fspath(value) if isinstance(value, PathLike) else value
+    except Exception:  # whatever an object of somebody's own can raise
+        text = None
     if not isinstance(text, str) or not text.strip() or "\0" in text:
         raise ParameterError(f"{show(value)} is no text", where=where, advice="Give a word or a path in quotes.")
     return text
