@@ -1,8 +1,5 @@
 """A block that is set on its corner rocks, and comes to rest: impacts, friction, and impacts that accumulate."""
 
-import sys
-from pathlib import Path
-
 import atwood
 from atwood import Scene
 from atwood_library import Box, BoxContact, Ground
