@@ -52,6 +52,7 @@ def test_mistakes_are_answered(arguments: list[str], said: str) -> None:
     assert said in done.output
 
 
+@pytest.mark.sample(0)
 def test_phase_draws_and_tells_states_of_rest(tmp_path: Path) -> None:
     picture = tmp_path / "phase.png"
     found = run("phase", "simple-pendulum", "--coordinates", "-180:180deg", "--plot", str(picture))

@@ -162,7 +162,7 @@ def test_times_have_units_and_pictures_are_drawn(tmp_path: Path) -> None:
     assert picture.stat().st_size > 1000
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "command",
     [

@@ -10,7 +10,7 @@ from ..helpers.runs import EVERY_FORM, FORMS, GENERAL, dense, difference_quotien
 EVERY_SCENE_AND_FORM = [(name, form, level) for name in GENERAL for form, level in EVERY_FORM]
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize(("name", "form", "level"), EVERY_SCENE_AND_FORM)
 def test_jacobian_is_the_derivative_of_the_residual(name: str, form: str, level: str) -> None:
     prepared = prepare(SCENES[name](), form, level)

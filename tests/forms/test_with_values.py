@@ -67,7 +67,7 @@ def moved(scene: Scene) -> dict[str, float]:
     return {name: 1.03 * value for name, value in numbers(scene).items()}
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("solver", ["ida", "explicit", "auto"])
 @pytest.mark.parametrize("name", GENERAL)
 @pytest.mark.parametrize("form", ["reduced", "dae"])

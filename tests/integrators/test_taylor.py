@@ -282,7 +282,7 @@ def test_an_event_that_comes_and_goes_is_not_passed_over(kind: Kind) -> None:
 SMOOTH = [name for name, scene in SCENES.items() if not assemble(scene()).reduced.constraints]
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", SMOOTH)
 def test_scenes_agree_with_the_other_explicit_method(name: str) -> None:
     one, other = (simulate(SCENES[name](), solver=solver, rtol=1e-12, outputs=11) for solver in ("taylor", "explicit"))

@@ -135,7 +135,7 @@ def four_bar(space: str, geared: str) -> Scene:
     return scene
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("geared", [f"hinge{number}" for number in range(4)])
 def test_a_gear_on_any_hinge_of_a_loop(geared: str) -> None:
     """Whichever hinge closes the loop: the same motion in a plane and in space, in both forms."""
@@ -203,6 +203,7 @@ def epicyclic(space: str, axis: tuple[float, float, float]) -> Scene:
     return scene
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("space", "axis"), SPACES)
 def test_an_epicyclic_gear_with_planets(space: str, axis: tuple[float, float, float], form: str) -> None:

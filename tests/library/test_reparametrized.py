@@ -19,6 +19,7 @@ def bead(wire: lib.PointOnCurve, **start: float) -> Scene:
     return scene
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 def test_a_cycloid_by_its_arc_length_is_a_harmonic_oscillator(form: str) -> None:
     """The force along a cycloid is as the arc length from its lowest place: ``s'' = -g s/(4 a)`` (Huygens)."""
@@ -30,6 +31,7 @@ def test_a_cycloid_by_its_arc_length_is_a_harmonic_oscillator(form: str) -> None
     assert np.max(np.abs(result["wire.speed"] - 0.5 * result["wire.rate"])) < 1e-10  # of size one by metres
 
 
+@pytest.mark.sample(0)
 def test_a_closed_curve_by_its_arc_length_goes_on_counting() -> None:
     ellipse = lib.reparametrized(("2*cos(p)", 0, "sin(p)"), 0.0, 2.0 * math.pi)
     scene = bead(lib.PointOnCurve(curve=ellipse), parameter=0.0, rate=9.0)

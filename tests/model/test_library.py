@@ -250,7 +250,7 @@ def law_values(cls: type[aw.Component], space: str, kind: str) -> Mapping[str, l
     return found
 
 
-@pytest.mark.sample(60)
+@pytest.mark.sample(20)
 @pytest.mark.parametrize("space", ["line", "plane", "space"])
 @pytest.mark.parametrize("cls", COMPONENTS, ids=lambda cls: cls.__name__)
 def test_laws_mean_the_same_on_floats_expressions_and_sympy(cls, space):

@@ -30,6 +30,7 @@ def test_a_pendulum_that_turns_over_has_a_picture() -> None:
     plt.close(atwood.plot_effective_potential(motion))
 
 
+@pytest.mark.sample(0)
 def test_the_axis_of_a_top_stays_between_its_circles() -> None:
     motion = reduced(LagrangeTop())
     figure = atwood.plot_top_path(motion, periods=3)

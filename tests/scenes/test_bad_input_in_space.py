@@ -232,6 +232,7 @@ def test_what_moves_is_not_called_immobile() -> None:
     assert simulate(scene, t_end=0.01, outputs=2).immobile is None
 
 
+@pytest.mark.sample(0)
 def test_a_bent_bricard_is_a_structure() -> None:
     scene = Bricard()
     scene.set("end3.displacement", (0.0, -1.0, 0.1))

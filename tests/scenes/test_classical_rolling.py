@@ -74,6 +74,7 @@ def rattle(scene: Scene, t: np.ndarray) -> np.ndarray:
     return np.asarray(found.y)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_a_rattleback_and_its_twin(form: str) -> None:
     scene = SCENES["rattleback"](t_end=1.0 if form == "dae" else 3.0)

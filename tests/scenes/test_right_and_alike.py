@@ -64,7 +64,7 @@ def gap(one: Result, other: Result) -> dict[str, float]:
     return found
 
 
-@pytest.mark.sample(20)
+@pytest.mark.sample(10)
 @pytest.mark.parametrize("name", SCENES)
 def test_each_form_is_right_and_both_agree(name: str) -> None:
     end = span(name)

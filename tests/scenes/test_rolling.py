@@ -320,6 +320,7 @@ def cart(lead: float) -> Scene:
     return scene
 
 
+@pytest.mark.sample(0)
 def test_a_cart_on_two_wheels_goes_round_when_it_is_balanced() -> None:
     """Both wheels keep their rates, as they must in a circle: v = r (w_l + w_r)/2, W = r (w_r - w_l)/(2 b)."""
     for form in ("reduced", "dae"):

@@ -157,6 +157,7 @@ def test_foucault_pendulum_turns_with_its_platform() -> None:
     assert np.max(np.abs(place - exact.position(result.time))) < 1e-6
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_bricard_moves_as_it_should(form: str) -> None:
     result = simulate(Bricard(), form=form, rtol=1e-9)

@@ -165,7 +165,7 @@ FORCES: dict[str, tuple[Function, Callable[[np.ndarray], np.ndarray]]] = {
 }
 
 
-@pytest.mark.sample(24)
+@pytest.mark.sample(12)
 @pytest.mark.parametrize(("form", "solver"), SOLVERS)
 @pytest.mark.parametrize("name", FORCES)
 def test_a_switch_is_exact_in_every_solver(name: str, form: str, solver: str) -> None:

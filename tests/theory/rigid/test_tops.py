@@ -150,6 +150,7 @@ def test_the_path_of_its_constants_is_that_of_a_run(motion: str) -> None:
         assert (np.sin(now[0]) * (after - before)[0] / (2.0 * h)) ** 2 == pytest.approx(float(top.f(u)), abs=1e-5)
 
 
+@pytest.mark.sample(0)
 def test_the_four_motions_in_one_figure_from_their_constants() -> None:
     """At one p_phi and p_psi by the energy, or at one p_psi by p_phi; here of one top."""
     tops = [symmetric_top(LagrangeTop(motion=one)) for one in ("loops", "cusps", "waves", "steady")]
