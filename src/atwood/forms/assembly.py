@@ -218,6 +218,11 @@ class Assembly:
         declared, flat = declared_starts(self.flat.parts, self.flat.t_start, is_discrete=True), self.flat
         return tuple({**declared, **flat.guess, **flat.start}[one.path] for one in self.discrete_states)
 
+    @property
+    def held_now(self) -> tuple[float, ...]:
+        """Values of the discrete states in this piece of a run."""
+        return self.held_at_start if self.held is None else self.held
+
     def with_held(self, values: Sequence[float]) -> Assembly:
         """Return the same with other values of the discrete states, with the same programs."""
         return replace(self, held=tuple(values))
@@ -233,7 +238,7 @@ class Assembly:
         """The values of the parameters."""
         if self.given_values is not None:
             return self.given_values
-        held = *(self.held_at_start if self.held is None else self.held), *self.side_values
+        held = *self.held_now, *self.side_values
         return np.array([*self.mechanism.table.values.values(), *held, *self.relation_values], dtype=float)
 
     @takes(values=optional(BY_PATH), start=optional(BY_PATH), guess=optional(BY_PATH))

@@ -170,9 +170,9 @@ def _solve(contacts: Contacts, states: Sequence[State]) -> tuple[FloatArray, Flo
     if not count:
         return right, right
     for k, (unit, (state, direction)) in enumerate(zip(contacts.units, states, strict=True)):
+        if _is_loose(contacts, states, unit):
+            continue
         for row, part in zip(unit.rows, direction, strict=True):
-            if _is_loose(contacts, states, unit):
-                continue
             if state == STICKS:
                 matrix[row], right[row] = contacts.response[row], -contacts.free[row]
             elif state == GOES_ON:

@@ -245,14 +245,9 @@ def rates_of_symbols(part: PlacedPart) -> tuple[dict[Expression, Expression | fl
         body = site.bodies.body_of[node]
         rates = [graph.symbol(f"{symbol.name}'") for symbol in (*symbols.velocity, *symbols.spin)]
         spin_rates: Sequence[Scalar] = kinematics.angular_accelerations.get(body, (0.0,) * len(symbols.spin))
-        if symbols.axes is not None and symbols.angular_velocity is not None:
-            if body in kinematics.placements.axes:
-                spin_rates = tuple(spin_in_world(spin_rates, kinematics.placements.axes[body]))
-            for axis in symbols.axes:
-                along.update(zip(axis, cross(symbols.angular_velocity, axis), strict=True))
-        if symbols.angle is not None and symbols.angular_speed is not None:
-            along[symbols.angle] = symbols.angular_speed
-        along.update(zip(symbols.position, symbols.velocity, strict=True))
+        if symbols.axes is not None and body in kinematics.placements.axes:
+            spin_rates = tuple(spin_in_world(spin_rates, kinematics.placements.axes[body]))
+        along.update(symbols.rates)
         along.update(zip((*symbols.velocity, *symbols.spin), rates, strict=True))
         found = (*kinematics.accelerations[node], *spin_rates)
         placed.update((rate, graph.convert(value)) for rate, value in zip(rates, found, strict=False))

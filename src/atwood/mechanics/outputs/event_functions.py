@@ -15,6 +15,7 @@ from atwood.mechanics.outputs.reactions import Reaction
 from atwood.model.declare.component import bind
 from atwood.model.declare.law_results import call_law, finite_scalar
 from atwood.model.declare.laws import Law
+from atwood.model.values.units import ALONG
 
 UPDATE = "update"
 """Target of an event that changes states of its part, and no mode."""
@@ -115,7 +116,7 @@ def _of_contacts(equations: Equations) -> list[EventFunction]:
     found: list[EventFunction] = []
     for one in equations.contacts:
         (part, law, _), unit = one.row.key, one.law.options.unit
-        of = {"N": "m", "N*m": "rad"}[unit]
+        of = ALONG[unit]
 
         def watch(target: str, value: Expression, unit: str, message: str, rate: Expression | None = None) -> None:
             (placed,) = substitute([value], dict(equations.read))

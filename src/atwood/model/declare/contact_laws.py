@@ -14,16 +14,11 @@ from atwood.arguments import DOC, NAME, TEXT, each, either, number, one_of, take
 from atwood.errors import DeclarationError, suggestion
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.field_functions import discrete_state
-from atwood.model.declare.laws import REACTION, Law, ObservableLaw, ObservableOptions
-from atwood.model.values.units import parse_si_unit
+from atwood.model.declare.laws import NAMES, REACTION, SPACES, Law, ObservableLaw, ObservableOptions
+from atwood.model.values.units import ALONG, parse_si_unit
 
 if TYPE_CHECKING:
     from atwood.model.declare.component import Component
-
-_SPACES = each(one_of(("line", "plane", "space")), "some of 'line', 'plane' and 'space'", 1)
-_NAMES = each(NAME, "names, as texts")
-_ALONG = {"N": "m", "N*m": "rad"}
-"""What a force of each unit acts along."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +48,12 @@ class FrictionOptions:
     spaces: tuple[str, ...]
 
 
+def value_names(contact: Law) -> tuple[str, ...]:
+    """Return the names of what a one-sided law returns: its own, numbered where it has two values."""
+    count = len(contact.options.reactions)
+    return (contact.name,) if count == 1 else tuple(f"{contact.name}_{i + 1}" for i in range(count))
+
+
 class ContactLaw(ObservableLaw[Any]):
     """A one-sided law in a class body: within a law its method, elsewhere the quantity that it returns."""
 
@@ -68,8 +69,7 @@ class ContactLaw(ObservableLaw[Any]):
     @property
     def names(self) -> tuple[str, ...]:
         """The names of its values: numbered where there are two."""
-        name, count = self.contact.name, len(self.contact.options.reactions)
-        return (name,) if count == 1 else tuple(f"{name}_{i + 1}" for i in range(count))
+        return value_names(self.contact)
 
     def beside(self) -> dict[str, Any]:
         """Return what a class gets besides: its reactions and values as quantities, and its states."""
@@ -104,11 +104,11 @@ def _element(name: str, number: int) -> Callable[[Component], Any]:
 
 def _along(unit: str, rate: str) -> str:
     parse_si_unit(unit)
-    if unit not in _ALONG:
+    if unit not in ALONG:
         raise DeclarationError(
-            f"a reaction is in {' or '.join(_ALONG)}, and {unit!r} is neither", advice=suggestion(unit, _ALONG)
+            f"a reaction is in {' or '.join(ALONG)}, and {unit!r} is neither", advice=suggestion(unit, ALONG)
         )
-    return _ALONG[unit] + rate
+    return ALONG[unit] + rate
 
 
 @takes(
@@ -118,8 +118,8 @@ def _along(unit: str, rate: str) -> str:
     doc=DOC,
     restitution=either(NAME, number("a number from 0 to 1", least=0.0, most=1.0)),
     impact_law=one_of(("newton", "poisson")),
-    modes=_NAMES,
-    spaces=_SPACES,
+    modes=NAMES,
+    spaces=SPACES,
 )
 def unilateral(
     *,
@@ -165,8 +165,8 @@ def unilateral(
     limit=NAME,
     static_limit=TEXT,
     at=TEXT,
-    modes=_NAMES,
-    spaces=_SPACES,
+    modes=NAMES,
+    spaces=SPACES,
 )
 def dry_friction(
     *,

@@ -181,7 +181,7 @@ def scalars(value: Any) -> list[Any]:
 
 def _acting(kind: Kind, function: F | None, modes: Sequence[str]) -> F | Callable[[F], F]:
     """Mark a method by itself, or return what marks one with options."""
-    options = ActingOptions(check(_NAMES, modes, "modes", kind, DeclarationError))
+    options = ActingOptions(check(NAMES, modes, "modes", kind, DeclarationError))
     if function is not None:
         check(CALLBACK, function, "function", kind, DeclarationError)
     if function is None:
@@ -266,8 +266,8 @@ def lagrangian(function: F) -> F:
     return mark(function, Law("lagrangian", function.__name__, ActingOptions(())))
 
 
-_SPACES = each(one_of(("line", "plane", "space")), "some of 'line', 'plane' and 'space'", 1)
-_NAMES = each(NAME, "names, as texts")
+SPACES = each(one_of(("line", "plane", "space")), "some of 'line', 'plane' and 'space'", 1)
+NAMES = each(NAME, "names, as texts")
 
 
 @takes(
@@ -276,8 +276,8 @@ _NAMES = each(NAME, "names, as texts")
     unit=TEXT,
     doc=DOC,
     sign=number(),
-    modes=_NAMES,
-    spaces=_SPACES,
+    modes=NAMES,
+    spaces=SPACES,
 )
 def constraint(
     *,
@@ -316,12 +316,12 @@ def constraint(
     DeclarationError,
     a=NAME,
     b=NAME,
-    coordinates=_NAMES,
-    solves=_NAMES,
-    spaces=_SPACES,
+    coordinates=NAMES,
+    solves=NAMES,
+    spaces=SPACES,
     rigid=FLAG,
     reaction=TEXT,
-    modes=_NAMES,
+    modes=NAMES,
 )
 def joint(
     a: str,
@@ -360,7 +360,7 @@ def joint(
     return lambda function: mark(function, Law("joint", function.__name__, options))
 
 
-@takes(DeclarationError, unit=TEXT, doc=DOC, periodic=FLAG, rate=TEXT, spaces=_SPACES, pole=TEXT, symbol=OWN_LETTERS)
+@takes(DeclarationError, unit=TEXT, doc=DOC, periodic=FLAG, rate=TEXT, spaces=SPACES, pole=TEXT, symbol=OWN_LETTERS)
 def observable(
     *,
     unit: str,
@@ -414,10 +414,10 @@ def observable(
     target=TEXT,
     message=DOC,
     unit=TEXT,
-    modes=_NAMES,
+    modes=NAMES,
     direction=whole("-1, 0 or +1", -1, 1),
     impact=FLAG,
-    spaces=_SPACES,
+    spaces=SPACES,
 )
 def event(
     *,
@@ -467,7 +467,7 @@ def derivative(*states: str, modes: Sequence[str] = ()) -> Callable[[F], F]:
         The modes of the component in which it holds; all when empty. In others these states stay as they are.
     """
     names = check(each(NAME, "the name of a state, or several", 1), states, "states", "derivative", DeclarationError)
-    options = DerivativeOptions(tuple(names), tuple(check(_NAMES, modes, "modes", "derivative", DeclarationError)))
+    options = DerivativeOptions(tuple(names), tuple(check(NAMES, modes, "modes", "derivative", DeclarationError)))
     return lambda function: mark(function, Law("derivative", function.__name__, options))
 
 
@@ -481,7 +481,7 @@ _MOMENT = either(NAME, number())
     offset=_MOMENT,
     at=TEXT,
     when=TEXT,
-    reads=optional(_NAMES),
+    reads=optional(NAMES),
     pure=FLAG,
 )
 def update(

@@ -14,12 +14,11 @@ from atwood.errors import DeclarationError, UnsupportedError, suggestion
 from atwood.expr import Expression, Graph, Scalar, depends_on, jvp, sqrt
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.declare.component import Binding, bind
-from atwood.model.declare.contact_laws import FrictionOptions
+from atwood.model.declare.contact_laws import FrictionOptions, value_names
 from atwood.model.declare.law_results import call_law, finite_scalar, one_scalar
 from atwood.model.declare.laws import Law, scalars
 from atwood.model.local.flatten import Part
 from atwood.model.local.parts import LocalConnector, LocalConstraint, multiplier_symbol
-from atwood.model.values.space import cross
 
 
 @dataclass(frozen=True)
@@ -114,7 +113,8 @@ def _gap(
     share = graph.convert(given) if not isinstance(given, str) else _named(part, law, bound, given, graph)
     mask = graph.convert(getattr(bound, f"{law.name}_state"))
     multiplier, read, stand_in = _symbols(part, law, graph)
-    (rate,) = jvp([value], _rates_of_places(connectors, graph.convert(binding.time)))
+    along = {symbol: rate for one in connectors.values() for symbol, rate in one.rates.items()}
+    (rate,) = jvp([value], {graph.convert(binding.time): 1.0, **along})
     row = LocalConstraint(law, 0, value, law.options.reactions[0], 1.0)
     return LocalContact(row, multiplier, read, mask, mask * multiplier, rate, stand_in, restitution=share)
 
@@ -136,8 +136,7 @@ def _slip(part: Part, law: Law, bound: Any, graph: Graph) -> list[LocalContact]:
             advice=suggestion(options.at, [x.name for x in part.component.contact_laws().values() if x is not law]),
         )
     state = graph.convert(getattr(bound, f"{law.name}_state"))
-    numbered = [law.name] if len(names) == 1 else [f"{law.name}_{i + 1}" for i in range(len(names))]
-    held = [graph.convert(getattr(bound, f"{one}_direction")) for one in numbered]
+    held = [graph.convert(getattr(bound, f"{one}_direction")) for one in value_names(law)]
     mask = 0.5 * state * (state - 1.0)  # 1 for the state 2, in which it sticks
     found = []
     for i, (name, value, way) in enumerate(zip(names, values, _ways(values, held), strict=True)):
@@ -177,21 +176,6 @@ def _named(part: Part, law: Law, bound: Any, name: str, graph: Graph) -> Express
 def _symbols(part: Part, law: Law, graph: Graph, number: int = 0) -> tuple[Expression, Expression, Expression]:
     multiplier = multiplier_symbol(graph, part.path, law.name, number)
     return multiplier, graph.symbol(f"read:{multiplier.name}"), graph.symbol(f"contact:{multiplier.name}")
-
-
-def _rates_of_places(
-    connectors: Mapping[str, LocalConnector], time: Expression
-) -> dict[Expression, Expression | float]:
-    """Return the rate of each symbol that says where connectors are, and of time."""
-    along: dict[Expression, Expression | float] = {time: 1.0}
-    for one in connectors.values():
-        along.update(zip(one.position, one.velocity, strict=True))
-        if one.angle is not None and one.angular_speed is not None:
-            along[one.angle] = one.angular_speed
-        if one.axes is not None and one.angular_velocity is not None:
-            for axis in one.axes:
-                along.update(zip(axis, cross(one.angular_velocity, axis), strict=True))
-    return along
 
 
 def powers(contacts: Sequence[LocalContact]) -> tuple[Expression, ...]:

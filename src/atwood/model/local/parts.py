@@ -7,7 +7,7 @@ from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
 from atwood.errors import DeclarationError, suggestion
-from atwood.expr import Expression, Graph
+from atwood.expr import Expression, Graph, Scalar
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.component import Binding
 from atwood.model.declare.field_functions import StateSpec
@@ -24,7 +24,7 @@ from atwood.model.declare.law_results import (
 from atwood.model.declare.laws import Law, scalars
 from atwood.model.local.flatten import Part
 from atwood.model.values.rotation import Axes
-from atwood.model.values.space import Vector
+from atwood.model.values.space import Vector, cross
 
 if TYPE_CHECKING:
     from atwood.model.local.contacts import LocalContact
@@ -57,6 +57,18 @@ class LocalConnector:
         if self.axes is not None:
             return tuple(component for axis in self.axes for component in axis)
         return () if self.angle is None else (self.angle,)
+
+    @property
+    def rates(self) -> dict[Expression, Scalar]:
+        """The rate of each symbol that says where it is and how it is turned."""
+        found: dict[Expression, Scalar] = {}
+        if self.axes is not None and self.angular_velocity is not None:
+            for axis in self.axes:
+                found.update(zip(axis, cross(self.angular_velocity, axis), strict=True))
+        if self.angle is not None and self.angular_speed is not None:
+            found[self.angle] = self.angular_speed
+        found.update(zip(self.position, self.velocity, strict=True))
+        return found
 
     @property
     def spin(self) -> tuple[Expression, ...]:

@@ -173,6 +173,9 @@ def unit_of(exponents: Exponents) -> Unit:
     return Unit("/".join(["*".join(above) or "1", *below]), 1.0, exponents)
 
 
+ALONG = {"N": "m", "N*m": "rad"}
+"""What a force of each unit acts along."""
+
 _NAMES = ("kg", "m", "s", "A")
 
 

@@ -16,6 +16,7 @@ from atwood.errors import SolveError, StartError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.outputs.event_functions import CLOSES, OPENS, YIELDS
+from atwood.model.values.units import ALONG
 from atwood.numerics.contact_sets import (
     GOES_ON,
     OPEN,
@@ -32,9 +33,6 @@ from atwood.simulation.dynamics.orientation_coordinates import to_regular
 from atwood.simulation.dynamics.scales import Scales
 from atwood.simulation.events.mode_change import generalized_speeds
 from atwood.simulation.events.modes import EventRecord
-
-_ALONG = {"N": "m", "N*m": "rad"}
-"""What a force of each unit acts along."""
 
 _NEAR = 10.0
 """Times the relative tolerance, in sizes of the scene: what is nearer to zero is there."""
@@ -90,11 +88,11 @@ class _Moment:
         self.u = values.u.copy()
         assembly = values.assembly
         paths = {one.path: i for i, one in enumerate(assembly.discrete_states)}
-        self.held = list(assembly.held_at_start if assembly.held is None else assembly.held)
-        self.places = [tuple(paths[path] for path in state_paths(self.contacts, rows)) for rows in self.units]
+        self.held = list(assembly.held_now)
+        self.places = [tuple(paths[path] for path in state_paths(one)) for one in self.first]
         self.before = [self._state(k) for k in range(len(self.units))]
         near = _NEAR * max(relative, 1e-13)
-        self.small = near * np.array([scales.of(_ALONG[one.law.options.unit]) for one in self.first])
+        self.small = near * np.array([scales.of(ALONG[one.law.options.unit]) for one in self.first])
         self.slow = self.small / scales.time
         self.triggers = {(one.part, one.law): one.target for one in triggers}
         self.events: list[EventRecord] = []
@@ -193,9 +191,7 @@ class _Moment:
         """Stop whatever touches: impacts have accumulated, and nothing opens any more; what has stuck goes on to."""
         still = [k for k, one in enumerate(self.first) if one.is_slip and self.before[k][0] == STICKS]
         held = [row for k in (*self.touching, *still) for row in self.units[k]]
-        push = np.zeros(len(self.contacts))
-        push[held] = least_norm(self.values.response[np.ix_(held, held)], -self.rates()[held])
-        self.u = self.u + self.values.speeds_by(push)
+        self._hold(held)
         self.slow = _NEAR / _NEAR_REST * self.slow
         for k in self.touching[:1]:
             self._tell(k, "impacts have accumulated: it rests", "rests")
@@ -230,36 +226,41 @@ class _Moment:
         for k in touching:
             speed = -self.rate(k, rates)
             if speed > self.slow[k]:
-                said = f"an impact at {speed:.6g} {_ALONG[self.first[k].law.options.unit]}/s"
+                said = f"an impact at {speed:.6g} {ALONG[self.first[k].law.options.unit]}/s"
                 self._tell(k, said, "impact")
 
     def _impulses(self, chosen: list[int], free: FloatArray) -> FloatArray:
         """Return the impulses of all rows: velocities take the place of accelerations, and limits are of impulses."""
         values, found = self.values, np.zeros(len(self.contacts))
-        rows = [row for k in chosen for row in self.units[k]]
         for _ in range(_MOST_TURNS):
-            near = values.limits_at(found)
-            none = np.zeros(len(self.units))
-            limits = Limits(none, near.shares, none, near.static_shares)
-            still = [(STICKS, (0.0,) * len(self.units[k])) for k in chosen]
-            solved = find_states(values.chosen(chosen, free, {}, limits), still)
+            limits = _of_impulses(values.limits_at(found))
+            solved = find_states(values.chosen(chosen, free, {}, limits), self._at_rest(chosen))
             if solved is None:
                 raise self._contradiction("no impulses satisfy the laws of impact and friction", chosen)
-            last, found = found, np.zeros(len(found))
-            found[rows] = solved.forces
+            last, found = found, self._on_all(chosen, solved)
             if _is_same(last, found):
                 break
         return found
+
+    def _on_all(self, chosen: list[int], found: Found) -> FloatArray:
+        """Return the forces of some units among those of all rows."""
+        forces = np.zeros(len(self.contacts))
+        forces[[row for k in chosen for row in self.units[k]]] = found.forces
+        return forces
+
+    def _at_rest(self, chosen: list[int]) -> list[State]:
+        """Return the states of units that are all closed and stick."""
+        return [(STICKS, (0.0,) * len(self.units[k])) for k in chosen]
 
     # -- accelerations --------------------------------------------------------------------------------------------
 
     def settle(self) -> None:
         """Find the states that hold from now on."""
-        self.values = values = self.values.with_speeds(self.u)
+        self.values = self.values.with_speeds(self.u)
         rates = self.rates()
         gaps = [k for k in self.touching if abs(self.rate(k, rates)) <= self.slow[k] and self.trigger(k) != OPENS]
         slips = self.slips_at(gaps)
-        given = {k: self._way(k, rates) for k in slips if self.rate(k, rates) > self.slow[k]}
+        given = self._going(slips, rates)
         given |= {k: self._yielding(k) for k in slips if k not in given and self.trigger(k) == YIELDS}
         chosen = [*gaps, *slips]
         states = [(STICKS, (0.0,)) if k in gaps else self.before[k] for k in chosen]
@@ -269,26 +270,32 @@ class _Moment:
         self._take(chosen, found)
         held = [row for k, one in zip(chosen, found.states, strict=True) if one[0] == STICKS for row in self.units[k]]
         if held:  # what holds from now on holds to rounding
-            push = np.zeros(len(self.contacts))
-            push[held] = least_norm(values.response[np.ix_(held, held)], -self.rates()[held])
-            self.u = self.u + values.speeds_by(push)
+            self._hold(held)
 
-    def _way(self, k: int, rates: FloatArray) -> tuple[float, ...]:
-        """Return the direction in which a slip goes on."""
-        own = rates[list(self.units[k])]
-        return tuple(float(x) / math.hypot(*own) for x in own)
+    def _hold(self, rows: list[int]) -> None:
+        """Take away the rates of some rows."""
+        push = np.zeros(len(self.contacts))
+        push[rows] = least_norm(self.values.response[np.ix_(rows, rows)], -self.rates()[rows])
+        self.u = self.u + self.values.speeds_by(push)
+
+    def _going(self, slips: list[int], rates: FloatArray) -> dict[int, tuple[float, ...]]:
+        """Return the directions of the slips that go on already."""
+        sizes = {k: self.rate(k, rates) for k in slips}
+        return {
+            k: tuple(float(x) / size for x in rates[list(self.units[k])])
+            for k, size in sizes.items()
+            if size > self.slow[k]
+        }
 
     def _found(self, chosen: list[int], states: list[State], given: dict[int, tuple[float, ...]]) -> Found | None:
         """Return states that contradict nothing at accelerations; limits may be curved in the forces."""
         values, free = self.values, self.values.accelerations()
         forces, found = np.zeros(len(self.contacts)), None
-        rows = [row for k in chosen for row in self.units[k]]
         for _ in range(_MOST_TURNS):
             found = find_states(values.chosen(chosen, free, given, values.limits_at(forces)), states)
             if found is None:
                 return None
-            last, forces = forces, np.zeros(len(forces))
-            forces[rows] = found.forces
+            last, forces = forces, self._on_all(chosen, found)
             states = list(found.states)
             if _is_same(last, forces):
                 break
@@ -316,25 +323,22 @@ class _Moment:
 
     def _jammed(self, chosen: list[int]) -> Found:
         """Where no accelerations contradict nothing an impulse acts (Painleve's paradox); then states are found."""
-        values, count = self.values, len(self.contacts)
-        none, near = np.zeros(len(self.units)), values.limits_at(np.zeros(count))
-        limits = Limits(none, near.shares, none, near.static_shares)
-        rows = [row for k in chosen for row in self.units[k]]
+        values = self.values
+        limits = _of_impulses(values.limits_at(np.zeros(len(self.contacts))))
         every = all_states(values.chosen(chosen, self.rates(), {}, limits))
         best = max(every, key=lambda one: float(np.sum(np.abs(one.forces))), default=None)
         if best is None or not float(np.sum(np.abs(best.forces))) > 0.0:
             raise self._contradiction("no accelerations and no impulses satisfy contact and friction", chosen)
-        push = np.zeros(count)
-        push[rows] = best.forces
+        push = self._on_all(chosen, best)
         self.u = self.u + values.speeds_by(push)
         pressed = [k for k in chosen if not self.first[k].is_slip and push[self.units[k][0]] > 0.0]
         self._tell(pressed[0] if pressed else chosen[0], "friction jams it: an impulse", "jams")
         rates = self.rates()
         gaps = [k for k in self.touching if abs(self.rate(k, rates)) <= self.slow[k]]
         slips = self.slips_at(gaps)
-        given = {k: self._way(k, rates) for k in slips if self.rate(k, rates) > self.slow[k]}
+        given = self._going(slips, rates)
         left = [k for k in chosen if k in gaps or k in slips]
-        found = self._found(left, [(STICKS, (0.0,) * len(self.units[k])) for k in left], given)
+        found = self._found(left, self._at_rest(left), given)
         if found is None:
             raise self._contradiction("no accelerations satisfy contact and friction after an impulse", chosen)
         known = dict(zip(left, found.states, strict=True))
@@ -378,10 +382,16 @@ class _Moment:
             value = self.values.values[self.units[k][0]]
             if not one.is_slip and value < -self.small[k]:
                 raise StartError(
-                    f"it starts inside, by {-value:.6g} {_ALONG[one.law.options.unit]}",
+                    f"it starts inside, by {-value:.6g} {ALONG[one.law.options.unit]}",
                     where=one.row.key[0],
                     advice="Start where the gap is zero or positive.",
                 )
+
+
+def _of_impulses(limits: Limits) -> Limits:
+    """Return limits of impulses: finite forces have none, and what follows from other forces is a share of these."""
+    none = np.zeros_like(limits.free)
+    return Limits(none, limits.shares, none, limits.static_shares)
 
 
 def _is_same(last: FloatArray, now: FloatArray) -> bool:

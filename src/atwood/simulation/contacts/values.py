@@ -6,7 +6,6 @@ A unit force along a row i makes accelerations ``X_i``, with the joints holding:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
 
@@ -19,15 +18,14 @@ from atwood.forms.caches import Key
 from atwood.forms.program import state_groups
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import ContactRow
+from atwood.model.declare.contact_laws import value_names
 from atwood.numerics.contact_sets import Contacts, Limits, Unit
 from atwood.numerics.matrices import least_norm, or_one, to_array
-from atwood.simulation.dynamics.balance import balance_of, bordered
+from atwood.simulation.dynamics.balance import LIGHT, balance_of, even_balance
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.scales import motion_scales
 
 _PROGRAM: Key[_Program] = Key("gaps and slips")
-_LIGHT = 1e-12
-"""A body that is lighter than the heaviest one by more is rounding of its mass matrix."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,11 +39,6 @@ class _Program:
     shares: tuple[tuple[tuple[int, int], ...], tuple[tuple[int, int], ...]]
 
 
-def contacts_of(assembly: Assembly) -> tuple[ContactRow, ...]:
-    """Return the gaps and slips of a scene."""
-    return assembly.own_equations.contacts
-
-
 def _program(assembly: Assembly) -> _Program:
     equations, graph = assembly.maximal, assembly.maximal.graph
     contacts = equations.contacts
@@ -57,7 +50,8 @@ def _program(assembly: Assembly) -> _Program:
     limits = [none if one.limit is None else one.limit for one in contacts]
     static = [none if one.static_limit is None else one.static_limit for one in contacts]
     own = [one.read for one in contacts]
-    read = tuple(x for x in (*own, *equations.multipliers) if depends_on_any([*limits, *static], x))
+    every = [*limits, *static]
+    read = tuple(x for x in (*own, *equations.multipliers) if any(depends_on(limit, [x]) for limit in every))
     found = [jacobian(some, list(read)) for some in (limits, static)]
     values = [none if one.row.value is None else one.row.value for one in contacts]
     outputs = (
@@ -75,11 +69,6 @@ def _program(assembly: Assembly) -> _Program:
     places = tuple(tuple(zip(one.rows, one.columns, strict=True)) for one in found)
     program = Program("gaps and slips", groups, assembly.parameters, outputs)
     return _Program(program, slopes.rows, slopes.columns, read, (places[0], places[1]))
-
-
-def depends_on_any(values: list[Expression], symbol: Expression) -> bool:
-    """Return whether one of some values depends on a symbol."""
-    return any(depends_on(value, [symbol]) for value in values)
 
 
 class ContactValues:
@@ -145,25 +134,21 @@ class ContactValues:
     def _solved(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Accelerations without these forces, those by a unit of each, and the multipliers of joints likewise."""
         assembly = self.assembly
-        held = dict(zip((one.path for one in assembly.discrete_states), _held(assembly), strict=True))
+        held = dict(zip((one.path for one in assembly.discrete_states), assembly.held_now, strict=True))
         for rows in self.units:
-            held |= dict.fromkeys(state_paths(self.contacts, rows), 0.0)
+            held |= dict.fromkeys(state_paths(self.contacts[rows[0]]), 0.0)
         loose = assembly.with_held([held[one.path] for one in assembly.discrete_states])
         now = balance_of(loose, "dae").at(self.t, self.q, self.u)
-        mass, held_by = to_array(now.mass), to_array(now.jacobian)
-        n, m = len(self.u), len(held_by)
-        each = or_one(np.max(np.abs(held_by * self.sizes), axis=1, initial=0.0))
-        heavy = self.sizes[:, None] * mass * self.sizes
-        unit = float(np.max(np.abs(heavy), initial=0.0)) or 1.0
-        matrix = bordered(heavy / unit, held_by * self.sizes / each[:, None])
-        right = np.zeros((n + m, 1 + len(self.contacts)))
+        n, each = len(self.u), or_one(np.max(np.abs(to_array(now.jacobian) * self.sizes), axis=1, initial=0.0))
+        matrix, unit = even_balance(now, self.sizes, each)
+        right = np.zeros((len(matrix), 1 + len(self.contacts)))
         right[:n, 0], right[n:, 0] = -now.bias * self.sizes / unit, -now.gamma / each
         right[:n, 1:] = (self.slopes * self.sizes).T / unit
-        found = least_norm(matrix, right, errors=_LIGHT)
+        found = least_norm(matrix, right, errors=LIGHT)
         moved, borne = found[:n] * self.sizes[:, None], found[n:] * unit / each[:, None]
         return moved[:, 0], moved[:, 1:], borne[:, 0], borne[:, 1:]
 
-    @property
+    @cached_property
     def response(self) -> FloatArray:
         """A: how the rows move by a unit of each force."""
         found: FloatArray = self.slopes @ self._solved[1]
@@ -230,14 +215,8 @@ class ContactValues:
         return Contacts(self.response[np.ix_(rows, rows)], free[rows], units, few)
 
 
-def _held(assembly: Assembly) -> tuple[float, ...]:
-    return assembly.held_at_start if assembly.held is None else assembly.held
-
-
-def state_paths(contacts: Sequence[ContactRow], rows: Sequence[int]) -> tuple[str, ...]:
+def state_paths(one: ContactRow) -> tuple[str, ...]:
     """Return the paths of the discrete states of a gap, or of a slip: its state, then its direction."""
-    part, law, _ = contacts[rows[0]].row.key
-    if not contacts[rows[0]].is_slip:
-        return (f"{part}.{law}_state",)
-    names = [law] if len(rows) == 1 else [f"{law}_{i + 1}" for i in range(len(rows))]
-    return (f"{part}.{law}_state", *(f"{part}.{name}_direction" for name in names))
+    part, law, _ = one.row.key
+    directions = value_names(one.law) if one.is_slip else ()
+    return (f"{part}.{law}_state", *(f"{part}.{name}_direction" for name in directions))

@@ -23,6 +23,7 @@ from atwood.numerics.matrices import (
     least_norm,
     scaled,
     solve_even,
+    to_array,
 )
 from atwood.numerics.newton import Missing, newton
 from atwood.numerics.rank import row_scales
@@ -224,6 +225,20 @@ def bordered(mass: FloatArray, jacobian: FloatArray) -> FloatArray:
     matrix[..., :n, n:] = -np.swapaxes(jacobian, -1, -2)
     matrix[..., n:, :n] = jacobian
     return matrix
+
+
+LIGHT = 1e-12
+"""A body that is lighter than the heaviest one by more is rounding of its mass matrix."""
+
+
+def even_balance(now: BalanceValues, sizes: FloatArray, rows: FloatArray) -> tuple[FloatArray, float]:
+    """Return the same matrix in displacements of the scene's size, with masses as shares of the largest, which follows.
+
+    Solved by least norm up to `LIGHT`, what is small beside the rest is small in truth, and not in its unit.
+    """
+    mass = sizes[:, None] * to_array(now.mass) * sizes
+    unit = float(np.max(np.abs(mass), initial=0.0)) or 1.0
+    return bordered(mass / unit, to_array(scaled(now.jacobian, sizes, rows))), unit
 
 
 def solve_determined(matrix: FloatArray, right: FloatArray, t: float) -> FloatArray:

@@ -17,6 +17,7 @@ from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import replace
 from atwood.mechanics.constraints.knots import BALANCES
 from atwood.mechanics.dynamics.equations import Constraint
+from atwood.model.values.units import ALONG
 from atwood.numerics.matrices import scaled, to_array
 from atwood.numerics.newton import Missing, newton
 from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_of
@@ -203,6 +204,6 @@ def _in_words(assembly: Assembly, constraint: Constraint, jump: float) -> str:
     path, law, _ = constraint.key
     for one in assembly.mechanism.locals_[path].constraints:
         if one.law.name == law:
-            unit = {"N": "m", "N*m": "rad"}.get(one.law.options.unit)
+            unit = ALONG.get(one.law.options.unit)
             return "" if unit is None else f" by {abs(jump):.3g} {unit}"
     return ""

@@ -15,10 +15,10 @@ from atwood.forms.caches import Key
 from atwood.forms.quantities import observer, to_maximal
 from atwood.mechanics.dynamics.equations import Constraint
 from atwood.mechanics.outputs.event_functions import UPDATE, EventFunction, list_event_functions
-from atwood.numerics.matrices import is_full, least_norm, scaled, to_array
+from atwood.numerics.matrices import is_full, least_norm
 from atwood.numerics.newton import Missing, newton
 from atwood.numerics.sparse import solve_bordered
-from atwood.simulation.dynamics.balance import Balance, BalanceValues, balance_of, bordered
+from atwood.simulation.dynamics.balance import LIGHT, Balance, BalanceValues, balance_of, even_balance
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of, reference_coordinates
 from atwood.simulation.dynamics.orientation_coordinates import (
     Reassemble,
@@ -166,9 +166,6 @@ def _reaction_event_functions(assembly: Assembly) -> tuple[EventFunction, ...]:
 _STEPS, _STILL = 30, 1e-14
 """So many steps lead to generalized coordinates at most, the last of them so short beside these."""
 
-_LIGHT = 1e-12
-"""A body that is lighter than the heaviest one by more is rounding of its mass matrix."""
-
 
 def _solve_impact(
     now: BalanceValues, u: FloatArray, sizes: FloatArray, rows: FloatArray
@@ -183,11 +180,9 @@ def _solve_impact(
         if solved is not None:
             return solved[0], solved[1] * rows
     n = len(u)
-    mass, slope = sizes[:, None] * to_array(now.mass) * sizes, to_array(scaled(now.jacobian, sizes, rows))
-    mass = mass / (np.max(np.abs(mass), initial=0.0) or 1.0)
-    matrix = bordered(mass, slope)
-    right = np.concatenate([mass @ (u / sizes), -now.explicit_rate / rows])
-    found = least_norm(matrix, right, errors=_LIGHT)
+    matrix, _ = even_balance(now, sizes, rows)
+    right = np.concatenate([matrix[:n, :n] @ (u / sizes), -now.explicit_rate / rows])
+    found = least_norm(matrix, right, errors=LIGHT)
     return found[:n] * sizes, found[n:]
 
 

@@ -112,7 +112,7 @@ class Sampler:
     def call(self, chosen: Iterable[int], assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> Updated:
         """Return what updates make of a state, one after the other."""
         reading = update_inputs_of(assembly)
-        held = list(assembly.held_at_start if assembly.held is None else assembly.held)
+        held = list(assembly.held_now)
         q, values = q.copy(), None
         order = _ordered([self.updates[i] for i in chosen], reading)
         for one in order:

@@ -141,7 +141,7 @@ def constrained_problem(
         event_count=len(directions),
         event_directions=directions,
         compiled=_compiled_on_constraints(plan, program, values),
-        project=project if plan.finding.kept or assembly.own_equations.contacts else None,
+        project=project if plan.holds else None,
     )
 
 
@@ -213,11 +213,7 @@ def _compiled_on_constraints(
     if plan.not_compilable:
         return None
     code = plan.assembly.shared.get(_COMPILED_ON_CONSTRAINTS, lambda: _code(program), program)
-    return (
-        None
-        if code is None
-        else _once(lambda: code.bind(values, projects=bool(plan.finding.kept or plan.assembly.own_equations.contacts)))
-    )
+    return None if code is None else _once(lambda: code.bind(values, projects=plan.holds))
 
 
 def _code(program: ConstrainedProgram) -> CompiledAccelerations | None:

@@ -103,6 +103,11 @@ class SceneProblem:
         return _restored, (self.assembly, self.finding, *sizes, *state)
 
     @property
+    def holds(self) -> bool:
+        """Whether something holds the scene that its coordinates do not solve: constraints, gaps or slips."""
+        return bool(self.finding.kept or self.assembly.own_equations.contacts)
+
+    @property
     def kept(self) -> NDArray[np.intp] | None:
         """Numbers of the independent constraints; None if all are."""
         if not self.finding.redundant:

@@ -242,17 +242,18 @@ class _Walk:
             self._prepare()
 
     def _prepare(self) -> None:
-        t, q, u, options = self.t, self.q, self.u, self.options
-        plan = self.plan
+        t, q, options = self.t, self.q, self.options
+        plan, is_new = self.plan, self.plan is None
         if plan is None:
             plan = self._plan()
             has_states = bool(plan.assembly.own_equations.states or self.sampler.updates)
             if not self.segments and not options.structure and not has_states:
                 refuse_immobile(self.assembly, len(plan.assembly.own_equations.speeds) - plan.finding.rank, self.start)
             self._plans, self.probe, self._handed = {}, None, ()
-            plan = self._settled(plan, is_new=True)
-            self.choice = choose(plan, options, t, q, self.u)
-        plan, u = self._settled(plan), self.u
+        plan = self._settled(plan)
+        u = self.u
+        if is_new:
+            self.choice = choose(plan, options, t, q, u)
         sided = self._sides.on(self.assembly, plan, t, q, u)
         if sided is None:  # a relation stays where it changes
             self.plan = None
@@ -266,10 +267,10 @@ class _Walk:
         self.probe.follow(self._handed)
         return None
 
-    def _settled(self, plan: SceneProblem, is_new: bool = False) -> SceneProblem:
+    def _settled(self, plan: SceneProblem) -> SceneProblem:
         """Return a plan with the states that gaps and slips have from now on, after impacts if there are any."""
         triggers, self._unsettled = self._unsettled, None
-        if not plan.assembly.own_equations.contacts or (triggers is None and not is_new):
+        if triggers is None or not plan.assembly.own_equations.contacts:
             return plan
         from atwood.simulation.contacts.changes import resolve
         from atwood.simulation.problem.explicit_scene import nearest_place
@@ -281,7 +282,7 @@ class _Walk:
             self.start.length,
             plan.scales,
             options.relative_tolerance,
-            triggers or (),
+            triggers,
             options.impacts == "one_by_one",
             self._impacts,
             is_start,
@@ -291,9 +292,7 @@ class _Walk:
         self.events += events if not is_start else [one for one in events if one.impact]
         self.impact |= any(one.impact for one in events)
         self.u, self.held = changed.speeds, changed.held
-        if (
-            changed.touching and not is_start
-        ):  # where it is found that a gap is zero, all that are closed are so to rounding
+        if changed.touching and not is_start:  # what is found to be closed is so to rounding
             met = self._sides.like(self.assembly.with_held(changed.touching), plan)
             self.q = nearest_place(plan.in_piece(met), self.t, self.q, self.u)
         self.assembly = self.assembly.with_held(self.held)
@@ -378,7 +377,7 @@ class _Walk:
         """Go on in other coordinates of an orientation."""
         _, q, self.u, _ = recorder.last()
         self.assembly, self.q = switch_coordinates(self.assembly, to_regular(self.assembly, q), self._reassemble)
-        self.plan, self.impact, self.show = None, False, False
+        self.plan, self.impact, self.show, self._unsettled = None, False, False, ()
         self.coordinate_switches.append(CoordinateSwitch(self.t, event.part))
 
     def _enter(self, outcome: Outcome, recorder: Recorder) -> None:
