@@ -331,6 +331,7 @@ class _Moment:
             raise self._contradiction("no accelerations and no impulses satisfy contact and friction", chosen)
         push = self._on_all(chosen, best)
         self.u = self.u + values.speeds_by(push)
+        self.values = self.values.with_speeds(self.u)
         pressed = [k for k in chosen if not self.first[k].is_slip and push[self.units[k][0]] > 0.0]
         self._tell(pressed[0] if pressed else chosen[0], "friction jams it: an impulse", "jams")
         rates = self.rates()

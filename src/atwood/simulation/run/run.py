@@ -242,8 +242,7 @@ class _Walk:
             self._prepare()
 
     def _prepare(self) -> None:
-        t, q, options = self.t, self.q, self.options
-        plan, is_new = self.plan, self.plan is None
+        options, plan, is_new = self.options, self.plan, self.plan is None
         if plan is None:
             plan = self._plan()
             has_states = bool(plan.assembly.own_equations.states or self.sampler.updates)
@@ -251,7 +250,7 @@ class _Walk:
                 refuse_immobile(self.assembly, len(plan.assembly.own_equations.speeds) - plan.finding.rank, self.start)
             self._plans, self.probe, self._handed = {}, None, ()
         plan = self._settled(plan)
-        u = self.u
+        t, q, u = self.t, self.q, self.u
         if is_new:
             self.choice = choose(plan, options, t, q, u)
         sided = self._sides.on(self.assembly, plan, t, q, u)
