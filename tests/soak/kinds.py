@@ -14,6 +14,7 @@ KINDS = {
     "arguments": "arguments",
     "broken": "broken",
     "claims": "claims",
+    "contacts": "contacts",
     "control": "control",
     "files": "files",
     "hostile": "hostile",

@@ -85,6 +85,14 @@ def test_files_and_poles(kind) -> None:
         assert not trial.findings, (seed, trial.findings[0])
 
 
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("seed", [3, 5, 6])
+def test_laws_of_contact_hold(seed: int) -> None:
+    trial, _ = run_trial("contacts", seed)
+    assert "compared" in trial.tried
+    assert not trial.findings, trial.findings[0].detail
+
+
 def test_rates_beside_a_pole_do_not_ask_for_more_samples_than_there_can_be() -> None:
     """Here 10 GB were taken."""
     with pytest.warns(UserWarning, match="may be counted wrong by whole turns"):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from atwood import Component, Number, ParameterError, Point, Scalar, connector, observable, parameter, unilateral
+from atwood import Component, Number, Point, Scalar, connector, observable, parameter, unilateral
+from atwood_library.interfaces.bounds import check_bounds
 
 __all__ = ["DistanceContact"]
 
@@ -17,9 +18,8 @@ class DistanceContact(Component):
 
     synonyms: ClassVar[tuple[str, ...]] = ("Buffer", "Coupling with slack", "Newton's cradle", "Bumper")
 
-    lower: Number = parameter(0.0, unit="m", minimum=0.0, doc="The smallest distance.")
-    upper: Number = parameter(1.0, unit="m", above=0.0, doc="The largest distance.")
-    ends: str = parameter("lower", choices=("both", "upper", "lower"), doc="Which of the two bounds there are.")
+    lower: Number = parameter(None, unit="m", minimum=0.0, doc="The smallest distance; none if not given.")
+    upper: Number = parameter(None, unit="m", above=0.0, doc="The largest distance; none if not given.")
     restitution: Number = parameter(
         0.0, minimum=0.0, maximum=1.0, doc="Share of the speed with which a bound is reached that is left after it."
     )
@@ -28,10 +28,7 @@ class DistanceContact(Component):
 
     def check_values(self) -> None:
         """Refuse bounds the wrong way round."""
-        if self.ends == "both" and not self.lower < self.upper:
-            raise ParameterError(
-                f"the upper bound {self.upper:g} is not above the lower one, {self.lower:g}", where=f"{self.path}.upper"
-            )
+        check_bounds(self)
 
     @observable(unit="m", doc="Distance of the two points.")
     def length(self) -> Scalar:
@@ -40,10 +37,10 @@ class DistanceContact(Component):
 
     @unilateral(reaction="pressure", restitution="restitution", doc="Force that pushes the points apart.")
     def above_lower(self) -> Scalar:
-        """Distance above the lower bound; a length that never changes where there is none."""
-        return 1.0 * self.upper if self.ends == "upper" else self.distance(self.a, self.b) - self.lower
+        """Distance above the lower bound; it never changes where there is none."""
+        return 1.0 if self.lower is None else self.distance(self.a, self.b) - self.lower
 
     @unilateral(reaction="tension", restitution="restitution", doc="Force that pulls the points together.")
     def below_upper(self) -> Scalar:
-        """Distance below the upper bound; a length that never changes where there is none."""
-        return 1.0 * self.upper if self.ends == "lower" else self.upper - self.distance(self.a, self.b)
+        """Distance below the upper bound; it never changes where there is none."""
+        return 1.0 if self.upper is None else self.upper - self.distance(self.a, self.b)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from atwood import Component, Number, ParameterError, Scalar, Slide, connector, observable, parameter, unilateral
+from atwood import Component, Number, Scalar, Slide, connector, observable, parameter, unilateral
 from atwood_library.interfaces.along_coordinates import between
+from atwood_library.interfaces.bounds import check_bounds
 
 __all__ = ["TranslationalStop"]
 
@@ -19,9 +20,8 @@ class TranslationalStop(Component):
     synonyms: ClassVar[tuple[str, ...]] = ("Hard stop", "Stop", "MassWithStopAndFriction")
     spaces: ClassVar[tuple[str, ...]] = ("plane", "space")
 
-    ends: str = parameter("both", choices=("both", "upper", "lower"), doc="Where it ends.")
-    lower: Number = parameter(-0.5, unit="m", doc="Where it ends below.")
-    upper: Number = parameter(0.5, unit="m", doc="Where it ends above.")
+    lower: Number = parameter(None, unit="m", doc="Where it ends below; nowhere if not given.")
+    upper: Number = parameter(None, unit="m", doc="Where it ends above; nowhere if not given.")
     restitution: Number = parameter(
         0.0, minimum=0.0, maximum=1.0, doc="Share of the speed with which an end is reached that is left after it."
     )
@@ -31,10 +31,7 @@ class TranslationalStop(Component):
 
     def check_values(self) -> None:
         """Refuse ends the wrong way round."""
-        if self.ends == "both" and not self.lower < self.upper:
-            raise ParameterError(
-                f"the lower end {self.lower:g} is not below the upper one, {self.upper:g}", where=f"{self.path}.lower"
-            )
+        check_bounds(self)
 
     @observable(unit="m", doc="By how much b is ahead of a.")
     def extension(self) -> Scalar:
@@ -43,12 +40,12 @@ class TranslationalStop(Component):
 
     @unilateral(reaction="lower_force", unit="N", restitution="restitution", doc="What the lower end exerts on b.")
     def above_lower(self) -> Scalar:
-        """Play above the lower end; a length that never changes where there is none."""
-        return abs(self.upper) if self.ends == "upper" else between(self)[0] - self.lower
+        """Play above the lower end; it never changes where there is none."""
+        return 1.0 if self.lower is None else between(self)[0] - self.lower
 
     @unilateral(
         reaction="upper_force", unit="N", restitution="restitution", doc="What the upper end exerts, against b."
     )
     def below_upper(self) -> Scalar:
-        """Play below the upper end; a length that never changes where there is none."""
-        return abs(self.lower) if self.ends == "lower" else self.upper - between(self)[0]
+        """Play below the upper end; it never changes where there is none."""
+        return 1.0 if self.upper is None else self.upper - between(self)[0]
