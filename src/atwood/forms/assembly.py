@@ -57,6 +57,11 @@ _REACTIONS: Key[tuple[Reaction, ...]] = Key("reactions")
 _OBSERVABLES: Key[Mapping[str, Observable]] = Key("quantities")
 _START_OBSERVABLES: Key[Mapping[str, Observable]] = Key("quantities of the start")
 
+_SETS: Key[dict[tuple[float, ...], Assembly]] = Key("the same with other discrete states")
+_MOST_SETS = 64
+"""So many sets of values of discrete states are remembered."""
+
+
 
 @dataclass(frozen=True, eq=False)
 class Assembly:
@@ -224,8 +229,14 @@ class Assembly:
         return self.held_at_start if self.held is None else self.held
 
     def with_held(self, values: Sequence[float]) -> Assembly:
-        """Return the same with other values of the discrete states, with the same programs."""
-        return replace(self, held=tuple(values))
+        """Return the same with other values of the discrete states, with the same programs; equal ones are one."""
+        known, held = self.kept.get(_SETS, dict), tuple(values)
+        if held not in known:
+            if len(known) >= _MOST_SETS:
+                known.clear()
+            made = known[held] = replace(self, held=held)
+            made.kept.get(_SETS, lambda: known)
+        return known[held]
 
     @cached_property
     def parameters(self) -> tuple[Expression, ...]:

@@ -127,16 +127,20 @@ class EventLocator:
         The problem, with its events and their directions.
     horizon
         A typical length of the run: what is shorter by the rounding of the arithmetic counts as one moment.
+    signs
+        What is known of each event before the first start; None for what the problem says.
     """
 
-    def __init__(self, problem: ImplicitProblem | ExplicitProblem, horizon: float) -> None:
+    def __init__(
+        self, problem: ImplicitProblem | ExplicitProblem, horizon: float, signs: tuple[int, ...] | None = None
+    ) -> None:
         assert problem.events is not None
         self._function = problem.events
         self._directions = problem.event_directions or (0,) * problem.event_count
         self._rough = [i in problem.event_rough for i in range(problem.event_count)]
         self._moment = 100 * ROUNDING * horizon
         self._signs = [0] * problem.event_count
-        self._given = problem.event_signs  # before the first start
+        self._given = problem.event_signs if signs is None else signs  # before the first start
         self._carried = [False] * problem.event_count  # whether its sign at the start is that before
         self._fired = [False] * problem.event_count
         self._fired_at = -inf

@@ -100,6 +100,7 @@ class ExplicitSession(SteppingSession):
         on_stiff: OnStiff | None,
         end: float,
         absolute: FloatArray | None = None,
+        signs: tuple[int, ...] | None = None,
     ) -> None:
         """Make another run, with the same method: all is as in a new session, and is counted from zero.
 
@@ -107,7 +108,7 @@ class ExplicitSession(SteppingSession):
         sessions that were opened to leave stiff problems to others or not, as this run does.
         """
         self._stepper.renew(horizon, absolute)
-        self._begin_count(horizon, budget)
+        self._begin_count(horizon, budget, signs)
         self._begin(t, y, on_stiff, end)
 
     def set_monitor(self, monitor: StepMonitor) -> bool:

@@ -120,12 +120,12 @@ class SteppingSession(Session):
         self._no_events = (0,) * problem.event_count
         self._begin_count(horizon, budget)
 
-    def _begin_count(self, horizon: float, budget: Budget | None) -> None:
-        """Begin a run that has cost nothing so far, and knows no sign of an event."""
+    def _begin_count(self, horizon: float, budget: Budget | None, signs: tuple[int, ...] | None = None) -> None:
+        """Begin a run that has cost nothing so far, and knows those signs of events that it is handed."""
         self.budget = budget or Budget()
         self._opened, self._seconds, self._starts = 0.0, 0.0, 0
         problem = self._problem
-        self._locator = None if problem.events is None else EventLocator(problem, horizon)
+        self._locator = None if problem.events is None else EventLocator(problem, horizon, signs)
 
     @property
     def handed_on(self) -> tuple[int, ...]:

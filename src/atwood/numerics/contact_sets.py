@@ -19,7 +19,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.lazy_dataclasses import dataclass
-from atwood.numerics.matrices import least_norm, or_one
+from atwood.numerics.matrices import least_norm
 
 OPEN, GOES_ON, STICKS = 0, 1, 2
 """States: a gap is open or sticks (is closed); a slip is free, goes on or sticks."""
@@ -29,6 +29,9 @@ SLACK = 1e-9
 
 _MOST_SETS = 20_000
 """More sets than these are not looked through."""
+
+_CLEAR = 1e-8
+"""A pivot of scaled rows that is no larger may be rounding: rows then depend on each other."""
 
 _TURNS = 60
 """So many turns find the direction in which something begins to slip."""
@@ -94,10 +97,31 @@ class Found:
     motions: FloatArray
 
 
+@dataclass(frozen=True, eq=False)
+class _Listed:
+    """The same in plain numbers: arrays of so few take ten times as long."""
+
+    response: list[list[float]]
+    free: list[float]
+    units: tuple[Unit, ...]
+    limits: list[float]
+    shares: list[list[float]]
+    static_limits: list[float]
+    static_shares: list[list[float]]
+
+
+def _listed(contacts: Contacts) -> _Listed:
+    limits = contacts.limits
+    of_limits = limits.free, limits.shares, limits.static_free, limits.static_shares
+    return _Listed(
+        contacts.response.tolist(), contacts.free.tolist(), contacts.units, *(one.tolist() for one in of_limits)
+    )
+
+
 def find_states(contacts: Contacts, states: Sequence[State]) -> Found | None:
     """Return states that contradict nothing, near to those given; None where there are none."""
     present = tuple(_allowed(unit, *one) for unit, one in zip(contacts.units, states, strict=True))
-    found = _improved(contacts, present)
+    found = _improved(_listed(contacts), present)
     if found is not None:
         return found
     every = [
@@ -112,15 +136,16 @@ def all_states(contacts: Contacts) -> Iterator[Found]:
     choices = [_choices(unit) for unit in contacts.units]
     if math.prod(map(len, choices)) > _MOST_SETS:
         return
+    listed = _listed(contacts)
     for tried in product(*choices):
         states = tried
         for _ in range(_TURNS):
-            forces, motions = _solve(contacts, states)
-            number, better = _contradiction(contacts, states, forces, motions)
+            forces, motions = _solve(listed, states)
+            number, better = _contradiction(listed, states, forces, motions)
             if number < 0:
-                yield Found(states, forces, motions)
+                yield Found(states, np.array(forces), np.array(motions))
                 break
-            if len(contacts.units[number].rows) < 2 or better[0] != states[number][0]:
+            if len(listed.units[number].rows) < 2 or better[0] != states[number][0]:
                 break
             states = (*states[:number], better, *states[number + 1 :])
 
@@ -145,7 +170,7 @@ def _choices(unit: Unit) -> list[State]:
     return [(STICKS, none), *((GOES_ON, way) for way in ways)]
 
 
-def _improved(contacts: Contacts, tried: tuple[State, ...]) -> Found | None:
+def _improved(contacts: _Listed, tried: tuple[State, ...]) -> Found | None:
     """Change the state that contradicts most, until none does or a set comes again."""
     seen: set[tuple[State, ...]] = set()
     while tried not in seen and len(seen) < _TURNS * (1 + len(contacts.units)):
@@ -153,75 +178,116 @@ def _improved(contacts: Contacts, tried: tuple[State, ...]) -> Found | None:
         forces, motions = _solve(contacts, tried)
         number, better = _contradiction(contacts, tried, forces, motions)
         if number < 0:
-            return Found(tried, forces, motions)
+            return Found(tried, np.array(forces), np.array(motions))
         tried = (*tried[:number], better, *tried[number + 1 :])
     return None
 
 
-def _is_loose(contacts: Contacts, states: Sequence[State], unit: Unit) -> bool:
+def _is_loose(states: Sequence[State], unit: Unit) -> bool:
     """Return whether a slip is one at a gap that is open."""
     return unit.is_slip and unit.at >= 0 and states[unit.at][0] == OPEN
 
 
-def _solve(contacts: Contacts, states: Sequence[State]) -> tuple[FloatArray, FloatArray]:
+def _solve(contacts: _Listed, states: Sequence[State]) -> tuple[list[float], list[float]]:
     """Return the forces and motions of a set of states."""
-    count = len(contacts.free)
-    matrix, right = np.eye(count), np.zeros(count)
-    if not count:
-        return right, right
+    acting: list[int] = []
+    rows: list[list[float]] = []
+    right: list[float] = []
     for k, (unit, (state, direction)) in enumerate(zip(contacts.units, states, strict=True)):
-        if _is_loose(contacts, states, unit):
+        if state == OPEN or _is_loose(states, unit):
             continue
         for row, part in zip(unit.rows, direction, strict=True):
+            acting.append(row)
             if state == STICKS:
-                matrix[row], right[row] = contacts.response[row], -contacts.free[row]
-            elif state == GOES_ON:
-                matrix[row] = matrix[row] + part * contacts.limits.shares[k]
-                right[row] = -part * contacts.limits.free[k]
-    size = or_one(np.max(np.abs(matrix), axis=1))
-    forces = least_norm(matrix / size[:, None], right / size)
-    return forces, contacts.free + contacts.response @ forces
+                rows.append(contacts.response[row])
+                right.append(-contacts.free[row])
+            else:
+                turned = [part * share for share in contacts.shares[k]]
+                turned[row] += 1.0
+                rows.append(turned)
+                right.append(-part * contacts.limits[k])
+    forces, motions = [0.0] * len(contacts.free), list(contacts.free)
+    for row, force in zip(acting, _solved([[one[i] for i in acting] for one in rows], right), strict=True):
+        forces[row] = force
+        for i, by in enumerate(contacts.response):
+            motions[i] += by[row] * force
+    return forces, motions
+
+
+def _solved(matrix: list[list[float]], right: list[float]) -> list[float]:
+    """Solve a small linear system; where rows depend on each other, by least norm."""
+    count = len(right)
+    sizes = [max(map(abs, row)) or 1.0 for row in matrix]
+    left = [[*(x / size for x in row), one / size] for row, one, size in zip(matrix, right, sizes, strict=True)]
+    for i in range(count):
+        best = max(range(i, count), key=lambda k: abs(left[k][i]))
+        if not abs(left[best][i]) > _CLEAR:
+            size = np.array(sizes)
+            found: list[float] = least_norm(np.array(matrix) / size[:, None], np.array(right) / size).tolist()
+            return found
+        left[i], left[best] = left[best], left[i]
+        pivot = left[i]
+        for row in left[i + 1 :]:
+            share = row[i] / pivot[i]
+            for k in range(i + 1, count + 1):
+                row[k] -= share * pivot[k]
+    solution = [0.0] * count
+    for i in reversed(range(count)):
+        row = left[i]
+        solution[i] = (row[count] - sum(row[k] * solution[k] for k in range(i + 1, count))) / row[i]
+    return solution
 
 
 def _contradiction(
-    contacts: Contacts, states: Sequence[State], forces: FloatArray, motions: FloatArray
+    contacts: _Listed, states: Sequence[State], forces: Sequence[float], motions: Sequence[float]
 ) -> tuple[int, State]:
     """Return the unit whose state contradicts most, and the state it has then; -1 where none does."""
     better: State = (OPEN, (0.0,))
     worst, number = SLACK, -1
     if not contacts.units:
         return number, better
-    limits = contacts.limits.free + contacts.limits.shares @ forces
-    static = contacts.limits.static_free + contacts.limits.static_shares @ forces
-    pushes = max(float(np.max(np.abs(forces))), float(np.max(np.abs(limits)))) or 1.0
-    moves = float(np.max(np.maximum(np.abs(contacts.free), np.abs(contacts.response) @ np.abs(forces)))) or 1.0
+    limits = _limits(contacts.limits, contacts.shares, forces)
+    static = _limits(contacts.static_limits, contacts.static_shares, forces)
+    pushes = max(max(map(abs, forces)), max(map(abs, limits))) or 1.0
+    moves = max(
+        max(abs(free), sum(abs(by * force) for by, force in zip(row, forces, strict=True)))
+        for free, row in zip(contacts.free, contacts.response, strict=True)
+    )
+    moves = moves or 1.0
     for k, (unit, state) in enumerate(zip(contacts.units, states, strict=True)):
-        if _is_loose(contacts, states, unit):
+        if _is_loose(states, unit):
             continue
-        rows = list(unit.rows)
-        f, a = forces[rows] / pushes, motions[rows] / moves
+        f, a = [forces[i] / pushes for i in unit.rows], [motions[i] / moves for i in unit.rows]
         for miss, other in _misses(unit, state, f, a, limits[k] / pushes, static[k] / pushes):
             if miss > worst:
                 worst, number, better = miss, k, other
     return number, better
 
 
+def _limits(limits: list[float], shares: list[list[float]], forces: Sequence[float]) -> list[float]:
+    """Return the limits at some forces."""
+    return [
+        one + sum(share * force for share, force in zip(row, forces, strict=True))
+        for one, row in zip(limits, shares, strict=True)
+    ]
+
+
 def _misses(
-    unit: Unit, state: State, f: FloatArray, a: FloatArray, limit: float, static: float
+    unit: Unit, state: State, f: Sequence[float], a: Sequence[float], limit: float, static: float
 ) -> Iterator[tuple[float, State]]:
     """Yield by how much a state contradicts each law, and the state that does not."""
     none = (0.0,) * len(f)
     if not unit.is_slip:
-        yield (-float(f[0]), (OPEN, none)) if state[0] == STICKS else (-float(a[0]), (STICKS, none))
+        yield (-f[0], (OPEN, none)) if state[0] == STICKS else (-a[0], (STICKS, none))
         if state[0] == STICKS:
-            yield -float(a[0]), (STICKS, none)
+            yield -a[0], (STICKS, none)
         return
     if unit.at < 0 and max(limit, static) <= 0.0:  # nothing is pressed
         yield (0.0 if state[0] == OPEN else 1.0), (OPEN, none)
         return
     if state[0] == STICKS:
         size = math.hypot(*f)
-        way = tuple(float(-x / size) for x in f) if size else (1.0, *none[1:])
+        way = tuple(-x / size for x in f) if size else (1.0, *none[1:])
         yield size - static, (GOES_ON, way)
         yield math.hypot(*a), (GOES_ON, way)  # rows that depend on each other cannot all stick
         return
@@ -230,13 +296,13 @@ def _misses(
             yield -limit, (OPEN, none)
         if unit.is_given:
             return
-        along = float(np.dot(a, state[1]))
+        along = sum(x * d for x, d in zip(a, state[1], strict=True))
         if along <= 0.0:
             yield -along, (STICKS, none)
             return
         size = math.hypot(*a)
         across = math.hypot(*(x - along * d for x, d in zip(a, state[1], strict=True)))
-        turned = [float(x / size + d) for x, d in zip(a, state[1], strict=True)]  # half the way, lest it swings
+        turned = [x / size + d for x, d in zip(a, state[1], strict=True)]  # half the way, lest it swings
         yield across, (GOES_ON, tuple(x / math.hypot(*turned) for x in turned))
         return
     yield max(limit, static), (GOES_ON, unit.given) if unit.is_given else (STICKS, none)

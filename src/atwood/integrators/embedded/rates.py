@@ -97,42 +97,44 @@ class CompiledAccelerations:
         routines = rates_source(q, u, given, projects)
         exports = ["rates", "project"] if projects else ["rates"]
         self._built = build_code(parts, default_options(parts), exports=exports, routines=routines)
-        self._prologue = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)(self._built.code.addresses["kernel_prologue"])
+        self._prologues = [
+            ctypes.CFUNCTYPE(None, *[c_void_p] * 3)(self._built.code.addresses[f"{name}_prologue"])
+            for name in self._programs
+        ]
 
     def bind(self, parameter_values: ArrayLike, projects: bool = True) -> Callable[[], CompiledRates]:
-        """Compute once what depends on parameters alone; return what gives each session functions of its own."""
-        addresses = self._built.code.addresses
-        derived = [self._built.derive(name, one, parameter_values)[0] for name, one in self._programs.items()]
-        project = addresses["project"] if projects and self._room else 0
-        head = 5 if self._room else 2
-        room = head + self._built.scratch
+        """Return what gives each session functions of its own, with these parameters."""
 
         def rates() -> CompiledRates:
-            # The pointers to derived values, scratch and room of each function, and then scratch and room themselves.
-            own = np.empty(room + self._room)
-            data = own.ctypes.data
-            scratch = data + 8 * head
-            pointers = [place for one in derived for place in (one.ctypes.data, scratch)]
-            own[:head].view(np.uint64)[:] = [*pointers, data + 8 * room][:head]
-            keep = (self._built, derived, own)
-            return CompiledRates(addresses["rates"], data, keep, project, data + 16 if project else 0)
+            own = self.open(projects)
+            self.fill(own, parameter_values)
+            return own.rates
 
         return rates
 
-    def open(self) -> OwnRates:
+    def open(self, projects: bool = True) -> OwnRates:
         """Return rates of a session whose parameters can be changed between its runs."""
-        # The pointers to derived values and scratch, then the derived values and the scratch themselves.
-        count = len(self._programs["kernel"].prologue)
-        own = np.empty(2 + count + self._built.scratch)
-        data = own.ctypes.data
-        own[:2].view(np.uint64)[:] = derived, scratch = data + 16, data + 16 + 8 * count
-        rates = CompiledRates(self._built.code.addresses["rates"], data, (self._built, own))
-        return OwnRates(rates, self._built.code.addresses["kernel_prologue"], derived, scratch)
+        # The pointers to derived values, scratch and room of each function; then scratch, room and the derived values.
+        head, counts = 5 if self._room else 2, [len(one.prologue) for one in self._programs.values()]
+        room = head + self._built.scratch
+        own = np.empty(room + self._room + sum(counts))
+        data, places, end = own.ctypes.data, [], room + self._room
+        for count in counts:
+            places.append(data + 8 * end)
+            end += count
+        scratch = data + 8 * head
+        pointers = [place for one in places for place in (one, scratch)]
+        own[:head].view(np.uint64)[:] = [*pointers, data + 8 * room][:head]
+        addresses, keep = self._built.code.addresses, (self._built, own)
+        project = addresses["project"] if projects and self._room else 0
+        rates = CompiledRates(addresses["rates"], data, keep, project, data + 16 if project else 0)
+        return OwnRates(rates, addresses["kernel_prologue"], places[0], scratch, tuple(places))
 
     def fill(self, own: OwnRates, parameter_values: ArrayLike) -> None:
         """Give rates of a session their parameters."""
         values = np.array(parameter_values, dtype=np.float64)
-        self._prologue(values.ctypes.data, own.derived, own.scratch)
+        for prologue, place in zip(self._prologues, own.places, strict=True):
+            prologue(values.ctypes.data, place, own.scratch)
 
 
 @dataclass(frozen=True)
@@ -145,9 +147,12 @@ class OwnRates:
         The rates; they have values once the prologue was called.
     prologue, derived, scratch
         Address of the function that computes what depends on parameters alone, and of its two arrays.
+    places
+        Where that is kept of the rates, and of the projection.
     """
 
     rates: CompiledRates
     prologue: int
     derived: int
     scratch: int
+    places: tuple[int, ...]

@@ -82,17 +82,14 @@ class _Moment:
     """Gaps and slips at one moment, while it is worked out what becomes of them; each is a unit of one or two rows."""
 
     def __init__(self, values: ContactValues, scales: Scales, relative: float, triggers: Sequence[EventRecord]) -> None:
-        self.values = values
+        self.values, self.layout = values, values.layout
         self.contacts, self.units, self.t = values.contacts, values.units, values.t
-        self.first = [self.contacts[rows[0]] for rows in self.units]
+        self.first, self.places = self.layout.first, self.layout.places
         self.u = values.u.copy()
-        assembly = values.assembly
-        paths = {one.path: i for i, one in enumerate(assembly.discrete_states)}
-        self.held = list(assembly.held_now)
-        self.places = [tuple(paths[path] for path in state_paths(one)) for one in self.first]
+        self.held = list(values.assembly.held_now)
         self.before = [self._state(k) for k in range(len(self.units))]
         near = _NEAR * max(relative, 1e-13)
-        self.small = near * np.array([scales.of(ALONG[one.law.options.unit]) for one in self.first])
+        self.small = np.array([near * scales.of(ALONG[one.law.options.unit]) for one in self.first])
         self.slow = self.small / scales.time
         self.triggers = {(one.part, one.law): one.target for one in triggers}
         self.events: list[EventRecord] = []
@@ -110,16 +107,16 @@ class _Moment:
     @property
     def touching(self) -> list[int]:
         """The gaps that are closed."""
+        values, small = self.values.values.tolist(), self.small.tolist()
         return [
             k
-            for k, one in enumerate(self.first)
-            if not one.is_slip
-            and (self.before[k][0] == STICKS or self.values.values[self.units[k][0]] <= self.small[k])
+            for k, is_slip in enumerate(self.layout.is_slip)
+            if not is_slip and (self.before[k][0] == STICKS or values[self.units[k][0]] <= small[k])
         ]
 
     def all_closed(self) -> tuple[float, ...]:
         """Return the states with every gap closed that is at zero, and nothing that rubs; empty where there is none."""
-        closed = self.touching
+        closed = set(self.touching)
         if not closed:
             return ()
         found = list(self.held)
@@ -135,12 +132,12 @@ class _Moment:
     def rate(self, k: int, rates: FloatArray) -> float:
         """Return the rate of a gap, or the size of a slip."""
         own = rates[list(self.units[k])]
-        return math.hypot(*own) if self.first[k].is_slip else float(own[0])
+        return math.hypot(*own) if self.layout.is_slip[k] else float(own[0])
 
     def slips_at(self, gaps: Sequence[int]) -> list[int]:
         """Return the slips that may rub where some gaps are closed."""
-        at, places = self.values.gap_of, set(gaps)
-        return [k for k, one in enumerate(self.first) if one.is_slip and (at[k] in places or not one.law.options.at)]
+        at, places = self.values.gap_of, {-1, *gaps}
+        return [k for k, is_slip in enumerate(self.layout.is_slip) if is_slip and at[k] in places]
 
     # -- impacts --------------------------------------------------------------------------------------------------
 
@@ -174,14 +171,19 @@ class _Moment:
         response = np.abs(self.values.response[self.units[closing[0]][0]])
         moved = response > 1e-12 * float(np.max(response))
         parts = {one.row.key[0] for one, is_moved in zip(self.contacts, moved, strict=True) if is_moved}
-        spans = np.diff([*dict.fromkeys(time for time, part in impacts if part in parts), self.t])[-_SPANS[1] :]
-        shrinks = spans[1:] < spans[:-1]
-        first = 0 if np.all(shrinks) else int(np.flatnonzero(~shrinks)[-1]) + 1
-        spans = spans[first:]
-        if len(spans) < _SPANS[0] or spans[-1] <= 0.0:
+        spans, last, end = list[float](), self.t, None  # the last first
+        for time, part in reversed(impacts):
+            if part not in parts or time == end:
+                continue
+            end = time
+            if len(spans) == _SPANS[1] or (spans and last - time <= spans[-1]):
+                break
+            spans.append(last - time)
+            last = time
+        if len(spans) < _SPANS[0] or spans[0] <= 0.0:
             return None
-        share = float(spans[-1] / spans[0]) ** (1.0 / (len(spans) - 1))
-        left: float = float(spans[-1]) * share / (1.0 - share)
+        share = (spans[0] / spans[-1]) ** (1.0 / (len(spans) - 1))
+        left = spans[0] * share / (1.0 - share)
         if not left < _LEFT * unit:
             return None
         self.small, self.slow = _NEAR_REST / _NEAR * self.small, _NEAR_REST / _NEAR * self.slow
@@ -238,7 +240,7 @@ class _Moment:
             if solved is None:
                 raise self._contradiction("no impulses satisfy the laws of impact and friction", chosen)
             last, found = found, self._on_all(chosen, solved)
-            if _is_same(last, found):
+            if not self.layout.is_curved or _is_same(last, found):
                 break
         return found
 
@@ -256,10 +258,12 @@ class _Moment:
 
     def settle(self) -> None:
         """Find the states that hold from now on."""
-        self.values = self.values.with_speeds(self.u)
         rates = self.rates()
         gaps = [k for k in self.touching if abs(self.rate(k, rates)) <= self.slow[k] and self.trigger(k) != OPENS]
         slips = self.slips_at(gaps)
+        if not gaps and not slips:
+            return self._take([], Found((), np.zeros(0), np.zeros(0)))
+        self.values = self.values.with_speeds(self.u)
         given = self._going(slips, rates)
         given |= {k: self._yielding(k) for k in slips if k not in given and self.trigger(k) == YIELDS}
         chosen = [*gaps, *slips]
@@ -271,6 +275,7 @@ class _Moment:
         held = [row for k, one in zip(chosen, found.states, strict=True) if one[0] == STICKS for row in self.units[k]]
         if held:  # what holds from now on holds to rounding
             self._hold(held)
+        return None
 
     def _hold(self, rows: list[int]) -> None:
         """Take away the rates of some rows."""
@@ -297,7 +302,7 @@ class _Moment:
                 return None
             last, forces = forces, self._on_all(chosen, found)
             states = list(found.states)
-            if _is_same(last, forces):
+            if not self.layout.is_curved or _is_same(last, forces):
                 break
         return found
 
@@ -316,7 +321,7 @@ class _Moment:
                         matrix[row] = matrix[row] + part * limits.shares[number]
                         right[row] = -part * limits.free[number]
             last, forces = forces, least_norm(matrix, right)
-            if _is_same(last, forces):
+            if not self.layout.is_curved or _is_same(last, forces):
                 break
         own = forces[list(self.units[k])]
         return tuple(-float(x) / (math.hypot(*own) or 1.0) for x in own)
@@ -354,7 +359,7 @@ class _Moment:
             at = self.values.gap_of[k]
             if one.is_slip and at >= 0 and states.get(at, (OPEN, (0.0,)))[0] == OPEN:
                 state, way = OPEN, (0.0,) * len(way)
-            values = (float(state), *way) if one.is_slip else (1.0 if state == STICKS else 0.0,)
+            values = (float(state), *way) if one.is_slip else (float(state == STICKS),)
             for place, value in zip(self.places[k], values, strict=True):
                 self.held[place] = value
             was, name = self.before[k], one.row.key[1]

@@ -16,30 +16,63 @@ from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.program import state_groups
+from atwood.forms.quantities import to_maximal
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import ContactRow
 from atwood.model.declare.contact_laws import value_names
 from atwood.numerics.contact_sets import Contacts, Limits, Unit
 from atwood.numerics.matrices import least_norm, or_one, to_array
-from atwood.simulation.dynamics.balance import LIGHT, balance_of, even_balance
-from atwood.simulation.dynamics.reactions import maximal_state
+from atwood.simulation.dynamics.balance import LIGHT, BalanceValues, balance_of, even_balance
+from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.scales import motion_scales
 
-_PROGRAM: Key[_Program] = Key("gaps and slips")
+_LAYOUT: Key[Layout] = Key("gaps and slips")
 
 
 @dataclass(frozen=True, eq=False)
-class _Program:
-    """The program of (t, q, u, multipliers that limits read), and the pattern of its matrices."""
+class Layout:
+    """The gaps and slips of a scene, and what tells their values.
+
+    Attributes
+    ----------
+    program
+        The program of (t, q, u, multipliers that limits read).
+    slopes
+        The pattern of the slopes of their rates.
+    read, shares
+        The multipliers that limits read, and the patterns of the slopes of limits and static limits along these.
+    is_curved, is_borne
+        Whether limits are curved in these multipliers, and whether some are those of joints.
+    contacts, units
+        The rows, and those of each gap and each slip.
+    first, is_slip
+        The first row of each unit, and whether it is a slip.
+    gap_of
+        For each unit that is a slip the number of its gap; -1 for what has none.
+    places
+        Where the states of each unit are among the discrete states.
+    """
 
     program: Program
-    rows: tuple[int, ...]
-    columns: tuple[int, ...]
+    slopes: tuple[tuple[int, ...], tuple[int, ...]]
     read: tuple[Expression, ...]
-    shares: tuple[tuple[tuple[int, int], ...], tuple[tuple[int, int], ...]]
+    shares: tuple[tuple[tuple[int, int], ...], ...]
+    is_curved: bool
+    is_borne: bool
+    contacts: tuple[ContactRow, ...]
+    units: tuple[tuple[int, ...], ...]
+    first: tuple[ContactRow, ...]
+    is_slip: tuple[bool, ...]
+    gap_of: tuple[int, ...]
+    places: tuple[tuple[int, ...], ...]
 
 
-def _program(assembly: Assembly) -> _Program:
+def layout_of(assembly: Assembly) -> Layout:
+    """Return the gaps and slips of a scene."""
+    return assembly.shared.get(_LAYOUT, lambda: _layout(assembly))
+
+
+def _layout(assembly: Assembly) -> Layout:
     equations, graph = assembly.maximal, assembly.maximal.graph
     contacts = equations.contacts
     rates = [one.row.rate for one in contacts]
@@ -66,9 +99,30 @@ def _program(assembly: Assembly) -> _Program:
         OutputGroup("restitution", tuple(none if one.restitution is None else one.restitution for one in contacts)),
     )
     groups = (*state_groups(equations), InputGroup("read", read))
-    places = tuple(tuple(zip(one.rows, one.columns, strict=True)) for one in found)
     program = Program("gaps and slips", groups, assembly.parameters, outputs)
-    return _Program(program, slopes.rows, slopes.columns, read, (places[0], places[1]))
+    units: dict[tuple[str, str], list[int]] = {}
+    for i, one in enumerate(contacts):
+        units.setdefault(one.row.key[:2], []).append(i)
+    first = tuple(contacts[rows[0]] for rows in units.values())
+    number = {key: k for k, key in enumerate(units)}
+    states = {one.path: i for i, one in enumerate(assembly.discrete_states)}
+    return Layout(
+        program,
+        (slopes.rows, slopes.columns),
+        read,
+        tuple(tuple(zip(one.rows, one.columns, strict=True)) for one in found),
+        any(depends_on(entry, list(read)) for one in found for entry in one.entries),
+        any(x not in own for x in read),
+        contacts,
+        tuple(map(tuple, units.values())),
+        first,
+        tuple(one.is_slip for one in first),
+        tuple(
+            number.get((one.row.key[0], one.law.options.at), -1) if one.is_slip and one.law.options.at else -1
+            for one in first
+        ),
+        tuple(tuple(states[path] for path in state_paths(one)) for one in first),
+    )
 
 
 class ContactValues:
@@ -85,104 +139,106 @@ class ContactValues:
     """
 
     def __init__(self, assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length: float) -> None:
-        self.assembly, self.t = assembly, t
-        self.contacts = assembly.maximal.contacts
-        self.q, self.u = (x[:, 0] for x in maximal_state(assembly, np.array([t]), q[:, None], u[:, None]))
+        self.assembly, self.t, self.layout = assembly, t, layout_of(assembly)
+        self.contacts, self.units, self.gap_of = self.layout.contacts, self.layout.units, self.layout.gap_of
+        if assembly.form == "reduced":
+            q, u = (np.array(x) for x in assembly.kernel(to_maximal(assembly))([t], q, u))
+            q = kinematic_map_of(assembly, "dae").normalized(q)
+        self.q, self.u = q, u
         self.sizes = motion_scales(assembly.maximal, length)
-        self._made = assembly.shared.get(_PROGRAM, lambda: _program(assembly))
-        self._kernel = assembly.kernel(self._made.program)
-        self.read = np.zeros(len(self._made.read))
+        self._kernel = assembly.kernel(self.layout.program)
+        self.read = np.zeros(len(self.layout.read))
         self._take(self.u)
 
     def with_speeds(self, u: FloatArray) -> ContactValues:
         """Return the same at other speeds of the maximal coordinates."""
-        if np.array_equal(u, self.u):
+        if u is self.u or np.array_equal(u, self.u):
             return self
         made = copy(self)
-        made.__dict__.pop("_solved", None)
+        for name in ("_now", "_free"):
+            made.__dict__.pop(name, None)
         made.u = u.copy()
         made._take(made.u)
         return made
 
     def _take(self, u: FloatArray) -> None:
-        found = [np.asarray(x, dtype=float) for x in self._kernel([self.t], self.q, u, self.read)]
+        found = [np.array(x) for x in self._kernel([self.t], self.q, u, self.read)]
         self.values, self.rates, slopes, self.seconds, self.limits, self.static_limits, *_ = found
         self.restitution = found[8]
         self.slopes = np.zeros((len(self.contacts), len(u)))
-        self.slopes[self._made.rows, self._made.columns] = slopes
+        self.slopes[self.layout.slopes] = slopes
         self._shares = found[6], found[7]
 
     @cached_property
-    def units(self) -> tuple[tuple[int, ...], ...]:
-        """The rows of each gap and each slip."""
-        found: dict[tuple[str, str], list[int]] = {}
-        for i, one in enumerate(self.contacts):
-            found.setdefault(one.row.key[:2], []).append(i)
-        return tuple(map(tuple, found.values()))
+    def _now(self) -> BalanceValues:
+        """The balance of forces without these forces."""
+        held = list(self.assembly.held_now)
+        for place in (place for places in self.layout.places for place in places):
+            held[place] = 0.0
+        return balance_of(self.assembly.with_held(held), "dae").at(self.t, self.q, self.u)
 
     @cached_property
-    def gap_of(self) -> tuple[int, ...]:
-        """For each unit that is a slip the number of its gap; -1 for what has none."""
-        first = [self.contacts[rows[0]] for rows in self.units]
-        places = {one.row.key[:2]: k for k, one in enumerate(first)}
-        return tuple(
-            places.get((one.row.key[0], one.law.options.at), -1) if one.is_slip and one.law.options.at else -1
-            for one in first
-        )
-
-    @cached_property
-    def _solved(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Accelerations without these forces, those by a unit of each, and the multipliers of joints likewise."""
-        assembly = self.assembly
-        held = dict(zip((one.path for one in assembly.discrete_states), assembly.held_now, strict=True))
-        for rows in self.units:
-            held |= dict.fromkeys(state_paths(self.contacts[rows[0]]), 0.0)
-        loose = assembly.with_held([held[one.path] for one in assembly.discrete_states])
-        now = balance_of(loose, "dae").at(self.t, self.q, self.u)
-        n, each = len(self.u), or_one(np.max(np.abs(to_array(now.jacobian) * self.sizes), axis=1, initial=0.0))
+    def _inverse(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The inverse of that balance, and what is scaled before and after it: they depend on the place alone."""
+        now = self._now
+        each = or_one(np.max(np.abs(to_array(now.jacobian) * self.sizes), axis=1, initial=0.0))
         matrix, unit = even_balance(now, self.sizes, each)
-        right = np.zeros((len(matrix), 1 + len(self.contacts)))
-        right[:n, 0], right[n:, 0] = -now.bias * self.sizes / unit, -now.gamma / each
-        right[:n, 1:] = (self.slopes * self.sizes).T / unit
-        found = least_norm(matrix, right, errors=LIGHT)
-        moved, borne = found[:n] * self.sizes[:, None], found[n:] * unit / each[:, None]
-        return moved[:, 0], moved[:, 1:], borne[:, 0], borne[:, 1:]
+        inverse = least_norm(matrix, np.eye(len(matrix)), errors=LIGHT)
+        sizes = self.sizes
+        return inverse, np.concatenate([sizes / unit, 1.0 / each]), np.concatenate([sizes, unit / each])
+
+    def _moved(self, right: FloatArray) -> FloatArray:
+        """Return accelerations and multipliers of joints for some right-hand sides, a column each."""
+        inverse, before, after = self._inverse
+        found: FloatArray = after[:, None] * (inverse @ (before[:, None] * right))
+        return found
+
+    @cached_property
+    def _free(self) -> FloatArray:
+        """Accelerations and multipliers of joints without these forces."""
+        return self._moved(np.concatenate([-self._now.bias, -self._now.gamma])[:, None])[:, 0]
+
+    @cached_property
+    def _by_each(self) -> FloatArray:
+        """Accelerations and multipliers of joints by a unit of each force."""
+        right = np.zeros((len(self._inverse[0]), len(self.contacts)))
+        right[: len(self.u)] = self.slopes.T
+        return self._moved(right)
 
     @cached_property
     def response(self) -> FloatArray:
         """A: how the rows move by a unit of each force."""
-        found: FloatArray = self.slopes @ self._solved[1]
+        found: FloatArray = self.slopes @ self._by_each[: len(self.u)]
         return found
 
     def accelerations(self) -> FloatArray:
         """Return how the rows accelerate without these forces."""
-        found: FloatArray = self.slopes @ self._solved[0] + self.seconds
+        found: FloatArray = self.slopes @ self._free[: len(self.u)] + self.seconds
         return found
 
     def speeds_by(self, forces: FloatArray) -> FloatArray:
         """Return the change of speeds, or the accelerations, that impulses, or forces, make."""
-        found: FloatArray = self._solved[1] @ forces
+        found: FloatArray = self._by_each[: len(self.u)] @ forces
         return found
 
     def limits_at(self, forces: FloatArray) -> Limits:
         """Return the limits of all units near some forces of the rows: ``L(f) = L_0 + P f``."""
-        contacts, borne, by = self.contacts, self._solved[2], self._solved[3]
-        count = len(contacts)
-        own = {one.read: i for i, one in enumerate(contacts)}
-        number = {symbol: i for i, symbol in enumerate(self.assembly.maximal.multipliers)}
-        ways, rest = np.zeros((len(self._made.read), count)), np.zeros(len(self._made.read))
-        for k, symbol in enumerate(self._made.read):
+        layout, count, n = self.layout, len(self.contacts), len(self.u)
+        own = {one.read: i for i, one in enumerate(self.contacts)}
+        number = {symbol: n + i for i, symbol in enumerate(self.assembly.maximal.multipliers)}
+        ways, rest = np.zeros((len(layout.read), count)), np.zeros(len(layout.read))
+        for k, symbol in enumerate(layout.read):
             if symbol in own:
                 ways[k, own[symbol]] = 1.0
             else:
-                ways[k], rest[k] = by[number[symbol]], borne[number[symbol]]
-        self.read = rest + ways @ forces
-        self._take(self.u)
+                ways[k], rest[k] = self._by_each[number[symbol]], self._free[number[symbol]]
+        read = rest + ways @ forces
+        if not np.array_equal(read, self.read):
+            self.read = read
+            self._take(self.u)
         found: list[FloatArray] = []
         heads = [rows[0] for rows in self.units]
-        for limits, entries, places in zip(
-            (self.limits, self.static_limits), self._shares, self._made.shares, strict=True
-        ):
+        for limits, entries, places in zip((self.limits, self.static_limits), self._shares, layout.shares, strict=True):
             slopes = np.zeros((count, len(self.read)))
             for (r, c), entry in zip(places, entries, strict=True):
                 slopes[r, c] = entry
@@ -200,7 +256,7 @@ class ContactValues:
         units = tuple(
             Unit(
                 tuple(place[row] for row in self.units[k]),
-                self.contacts[self.units[k][0]].is_slip,
+                self.layout.is_slip[k],
                 given.get(k, (0.0,) * len(self.units[k])),
                 number.get(self.gap_of[k], -1),
             )
@@ -208,11 +264,11 @@ class ContactValues:
         )
         few = Limits(
             limits.free[chosen],
-            limits.shares[np.ix_(chosen, rows)],
+            limits.shares[chosen][:, rows],
             limits.static_free[chosen],
-            limits.static_shares[np.ix_(chosen, rows)],
+            limits.static_shares[chosen][:, rows],
         )
-        return Contacts(self.response[np.ix_(rows, rows)], free[rows], units, few)
+        return Contacts(self.response[rows][:, rows], free[rows], units, few)
 
 
 def state_paths(one: ContactRow) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ from atwood.codegen import BoundKernel
 from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.balance_program import BalanceProgram
+from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.matrices import (
     Matrix,
@@ -193,6 +194,10 @@ class Balance:
 
 def balance_of(assembly: Assembly, form: FormName) -> Balance:
     """Return the balance of forces of a scene in the coordinates of either form."""
+    return assembly.kept.get(_BALANCES[form], lambda: _balance_of(assembly, form))
+
+
+def _balance_of(assembly: Assembly, form: FormName) -> Balance:
     program = assembly.balance(form)
     mass = None if program.mass_product is None else partial(mass_at, assembly, form)
     held = partial(assembly.kernel, program.constraints_alone)
@@ -226,6 +231,8 @@ def bordered(mass: FloatArray, jacobian: FloatArray) -> FloatArray:
     matrix[..., n:, :n] = jacobian
     return matrix
 
+
+_BALANCES: dict[FormName, Key[Balance]] = {"reduced": Key("reduced balance"), "dae": Key("balance of the dae form")}
 
 LIGHT = 1e-12
 """A body that is lighter than the heaviest one by more is rounding of its mass matrix."""

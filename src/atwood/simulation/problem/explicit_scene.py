@@ -98,9 +98,19 @@ def own_rates(assembly: Assembly) -> tuple[CompiledAccelerations, OwnRates] | No
     if found is None or not _compiles(assembly, found):
         return None
     code = compiled_rates(assembly, found)
-    rates = code.open()
-    code.fill(rates, assembly.parameter_values)
-    return code, rates
+    return code, code.open()
+
+
+def own_rates_on_constraints(plan: SceneProblem, t: float, y: FloatArray) -> tuple[CompiledAccelerations, OwnRates] | None:
+    """Return the same of a scene whose constraints stay; its parameters are those of `values_on_constraints`."""
+    program = _program(plan, t, y)
+    code = plan.assembly.shared.get(_COMPILED_ON_CONSTRAINTS, lambda: _code(program), program)
+    return None if code is None or plan.not_compilable else (code, code.open(plan.holds))
+
+
+def values_on_constraints(plan: SceneProblem) -> FloatArray:
+    """Return the parameters of accelerations and projections where constraints stay."""
+    return np.concatenate([plan.assembly.parameter_values, plan.sizes])
 
 
 def _compiles(assembly: Assembly, found: AccelerationProgram) -> bool:
@@ -127,7 +137,7 @@ def constrained_problem(
     """Return the equations of a scene for an explicit method, with ``y = (q, u)`` on its constraints."""
     assembly, program = plan.assembly, _program(plan, t, y)
     n, m = plan.program.coordinates, plan.program.speeds
-    values = np.concatenate([assembly.parameter_values, plan.sizes])
+    values = values_on_constraints(plan)
     kernel = assembly.compiled(program.accelerations).bind(values)
     nearer = assembly.compiled(program.projection).bind(values)
 
@@ -148,7 +158,7 @@ def constrained_problem(
 def nearest_place(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
     """Return the coordinates nearest to others at which the constraints, and the gaps that are closed, are met."""
     y = np.concatenate([q, u])
-    values = np.concatenate([plan.assembly.parameter_values, plan.sizes])
+    values = values_on_constraints(plan)
     nearer = plan.assembly.compiled(_program(plan, t, y).projection).bind(values)
     return _projected(nearer, t, y, len(q))[: len(q)]
 

@@ -26,7 +26,13 @@ from atwood.integrators.session import Session
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.simulation.dynamics.orientation_coordinates import longest_step
 from atwood.simulation.events.modes import EventProbe
-from atwood.simulation.problem.explicit_scene import constrained_problem, explicit_problem, own_rates
+from atwood.simulation.problem.explicit_scene import (
+    constrained_problem,
+    explicit_problem,
+    own_rates,
+    own_rates_on_constraints,
+    values_on_constraints,
+)
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.step_guard import step_guard
@@ -128,7 +134,7 @@ def open_session(
     if method.keeps_constraints and (
         plan.balance.constraints or plan.assembly.form == "dae" or plan.assembly.own_equations.contacts
     ):
-        session = method.open(_constrained_task(request, method, t, y, on_stiff))
+        session = _open_on_constraints(request, method, t, y, on_stiff)
     else:
         session = _open_tree(request, method, t, y, on_stiff)
     session.limit_steps(longest_step(plan.assembly.own_equations, plan.program.split(y)[1]))
@@ -216,36 +222,48 @@ class KeptSession:
     ----------
     session
         The session; None before the first.
-    code, rates
-        The compiled rates, and their place for parameters.
+    fill
+        Gives its functions the parameters of a request.
     opened_with
         What else it was opened with.
     """
 
     session: ExplicitSession | None = None
-    code: CompiledAccelerations | None = None
-    rates: OwnRates | None = None
+    fill: Callable[[SolverRequest], object] | None = None
     opened_with: tuple[object, ...] = ()
 
     def begin_again(
         self, request: SolverRequest, method: Method, t: float, y: FloatArray, on_stiff: OnStiff | None
     ) -> ExplicitSession | None:
         """Return the session at the start of another segment; None where it was opened for something else."""
-        session, code, rates = self.session, self.code, self.rates
-        if session is None or code is None or rates is None or request.probe.event_functions:
+        session, fill = self.session, self.fill
+        if session is None or fill is None:
             return None
         if not all(
             one is other for one, other in zip(self.opened_with, _opened_with(request, method, on_stiff), strict=True)
         ):
             return None
-        code.fill(rates, request.plan.assembly.parameter_values)
-        session.begin_again(t, y, request.horizon(t), request.budget, on_stiff, request.end)
+        fill(request)
+        signs = request.probe.handed
+        session.begin_again(t, y, request.horizon(t), request.budget, on_stiff, request.end, signs=signs)
         return session
+
+    def keep(self, session: Session, fill: Callable[[SolverRequest], object], opened_with: tuple[object, ...]) -> None:
+        """Keep a session for what comes next."""
+        assert isinstance(session, ExplicitSession)
+        self.session, self.fill, self.opened_with = session, fill, opened_with
 
 
 def _opened_with(request: SolverRequest, method: Method, on_stiff: OnStiff | None) -> tuple[object, ...]:
     plan = request.plan
-    return method, plan.assembly.shared, plan.program, request.options, plan.scales, plan.sizes, on_stiff is None
+    shared, finding, events = plan.assembly.shared, plan.finding, request.probe.code(for_ida=False)
+    return method, shared, plan.program, request.options, plan.scales, plan.sizes, on_stiff is None, finding, events
+
+
+def _can_be_kept(problem: ExplicitProblem, method: Method) -> bool:
+    """Return whether a session can be begun again: nothing in Python belongs to the segment that it was opened for."""
+    is_watched = problem.events is not None and problem.compiled_events is None
+    return method.tableau is not None and problem.guard is None and not is_watched
 
 
 def _open_tree(request: SolverRequest, method: Method, t: float, y: FloatArray, on_stiff: OnStiff | None) -> Session:
@@ -255,9 +273,10 @@ def _open_tree(request: SolverRequest, method: Method, t: float, y: FloatArray, 
     if session is not None:
         return session
     problem, assembly = _explicit_problem(request, method), plan.assembly
-    can_be_kept = method.tableau is not None and problem.events is None and problem.guard is None
-    own = own_rates(assembly) if can_be_kept else None
-    if own is not None:
+    own = own_rates(assembly) if _can_be_kept(problem, method) else None
+    fill = None if own is None else _filling(*own, problem, lambda one: one.plan.assembly.parameter_values)
+    if own is not None and fill is not None:
+        fill(request)
         rates = own[1].rates
         problem = replace(problem, compiled=lambda: rates)
     series, canonical = equations_of(request, problem, (t, y))
@@ -274,11 +293,27 @@ def _open_tree(request: SolverRequest, method: Method, t: float, y: FloatArray, 
         hamiltonian=canonical,
     )
     opened = method.open(task)
-    if own is not None:
-        assert isinstance(opened, ExplicitSession)
-        kept.session, (kept.code, kept.rates) = opened, own
-        kept.opened_with = _opened_with(request, method, on_stiff)
+    if fill is not None:
+        kept.keep(opened, fill, _opened_with(request, method, on_stiff))
     return opened
+
+
+def _filling(
+    code: CompiledAccelerations,
+    rates: OwnRates,
+    problem: ExplicitProblem,
+    values: Callable[[SolverRequest], FloatArray],
+) -> Callable[[SolverRequest], None]:
+    """Return what gives rates, and events if there are any, the parameters of a request."""
+    events = problem.compiled_events
+
+    def fill(request: SolverRequest) -> None:
+        code.fill(rates, values(request))
+        found = None if events is None else request.probe.code(for_ida=False)
+        if found is not None and events is not None:
+            found.fill(events, request.plan.assembly.parameter_values, request.probe.shift)
+
+    return fill
 
 
 def equations_of(
@@ -306,18 +341,31 @@ def equations_of(
     return series, canonical
 
 
-def _constrained_task(
+def _open_on_constraints(
     request: SolverRequest, method: Method, t: float, y: FloatArray, on_stiff: OnStiff | None
-) -> Task:
-    """Return a task with steps that end on the constraints."""
-    plan, probe = request.plan, request.probe
+) -> Session:
+    """Start a method whose steps end on the constraints, and keep its session if that can be begun again."""
+    plan, probe, kept = request.plan, request.probe, request.kept
     plan.keep_better(t, plan.program.split(y)[0])
+    session = kept.begin_again(request, method, t, y, on_stiff)
+    if session is not None:
+        return session
     problem = constrained_problem(plan, t, y, probe.function(), probe.directions)
     settings = request.settings(t, method.loosest_tolerance)
     absolute = np.asarray(settings.absolute_tolerances)[: len(y)]
     settings = replace(settings, absolute_tolerances=absolute)
     explicit = _watched(request, problem, method)
-    return Task(settings, t, y, budget=request.budget, end=request.end, on_stiff=on_stiff, explicit=explicit)
+    own = own_rates_on_constraints(plan, t, y) if _can_be_kept(explicit, method) else None
+    fill = None if own is None else _filling(*own, explicit, lambda one: values_on_constraints(one.plan))
+    if own is not None and fill is not None:
+        fill(request)
+        rates = own[1].rates
+        explicit = replace(explicit, compiled=lambda: rates)
+    task = Task(settings, t, y, budget=request.budget, end=request.end, on_stiff=on_stiff, explicit=explicit)
+    opened = method.open(task)
+    if fill is not None:
+        kept.keep(opened, fill, _opened_with(request, method, on_stiff))
+    return opened
 
 
 def _explicit_problem(request: SolverRequest, method: Method) -> ExplicitProblem:
