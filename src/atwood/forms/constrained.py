@@ -61,8 +61,8 @@ class ConstrainedProgram:
 def constrained_program(
     name: str,
     equations: Equations,
-    parameters: Sequence[Expression],
     rows: Sequence[Expression],
+    parameters: Sequence[Expression],
     kept: Sequence[int],
     light: Sequence[int],
 ) -> ConstrainedProgram:

@@ -28,7 +28,7 @@ from atwood.numerics.contact_sets import (
     find_states,
 )
 from atwood.numerics.matrices import least_norm
-from atwood.simulation.contacts.values import ContactValues, state_paths
+from atwood.simulation.contacts.values import ContactValues
 from atwood.simulation.dynamics.orientation_coordinates import to_regular
 from atwood.simulation.dynamics.scales import Scales
 from atwood.simulation.events.mode_change import generalized_speeds

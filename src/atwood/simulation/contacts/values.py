@@ -15,11 +15,11 @@ from atwood.arrays import FloatArray
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
+from atwood.forms.loose import state_paths
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import to_maximal
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import ContactRow
-from atwood.model.declare.contact_laws import value_names
 from atwood.numerics.contact_sets import Contacts, Limits, Unit
 from atwood.numerics.matrices import least_norm, or_one, to_array
 from atwood.simulation.dynamics.balance import LIGHT, BalanceValues, balance_of, even_balance
@@ -270,9 +270,3 @@ class ContactValues:
         )
         return Contacts(self.response[rows][:, rows], free[rows], units, few)
 
-
-def state_paths(one: ContactRow) -> tuple[str, ...]:
-    """Return the paths of the discrete states of a gap, or of a slip: its state, then its direction."""
-    part, law, _ = one.row.key
-    directions = value_names(one.law) if one.is_slip else ()
-    return (f"{part}.{law}_state", *(f"{part}.{name}_direction" for name in directions))

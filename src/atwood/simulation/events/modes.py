@@ -14,6 +14,7 @@ from atwood.arrays import BoolArray, FloatArray
 from atwood.expr import Program, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
+from atwood.forms.loose import is_loose, loosened
 from atwood.forms.quantities import known_program
 from atwood.integrators.protocol import StepResult
 from atwood.lazy_dataclasses import dataclass, replace
@@ -83,13 +84,17 @@ class EventRecord:
 
 def find_event_functions(assembly: Assembly) -> tuple[EventFunction, ...]:
     """Return what is watched in the modes of an assembly."""
-    return assembly.shared.get(
-        _EVENT_FUNCTIONS,
-        lambda: (
-            *list_event_functions(assembly.mechanism, assembly.own_equations, assembly.reactions, assembly.modes),
-            *side_functions(assembly),
-            *switch_functions(assembly.own_equations),  # last: of what happens at the same time, the others come first
-        ),
+    return assembly.shared.get(_EVENT_FUNCTIONS, lambda: _event_functions(assembly), is_loose(assembly))
+
+
+def _event_functions(assembly: Assembly) -> tuple[EventFunction, ...]:
+    declared = list_event_functions(assembly.mechanism, assembly.own_equations, assembly.reactions, assembly.modes)
+    values = loosened(assembly, [one.value for one in declared])
+    found = [one if one.value is value else replace(one, value=value) for one, value in zip(declared, values, strict=True)]
+    return (
+        *(one for one in found if not (one.target in CONTACT and one.value.is_constant)),
+        *side_functions(assembly),
+        *switch_functions(assembly.own_equations),  # last: of what happens at the same time, the others come first
     )
 
 
@@ -166,15 +171,16 @@ class EventProbe:
         tolerance: float,
         conditions: tuple[Condition, ...] = (),
     ) -> None:
-        self.plan, self._conditions = plan, conditions
+        self.plan = plan
         self.handed: tuple[int, ...] = ()
         self.assembly = assembly = plan.assembly
+        self._about = conditions, is_loose(assembly)
         self.event_functions = (*condition_functions(assembly, conditions), *find_event_functions(assembly))
-        self.needs = assembly.shared.get(_NEEDS, lambda: _find_needs(assembly, self.event_functions), conditions)
+        self.needs = assembly.shared.get(_NEEDS, lambda: _find_needs(assembly, self.event_functions), self._about)
         self.reactions = ReactionSolver(assembly, t, q, u) if self.needs.reactions else None
         self.kernel = (
             assembly.kernel(
-                known_program(assembly, _EVENTS, lambda: [one.value for one in self.event_functions], conditions)
+                known_program(assembly, _EVENTS, lambda: [one.value for one in self.event_functions], self._about)
             )
             if self.event_functions
             else None
@@ -209,7 +215,7 @@ class EventProbe:
             (i, one.rate) for i, one in enumerate(self.event_functions) if one.target == CLOSES and one.rate is not None
         ]
         if gaps:
-            program = known_program(self.assembly, _RATES, lambda: [rate for _, rate in gaps])
+            program = known_program(self.assembly, _RATES, lambda: [rate for _, rate in gaps], self._about)
             idle = [0.0] * len(self.assembly.reactions)
             rates = self.assembly.kernel(program)([t], q, u, np.zeros_like(u), idle)[0]
             for (i, _), rate in zip(gaps, rates, strict=True):
@@ -278,7 +284,7 @@ class EventProbe:
     def key(self) -> tuple[Any, ...]:
         """What the program of the events depends on, besides the scene in its mode."""
         maximal = () if self.reactions is None else self.reactions.finding.kept
-        return self.plan.finding.kept, maximal, self._conditions
+        return self.plan.finding.kept, maximal, self._about
 
     def program(self) -> Program | None:
         """Return the events as a program of (t, q, u, shift); see `atwood.forms.event_program.event_program`."""
@@ -341,7 +347,7 @@ class EventProbe:
     def _is_there(self, step: StepResult, one: EventFunction) -> bool:
         assembly, expression = self.assembly, one.is_there
         assert expression is not None
-        program = known_program(assembly, _IS_THERE, lambda: [expression], one.law, self._conditions)
+        program = known_program(assembly, _IS_THERE, lambda: [expression], one.law, self._about)
         kernel = assembly.kernel(program)
         q, u = self.plan.program.split(step.y)
         return bool(kernel([step.t], q, u, np.zeros_like(u), [0.0] * len(assembly.reactions))[0][0] > 0.0)

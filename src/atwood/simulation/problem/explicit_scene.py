@@ -19,6 +19,7 @@ from atwood.forms.accelerations import AccelerationProgram, accelerations_of
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.constrained import ConstrainedProgram, constrained_program
+from atwood.forms.loose import is_loose, loose_equations
 from atwood.forms.quantities import to_maximal
 from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
 from atwood.integrators.protocol import MET, STEPS, CompiledRates, ExplicitProblem, Values
@@ -170,9 +171,9 @@ def _program(plan: SceneProblem, t: float, y: FloatArray) -> ConstrainedProgram:
     name = f"{assembly.flat.name} ({assembly.form})"
 
     def make() -> ConstrainedProgram:
-        return constrained_program(name, assembly.own_equations, assembly.parameters, rows, kept, light)
+        return constrained_program(name, *loose_equations(assembly, rows), assembly.parameters, kept, light)
 
-    return assembly.shared.get(_PROGRAM, make, assembly.form, kept, light)
+    return assembly.shared.get(_PROGRAM, make, assembly.form, kept, light, is_loose(assembly))
 
 
 def _light_speeds(plan: SceneProblem, t: float, y: FloatArray) -> tuple[int, ...]:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
+from atwood.forms.loose import is_loose
 from atwood.integrators.explicit_session import ExplicitSession, OnStiff
 from atwood.integrators.ida.guarded_residual import GuardedResidual
 from atwood.integrators.methods import EXPLICIT, IDA, LEAST, Method, Task, advise
@@ -213,51 +215,45 @@ def _with_events(problem: ImplicitProblem, probe: EventProbe) -> ImplicitProblem
 
 @dataclass(eq=False)
 class KeptSession:
-    """The session of an explicit method, which a run begins again where only values of parameters have changed.
+    """The sessions of an explicit method, which a run begins again where only values of parameters have changed.
 
-    So a run that stops at sample times opens one session, not one for each. What it was opened with is compared by
-    identity: a run has one object of each as long as these stay what they are.
+    So a run that stops at sample times opens one session, not one for each, and a run with contacts one for where
+    something touches and one for where nothing does. What they were opened with is compared by identity: a run has one
+    object of each as long as these stay what they are.
 
     Attributes
     ----------
-    session
-        The session; None before the first.
-    fill
-        Gives its functions the parameters of a request.
-    opened_with
-        What else it was opened with.
+    kept
+        What sessions were opened with, the sessions, and what gives their functions the parameters of a request.
     """
 
-    session: ExplicitSession | None = None
-    fill: Callable[[SolverRequest], object] | None = None
-    opened_with: tuple[object, ...] = ()
+    kept: list[tuple[tuple[object, ...], ExplicitSession, Callable[[SolverRequest], object]]] = field(
+        default_factory=list
+    )
 
     def begin_again(
         self, request: SolverRequest, method: Method, t: float, y: FloatArray, on_stiff: OnStiff | None
     ) -> ExplicitSession | None:
-        """Return the session at the start of another segment; None where it was opened for something else."""
-        session, fill = self.session, self.fill
-        if session is None or fill is None:
-            return None
-        if not all(
-            one is other for one, other in zip(self.opened_with, _opened_with(request, method, on_stiff), strict=True)
-        ):
-            return None
-        fill(request)
-        signs = request.probe.handed
-        session.begin_again(t, y, request.horizon(t), request.budget, on_stiff, request.end, signs=signs)
-        return session
+        """Return the session at the start of another segment; None where none was opened for it."""
+        wanted = _opened_with(request, method, on_stiff) if self.kept else ()
+        for opened_with, session, fill in self.kept:
+            if all(one is other for one, other in zip(opened_with, wanted, strict=True)):
+                fill(request)
+                signs = request.probe.handed
+                session.begin_again(t, y, request.horizon(t), request.budget, on_stiff, request.end, signs=signs)
+                return session
+        return None
 
-    def keep(self, session: Session, fill: Callable[[SolverRequest], object], opened_with: tuple[object, ...]) -> None:
-        """Keep a session for what comes next."""
+    def keep(self, opened_with: tuple[object, ...], session: Session, fill: Callable[[SolverRequest], object]) -> None:
+        """Keep a session for what comes next, with the one before it."""
         assert isinstance(session, ExplicitSession)
-        self.session, self.fill, self.opened_with = session, fill, opened_with
+        self.kept[:] = [*self.kept[-1:], (opened_with, session, fill)]
 
 
 def _opened_with(request: SolverRequest, method: Method, on_stiff: OnStiff | None) -> tuple[object, ...]:
     plan = request.plan
-    shared, finding, events = plan.assembly.shared, plan.finding, request.probe.code(for_ida=False)
-    return method, shared, plan.program, request.options, plan.scales, plan.sizes, on_stiff is None, finding, events
+    scene = plan.assembly.shared, is_loose(plan.assembly), request.probe.code(for_ida=False)
+    return method, *scene, plan.program, request.options, plan.scales, plan.sizes, on_stiff is None, plan.finding
 
 
 def _can_be_kept(problem: ExplicitProblem, method: Method) -> bool:
@@ -294,7 +290,7 @@ def _open_tree(request: SolverRequest, method: Method, t: float, y: FloatArray, 
     )
     opened = method.open(task)
     if fill is not None:
-        kept.keep(opened, fill, _opened_with(request, method, on_stiff))
+        kept.keep(_opened_with(request, method, on_stiff), opened, fill)
     return opened
 
 
@@ -364,7 +360,7 @@ def _open_on_constraints(
     task = Task(settings, t, y, budget=request.budget, end=request.end, on_stiff=on_stiff, explicit=explicit)
     opened = method.open(task)
     if fill is not None:
-        kept.keep(opened, fill, _opened_with(request, method, on_stiff))
+        kept.keep(_opened_with(request, method, on_stiff), opened, fill)
     return opened
 
 

@@ -1,0 +1,64 @@
+"""Equations of scenes with gaps and slips as they are where nothing touches, slips or sticks.
+
+Programs for all states have rows for every gap and slip. Those for none are the shorter ones, and are derived from the
+same equations with zeros for these states, so that what is far away costs nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from atwood.expr import Expression, substitute
+from atwood.forms.assembly import Assembly
+from atwood.forms.caches import Key
+from atwood.lazy_dataclasses import replace
+from atwood.mechanics.dynamics.equations import ContactRow, Equations
+from atwood.model.declare.contact_laws import value_names
+
+_STATES: Key[tuple[int, ...]] = Key("states of gaps and slips")
+_LOOSE: Key[bool] = Key("whether nothing touches")
+
+
+def state_paths(one: ContactRow) -> tuple[str, ...]:
+    """Return the paths of the discrete states of a gap, or of a slip: its state, then its direction."""
+    part, law, _ = one.row.key
+    directions = value_names(one.law) if one.is_slip else ()
+    return (f"{part}.{law}_state", *(f"{part}.{name}_direction" for name in directions))
+
+
+def _states(assembly: Assembly) -> tuple[int, ...]:
+    """Return which discrete states are those of gaps and slips."""
+
+    def find() -> tuple[int, ...]:
+        paths = {path for one in assembly.own_equations.contacts for path in state_paths(one)}
+        return tuple(i for i, one in enumerate(assembly.discrete_states) if one.path in paths)
+
+    return assembly.shared.get(_STATES, find)
+
+
+def is_loose(assembly: Assembly) -> bool:
+    """Return whether a scene has gaps or slips, and none of them touches, slips or sticks."""
+
+    def find() -> bool:
+        places, held = _states(assembly), assembly.held_now
+        return bool(places) and not any(held[i] for i in places)
+
+    return assembly.kept.get(_LOOSE, find)
+
+
+def loosened(assembly: Assembly, values: Sequence[Expression]) -> list[Expression]:
+    """Return expressions as they are in the present states, if these are all zero; else as they stand."""
+    if not is_loose(assembly):
+        return list(values)
+    states, zero = assembly.discrete_states, assembly.own_equations.graph.zero
+    return substitute(list(values), {states[i].symbol: zero for i in _states(assembly)})
+
+
+def loose_equations(assembly: Assembly, rows: Sequence[Expression]) -> tuple[Equations, tuple[Expression, ...]]:
+    """Return the equations of the form, and equations of motion, as they are in the present states."""
+    equations = assembly.own_equations
+    if not is_loose(assembly):
+        return equations, tuple(rows)
+    found = loosened(assembly, [*rows, *equations.rates])
+    rates = tuple(found[len(rows) :])
+    return replace(equations, rates=rates, contacts=()), tuple(found[: len(rows)])
