@@ -62,7 +62,6 @@ _MOST_SETS = 64
 """So many sets of values of discrete states are remembered."""
 
 
-
 @dataclass(frozen=True, eq=False)
 class Assembly:
     """A scene that has been assembled in one form.

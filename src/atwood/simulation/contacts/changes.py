@@ -183,7 +183,7 @@ class _Moment:
         if len(spans) < _SPANS[0] or spans[0] <= 0.0:
             return None
         share = (spans[0] / spans[-1]) ** (1.0 / (len(spans) - 1))
-        left = spans[0] * share / (1.0 - share)
+        left: float = spans[0] * share / (1.0 - share)
         if not left < _LEFT * unit:
             return None
         self.small, self.slow = _NEAR_REST / _NEAR * self.small, _NEAR_REST / _NEAR * self.slow

@@ -269,4 +269,3 @@ class ContactValues:
             limits.static_shares[chosen][:, rows],
         )
         return Contacts(self.response[rows][:, rows], free[rows], units, few)
-

@@ -90,7 +90,9 @@ def find_event_functions(assembly: Assembly) -> tuple[EventFunction, ...]:
 def _event_functions(assembly: Assembly) -> tuple[EventFunction, ...]:
     declared = list_event_functions(assembly.mechanism, assembly.own_equations, assembly.reactions, assembly.modes)
     values = loosened(assembly, [one.value for one in declared])
-    found = [one if one.value is value else replace(one, value=value) for one, value in zip(declared, values, strict=True)]
+    found = [
+        one if one.value is value else replace(one, value=value) for one, value in zip(declared, values, strict=True)
+    ]
     return (
         *(one for one in found if not (one.target in CONTACT and one.value.is_constant)),
         *side_functions(assembly),

@@ -102,7 +102,9 @@ def own_rates(assembly: Assembly) -> tuple[CompiledAccelerations, OwnRates] | No
     return code, code.open()
 
 
-def own_rates_on_constraints(plan: SceneProblem, t: float, y: FloatArray) -> tuple[CompiledAccelerations, OwnRates] | None:
+def own_rates_on_constraints(
+    plan: SceneProblem, t: float, y: FloatArray
+) -> tuple[CompiledAccelerations, OwnRates] | None:
     """Return the same of a scene whose constraints stay; its parameters are those of `values_on_constraints`."""
     program = _program(plan, t, y)
     code = plan.assembly.shared.get(_COMPILED_ON_CONSTRAINTS, lambda: _code(program), program)
