@@ -21,6 +21,8 @@ from atwood_library.scenes import (
     DoublePendulum,
     PendulumOnCart,
     RotatingFrame,
+    RotatingHoopDriven,
+    RotatingHoopFree,
     SimplePendulum,
     Strandbeest,
 )
@@ -58,6 +60,8 @@ def values_along(scene: Scene, path: str, form: str = "reduced") -> tuple[np.nda
         ("atwood", "rope.tension"),
         ("double-atwood", "rope2.tension"),
         ("rotating-frame", "observer.coriolis_force.y"),
+        ("rotating-hoop-driven", "hoop.radial_force"),
+        ("rotating-hoop-free", "hoop.radial_force"),
         ("rotating-frame", "observer.euler_force.x"),
         ("rotating-frame", "observer.translational_force.x"),
         ("rotating-frame", "observer.centrifugal_force.x"),
@@ -125,6 +129,21 @@ def test_machines_of_atwood() -> None:
     twice = equations(DoubleAtwood())
     for row in twice.rows:
         assert same(row.subs(twice.solved), 0)
+
+
+@pytest.mark.parametrize(
+    ("scene", "turn"),
+    [(RotatingHoopDriven(), "clock.slope"), (RotatingHoopFree(), "axle.angle")],
+    ids=["driven", "free"],
+)
+def test_a_hoop_presses_on_its_bead_along_the_radius_and_across(scene: Scene, turn: str) -> None:
+    """``m (g cos(theta) - a theta'^2 - a w^2 sin(theta)^2)``, and ``m a (2 w theta' cos(theta) + w' sin(theta))``."""
+    eq = equations(scene)
+    m, a, g = map(eq.symbol, ("bead.mass", "hoop.radius", "gravity"))
+    theta, w = eq.symbol("hoop.angle"), eq.symbol(turn) if turn == "clock.slope" else diff(eq.symbol(turn), t)
+    radial, across = eq.quantity("hoop.radial_force"), eq.quantity("hoop.axial_force")
+    assert same(radial, m * (g * cos(theta) - a * diff(theta, t) ** 2 - a * w**2 * sin(theta) ** 2))
+    assert same(across, m * a * (2 * w * diff(theta, t) * cos(theta) + diff(w, t) * sin(theta)))
 
 
 def test_the_forces_of_a_frame_add_up_to_the_acceleration_in_it() -> None:

@@ -288,3 +288,18 @@ def test_springs_of_one_letter_are_equal() -> None:
     letters |= {"m1.mass": "m", "m2.mass": "m"}
     slow, fast = squares(atwood.normal_modes(MassSpringChain(), symbolic=True, symbols=letters))
     assert (sympy.simplify(slow - k / m), sympy.simplify(fast - 3 * k / m)) == (0, 0)
+
+
+def test_forces_of_a_deviation_without_potential_are_told_beside_v() -> None:
+    """Drag at rest about a shaft that turns: ``-b Omega e_z x eta``, which is no slope of V."""
+    found = atwood.normal_modes(rotor(), symbolic=True)
+    eta_1, eta_2 = (sympy.Function(f"eta_{k}")(sympy.Symbol("t")) for k in (1, 2))
+    b, omega = sympy.symbols("b Omega")
+    first, second = found.circulatory
+    assert sympy.expand(first**2 - (b * omega * eta_2) ** 2) == 0 == sympy.expand(second * eta_2 + first * eta_1)
+    force = -found.stiffness * sympy.Matrix([eta_1, eta_2])
+    slope = sympy.Matrix([found.energies[1].diff(one) for one in (eta_1, eta_2)])
+    assert (force + slope - found.circulatory).expand().is_zero_matrix
+    assert "circulatory forces" in found.as_text()
+    assert "Q_{1} &=" in found.latex()
+    assert "circulatory" not in atwood.normal_modes(chain(2), symbolic=True).as_text()

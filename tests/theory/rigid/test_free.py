@@ -8,7 +8,7 @@ import sympy
 
 import atwood
 from atwood import UnsupportedError, UsageError, free_body, free_rotation
-from atwood_library.scenes import FreeBody, FreeSymmetricBody, IntermediateAxis, LagrangeTop
+from atwood_library.scenes import FreeBody, FreeSymmetricBody, IntermediateAxis, LagrangeTop, RotatingHoopFree
 
 T = sympy.Symbol("t")
 I1, I2, I3, E, L, RHO = sympy.symbols("I_1 I_2 I_3 E L rho")
@@ -195,6 +195,8 @@ def test_pictures_and_refusals(tmp_path) -> None:
         plt.close(figure)
     with pytest.raises(UnsupportedError, match="a torque acts on it"):
         free_rotation(LagrangeTop())
+    with pytest.raises(UnsupportedError, match="moments of inertia are 0, 0 and 0"):
+        free_rotation(RotatingHoopFree())
     with pytest.raises(UsageError, match="a body is needed"):
         free_rotation()
     with pytest.raises(UsageError, match="do not say a motion"):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from atwood.display import listed
 from atwood.errors import UnsupportedError
-from atwood.expr import Expression, collect, depends_on, jacobian, jvp, substitute
+from atwood.expr import Expression, collect, cos, depends_on, jacobian, jvp, live, sin, substitute
 from atwood.forms.lagrangian import lagrangian_of, rows_by_part
 from atwood.forms.quantities import find_observables, internal_reactions_of, places
 from atwood.mechanics.outputs.reactions import Reaction
@@ -155,7 +155,7 @@ def _balanced(
     """
     maximal, graph = formulas.assembly.maximal, formulas.expressions.graph
     sides = zip(maximal.rows_with_multipliers or maximal.rows, maximal.constraint_rows, strict=True)
-    rows = substitute([row - held for row, held in sides], dict(where))
+    rows = _in_whole_angles(formulas, substitute([row - held for row, held in sides], dict(where)))
     kept = {one.multiplier for one in formulas.expressions.constraints}
     unknown = [one.multiplier for one in maximal.constraints if one.multiplier not in kept]
     slopes: dict[int, dict[Expression, Expression]] = {i: {} for i in range(len(rows))}
@@ -165,19 +165,46 @@ def _balanced(
     balance = {graph.symbol(f"row:{i}"): row for i, row in enumerate(substitute(rows, dict.fromkeys(unknown, 0.0)))}
     names, known = list(balance), dict[Expression, Expression | float]()
     while True:
-        alone: dict[tuple[Expression, tuple[str, bool]], list[tuple[Expression, Expression]]] = {}
-        for i, row in slopes.items():
-            open_ = [one for one in row if one not in known]
-            if len(open_) == 1:
-                rest = sum((row[one] * known[one] for one in row if one in known), names[i])
-                alone.setdefault((open_[0], points[i]), []).append((row[open_[0]], rest))
-        for (multiplier, (_, is_force)), several in alone.items():
-            fixed = [pair for pair in several if pair[0].is_parametric]
-            chosen = fixed[:1] or (several if is_force else [])
-            squares = sum((slope * slope for slope, _ in chosen), graph.zero)
-            size = collect([squares], formulas.book.angles, formulas.book.parameters)[0]
-            if chosen and size.is_parametric and not size.is_zero:
-                known[multiplier] = -sum((slope * rest for slope, rest in chosen), graph.zero) / size
+        alone: dict[tuple[Expression, tuple[str, bool]], list[int]] = {}
+        beside: dict[tuple[Expression, tuple[str, bool]], list[int]] = {}
+        left = {i: [one for one in row if one not in known] for i, row in slopes.items()}
+        for i, open_ in left.items():
+            for one in open_:
+                (alone if len(open_) == 1 else beside).setdefault((one, points[i]), []).append(i)
+        ways = [(one, [i for i in at if slopes[i][one].is_parametric][:1] or at) for (one, _), at in alone.items()]
+        ways += [(one, alone.get((one, point), []) + at) for (one, point), at in beside.items()]
+        for multiplier, several in ways:
+            if len(several) > 1 or not slopes[several[0]][multiplier].is_parametric:
+                several = [i for i in several if points[i][1]]
+            across = dict.fromkeys((one for i in several for one in left[i]), graph.zero)
+            for i in several:
+                across |= {one: across[one] + slopes[i][multiplier] * slopes[i][one] for one in left[i]}
+            square = across.pop(multiplier, graph.zero)
+            [size] = collect([square], formulas.book.angles, formulas.book.parameters)
+            if size.is_zero or not size.is_parametric:
+                continue
+            if not any(formulas.formula(one).terms for one in across.values()):  # it is square to all others
+                rests = [
+                    sum((s * known[one] for one, s in slopes[i].items() if one in known), names[i]) for i in several
+                ]
+                pushed = (slopes[i][multiplier] * rest for i, rest in zip(several, rests, strict=True))
+                known[multiplier] = -sum(pushed, graph.zero) / size
                 break
         else:
             return known, dict(balance)
+
+
+def _in_whole_angles(formulas: EquationFormulas, rows: Sequence[Expression]) -> list[Expression]:
+    """Return rows with products of sines and cosines of half an angle as those of the angle."""
+    nodes, parameters = live(rows), formulas.book.parameters
+    waves = dict.fromkeys(one.arguments[0] for one in nodes if one.operation in ("sin", "cos"))
+    halves = [one for one in waves if 2.0 * one in waves and not one.is_parametric]
+    if not halves:
+        return list(rows)
+    angles = [*(one for one in formulas.book.angles if 0.5 * one not in halves), *halves]
+    known: dict[Expression, Expression | float] = {}
+    for divisor in {one.arguments[1] for one in nodes if one.operation == "div"}:
+        known |= {divisor: collect([divisor], angles, parameters)[0]}
+    for half in halves:
+        known |= {sin(2.0 * half): 2.0 * sin(half) * cos(half), cos(2.0 * half): 1.0 - 2.0 * sin(half) * sin(half)}
+    return [collect([one], angles, parameters)[0] for one in substitute(list(rows), known)]

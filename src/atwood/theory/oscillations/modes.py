@@ -110,7 +110,7 @@ class SymbolicModes(Shown):
 
     @property
     def stiffness(self) -> Sympy:
-        """K of ``M z'' + C z' + K z = 0``; ``V = z.K z / 2``."""
+        """K of ``M z'' + C z' + K z = 0``; ``V = z.K z / 2`` where K is symmetric."""
         return self.expansion.stiffness.applyfunc(self.plain.told)
 
     @property
@@ -202,12 +202,20 @@ class SymbolicModes(Shown):
     # -- to be shown --------------------------------------------------------------------------------------------------
 
     @property
-    def energies(self) -> tuple[Sympy, Sympy]:
-        """T and V to second order, in deviations eta, functions of t."""
+    def _deviations(self) -> Sympy:
         t, n = sympy.Symbol("t"), len(self.coordinates)
-        eta = sympy.Matrix([sympy.Function(f"eta_{k + 1}" if n > 1 else "eta")(t) for k in range(n)])
-        rate = eta.diff(t)
+        return sympy.Matrix([sympy.Function(f"eta_{k + 1}" if n > 1 else "eta")(t) for k in range(n)])
+
+    @property
+    def energies(self) -> tuple[Sympy, Sympy]:
+        """T and V to second order, in deviations eta, functions of t; V lacks what `circulatory` forces do."""
+        eta, rate = self._deviations, self._deviations.diff(sympy.Symbol("t"))
         return (rate.T * self.mass * rate)[0].expand() / 2, (eta.T * self.stiffness * eta)[0].expand() / 2
+
+    @property
+    def circulatory(self) -> Sympy:
+        """Forces along the deviations eta that no potential has, from the skew part of K."""
+        return ((self.stiffness.T - self.stiffness) / 2).applyfunc(short) * self._deviations
 
     @property
     def equation(self) -> Sympy:
@@ -220,6 +228,7 @@ class SymbolicModes(Shown):
         """Return energies to second order, and omega^2 and shapes of all modes, as an aligned block of LaTeX."""
         kinetic, potential = self.energies
         rows = [f"T &= {latex_of(kinetic)}", f"V &= {latex_of(potential)}"]
+        rows += [f"Q_{{{k}}} &= {latex_of(one)}" for k, one in enumerate(self.circulatory, 1) if one != 0]
         for k, one in enumerate(self.modes, 1):
             left, value = (rf"\omega_{{{k}}}^2", one.square) if one.square is not None else (f"s_{{{k}}}", one.rate)
             rows.append(f"{left} &= {latex_of(value)}" if value is not None else f"0 &= {latex_of(one.polynomial)}")
@@ -240,6 +249,8 @@ class SymbolicModes(Shown):
             ("stable where", said(self.rest.stable)),
         ]
         rows += [("T", text_of(kinetic)), ("V", text_of(potential))]
+        if not self.circulatory.is_zero_matrix:
+            rows.append(("circulatory forces", "; ".join(map(text_of, self.circulatory))))
         shown = []
         for k, one in enumerate(self.modes, 1):
             shapes = "; ".join(" : ".join(map(text_of, shape.values())) for shape in one.shapes)

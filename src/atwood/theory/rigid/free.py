@@ -15,7 +15,7 @@ import numpy as np
 
 from atwood.arguments import ARRAY, TEXT, check, each, instance, number, one_of, optional, takes, takes_names
 from atwood.arrays import FloatArray
-from atwood.errors import UsageError
+from atwood.errors import UnsupportedError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import scipy
@@ -278,7 +278,7 @@ def free_rotation(
     Raises
     ------
     UnsupportedError
-        If a torque about the centre of mass acts on the body.
+        If a torque about the centre of mass acts on the body, or it has no inertia about an axis.
     """
     if (scene is None) == (moments is None):
         raise UsageError("a body is needed", where="free_rotation", advice="Give a scene, or moments and spin.")
@@ -288,6 +288,11 @@ def free_rotation(
         return FreeRotation(np.array(moments), np.array(spin))
     assembly = smooth_assembly_of(scene)
     own = principal_body(assembly, body)
+    if np.min(own.moments) <= _SAME * np.max(own.moments):
+        told = "its moments of inertia are {:.6g}, {:.6g} and {:.6g} kg m^2, and a motion needs three".format(
+            *own.moments
+        )
+        raise UnsupportedError(told, where=own.part, advice="Name a rigid body with mass.")
     check_free(assembly, own.part)
     began = own.spin if spin is None else np.array(spin)
     return FreeRotation(own.moments, began, find_start(assembly).time, own.part)
