@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from atwood_library.contacts.ball_contact import BallContact as BallContact
     from atwood_library.contacts.box_contact import BoxContact as BoxContact
     from atwood_library.contacts.distance_contact import DistanceContact as DistanceContact
+    from atwood_library.contacts.lossy_gear import LossyGear as LossyGear
+    from atwood_library.contacts.one_way_clutch import OneWayClutch as OneWayClutch
     from atwood_library.contacts.point_contact import PointContact as PointContact
     from atwood_library.contacts.rotational_friction import RotationalFriction as RotationalFriction
     from atwood_library.contacts.rotational_stop import RotationalStop as RotationalStop
@@ -175,10 +177,12 @@ _MODULES = {
     "Link": "parts.link",
     "LinkedRope": "ropes.linked_rope",
     "LorentzForce": "fields.lorentz_force",
+    "LossyGear": "contacts.lossy_gear",
     "Mass1D": "parts.mass_1d",
     "MeshBody": "parts.mesh_body",
     "MinimumJerk": "sources.minimum_jerk",
     "MutualPotential": "fields.mutual_potential",
+    "OneWayClutch": "contacts.one_way_clutch",
     "OrientationSensor": "sensors.orientation_sensor",
     "PI": "blocks.pi",
     "PID": "blocks.pid",

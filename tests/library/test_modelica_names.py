@@ -38,7 +38,8 @@ TABLE = {
         Fixed RotationalMotion; Inertia Inertia; Disc RotationalCoupling; Spring RotationalSpringDamper;
         Damper RotationalSpringDamper; SpringDamper RotationalSpringDamper; ElastoBacklash RotationalGap;
         ElastoBacklash2 RotationalGap; BearingFriction RotationalFriction; Brake RotationalFriction;
-        IdealGear Gear; LossyGear Gear; IdealPlanetary PlanetaryGear; Gearbox Gear; IdealGearR2T
+        IdealGear Gear; LossyGear LossyGear; Clutch
+        RotationalFriction; OneWayClutch OneWayClutch; IdealPlanetary PlanetaryGear; Gearbox Gear; IdealGearR2T
         RackAndPinion; IdealRollingWheel RackAndPinion; RelativeStates RotationalSensor;
         AngleToTorqueAdaptor RotationalMotion; TorqueToAngleAdaptor RotationalSource""",
     "Rotational.Sensors": """

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from atwood import Component, Number, Scalar, Shaft, connector, constraint, observable, parameter
 
 
@@ -14,7 +16,14 @@ class Gear(Component):
     from that of a housing, which takes the torque that is left.
     """
 
-    synonyms = ("IdealGear", "Gear pair", "Transmission", "GearConstraint", "Gearbox", "BevelGear1D", "LossyGear")
+    synonyms: ClassVar[tuple[str, ...]] = (
+        "IdealGear",
+        "Gear pair",
+        "Transmission",
+        "GearConstraint",
+        "Gearbox",
+        "BevelGear1D",
+    )
 
     ratio: Number = parameter(-1.0, doc="Turns of joint a for one turn of joint b; negative for outer wheels.")
     offset: Number = parameter(0.0, unit="rad", doc="Angle of joint a where that of joint b is zero.")

@@ -2,8 +2,8 @@
 
 Rows move by ``a = b + A f``. A gap has ``f >= 0``, ``a >= 0`` and ``f a = 0``. A slip, of one row or of two that are
 square to each other, sticks with ``a = 0`` and ``|f|`` within its static limit, or goes on in a direction d with
-``f = -L d`` and ``a = |a| d``; its limits are ``L = L_0 + P f`` (F. Pfeiffer and C. Glocker, *Multibody Dynamics with
-Unilateral Contacts*, 1996, chapters 6 and 8).
+``f = -L d`` and ``a = |a| d``; its limits, which may be others backwards, are ``L = L_0 + P f`` (F. Pfeiffer and C.
+Glocker, *Multibody Dynamics with Unilateral Contacts*, 1996, chapters 6 and 8).
 
 A set of states is tried, and the state that contradicts most is changed, until none does; where that does not end, all
 sets of few rows are looked through.
@@ -80,12 +80,16 @@ class Limits:
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
-    """What is asked of some gaps and slips: A, b, the units and their limits."""
+    """What is asked of some gaps and slips: A, b, the units and their limits, also those of what goes backwards.
+
+    The static limit of a gap is what it bears that is pulled open.
+    """
 
     response: FloatArray
     free: FloatArray
     units: tuple[Unit, ...]
     limits: Limits
+    backwards: Limits | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,18 +108,26 @@ class _Listed:
     response: list[list[float]]
     free: list[float]
     units: tuple[Unit, ...]
-    limits: list[float]
-    shares: list[list[float]]
-    static_limits: list[float]
-    static_shares: list[list[float]]
+    sides: tuple[_Side, _Side]
+
+
+_Side = tuple[list[float], list[list[float]], list[float], list[list[float]]]
+"""Limits and their shares, and the same of what sticks."""
 
 
 def _listed(contacts: Contacts) -> _Listed:
-    limits = contacts.limits
-    of_limits = limits.free, limits.shares, limits.static_free, limits.static_shares
-    return _Listed(
-        contacts.response.tolist(), contacts.free.tolist(), contacts.units, *(one.tolist() for one in of_limits)
-    )
+    ahead, back = _side(contacts.limits), contacts.backwards
+    sides = ahead, ahead if back is None else _side(back)
+    return _Listed(contacts.response.tolist(), contacts.free.tolist(), contacts.units, sides)
+
+
+def _side(one: Limits) -> _Side:
+    return one.free.tolist(), one.shares.tolist(), one.static_free.tolist(), one.static_shares.tolist()
+
+
+def is_back(direction: Direction) -> bool:
+    """Return whether a direction is that in which limits may be others."""
+    return len(direction) == 1 and direction[0] < 0.0
 
 
 def find_states(contacts: Contacts, states: Sequence[State]) -> Found | None:
@@ -202,10 +214,11 @@ def _solve(contacts: _Listed, states: Sequence[State]) -> tuple[list[float], lis
                 rows.append(contacts.response[row])
                 right.append(-contacts.free[row])
             else:
-                turned = [part * share for share in contacts.shares[k]]
+                limits, shares, _, _ = contacts.sides[is_back(direction)]
+                turned = [part * share for share in shares[k]]
                 turned[row] += 1.0
                 rows.append(turned)
-                right.append(-part * contacts.limits[k])
+                right.append(-part * limits[k])
     forces, motions = [0.0] * len(contacts.free), list(contacts.free)
     for row, force in zip(acting, _solved([[one[i] for i in acting] for one in rows], right), strict=True):
         forces[row] = force
@@ -246,9 +259,8 @@ def _contradiction(
     worst, number = SLACK, -1
     if not contacts.units:
         return number, better
-    limits = _limits(contacts.limits, contacts.shares, forces)
-    static = _limits(contacts.static_limits, contacts.static_shares, forces)
-    pushes = max(max(map(abs, forces)), max(map(abs, limits))) or 1.0
+    size = max(abs(_limits(contacts.sides[0], k, forces)[0]) for k in range(len(contacts.units)))
+    pushes = max(max(map(abs, forces)), size) or 1.0
     moves = max(
         max(abs(free), sum(abs(by * force) for by, force in zip(row, forces, strict=True)))
         for free, row in zip(contacts.free, contacts.response, strict=True)
@@ -258,31 +270,36 @@ def _contradiction(
         if _is_loose(states, unit):
             continue
         f, a = [forces[i] / pushes for i in unit.rows], [motions[i] / moves for i in unit.rows]
-        for miss, other in _misses(unit, state, f, a, limits[k] / pushes, static[k] / pushes):
+        side = contacts.sides[is_back(state[1] if state[0] == GOES_ON else tuple(-x for x in f))]
+        limit, static = (one / pushes for one in _limits(side, k, forces))
+        for miss, other in _misses(unit, state, f, a, limit, static, any(side[1][k])):
             if miss > worst:
                 worst, number, better = miss, k, other
     return number, better
 
 
-def _limits(limits: list[float], shares: list[list[float]], forces: Sequence[float]) -> list[float]:
-    """Return the limits at some forces."""
-    return [
-        one + sum(share * force for share, force in zip(row, forces, strict=True))
-        for one, row in zip(limits, shares, strict=True)
-    ]
+def _limits(side: _Side, k: int, forces: Sequence[float]) -> tuple[float, float]:
+    """Return limit and static limit of a unit at some forces."""
+    limits, shares, static, static_shares = side
+    ahead = sum(share * force for share, force in zip(shares[k], forces, strict=True))
+    return limits[k] + ahead, static[k] + sum(share * f for share, f in zip(static_shares[k], forces, strict=True))
 
 
 def _misses(
-    unit: Unit, state: State, f: Sequence[float], a: Sequence[float], limit: float, static: float
+    unit: Unit, state: State, f: Sequence[float], a: Sequence[float], limit: float, static: float, reads: bool
 ) -> Iterator[tuple[float, State]]:
-    """Yield by how much a state contradicts each law, and the state that does not."""
+    """Yield by how much a state contradicts each law, and the state that does not.
+
+    A limit that reads forces is zero now and then, and what has it rubs all the same.
+    """
     none = (0.0,) * len(f)
     if not unit.is_slip:
-        yield (-f[0], (OPEN, none)) if state[0] == STICKS else (-a[0], (STICKS, none))
+        yield (-f[0] - static, (OPEN, none)) if state[0] == STICKS else (-a[0], (STICKS, none))
         if state[0] == STICKS:
             yield -a[0], (STICKS, none)
         return
-    if unit.at < 0 and max(limit, static) <= 0.0:  # nothing is pressed
+    is_alone = unit.at < 0 and not reads
+    if is_alone and max(limit, static) <= 0.0:  # nothing is pressed
         yield (0.0 if state[0] == OPEN else 1.0), (OPEN, none)
         return
     if state[0] == STICKS:
@@ -292,7 +309,7 @@ def _misses(
         yield math.hypot(*a), (GOES_ON, way)  # rows that depend on each other cannot all stick
         return
     if state[0] == GOES_ON:
-        if unit.at < 0:  # at a gap it is negative only where the gap pulls, which is said there
+        if is_alone:  # at a gap it is negative only where the gap pulls, which is said there
             yield -limit, (OPEN, none)
         if unit.is_given:
             return
@@ -305,4 +322,4 @@ def _misses(
         turned = [x / size + d for x, d in zip(a, state[1], strict=True)]  # half the way, lest it swings
         yield across, (GOES_ON, tuple(x / math.hypot(*turned) for x in turned))
         return
-    yield max(limit, static), (GOES_ON, unit.given) if unit.is_given else (STICKS, none)
+    yield max(limit, static, float(reads)), (GOES_ON, unit.given) if unit.is_given else (STICKS, none)

@@ -83,6 +83,7 @@ def known_multipliers(
     right += [-(one.mask * second) for one, second in zip(contacts, seconds, strict=True)]
     system = _System(rows, speeds, accelerations, constraints, right, contacts)
     can_repeat = _close_loops(mechanism, [*constraints, *(one.row for one in contacts)])
+    can_repeat = can_repeat or (bool(contacts) and _are_crowded(system))
     solved = _without_choice(system, speeds) if can_repeat else _solve_system(system)
     if wanted:
         known |= _forces_met(wanted, [solved[number[symbol]] for symbol in wanted], stand_ins, bias)
@@ -168,6 +169,25 @@ def _close_loops(mechanism: Mechanism, constraints: Sequence[Constraint]) -> boo
             return True
         group.update(dict.fromkeys(leaders, min(leaders)))
     return False
+
+
+def _are_crowded(system: _System) -> bool:
+    """Return whether some rows hold fewer speeds than they are, as two brakes on one shaft (Koenig's matching)."""
+    columns: dict[int, list[int]] = {}
+    for row, column in system.slopes:
+        columns.setdefault(row, []).append(column)
+    holder: dict[int, int] = {}
+
+    def finds_place(row: int, tried: set[int]) -> bool:
+        for column in columns[row]:
+            if column not in tried:
+                tried.add(column)
+                if column not in holder or finds_place(holder[column], tried):
+                    holder[column] = row
+                    return True
+        return False
+
+    return not all(finds_place(row, set()) for row in columns)
 
 
 def _without_choice(system: _System, speeds: Sequence[Expression]) -> list[Expression]:

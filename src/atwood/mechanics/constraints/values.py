@@ -147,7 +147,7 @@ def contact_rows(
         for one in local.contacts:
             assert part is not None
             held = in_coordinates(local, one.row, state.kinematics.placements)
-            if one.is_slip:
+            if one.is_slip or one.law.options.level == "velocity":
                 (row,) = velocity_levels(mechanism, site, state, [(path, held, one.multiplier)], signals, {})
             else:
                 placed = part.put([held.value])

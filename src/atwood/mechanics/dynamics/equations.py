@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 
-from atwood.expr import Expression, Graph, Scalar, jvp, vjp
+from atwood.expr import Expression, Graph, Scalar, jvp, substitute, vjp
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.forces import Forces, Site, constraint_forces, part_forces, place_part
 from atwood.mechanics.dynamics.inertia import Masses, tensor_of, turned_tensor
@@ -84,7 +84,7 @@ class ContactRow:
     direction
         The sign of a slip that goes on, else 0; None for a gap.
     limit, static_limit
-        The largest force of friction, and that while it sticks; None for a gap.
+        The largest force of friction, and that while it sticks; of a gap None, and what it bears that is pulled open.
     restitution
         Of a gap.
     """
@@ -103,6 +103,19 @@ class ContactRow:
     def is_slip(self) -> bool:
         """Whether it is a slip, and not a gap."""
         return self.limit is not None
+
+    @property
+    def is_speed(self) -> bool:
+        """Whether it is a gap at velocities, as a freewheel is."""
+        return not self.is_slip and self.row.value is None
+
+    def towards(self, way: float) -> tuple[Expression, Expression]:
+        """Return the limit and the static one of a slip that goes, or would go, in a direction; of a gap the second."""
+        zero = self.mask.graph.zero
+        limits = [zero if one is None else one for one in (self.limit, self.static_limit)]
+        if self.direction is not None and len(self.law.options.reactions) == 1:
+            limits = substitute(limits, {self.direction: way})
+        return limits[0], limits[1]
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from atwood.expr import Expression, Graph, sqrt, substitute
+from atwood.expr import Expression, Graph, depends_on, sqrt, substitute
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Mechanism
@@ -114,6 +114,7 @@ def list_event_functions(
 def _of_contacts(equations: Equations) -> list[EventFunction]:
     """Return what tells that gaps and slips go over into another state; what cannot happen in a state is positive."""
     found: list[EventFunction] = []
+    reads = [*(one.read for one in equations.contacts), *equations.multipliers]
     for one in equations.contacts:
         (part, law, _), unit = one.row.key, one.law.options.unit
         of = ALONG[unit]
@@ -123,21 +124,22 @@ def _of_contacts(equations: Equations) -> list[EventFunction]:
             found.append(EventFunction(part, law, placed, -1, target, message, unit, False, rate=rate))  # noqa: B023
 
         if one.direction is None:
-            assert one.row.value is not None
-            rest = 1.0 - one.mask
-            watch(CLOSES, rest * one.row.value + one.mask, of, "the gap closes", one.row.rate)
-            watch(OPENS, one.mask * one.row.multiplier + rest, unit, "the gap opens")
+            rest, value = 1.0 - one.mask, one.row.value
+            if value is None:
+                watch(CLOSES, rest * one.row.rate + one.mask, f"{of}/s", "it runs free no longer")
+            else:
+                watch(CLOSES, rest * value + one.mask, of, "the gap closes", one.row.rate)
+            watch(OPENS, one.mask * (one.row.multiplier + one.towards(1.0)[1]) + rest, unit, "the gap opens")
             continue
         assert one.limit is not None
-        assert one.static_limit is not None
         if one.row.key[2]:
             continue  # the second of two directions
         loose, pair = 1.0 - one.mask, [x for x in equations.contacts if x.row.key[:2] == one.row.key[:2]]
         sides = [x.direction for x in pair if x.direction is not None]
         if len(pair) == 1:
-            reserves = [one.static_limit - one.row.multiplier, one.static_limit + one.row.multiplier]
+            reserves = [one.towards(-way)[1] - way * one.row.multiplier for way in (1.0, -1.0)]
         else:
-            reserves = [one.static_limit - norm_of([x.row.multiplier for x in pair])]
+            reserves = [one.towards(1.0)[1] - norm_of([x.row.multiplier for x in pair])]
         for reserve in reserves:
             watch(YIELDS, one.mask * reserve + loose, unit, "what sticks begins to slip")
         zero = one.mask.graph.zero
@@ -148,7 +150,7 @@ def _of_contacts(equations: Equations) -> list[EventFunction]:
             for target in (RESTS, RUNS):
                 size = acts * norm_of([x.row.rate for x in pair]) + (1.0 - acts)
                 watch(target, size if target == RESTS else -size, f"{of}/s", "what slips comes to rest, or runs")
-        if not one.law.options.at:
+        if not one.law.options.at and not depends_on(one.limit, reads):
             held = 1.0 - (1.0 - one.mask) * (1.0 - acts)
             watch(FREES, (2.0 * held - 1.0) * one.limit, unit, "the limit of friction passes zero")
     return found

@@ -29,6 +29,8 @@ class UnilateralOptions:
     unit: str
     restitution: str | float
     impact_law: str
+    level: str
+    adhesion: str
     doc: str
     modes: tuple[str, ...]
     spaces: tuple[str, ...]
@@ -118,6 +120,8 @@ def _along(unit: str, rate: str) -> str:
     doc=DOC,
     restitution=either(NAME, number("a number from 0 to 1", least=0.0, most=1.0)),
     impact_law=one_of(("newton", "poisson")),
+    level=one_of(("position", "velocity")),
+    adhesion=TEXT,
     modes=NAMES,
     spaces=SPACES,
 )
@@ -128,10 +132,12 @@ def unilateral(
     doc: str,
     restitution: str | float = 0.0,
     impact_law: Literal["newton", "poisson"] = "newton",
+    level: Literal["position", "velocity"] = "position",
+    adhesion: str = "",
     modes: Sequence[str] = (),
     spaces: Sequence[str] = ("line", "plane", "space"),
 ) -> Callable[[Callable[[Any], Any]], ContactLaw]:
-    """Mark a method that returns a gap: what never becomes negative, from positions, angles and time.
+    """Mark a method that returns a gap: what never becomes negative, a distance, or a speed as that of a freewheel.
 
     Where the gap is zero a force keeps it so, which only pushes; where it opens there is none. Where it closes with a
     speed, velocities jump. The gap, the force and `<name>_state` are quantities of the component.
@@ -141,7 +147,7 @@ def unilateral(
     reaction
         Name of the quantity that the force along the gap is reported as; it is never negative.
     unit
-        Unit of the reaction: ``"N"`` for a gap in m, ``"N*m"`` for one in rad.
+        Unit of the reaction: ``"N"`` for a gap in m, ``"N*m"`` for one in rad; in m/s and rad/s at velocities.
     doc
         One line of what the reaction is.
     restitution
@@ -149,12 +155,18 @@ def unilateral(
     impact_law
         What restitution is a share of: of the speed of approach (Newton), or of the impulse until it has ended
         (Poisson).
+    level
+        What the method reads: positions, angles and time, or also velocities, in which it is affine then.
+    adhesion
+        Name of a method, or a parameter, that gives how much a gap bears that is pulled open; it then lets go.
     modes, spaces
         The modes of the component and the spaces in which it holds; all modes when empty.
     """
     given = str(restitution) if isinstance(restitution, str) else float(restitution)
-    options = UnilateralOptions((reaction,), unit, given, impact_law, doc, tuple(modes), tuple(spaces))
-    return lambda function: ContactLaw(function, Law("unilateral", function.__name__, options), _along(unit, ""))
+    many = tuple(modes), tuple(spaces)
+    options = UnilateralOptions((reaction,), unit, given, impact_law, level, adhesion, doc, *many)
+    along = _along(unit, "/s" if level == "velocity" else "")
+    return lambda function: ContactLaw(function, Law("unilateral", function.__name__, options), along)
 
 
 @takes(
@@ -191,7 +203,8 @@ def dry_friction(
         directions that are square to each other: the size of both together is limited then (a cone).
     limit
         Name of a method, or a parameter, that gives the largest force: from positions, velocities, states, inputs,
-        time and reactions of the component. Where it is zero or less nothing rubs.
+        time and reactions of the component. Where it is zero or less nothing rubs. It may read `<name>_direction`, the
+        sign of the slip, and of a slip at rest, where it may be tried either way.
     unit
         Unit of the reaction: ``"N"`` for a slip in m/s, ``"N*m"`` for one in rad/s.
     doc

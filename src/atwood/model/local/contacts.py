@@ -42,7 +42,7 @@ class LocalContact:
     direction
         The sign of a slip that goes on, else 0; None for a gap.
     limit, static_limit
-        The largest force of friction, and that while it sticks; None for a gap.
+        The largest force of friction, and that while it sticks; of a gap None, and what it bears that is pulled open.
     restitution
         Of a gap.
     """
@@ -103,20 +103,24 @@ def _gap(
 ) -> LocalContact:
     bound = bind(part.component, binding)
     value = _value(part, law, bound, law.name, graph)
-    if depends_on(value, [symbol for one in connectors.values() for symbol in (*one.velocity, *one.spin)]):
+    velocities = [symbol for one in connectors.values() for symbol in (*one.velocity, *one.spin)]
+    is_speed = law.options.level == "velocity"
+    if not is_speed and depends_on(value, velocities):
         raise UnsupportedError(
             "a gap is read from positions, angles and time, and this one reads velocities",
             where=f"{part.path}.{law.name}",
-            advice="Return the gap itself; its rate is found by differentiation.",
+            advice="Return the gap itself; its rate is found by differentiation. A freewheel has level='velocity'.",
         )
     given = law.options.restitution
     share = graph.convert(given) if not isinstance(given, str) else _named(part, law, bound, given, graph)
     mask = graph.convert(getattr(bound, f"{law.name}_state"))
     multiplier, read, stand_in = _symbols(part, law, graph)
     along = {symbol: rate for one in connectors.values() for symbol, rate in one.rates.items()}
-    (rate,) = jvp([value], {graph.convert(binding.time): 1.0, **along})
+    rate = value if is_speed else jvp([value], {graph.convert(binding.time): 1.0, **along})[0]
     row = LocalConstraint(law, 0, value, law.options.reactions[0], 1.0)
-    return LocalContact(row, multiplier, read, mask, mask * multiplier, rate, stand_in, restitution=share)
+    pull = _named(part, law, bound, law.options.adhesion, graph) if law.options.adhesion else None
+    force = mask * multiplier
+    return LocalContact(row, multiplier, read, mask, force, rate, stand_in, static_limit=pull, restitution=share)
 
 
 def _slip(part: Part, law: Law, bound: Any, graph: Graph) -> list[LocalContact]:

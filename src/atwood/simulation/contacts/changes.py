@@ -15,7 +15,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import SolveError, StartError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, replace
-from atwood.mechanics.outputs.event_functions import CLOSES, OPENS, YIELDS
+from atwood.mechanics.outputs.event_functions import CLOSES, OPENS, RESTS, STOPS, YIELDS
 from atwood.model.values.units import ALONG
 from atwood.numerics.contact_sets import (
     GOES_ON,
@@ -26,6 +26,7 @@ from atwood.numerics.contact_sets import (
     State,
     all_states,
     find_states,
+    is_back,
 )
 from atwood.numerics.matrices import least_norm
 from atwood.simulation.contacts.values import ContactValues
@@ -48,6 +49,9 @@ What still rises in one interval rises by some tolerances, and rounding does not
 
 _NEAR_REST = 1000.0
 """The same where impacts have accumulated: what still bounces is as near as that."""
+
+_SEEN = 2.0
+"""Times what is slow: what has come to rest may go by that still, or again, where its event is seen."""
 
 _MOST_TURNS = 50
 """Limits that are curved in the forces are met in so many turns at most."""
@@ -112,7 +116,11 @@ class _Moment:
             k
             for k, is_slip in enumerate(self.layout.is_slip)
             if not is_slip and (self.before[k][0] == STICKS or values[self.units[k][0]] <= small[k])
+            if k not in self.layout.speeds or self.before[k][0] == STICKS or self._is_slow(k)
         ]
+
+    def _is_slow(self, k: int) -> bool:
+        return bool(self.rates()[self.units[k][0]] <= self.slow[k])
 
     def all_closed(self) -> tuple[float, ...]:
         """Return the states with every gap closed that is at zero, and nothing that rubs; empty where there is none."""
@@ -149,6 +157,7 @@ class _Moment:
             coming = [k for k in touching if speeds[k] < -self.slow[k]]
             if not coming:
                 return
+            touching += [k for k in self.layout.speeds if k not in touching]
             if one_by_one:
                 fastest = min(speeds[k] for k in coming)
                 touching = [k for k in coming if speeds[k] <= fastest * (1.0 - 1e-9)]
@@ -165,7 +174,7 @@ class _Moment:
         Intervals that shrink by a factor r are a geometric series: what is left of it is the last one times r/(1 - r).
         It counts what moves together with the gap that closes now.
         """
-        closing = [k for k, one in enumerate(self.first) if self.triggers.get(one.row.key[:2]) == CLOSES]
+        closing = [k for k, one in enumerate(self.first) if self.trigger(k) == CLOSES and not one.is_speed]
         if not closing or len(impacts) < _SPANS[0]:
             return None
         response = np.abs(self.values.response[self.units[closing[0]][0]])
@@ -267,7 +276,8 @@ class _Moment:
         given = self._going(slips, rates)
         given |= {k: self._yielding(k) for k in slips if k not in given and self.trigger(k) == YIELDS}
         chosen = [*gaps, *slips]
-        states = [(STICKS, (0.0,)) if k in gaps else self.before[k] for k in chosen]
+        still = *gaps, *self._stopped(slips)
+        states = [(STICKS, (0.0,) * len(self.units[k])) if k in still else self.before[k] for k in chosen]
         found = self._found(chosen, states, given)
         if found is None:
             found = self._jammed(chosen)
@@ -284,13 +294,16 @@ class _Moment:
         self.u = self.u + self.values.speeds_by(push)
 
     def _going(self, slips: list[int], rates: FloatArray) -> dict[int, tuple[float, ...]]:
-        """Return the directions of the slips that go on already."""
-        sizes = {k: self.rate(k, rates) for k in slips}
+        """Return the directions of the slips that go on already; what has come to rest is as slow as its event sees."""
+        sizes, stops = {k: self.rate(k, rates) for k in slips}, self._stopped(slips)
         return {
             k: tuple(float(x) / size for x in rates[list(self.units[k])])
             for k, size in sizes.items()
-            if size > self.slow[k]
+            if size > (_SEEN if k in stops else 1.0) * self.slow[k]
         }
+
+    def _stopped(self, slips: list[int]) -> list[int]:
+        return [k for k in slips if self.trigger(k) in (STOPS, RESTS)]
 
     def _found(self, chosen: list[int], states: list[State], given: dict[int, tuple[float, ...]]) -> Found | None:
         """Return states that contradict nothing at accelerations; limits may be curved in the forces."""
@@ -318,8 +331,9 @@ class _Moment:
                     if state == STICKS:
                         matrix[row], right[row] = values.response[row], -free[row]
                     elif state == GOES_ON:
-                        matrix[row] = matrix[row] + part * limits.shares[number]
-                        right[row] = -part * limits.free[number]
+                        side = limits[is_back(way)]
+                        matrix[row] = matrix[row] + part * side.shares[number]
+                        right[row] = -part * side.free[number]
             last, forces = forces, least_norm(matrix, right)
             if not self.layout.is_curved or _is_same(last, forces):
                 break
@@ -385,19 +399,27 @@ class _Moment:
     def check_start(self) -> None:
         """Refuse a start inside of something."""
         for k, one in enumerate(self.first):
-            value = self.values.values[self.units[k][0]]
+            unit, row = ALONG[one.law.options.unit], self.units[k][0]
+            if one.is_speed and self.values.rates[row] < -self.slow[k]:
+                raise StartError(
+                    f"it starts the way that is locked, at {-self.values.rates[row]:.6g} {unit}/s",
+                    where=one.row.key[0],
+                    advice="Start where that speed is zero or positive.",
+                )
+            value = self.values.values[row]
             if not one.is_slip and value < -self.small[k]:
                 raise StartError(
-                    f"it starts inside, by {-value:.6g} {ALONG[one.law.options.unit]}",
+                    f"it starts inside, by {-value:.6g} {unit}",
                     where=one.row.key[0],
                     advice="Start where the gap is zero or positive.",
                 )
 
 
-def _of_impulses(limits: Limits) -> Limits:
+def _of_impulses(limits: tuple[Limits, Limits]) -> tuple[Limits, Limits]:
     """Return limits of impulses: finite forces have none, and what follows from other forces is a share of these."""
-    none = np.zeros_like(limits.free)
-    return Limits(none, limits.shares, none, limits.static_shares)
+    none = np.zeros_like(limits[0].free)
+    ahead, back = (Limits(none, one.shares, none, one.static_shares) for one in limits)
+    return ahead, back
 
 
 def _is_same(last: FloatArray, now: FloatArray) -> bool:

@@ -28,6 +28,8 @@ from atwood.simulation.dynamics.scales import motion_scales
 
 _LAYOUT: Key[Layout] = Key("gaps and slips")
 
+_LIMITS = ("limits", "static limits", "limits backwards", "static limits backwards")
+
 
 @dataclass(frozen=True, eq=False)
 class Layout:
@@ -47,6 +49,8 @@ class Layout:
         The rows, and those of each gap and each slip.
     first, is_slip
         The first row of each unit, and whether it is a slip.
+    speeds
+        The units that are gaps at velocities.
     gap_of
         For each unit that is a slip the number of its gap; -1 for what has none.
     places
@@ -63,6 +67,7 @@ class Layout:
     units: tuple[tuple[int, ...], ...]
     first: tuple[ContactRow, ...]
     is_slip: tuple[bool, ...]
+    speeds: tuple[int, ...]
     gap_of: tuple[int, ...]
     places: tuple[tuple[int, ...], ...]
 
@@ -80,22 +85,18 @@ def _layout(assembly: Assembly) -> Layout:
     at_rest = dict.fromkeys(equations.accelerations, graph.zero)
     seconds = substitute([one.row.second for one in contacts], at_rest)
     none = graph.zero
-    limits = [none if one.limit is None else one.limit for one in contacts]
-    static = [none if one.static_limit is None else one.static_limit for one in contacts]
-    own = [one.read for one in contacts]
-    every = [*limits, *static]
+    limits = [[one.towards(way)[i] for one in contacts] for way in (1.0, -1.0) for i in (0, 1)]
+    own, every = [one.read for one in contacts], [limit for some in limits for limit in some]
     read = tuple(x for x in (*own, *equations.multipliers) if any(depends_on(limit, [x]) for limit in every))
-    found = [jacobian(some, list(read)) for some in (limits, static)]
+    found = [jacobian(some, list(read)) for some in limits]
     values = [none if one.row.value is None else one.row.value for one in contacts]
     outputs = (
         OutputGroup("values", tuple(values)),
         OutputGroup("rates", tuple(rates)),
         OutputGroup("slopes", tuple(slopes.entries)),
         OutputGroup("seconds", tuple(seconds)),
-        OutputGroup("limits", tuple(limits)),
-        OutputGroup("static limits", tuple(static)),
-        OutputGroup("shares", tuple(found[0].entries)),
-        OutputGroup("static shares", tuple(found[1].entries)),
+        *(OutputGroup(name, tuple(some)) for name, some in zip(_LIMITS, limits, strict=True)),
+        *(OutputGroup(f"shares of {name}", tuple(one.entries)) for name, one in zip(_LIMITS, found, strict=True)),
         OutputGroup("restitution", tuple(none if one.restitution is None else one.restitution for one in contacts)),
     )
     groups = (*state_groups(equations), InputGroup("read", read))
@@ -117,6 +118,7 @@ def _layout(assembly: Assembly) -> Layout:
         tuple(map(tuple, units.values())),
         first,
         tuple(one.is_slip for one in first),
+        tuple(k for k, one in enumerate(first) if one.is_speed),
         tuple(
             number.get((one.row.key[0], one.law.options.at), -1) if one.is_slip and one.law.options.at else -1
             for one in first
@@ -163,11 +165,10 @@ class ContactValues:
 
     def _take(self, u: FloatArray) -> None:
         found = [np.array(x) for x in self._kernel([self.t], self.q, u, self.read)]
-        self.values, self.rates, slopes, self.seconds, self.limits, self.static_limits, *_ = found
-        self.restitution = found[8]
+        self.values, self.rates, slopes, self.seconds, *limits = found
+        self._limits, self._shares, self.restitution = limits[:4], limits[4:8], limits[8]
         self.slopes = np.zeros((len(self.contacts), len(u)))
         self.slopes[self.layout.slopes] = slopes
-        self._shares = found[6], found[7]
 
     @cached_property
     def _now(self) -> BalanceValues:
@@ -221,8 +222,8 @@ class ContactValues:
         found: FloatArray = self._by_each[: len(self.u)] @ forces
         return found
 
-    def limits_at(self, forces: FloatArray) -> Limits:
-        """Return the limits of all units near some forces of the rows: ``L(f) = L_0 + P f``."""
+    def limits_at(self, forces: FloatArray) -> tuple[Limits, Limits]:
+        """Return the limits of all units near some forces of the rows, forwards and backwards: ``L(f) = L_0 + P f``."""
         layout, count, n = self.layout, len(self.contacts), len(self.u)
         own = {one.read: i for i, one in enumerate(self.contacts)}
         number = {symbol: n + i for i, symbol in enumerate(self.assembly.maximal.multipliers)}
@@ -238,16 +239,16 @@ class ContactValues:
             self._take(self.u)
         found: list[FloatArray] = []
         heads = [rows[0] for rows in self.units]
-        for limits, entries, places in zip((self.limits, self.static_limits), self._shares, layout.shares, strict=True):
+        for limits, entries, places in zip(self._limits, self._shares, layout.shares, strict=True):
             slopes = np.zeros((count, len(self.read)))
             for (r, c), entry in zip(places, entries, strict=True):
                 slopes[r, c] = entry
             shares = slopes @ ways
             found += [(limits - shares @ forces)[heads], shares[heads]]
-        return Limits(*found)
+        return Limits(*found[:4]), Limits(*found[4:])
 
     def chosen(
-        self, chosen: list[int], free: FloatArray, given: dict[int, tuple[float, ...]], limits: Limits
+        self, chosen: list[int], free: FloatArray, given: dict[int, tuple[float, ...]], limits: tuple[Limits, Limits]
     ) -> Contacts:
         """Return what is asked of some units."""
         rows = [row for k in chosen for row in self.units[k]]
@@ -262,10 +263,13 @@ class ContactValues:
             )
             for k in chosen
         )
-        few = Limits(
-            limits.free[chosen],
-            limits.shares[chosen][:, rows],
-            limits.static_free[chosen],
-            limits.static_shares[chosen][:, rows],
+        ahead, back = (
+            Limits(
+                some.free[chosen],
+                some.shares[chosen][:, rows],
+                some.static_free[chosen],
+                some.static_shares[chosen][:, rows],
+            )
+            for some in limits
         )
-        return Contacts(self.response[rows][:, rows], free[rows], units, few)
+        return Contacts(self.response[rows][:, rows], free[rows], units, ahead, back)

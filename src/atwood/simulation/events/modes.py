@@ -361,6 +361,9 @@ class EventProbe:
 _SHORT = 1e-6
 """Share of the time since the mode began in which the rate of an event is read."""
 
+_ALIKE = 1.0 + 1e-6
+"""Events that pass their margins at once have passed zero at once, if it was earlier by shares as alike as this."""
+
 _LONGEST = 0.1
 """Share of that time by which an event may be brought forward, by one Euler step back."""
 
@@ -376,16 +379,14 @@ def without_margin(
     """
     fired = [i for i, sign in enumerate(step.events) if sign]
     since = step.t - began
-    if len(fired) != 1 or not shift[fired[0]] or not since > 0.0:
+    if not fired or not all(shift[fired]) or not since > 0.0:
         return step
-    number, margin = fired[0], float(shift[fired[0]])
-
-    def value(earlier: float) -> float:
-        return float(values(step.t - earlier, step.y - earlier * step.yp)[number]) - margin
-
-    now, short = value(0.0), _SHORT * since
-    rate = (now - value(short)) / short
-    if rate * margin >= 0.0 or not abs(now) < _LONGEST * since * abs(rate):
+    margins, short = shift[fired], _SHORT * since
+    now, before = (values(step.t - t, step.y - t * step.yp)[fired] - margins for t in (0.0, short))
+    rates = (now - before) / short
+    if np.any(rates * margins >= 0.0) or not np.all(np.abs(now) < _LONGEST * since * np.abs(rates)):
         return step
-    earlier = now / rate
+    earlier = float(np.min(now / rates))  # equal ones happen at once
+    if not np.max(now / rates) <= _ALIKE * earlier:
+        return step
     return replace(step, t=step.t - earlier, y=step.y - earlier * step.yp)
