@@ -217,7 +217,7 @@ def test_a_freewheel_takes_part_in_impacts(form: str) -> None:
     scene = train({"a": 1.0, "b": 1.0}, {"a": 3.0, "b": 2.0})
     clutch, stop = (
         scene.add("clutch", OneWayClutch()),
-        scene.add("stop", RotationalStop(ends="upper", upper=0.5, restitution=0.8, against="ground")),
+        scene.add("stop", RotationalStop(upper=0.5, restitution=0.8, against="ground")),
     )
     for rotor, end in ((scene.a, clutch.a), (scene.b, clutch.b), (scene.b, stop.b)):
         scene.connect(rotor.flange, end)
