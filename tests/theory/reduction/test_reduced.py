@@ -276,6 +276,19 @@ def test_the_effective_potential_is_the_same_in_symbols_and_numbers() -> None:
         assert found.effective_potential(values) == pytest.approx(symbolic, rel=1e-12)
 
 
+def test_the_effective_potential_of_a_top_is_a_sum_of_squares() -> None:
+    """``(p_phi - p_psi cos)^2/(2 I1 sin^2) + p_psi^2/(2 I3) + m g l cos`` (Goldstein, equation 5.60), three terms."""
+    found = routhian(SCENES["lagrange-top"]())
+    assert found.ignorable == ("top.euler.phi", "top.euler.psi")
+    (theta,), (p, spin) = found.coordinates, found.momenta
+    m, l, first, third, g = sympy.symbols("m c_z I_1 I_3 g")
+    across = (first + m * l**2) * sympy.sin(theta) ** 2
+    book = (p - spin * sympy.cos(theta)) ** 2 / (2 * across) + spin**2 / (2 * third) + m * g * l * sympy.cos(theta)
+    assert sympy.simplify(found.effective_potential - book) == 0
+    assert len(found.effective_potential.args) == 3
+    assert found.effective_potential.has((p - spin * sympy.cos(theta)) ** 2)
+
+
 # -- questions without an answer --------------------------------------------------------------------------------------
 
 

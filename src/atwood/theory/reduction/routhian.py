@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
+from itertools import islice, permutations
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -83,7 +84,7 @@ class Routhian(Described):
 
     @cached_property
     def _parts(self) -> tuple[Sympy, Sympy, Sympy, dict[Sympy, Sympy], tuple[Sympy, ...], tuple[Sympy, ...]]:
-        """L on plain symbols, the rates of the ignorable coordinates, and what the symbols stand for."""
+        """L on plain symbols, the rates of the ignorable coordinates, their mass matrix, and what symbols stand for."""
         left, gone = self._numbers()
         found, t = self._found, sympy.Symbol("t")
         linear = found.lagrangian - found.kinetic + found.potential
@@ -107,7 +108,7 @@ class Routhian(Described):
             )
         solved = (mass.adjugate() * free).applyfunc(lambda one: short(one / determinant)) if own else free
         others = tuple(rates[k] for k in left)
-        return plain, solved, momenta, back, tuple(own), others
+        return plain, solved, mass, back, tuple(own), others
 
     @cached_property
     def expression(self) -> Sympy:
@@ -115,17 +116,20 @@ class Routhian(Described):
         plain, solved, _, back, own, others = self._parts
         rates = dict(zip(own, solved, strict=True))
         total = sympy.Add(*(p * w for p, w in zip(self.momenta, solved, strict=True))) - plain.xreplace(rates)
-        return collected(total, [*self.momenta, *others]).xreplace(back)
+        moving = total - total.xreplace(dict.fromkeys(others, 0))
+        whole, rest = (collected(one, [*self.momenta, *others]).xreplace(back) for one in (total, moving))
+        return min(whole, rest + self.effective_potential, key=length)
 
     @cached_property
     def effective_potential(self) -> Sympy:
         """The Routhian where the coordinates that are left are at rest: their effective potential, J."""
-        plain, solved, _, back, own, others = self._parts
-        still = dict.fromkeys(others, sympy.Integer(0))
-        rates = {rate: w.xreplace(still) for rate, w in zip(own, solved, strict=True)}
-        total = sympy.Add(*(p * w for p, w in zip(self.momenta, rates.values(), strict=True)))
-        total = total - plain.xreplace(still).xreplace(rates)
-        return min((short(total), collected(total, self.momenta)), key=length).xreplace(back)
+        plain, _, mass, back, own, others = self._parts
+        linear, still = plain.xreplace(dict.fromkeys(others, 0)), dict.fromkeys(own, 0)
+        free = sympy.Matrix([p - linear.diff(rate).xreplace(still) for p, rate in zip(self.momenta, own, strict=True)])
+        static = short(-linear.xreplace(still))
+        ways = [static + _squares(mass, free, order) for order in islice(permutations(range(len(own))), _ORDERS)]
+        written = [*ways, short(ways[0]), collected(ways[0], self.momenta)]
+        return min(written, key=length).xreplace(back)
 
     @property
     def values(self) -> dict[Sympy, float]:
@@ -146,6 +150,20 @@ class Routhian(Described):
 
     def __repr__(self) -> str:
         return f"<Routhian of {self.formulas.name}, {', '.join(self.ignorable) or 'nothing'} ignored>"
+
+
+_ORDERS = 6
+"""So many orders are tried in which squares of momenta are completed."""
+
+
+def _squares(mass: Sympy, free: Sympy, order: Sequence[int]) -> Sympy:
+    """Return ``p.M^-1 p / 2`` as a sum of squares, completed in an order of the momenta."""
+    total = sympy.Integer(0)
+    for k in order:
+        size, column, own = short(mass[k, k]), mass[:, k], short(free[k])
+        total += own**2 / 2 / sympy.factor(size)
+        mass, free = mass - column * column.T / size, free - column * own / size
+    return total
 
 
 def _formula(written: Sum) -> Sympy:
