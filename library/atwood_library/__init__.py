@@ -119,6 +119,7 @@ if TYPE_CHECKING:
     from atwood_library.ropes.linked_rope import LinkedRope as LinkedRope
     from atwood_library.ropes.pulley import Pulley as Pulley
     from atwood_library.ropes.rope import Rope as Rope
+    from atwood_library.ropes.rough_pulley import RoughPulley as RoughPulley
     from atwood_library.ropes.wound_rope import WoundRope as WoundRope
     from atwood_library.sensors.angle_sensor import AngleSensor as AngleSensor
     from atwood_library.sensors.energy_sensor import EnergySensor as EnergySensor
@@ -227,6 +228,7 @@ _MODULES = {
     "RotationalSpringDamper": "drives.rotational_spring_damper",
     "RotationalStop": "contacts.rotational_stop",
     "Rotor": "drives.rotor",
+    "RoughPulley": "ropes.rough_pulley",
     "SampleAndHold": "blocks.sample_and_hold",
     "SampleDelay": "blocks.sample_delay",
     "SampledFeedback": "blocks.sampled_feedback",

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from atwood import Component, Number, Point, Scalar, connector, observable, parameter, unilateral
-from atwood_library.interfaces.bounds import check_bounds
+from atwood import Number, Point, Scalar, connector, observable, parameter, unilateral
+from atwood_library.interfaces.bounds import Bounded
 
 __all__ = ["DistanceContact"]
 
 
-class DistanceContact(Component):
+class DistanceContact(Bounded):
     """Two points whose distance stays between two bounds: a slack rope, a rod with play, two smooth balls.
 
     On a line the distance has the sign that it starts with.
@@ -26,10 +26,6 @@ class DistanceContact(Component):
     a: Point = connector(Point, "One point.")
     b: Point = connector(Point, "The other point.")
 
-    def check_values(self) -> None:
-        """Refuse bounds the wrong way round."""
-        check_bounds(self)
-
     @observable(unit="m", doc="Distance of the two points.")
     def length(self) -> Scalar:
         """Return the distance."""
@@ -38,9 +34,9 @@ class DistanceContact(Component):
     @unilateral(reaction="pressure", restitution="restitution", doc="Force that pushes the points apart.")
     def above_lower(self) -> Scalar:
         """Distance above the lower bound; it never changes where there is none."""
-        return 1.0 if self.lower is None else self.distance(self.a, self.b) - self.lower
+        return self.above(self.distance(self.a, self.b))
 
     @unilateral(reaction="tension", restitution="restitution", doc="Force that pulls the points together.")
     def below_upper(self) -> Scalar:
         """Distance below the upper bound; it never changes where there is none."""
-        return 1.0 if self.upper is None else self.upper - self.distance(self.a, self.b)
+        return self.below(self.distance(self.a, self.b))

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from atwood import Component, Number, Scalar, Shaft, connector, observable, parameter, unilateral
+from atwood import Number, Scalar, Shaft, connector, observable, parameter, unilateral
 from atwood_library.interfaces.along_coordinates import between
-from atwood_library.interfaces.bounds import check_bounds
+from atwood_library.interfaces.bounds import Bounded
 
 __all__ = ["RotationalStop"]
 
 
-class RotationalStop(Component):
+class RotationalStop(Bounded):
     """Rigid ends of the play between two angles, or from one to the ground: backlash, a hard stop.
 
     Nothing goes beyond an end. Where one is reached with a speed velocities jump.
@@ -29,10 +29,6 @@ class RotationalStop(Component):
     a: Shaft = connector(Shaft, "The angle that it acts against.", when={"against": ("flange",)})
     b: Shaft = connector(Shaft, "The angle that it acts on.")
 
-    def check_values(self) -> None:
-        """Refuse ends the wrong way round."""
-        check_bounds(self)
-
     @observable(unit="rad", doc="By how much b is ahead of a.")
     def extension(self) -> Scalar:
         """Return the extension."""
@@ -41,11 +37,11 @@ class RotationalStop(Component):
     @unilateral(reaction="lower_torque", unit="N*m", restitution="restitution", doc="What the lower end exerts on b.")
     def above_lower(self) -> Scalar:
         """Play above the lower end; it never changes where there is none."""
-        return 1.0 if self.lower is None else between(self)[0] - self.lower
+        return self.above(between(self)[0])
 
     @unilateral(
         reaction="upper_torque", unit="N*m", restitution="restitution", doc="What the upper end exerts, against b."
     )
     def below_upper(self) -> Scalar:
         """Play below the upper end; it never changes where there is none."""
-        return 1.0 if self.upper is None else self.upper - between(self)[0]
+        return self.below(between(self)[0])

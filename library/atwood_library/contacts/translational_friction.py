@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from atwood import Component, Number, Scalar, Slide, connector, dry_friction, parameter, signal
+from atwood import Number, Scalar, Slide, connector, dry_friction, parameter, signal
 from atwood_library.interfaces.along_coordinates import between
+from atwood_library.interfaces.rubbing import Rubbing
 
 __all__ = ["TranslationalFriction"]
 
 
-class TranslationalFriction(Component):
+class TranslationalFriction(Rubbing):
     """Dry friction between two displacements, or from one to the ground. It holds what it has brought to rest.
 
     While it slips its size is ``level (sliding(v) + viscous v)``; while it sticks it bears `peak` times as much as it
@@ -36,12 +37,3 @@ class TranslationalFriction(Component):
     def slip(self) -> Scalar:
         """Speed of b past a."""
         return between(self)[1]
-
-    def largest(self) -> Scalar:
-        """Return the friction while it slips."""
-        speed = self.slip_direction * between(self)[1]
-        return self.level * (self.sliding(speed) + self.viscous * speed)
-
-    def largest_static(self) -> Scalar:
-        """Return the largest friction while it sticks."""
-        return self.level * self.peak * self.sliding(0.0)

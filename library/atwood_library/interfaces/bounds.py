@@ -1,26 +1,34 @@
-"""A lower and an upper bound, of which a part has one or both."""
+"""A value between a lower and an upper bound, of which a part has one or both."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from atwood import ParameterError
+from atwood import Component, ParameterError, Scalar
 
-__all__ = ["check_bounds"]
+__all__ = ["Bounded"]
 
 
-def check_bounds(part: Any) -> None:
-    """Refuse bounds the wrong way round, and none at all.
+class Bounded(Component):
+    """A part with the parameters `lower` and `upper`, each None where there is no bound."""
 
-    Parameters
-    ----------
-    part
-        A part with the parameters `lower` and `upper`, each None where there is no bound.
-    """
-    lower, upper = part.lower, part.upper
-    if lower is None and upper is None:
-        raise ParameterError("it has no bound", where=part.path, advice="Give lower=, upper= or both.")
-    if None not in (lower, upper) and not lower < upper:
-        raise ParameterError(
-            f"the upper bound {upper:g} is not above the lower one, {lower:g}", where=f"{part.path}.upper"
-        )
+    lower: Any
+    upper: Any
+
+    def check_values(self) -> None:
+        """Refuse bounds the wrong way round, and none at all."""
+        lower, upper = self.lower, self.upper
+        if lower is None and upper is None:
+            raise ParameterError("it has no bound", where=self.path, advice="Give lower=, upper= or both.")
+        if None not in (lower, upper) and not lower < upper:
+            raise ParameterError(
+                f"the upper bound {upper:g} is not above the lower one, {lower:g}", where=f"{self.path}.upper"
+            )
+
+    def above(self, value: Scalar) -> Scalar:
+        """Return how far a value is above the lower bound; what never changes where there is none."""
+        return abs(self.upper) if self.lower is None else value - self.lower
+
+    def below(self, value: Scalar) -> Scalar:
+        """Return how far a value is below the upper bound; what never changes where there is none."""
+        return abs(self.lower) if self.upper is None else self.upper - value

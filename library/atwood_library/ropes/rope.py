@@ -23,6 +23,7 @@ from atwood import (
     parameter,
     signal,
 )
+from atwood_library.interfaces.spans import rate_of_span
 
 
 class Rope(Component):
@@ -86,14 +87,7 @@ class Rope(Component):
     def speed_at(self, number: int) -> Scalar:
         """Return how fast the rope runs over a pulley, towards the side of a."""
         stops = [self.a, *self.over, self.b]
-        return sum_up([self.rate_of_span(p, q, "velocity") for p, q in pairwise(stops[: number + 2])])
-
-    def rate_of_span(self, p: Point, q: Point, of: str) -> Scalar:
-        """Return the rate of a piece's length, of velocities; on a line also the second one, of accelerations."""
-        apart = getattr(q, of) - getattr(p, of)
-        if self.on_a_line:
-            return dot(apart, self.line) * self.side(p, q, None)
-        return dot(apart, q.position - p.position) / self.distance(p, q)
+        return sum_up([rate_of_span(self, p, q) for p, q in pairwise(stops[: number + 2])])
 
     @event(modes=("taut",), direction=-1, unit="N", target="when_slack", message="the rope has gone slack")
     def goes_slack(self) -> Scalar:
@@ -140,7 +134,7 @@ class Rope(Component):
         """Return the tension at b, and what speeds the pulleys up."""
         stops = [self.a, *self.over, self.b]
         rates = [
-            sum_up([self.rate_of_span(p, q, "acceleration") for p, q in pairwise(stops[: number + 2])])
+            sum_up([rate_of_span(self, p, q, "acceleration") for p, q in pairwise(stops[: number + 2])])
             for number in range(self.pulleys)
         ]
         return self.reaction("tension") + (self.pulley_inertia * sum_up(rates) if rates else 0.0)
