@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from atwood_library.blocks.state_space import StateSpace as StateSpace
     from atwood_library.blocks.transfer_function import TransferFunction as TransferFunction
     from atwood_library.contacts.ball_contact import BallContact as BallContact
+    from atwood_library.contacts.ball_pair_contact import BallPairContact as BallPairContact
     from atwood_library.contacts.box_contact import BoxContact as BoxContact
     from atwood_library.contacts.distance_contact import DistanceContact as DistanceContact
     from atwood_library.contacts.lossy_gear import LossyGear as LossyGear
@@ -143,6 +144,7 @@ _MODULES = {
     "Add": "blocks.add",
     "AngleSensor": "sensors.angle_sensor",
     "BallContact": "contacts.ball_contact",
+    "BallPairContact": "contacts.ball_pair_contact",
     "Bar": "parts.bar",
     "Blade": "joints.blade",
     "Box": "parts.box",

@@ -16,7 +16,23 @@ from atwood import (
     unilateral,
 )
 
-__all__ = ["Touching"]
+__all__ = ["Touching", "across"]
+
+_FIRST, _SECOND, _FROM = Vector(0.8, 0.0, -0.6), Vector(-0.36, 0.8, -0.48), Vector(0.48, 0.6, 0.64)
+"""A right-handed triad along which no scene lies: directions across a normal have no limit opposite to its last."""
+
+
+def across(normal: Vector) -> tuple[Vector, Vector]:
+    """Return two directions across a unit normal in space: those of a triad that is turned there the shortest way.
+
+    Parameters
+    ----------
+    normal
+        In any axes; the directions are in the same.
+    """
+    both = (_FROM + normal) / (1.0 + dot(_FROM, normal))
+    first, second = (one - both * dot(one, normal) for one in (_FIRST, _SECOND))
+    return first, second
 
 
 class Touching(Component):
