@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 from atwood import Component, Scalar
 from atwood_library.interfaces.along_coordinates import between
@@ -21,7 +21,7 @@ class Rubbing(Component):
     viscous: Any
     peak: Any
     level: Any
-    slip_direction: Any
+    slip_direction: ClassVar[Any]
 
     def largest(self) -> Scalar:
         """Return the friction while it slips."""

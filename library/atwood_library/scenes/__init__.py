@@ -19,12 +19,15 @@ if TYPE_CHECKING:
     from atwood_library.scenes.bead_on_surface import BeadOnSurface as BeadOnSurface
     from atwood_library.scenes.bead_on_wire import BeadOnWire as BeadOnWire
     from atwood_library.scenes.benchmark_bicycle import BenchmarkBicycle as BenchmarkBicycle
+    from atwood_library.scenes.billiards import Billiards as Billiards
+    from atwood_library.scenes.bouncing_ball import BouncingBall as BouncingBall
     from atwood_library.scenes.bricard import Bricard as Bricard
     from atwood_library.scenes.car_axis import CarAxis as CarAxis
     from atwood_library.scenes.cart_pole import CartPole as CartPole
     from atwood_library.scenes.chain import Chain as Chain
     from atwood_library.scenes.chaplygin_sleigh import ChaplyginSleigh as ChaplyginSleigh
     from atwood_library.scenes.charged_particle import ChargedParticle as ChargedParticle
+    from atwood_library.scenes.clutches import Clutches as Clutches
     from atwood_library.scenes.double_atwood import DoubleAtwood as DoubleAtwood
     from atwood_library.scenes.double_cardan_twice import DoubleCardanTwice as DoubleCardanTwice
     from atwood_library.scenes.double_pendulum import DoublePendulum as DoublePendulum
@@ -46,6 +49,7 @@ if TYPE_CHECKING:
     from atwood_library.scenes.lagrange_top import LagrangeTop as LagrangeTop
     from atwood_library.scenes.mass_spring_chain import MassSpringChain as MassSpringChain
     from atwood_library.scenes.n_body import NBody as NBody
+    from atwood_library.scenes.newtons_cradle import NewtonsCradle as NewtonsCradle
     from atwood_library.scenes.oscillators import Oscillators as Oscillators
     from atwood_library.scenes.overhead_crane import OverheadCrane as OverheadCrane
     from atwood_library.scenes.pendulum_on_cart import PendulumOnCart as PendulumOnCart
@@ -53,6 +57,7 @@ if TYPE_CHECKING:
     from atwood_library.scenes.quarter_car import QuarterCar as QuarterCar
     from atwood_library.scenes.rattleback import Rattleback as Rattleback
     from atwood_library.scenes.rigid_bodies import RigidBodies as RigidBodies
+    from atwood_library.scenes.rocking_block import RockingBlock as RockingBlock
     from atwood_library.scenes.rolling_ball import RollingBall as RollingBall
     from atwood_library.scenes.rolling_disc import RollingDisc as RollingDisc
     from atwood_library.scenes.rotating_frame import RotatingFrame as RotatingFrame
@@ -65,6 +70,7 @@ if TYPE_CHECKING:
     from atwood_library.scenes.spatial_slider_crank import SpatialSliderCrank as SpatialSliderCrank
     from atwood_library.scenes.spherical_pendulum import SphericalPendulum as SphericalPendulum
     from atwood_library.scenes.stewart_platform import StewartPlatform as StewartPlatform
+    from atwood_library.scenes.stick_slip import StickSlip as StickSlip
     from atwood_library.scenes.strandbeest import Strandbeest as Strandbeest
     from atwood_library.scenes.swinging_atwood import SwingingAtwood as SwingingAtwood
     from atwood_library.scenes.trebuchet import Trebuchet as Trebuchet
@@ -72,6 +78,7 @@ if TYPE_CHECKING:
     from atwood_library.scenes.two_body import TwoBody as TwoBody
     from atwood_library.scenes.universal_shaft import UniversalShaft as UniversalShaft
     from atwood_library.scenes.wilberforce_pendulum import WilberforcePendulum as WilberforcePendulum
+    from atwood_library.scenes.woodpecker import Woodpecker as Woodpecker
 
 _CLASSES = {
     "simple-pendulum": "SimplePendulum",
@@ -133,6 +140,13 @@ _CLASSES = {
     "cart-pole": "CartPole",
     "quarter-car": "QuarterCar",
     "furuta-pendulum": "FurutaPendulum",
+    "bouncing-ball": "BouncingBall",
+    "newtons-cradle": "NewtonsCradle",
+    "woodpecker": "Woodpecker",
+    "rocking-block": "RockingBlock",
+    "clutches": "Clutches",
+    "stick-slip": "StickSlip",
+    "billiards": "Billiards",
 }
 """The class of each scene by the name that the command line knows it by."""
 

@@ -272,7 +272,8 @@ def _contradiction(
         f, a = [forces[i] / pushes for i in unit.rows], [motions[i] / moves for i in unit.rows]
         side = contacts.sides[is_back(state[1] if state[0] == GOES_ON else tuple(-x for x in f))]
         limit, static = (one / pushes for one in _limits(side, k, forces))
-        for miss, other in _misses(unit, state, f, a, limit, static, any(side[1][k])):
+        by = max(contacts.response[i][i] for i in unit.rows) * pushes / moves
+        for miss, other in _misses(unit, state, f, a, limit, static, any(side[1][k]), by):
             if miss > worst:
                 worst, number, better = miss, k, other
     return number, better
@@ -286,11 +287,19 @@ def _limits(side: _Side, k: int, forces: Sequence[float]) -> tuple[float, float]
 
 
 def _misses(
-    unit: Unit, state: State, f: Sequence[float], a: Sequence[float], limit: float, static: float, reads: bool
+    unit: Unit,
+    state: State,
+    f: Sequence[float],
+    a: Sequence[float],
+    limit: float,
+    static: float,
+    reads: bool,
+    by: float,
 ) -> Iterator[tuple[float, State]]:
     """Yield by how much a state contradicts each law, and the state that does not.
 
-    A limit that reads forces is zero now and then, and what has it rubs all the same.
+    A limit that reads forces is zero now and then, and what has it rubs all the same. A direction is turned towards
+    that of the motion as an augmented Lagrangian turns it, by what the limit itself moves: lest it swings.
     """
     none = (0.0,) * len(f)
     if not unit.is_slip:
@@ -319,7 +328,7 @@ def _misses(
             return
         size = math.hypot(*a)
         across = math.hypot(*(x - along * d for x, d in zip(a, state[1], strict=True)))
-        turned = [x / size + d for x, d in zip(a, state[1], strict=True)]  # half the way, lest it swings
+        turned = [x / max(size, limit * by) + d for x, d in zip(a, state[1], strict=True)]
         yield across, (GOES_ON, tuple(x / math.hypot(*turned) for x in turned))
         return
     yield max(limit, static, float(reads)), (GOES_ON, unit.given) if unit.is_given else (STICKS, none)
