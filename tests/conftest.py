@@ -38,22 +38,53 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Keep a sample of the variants of each test with the mark, unless all are wanted or one was asked for by name.
+    """Keep a sample of the variants of each test, unless all are wanted or one was asked for by name.
 
-    The order of hashes decides: it picks from all parameters of a test alike, and is the same in every process.
+    Of a test over several parameters each value of each one stays, with some of the others; a mark says of how many
+    variants a sample is.
     """
     if config.getoption("--all") or any("::" in argument for argument in config.args):
         return
     variants: defaultdict[str, list[pytest.Item]] = defaultdict(list)
     for item in items:
-        if item.get_closest_marker("sample"):
-            variants[item.nodeid.partition("[")[0]].append(item)
+        variants[item.nodeid.partition("[")[0]].append(item)
     left_out: set[pytest.Item] = set()
     for found in variants.values():
         mark = found[0].get_closest_marker("sample")
-        assert mark is not None
-        ordered = sorted(found, key=lambda item: hashlib.sha256(item.nodeid.encode()).digest())
-        left_out.update(ordered[mark.args[0] :])
+        if mark is not None or len(found) > 1:
+            ordered, needed = _spread(found)
+            left_out.update(ordered[needed if mark is None else mark.args[0] :])
     if left_out:
         config.hook.pytest_deselected(items=[item for item in items if item in left_out])
         items[:] = [item for item in items if item not in left_out]
+
+
+def _spread(items: list[pytest.Item]) -> tuple[list[pytest.Item], int]:
+    """Return variants in the order in which they say most that is new, and how many have each value of each parameter.
+
+    Among equals the order of hashes decides: it is the same in every process.
+    """
+    left = sorted(items, key=lambda item: hashlib.sha256(item.nodeid.encode()).digest())
+    values = {item: _values(item) for item in items}
+    seen: set[tuple[int, ...]] = set()
+    ordered: list[pytest.Item] = []
+    needed = 0
+    while left:
+        best = max(left, key=lambda item: len(values[item] - seen))
+        if values[best] <= seen:
+            needed = needed or len(ordered)
+            break
+        left.remove(best)
+        ordered.append(best)
+        seen |= values[best]
+    return [*ordered, *left], len(ordered)
+
+
+def _values(item: pytest.Item) -> set[tuple[int, ...]]:
+    """Return what a variant is one of: what is said together counts as one value."""
+    params = dict(item.callspec.params) if hasattr(item, "callspec") else {}
+    said = [mark.kwargs.get("argnames") or mark.args[0] for mark in item.iter_markers("parametrize")]
+    together = [one.replace(",", " ").split() if isinstance(one, str) else one for one in said]
+    groups = [(number, [params.pop(name) for name in names if name in params]) for number, names in enumerate(together)]
+    groups += [(number, [one]) for number, one in enumerate(params.values(), len(groups))]
+    return {(number, *map(id, made)) for number, made in groups}

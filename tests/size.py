@@ -11,8 +11,9 @@ import io
 import re
 import sys
 import tokenize
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -30,6 +31,7 @@ _NO_CODE = {
 }
 _LLVM = ("getelementptr", "define ", " phi ", "fadd ", "load double", "load ptr", "br i1", "br label")
 SOLVERS = ("ida", "ida-sundae", "explicit", "tsitouras", "taylor", "gauss", "composition")
+_FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 _ALGEBRA = {"svd", "matrix_rank", "lstsq", "pinv"}
 
 
@@ -50,11 +52,11 @@ class Size:
         return Size(*(a + b for a, b in zip(vars(self).values(), vars(other).values(), strict=True)))
 
 
-def code_lines(text: str) -> int:
+def code_lines(text: str, nodes: Sequence[ast.AST] | None = None) -> int:
     """Return how many lines of a source have code."""
     said = {
         line
-        for node in ast.walk(ast.parse(text))
+        for node in nodes or nodes_of(text)
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
         for line in range(node.lineno, (node.end_lineno or node.lineno) + 1)
     }
@@ -65,50 +67,56 @@ def code_lines(text: str) -> int:
     return len(code - said)
 
 
-def strings(tree: ast.AST) -> Iterator[str]:
-    """Yield the strings of a source that are no docstrings."""
-    said = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-    for node in ast.walk(tree):
+def strings(nodes: Sequence[ast.AST]) -> Iterator[str]:
+    """Yield the strings among the nodes of a source that are no docstrings."""
+    said = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
+    for node in nodes:
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in said:
             yield node.value
 
 
-def names_solver(tree: ast.AST) -> bool:
+def names_solver(nodes: Sequence[ast.AST]) -> bool:
     """Tell whether a string of a source is the name of a solver, or has one in quotes."""
-    return any(one == name or f"'{name}'" in one for one in strings(tree) for name in SOLVERS)
+    return any(one == name or f"'{name}'" in one for one in strings(nodes) for name in SOLVERS)
 
 
+def writes_llvm(text: str, nodes: Sequence[ast.AST] | None = None) -> bool:
+    """Tell whether a source has the language of LLVM in its strings."""
+    words = [word for word in _LLVM if word in text]
+    return bool(words) and any(word in one for one in strings(nodes or nodes_of(text)) for word in words)
+
+
+@cache
+def nodes_of(text: str) -> list[ast.AST]:
+    """Return the nodes of a source, outer ones first."""
+    return list(ast.walk(ast.parse(text)))
+
+
+@cache
 def size(path: Path) -> Size:
     """Return what is counted of a file."""
     text = path.read_text(encoding="utf-8")
-    tree = ast.parse(text)
-    functions = [node for node in ast.walk(tree) if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))]
-    inner = {
-        id(node)
-        for function in functions
-        for node in ast.walk(function)
-        if isinstance(node, (ast.Import, ast.ImportFrom))
-    }
+    nodes = nodes_of(text)
+    tree = nodes[0]
+    assert isinstance(tree, ast.Module)
+    within = [(node.lineno, node.end_lineno or 0) for node in nodes if isinstance(node, _FUNCTIONS)]
+    imports = [node.lineno for node in nodes if isinstance(node, (ast.Import, ast.ImportFrom)) and node.col_offset]
     listed = [
         node.value
         for node in tree.body
         if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "__all__"
     ]
     exported = sum(len(one.elts) for one in listed if isinstance(one, (ast.List, ast.Tuple)))
-    called = {
-        getattr(node.func, "attr", getattr(node.func, "id", ""))
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Call)
-    }
+    called = {getattr(node.func, "attr", getattr(node.func, "id", "")) for node in nodes if isinstance(node, ast.Call)}
     return Size(
-        code=code_lines(text),
+        code=code_lines(text, nodes),
         lines=len(text.splitlines()),
         files=1,
-        inner_imports=len(inner),
+        inner_imports=sum(any(first < line <= last for first, last in within) for line in imports),
         exported=exported,
-        llvm=int(any(word in one for one in strings(tree) for word in _LLVM)),
+        llvm=int(writes_llvm(text, nodes)),
         algebra=int(bool(called & _ALGEBRA)),
-        solvers=int(names_solver(tree)),
+        solvers=int(names_solver(nodes)),
     )
 
 

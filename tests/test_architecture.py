@@ -13,7 +13,7 @@ import pytest
 
 from atwood.integrators.methods import METHODS
 
-from .size import SOLVERS, by_room, measured, names_solver, stated
+from .size import SOLVERS, by_room, measured, names_solver, nodes_of, stated
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE = ROOT / "src" / "atwood"
@@ -86,7 +86,7 @@ def test_functions_are_short() -> None:
     long = {
         f"{name}:{node.name}"
         for name, text in SOURCES.items()
-        for node in ast.walk(ast.parse(text))
+        for node in nodes_of(text)
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)) and length(node) > LONGEST_FUNCTION
     }
     assert not long, f"split what does more than one thing: {sorted(long)}"
@@ -97,7 +97,7 @@ def test_ranks_and_least_norm_solutions_are_decided_in_one_room() -> None:
     own = {
         name
         for name, text in SOURCES.items()
-        for node in ast.walk(ast.parse(text))
+        for node in nodes_of(text)
         if isinstance(node, ast.Call)
         and getattr(node.func, "attr", getattr(node.func, "id", "")) in {"svd", "matrix_rank", "lstsq", "pinv"}
     }
@@ -107,7 +107,7 @@ def test_ranks_and_least_norm_solutions_are_decided_in_one_room() -> None:
 
 def test_solvers_are_named_in_their_records_alone() -> None:
     """Whoever else needs to know one of a method asks its record."""
-    named = {name for name, text in SOURCES.items() if names_solver(ast.parse(text))}
+    named = {name for name, text in SOURCES.items() if names_solver(nodes_of(text))}
     assert {name for name in named if not name.startswith("integrators/methods/")} == set()
     assert set(SOLVERS) == set(METHODS)
 

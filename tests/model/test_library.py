@@ -123,8 +123,8 @@ class Numbers:
         if self.kind == "expression":
             return evaluate([self.graph.convert(made)], {self.graph.symbol(k): v for k, v in self.values.items()})[0]
         if self.kind == "sympy":
-            known = {sympy.Symbol(name, real=True): value for name, value in self.values.items()}
-            return float(sympy.sympify(made).subs(known))
+            known = {sympy.Symbol(name, real=True): sympy.Float(value) for name, value in self.values.items()}
+            return float(sympy.sympify(made).xreplace(known))
         return float(made)
 
 

@@ -146,6 +146,7 @@ def crossed(start: Mapping[str, float] | None = None) -> Scene:
     return scene
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_joints_that_let_nothing_move_are_named(form: str) -> None:
     spare = r"joint\.bearing: nothing can move.*4 of their constraints to spare"

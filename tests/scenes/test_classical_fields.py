@@ -62,6 +62,7 @@ def test_a_cycloid_has_one_period_for_every_amplitude(form: str, away: float) ->
     assert np.ptp(exact) > 1.9 * away
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_a_circle_is_a_pendulum_and_a_helix_an_incline(form: str) -> None:
     circle = run("bead-on-wire", form, shape="circle", away=1.2)
@@ -73,6 +74,7 @@ def test_a_circle_is_a_pendulum_and_a_helix_an_incline(form: str) -> None:
     assert gap(helix.array("wire.parameter"), 1.0 - 0.5 * fall * helix.time**2) < 1e-8 * 0.5 * fall * 25.0
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_a_wire_that_turns_about_the_vertical_keeps_its_jacobi_integral(form: str) -> None:
     result = run("bead-on-wire", form, shape="parabola", rate=2.5)
@@ -82,6 +84,7 @@ def test_a_wire_that_turns_about_the_vertical_keeps_its_jacobi_integral(form: st
     assert np.ptp(result.energy.kinetic + result.energy.potential) > 0.1
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_a_wire_that_turns_about_the_horizontal_keeps_neither(form: str) -> None:
     # H = T2 - T0 + V with V = m g z cos(omega t) for z up in the wire's frame: dH/dt = dV/dt explicitly

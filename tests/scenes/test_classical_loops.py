@@ -16,6 +16,7 @@ def gap(a: object, b: object) -> float:
     return float(np.max(np.abs(np.asarray(a) - np.asarray(b))))
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("name", "freedom"),
     [
@@ -77,6 +78,7 @@ def test_the_car_axis_meets_its_reference(form: str) -> None:
         assert at[path] == pytest.approx(value, abs=1e-8 if "position" in path else 1e-7), path
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_a_double_cardan_shaft_turns_evenly(form: str) -> None:
     scene = SCENES["double-cardan-twice"]()
@@ -108,6 +110,7 @@ def test_the_lift_goes_straight_up(form: str) -> None:
     assert result.energy.max_drift < 1e-8
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_feet_are_where_circles_meet(form: str) -> None:
     scene = SCENES["strandbeest"]()

@@ -56,6 +56,7 @@ VARIANTS: list[tuple[str, dict[str, object], float]] = [
 ]
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("name", "settings", "bound"), VARIANTS)
 def test_closed_forms(name: str, settings: dict[str, object], bound: float, form: str) -> None:
@@ -205,6 +206,7 @@ def test_a_trolley_that_starts_makes_the_load_hang_back() -> None:
     assert np.min(angle) == pytest.approx(-2.0 * math.atan(0.5 / 9.81), rel=1e-3)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_a_trebuchet_keeps_its_energy_and_throws_a_parabola(form: str) -> None:
     scene = SCENES["trebuchet"](t_end=1.6)

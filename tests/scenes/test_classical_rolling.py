@@ -119,6 +119,7 @@ def shell(scene: Scene, t: np.ndarray) -> np.ndarray:
     return np.asarray(solve_ivp(rates, (0.0, t[-1]), start, "DOP853", t, rtol=1e-13, atol=1e-13).y)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_a_ball_in_a_shell_and_its_twin(form: str) -> None:
     scene = SCENES["ball-in-shell"](t_end=3.0)
@@ -132,6 +133,7 @@ def test_a_ball_in_a_shell_and_its_twin(form: str) -> None:
     assert np.min(result.array("contact.normal_force")) > 0.0
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("shape", ["sphere", "cylinder"])
 def test_a_ball_that_swings_in_a_bowl_is_a_pendulum(form: str, shape: str) -> None:

@@ -36,6 +36,7 @@ from ..helpers.runs import EVERYDAY, FORMS
 UNDRIVEN = [name for name in EVERYDAY if name != "driven-pendulum"]
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("name", UNDRIVEN)
 def test_energy_of_undriven_scenes(name: str, form: str) -> None:
@@ -172,6 +173,7 @@ def test_index_one_drifts_and_says_so() -> None:
     assert np.max(np.abs(np.hypot(x, z) - 1.0)) > 1e-7
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", ["double-pendulum", "four-bar", "double-atwood", "driven-pendulum"])
 @pytest.mark.parametrize("level", ["index1", "index1-projected"])
 def test_every_level_gives_the_same_motion(name: str, level: str) -> None:
@@ -182,6 +184,7 @@ def test_every_level_gives_the_same_motion(name: str, level: str) -> None:
         assert np.max(np.abs(result.array(path) - expected)) < 1e-5 * max(1.0, np.max(np.abs(expected))), path
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("form", "level"), [("reduced", "ggl"), ("dae", "ggl"), ("dae", "index1"), ("dae", "index1-projected")]
 )

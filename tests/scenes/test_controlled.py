@@ -86,6 +86,7 @@ def furuta_by_hand(scene: FurutaPendulum) -> Any:
     return rates
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_furutas_pendulum_by_lagranges_equations(form: str) -> None:
     scene = FurutaPendulum()

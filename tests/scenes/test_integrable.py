@@ -113,6 +113,7 @@ def upright() -> Scene:
     return scene
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_a_disc_that_is_kept_upright_has_one_freedom(form: str) -> None:
     made = simulate(upright(), form=form, rtol=1e-11)

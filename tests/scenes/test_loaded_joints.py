@@ -87,7 +87,7 @@ def on_carrier(name: str) -> Scene:
     return scene
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", LOADS)
 def test_both_forms_agree_and_the_energy_ledger_closes(name: str) -> None:
     scene = on_carrier(name)
@@ -183,6 +183,7 @@ def test_each_hinge_of_a_cross_has_its_own_spring_and_motor() -> None:
     assert_allclose(motor["joint.rate_a"], 0.5 * motor.time, atol=1e-9)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     ("joint", "body", "start", "path", "stop", "stiffness", "inertia"),
     [

@@ -76,6 +76,7 @@ def runs() -> dict[str, tuple[ExactTop, Result]]:
 MOTIONS = ("cusps", "loops", "waves", "steady")
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_a_top_keeps_its_constants_over_a_hundred_nutations(runs: Any, motion: str) -> None:
     exact, result = runs[motion]

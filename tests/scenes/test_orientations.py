@@ -90,6 +90,7 @@ def top(**settings: float) -> Scene:
     return scene
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("solver", ["ida", "ida-sundae", "explicit"])
 def test_every_method_agrees_with_taylor_series(solver: str) -> None:
     paths = ("body.position.x", "body.x_axis.y", "body.spin.z", "body.kinetic_energy", "ball.force.x")

@@ -133,6 +133,7 @@ def test_every_scene_in_a_plane_or_on_a_line_is_here() -> None:
     assert set(RECORDED) == {name for name, make in SCENES.items() if make().space != "space"}
 
 
+@pytest.mark.sample(12)
 @pytest.mark.parametrize("name", [*RECORDED, *LARGER])
 def test_states_and_operations_are_those_recorded(name: str) -> None:
     make, recorded = LARGER[name] if name in LARGER else (SCENES[name], RECORDED[name])

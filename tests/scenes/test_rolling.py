@@ -68,7 +68,7 @@ def _rates(state: Any) -> tuple[float, float, float]:
 # -- the disc ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("form", "solver", "rtol", "error"),
     [
@@ -167,6 +167,7 @@ def test_upright_rolling_is_stable_when_it_is_fast(share: float, is_stable: bool
 # -- the ball ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("form", "rtol", "error"), [("reduced", 1e-12, 1e-10), ("dae", 1e-12, 2e-9)])
 def test_a_ball_on_a_turntable_goes_round_at_two_sevenths(form: str, rtol: float, error: float) -> None:
     made = simulate(RollingBall(spin=0.7), form=form, rtol=rtol, t_end=6.0)
@@ -289,6 +290,7 @@ def test_a_disc_that_starts_flat_is_named(form: str) -> None:
         simulate(scene, form=form)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("orientation", ["euler-yxz", "euler-zyz"])
 def test_three_coordinates_of_orientation_do_as_well(orientation: str) -> None:
     made = simulate(assemble(tumbling(), orientation=orientation), rtol=1e-12, outputs=11)

@@ -20,6 +20,7 @@ def runs() -> dict[str, tuple[Result, Result]]:
     return {name: run_both(make, rtol=TIGHT, outputs=41) for name, make in SCENES.items() if name in EVERYDAY}
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("name", EVERYDAY)
 def test_both_forms_agree_at_every_quantity(runs: dict[str, tuple[Result, Result]], name: str) -> None:
     reduced, dae = runs[name]
@@ -196,6 +197,7 @@ def test_degrees_of_freedom_and_states() -> None:
         assert (freedom, 2 * len(equations.coordinates)) == expected[name], name
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", EVERYDAY)
 def test_every_scene_is_a_part_like_any_other(name: str) -> None:
     outer = Scene(space="line", line_axis=(0.0, 0.0, 1.0)) if "atwood" in name else Scene(space="line")

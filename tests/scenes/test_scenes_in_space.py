@@ -81,7 +81,7 @@ def test_every_scene_in_space_is_here() -> None:
     assert set(SIZES) == {name for name, make in SCENES.items() if make().space == "space"}
 
 
-@pytest.mark.sample(11)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", SIZES)
 def test_as_few_states_as_by_hand(name: str) -> None:
     coordinates, speeds, _, freedom = SIZES[name]
@@ -170,6 +170,7 @@ def test_bricard_moves_as_it_should(form: str) -> None:
     assert len(found.redundant) == 1
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_stiff_governor(form: str) -> None:
     result = simulate(FlyballGovernor(), form=form, rtol=1e-9, t_end=0.5, outputs=6)

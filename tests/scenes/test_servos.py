@@ -31,6 +31,7 @@ def stiffness(name: str) -> float:
     return found
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", CASES)
 def test_the_error_stays_below_the_force_over_the_stiffness(name: str) -> None:
     choice, load, numbers = CASES[name]

@@ -10,7 +10,7 @@ from atwood_library.scenes import SCENES
 from ..helpers.runs import EVERYDAY
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 @pytest.mark.parametrize("name", EVERYDAY)
 def test_both_drivers_agree(name: str, form: str) -> None:
@@ -31,6 +31,7 @@ def test_an_unknown_solver_is_refused() -> None:
         simulate(SCENES["atwood"](), solver="ida-sundea")
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", [name for name in EVERYDAY if name not in ("four-bar", "slider-crank")])
 def test_the_explicit_method_agrees(name: str) -> None:
     scene = SCENES[name]()

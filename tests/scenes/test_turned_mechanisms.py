@@ -131,7 +131,7 @@ def three_cranks(place: tuple[float, ...], length: float, mass: float, order: tu
     return scene
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("place", "length", "mass", "order", "prefix"),
     [

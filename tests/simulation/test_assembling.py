@@ -44,6 +44,7 @@ def open_four_bar(gap: float, scale: float = 1.0) -> FourBar:
     return scene
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_the_gap_of_a_four_bar_is_what_its_links_lack(form: str) -> None:
     with pytest.raises(StartError, match=r"the loop cannot be closed.* is 0\.1 m") as caught:
@@ -53,6 +54,7 @@ def test_the_gap_of_a_four_bar_is_what_its_links_lack(form: str) -> None:
     assert "right.position.x = 5.5 m (it is 5.6 m)" in caught.value.advice
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("scale", [1e-3, 1e3])
 def test_gaps_are_of_the_size_of_the_scene(scale: float) -> None:
     with pytest.raises(StartError, match=f"found is {0.1 * scale:.4g} m"):
@@ -170,6 +172,7 @@ def test_which_way_round_is_known_of_every_joint(kind: type[Component], is_turne
             assert wrong == ["second"]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("size", [1e-9, 1e6])
 def test_gaps_are_seen_in_scenes_of_any_size(size: float) -> None:
     scene = Scene()

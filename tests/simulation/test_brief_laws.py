@@ -79,6 +79,7 @@ def impulse(force: Any, at: float, width: float) -> tuple[float, float]:
     return sum(quad(lambda t: (10.0 - t) * force(t), a, b, epsabs=1e-14)[0] for a, b in pairs), speed
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("solver", ALL)
 @pytest.mark.parametrize(("width", "height"), [(0.1, 0.45), (1e-4, 0.45), (1e-3, -3.0)])
 def test_a_narrow_hill_or_well_is_crossed(solver: str, width: float, height: float) -> None:
@@ -146,6 +147,7 @@ def test_a_bump_of_the_road_under_a_mass_at_rest_is_felt(form: str, solver: str)
     assert result["mass.displacement"][-1] == pytest.approx(expected, abs=1e-6)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("solver", ALL)
 def test_what_turns_back_within_a_narrow_wall_has_its_speed_again(solver: str) -> None:
     result = simulate(on_a_line("1e3*exp(-500*(3-x))"), solver=solver)
@@ -172,6 +174,7 @@ def test_a_ridge_across_the_way_is_felt_whatever_its_direction_and_size(form: st
     assert result["mass.position.x"][-1] / scale == pytest.approx(along * c, abs=1e-6)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("solver", ALL)
 def test_what_passes_close_by_a_centre_is_turned_away(solver: str) -> None:
     near = 1e-3
@@ -235,7 +238,7 @@ UNEVEN = {
 }
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("solver", ["gauss", "composition"])
 @pytest.mark.parametrize("potential", UNEVEN)
 def test_steps_of_fixed_length_see_corners_and_waves_farther_on(solver: str, potential: str) -> None:
@@ -274,6 +277,7 @@ CHOICES = {
 }
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("solver", ALL)
 @pytest.mark.parametrize("potential", CHOICES)
 def test_a_curved_function_of_a_choice_or_an_arc_holds_no_run_up(solver: str, potential: str) -> None:
@@ -292,7 +296,7 @@ LARGE = {
 }
 
 
-@pytest.mark.sample(7)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("solver", ["auto", "explicit", "ida", "gauss", "composition"])
 @pytest.mark.parametrize("potential", LARGE)
 def test_a_divisor_or_a_factor_too_large_for_a_number_is_no_bar(solver: str, potential: str) -> None:
@@ -353,6 +357,7 @@ class Pushed(Component):
         return [Load(self.point, force=atwood.Vector(external(SLOPE, self.point.position.x), 0.0, 0.0))]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.filterwarnings("ignore:.*is evaluated in Python")
 @pytest.mark.parametrize("solver", ["explicit", "ida", "ida-sundae"])
 def test_functions_in_python_are_sampled_and_that_is_said(solver: str) -> None:

@@ -74,6 +74,7 @@ def swinging(share: Any, space: str, part: type[Component] = BurningBody) -> Sce
     return scene
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("form", "space"), [("reduced", "plane"), ("dae", "plane"), ("reduced", "space"), ("dae", "space")]
 )
@@ -142,6 +143,7 @@ def rigid() -> Component:
     return RigidBody(mass=2.0, center=(0.3, 0.0, 0.0), moments=(0.16, 0.2, 0.3))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_a_lagrangian_of_a_body_is_a_rigid_body(form: str) -> None:
     runs = [
@@ -163,6 +165,7 @@ def wheel(part: Callable[[], Component], space: str, speed: float) -> Scene:
     return scene
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(("form", "space"), CASES)
 def test_a_moment_of_inertia_that_depends_on_the_angle(form: str, space: str) -> None:
     result = simulate(wheel(CrankInertia, space, 2.0), form=form, t_end=3.0, rtol=1e-11, outputs=31)

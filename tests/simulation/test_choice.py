@@ -97,7 +97,7 @@ def solvers(result: Result) -> list[str]:
     return [one.solver for one in result.run.choices]
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", SCENES)
 def test_each_scene_is_given_to_what_suits_it(name: str) -> None:
     scene = SCENES[name]()
@@ -125,6 +125,7 @@ def test_what_is_to_be_seen_of_index_1_is_left_to_ida() -> None:
         assert solvers(result) == ["ida"]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", SMOOTH)
 def test_very_accurate_answers_come_from_taylor_series(name: str) -> None:
     scene = SCENES[name]()
@@ -253,6 +254,7 @@ def test_the_fallback_is_announced(monkeypatch: pytest.MonkeyPatch) -> None:
     assert solvers(simulate(SCENES["double-pendulum"](), t_end=0.1, outputs=3)) == ["explicit"]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("solver", ["explicit", "auto"])
 def test_a_long_chain_does_not_fly_apart_at_a_loose_tolerance(solver: str) -> None:
     """At 0.1 its steps became too small to move the time, at 0.53 s."""

@@ -77,7 +77,7 @@ CASES: dict[str, tuple[Callable[[], Scene], str]] = {
 }
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("solver", ["ida", "auto"])
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 @pytest.mark.parametrize("case", CASES)

@@ -40,6 +40,7 @@ def test_rising_and_falling_are_told_apart_and_units_are_read() -> None:
     assert np.all(result["rod.angular_velocity"][at] < 0.0)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(("form", "solver"), FORMS)
 def test_what_is_noted_changes_nothing_in_a_run(form: str, solver: str) -> None:
     plain = simulate(DoublePendulum(), t_end=2.0, form=form, solver=solver)

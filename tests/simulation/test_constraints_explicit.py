@@ -72,6 +72,7 @@ LOOPS_AND_CHAINS: dict[str, tuple[Any, str]] = {
 }
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("name", "t_end", "few", "many"),
     [("bricard", 1.0, 6, 16), ("four-bar", 0.5, 6, 16), ("chain", 0.5, 12, 32), ("bricard, dae", 1.0, 6, 12)],
@@ -140,6 +141,7 @@ def test_a_loop_moves_alike_wherever_it_stands(form: str, base: Any) -> None:
     assert_allclose(found, last(stands_on("bricard", *BASES[0]), "reduced", "hinge3.angle"), rtol=0.0, atol=1e-9)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_the_redundant_loop_of_bricard_keeps_its_relation_and_its_energy(form: str) -> None:
     result = simulate(moving_bricard(), form=form, t_end=5.0, rtol=1e-10, solver="explicit", outputs=60)
@@ -149,6 +151,7 @@ def test_the_redundant_loop_of_bricard_keeps_its_relation_and_its_energy(form: s
     assert [one.solver for one in result.run.choices] == ["explicit"]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_rolling_keeps_what_it_conserves(form: str) -> None:
     for scene in (RollingDisc(), BenchmarkBicycle()):
@@ -170,6 +173,7 @@ def test_ida_comes_to_the_same(scene: Scene, path: str, form: str) -> None:
     )
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_reactions_are_those_of_the_motion(form: str) -> None:
     """The tension of a pendulum's rod: m (g cos a + l w^2)."""
@@ -185,6 +189,7 @@ def test_reactions_are_those_of_the_motion(form: str) -> None:
     assert_allclose(loop.energy.total, other.energy.total, rtol=0.0, atol=1e-6)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_an_event_in_a_loop_is_found_at_its_time(form: str) -> None:
     ends = []

@@ -47,6 +47,7 @@ def test_a_crossing_takes_few_evaluations(form: str, most: int, calls: list[int]
     assert calls[0] <= 10 * most  # 55 and 111 before
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_reactions_of_redundant_constraints_are_found_for_all_samples_at_once(
     form: str, monkeypatch: pytest.MonkeyPatch

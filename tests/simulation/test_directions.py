@@ -47,7 +47,7 @@ def assert_alike(one: Result, other: Result, tolerance: float) -> None:
     assert not worst
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("solver", ["ida", "ida-sundae"])
 @pytest.mark.parametrize(("form", "level"), EVERY_FORM)
 @pytest.mark.parametrize("name", NAMES)

@@ -93,6 +93,7 @@ def test_all_parts_whose_events_happen_together_change(form: str, solver: str) -
     assert len(run.events) == 4
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize(("form", "solver"), WAYS)
 def test_samples_and_events_at_the_end_are_taken(form: str, solver: str) -> None:
     scene = with_a_clock(mover(1.0, -1.0), 0.0)

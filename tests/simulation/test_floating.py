@@ -59,6 +59,7 @@ def miss(result: Result, name: str = "p") -> float:
     return float(np.max(np.abs(distance(result, name) - exact)))
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 @pytest.mark.parametrize("space", ["line", "plane", "space"])
 @pytest.mark.parametrize("way", WAYS)

@@ -17,6 +17,7 @@ def turned(axis: np.ndarray, angle: float) -> np.ndarray:
     return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("seed", [4, 10, 14, 28])
 @pytest.mark.parametrize("size", [1.0, 1e-4])
 def test_a_chain_of_hinges_starts_where_its_bodies_are_said_to_be(seed: int, size: float) -> None:

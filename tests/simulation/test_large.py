@@ -57,7 +57,7 @@ SCENES = {
 }
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 @pytest.mark.parametrize("name", SCENES)
 def test_same_motion_and_forces(name: str, form: str, request: pytest.FixtureRequest) -> None:

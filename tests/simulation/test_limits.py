@@ -75,6 +75,7 @@ def test_a_crossing_is_left_when_the_time_is_used_up(looks: list[int]) -> None:
         assert late.count < 0.1 * crossing
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_a_run_without_time_for_its_start_has_nothing_and_says_so(form: str) -> None:
     with calls() as made:

@@ -64,6 +64,7 @@ def looped(kind: type[Plain]) -> Scene:
     return scene
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("solver", ["ida", "ida-sundae", "auto"])
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 @pytest.mark.parametrize("make", [hanging, looped])

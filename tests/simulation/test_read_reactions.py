@@ -99,6 +99,7 @@ def speed_squared(phi: np.ndarray) -> np.ndarray:
     return np.asarray(a * np.cos(phi) + b * np.sin(phi) + (4.0 - a) * np.exp(-k * phi))
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     ("rule", "form", "solver"), [("size", "reduced", "explicit"), *(("inwards", *way) for way in WAYS), ("size", *DAE)]
 )
@@ -152,6 +153,7 @@ def on_a_plane() -> Scene:
     return scene
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("make", [wedge, turning, on_a_plane, lambda: bead("smooth")])
 def test_both_forms_are_alike(make: Callable[[], Scene]) -> None:
     reduced, dae = run_both(make, t_end=0.4, rtol=1e-12, outputs=9)

@@ -61,7 +61,7 @@ def in_the_plane() -> np.ndarray:
     return motion(four_bar())
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("turned", "form", "solver"),
     [

@@ -94,6 +94,7 @@ def test_in_a_plane_an_axis_that_was_computed_is_the_normal() -> None:
     assert Pivot(axis=(math.cos(math.pi / 2.0), -1.0, 0.0)).axis == (0.0, -1.0, 0.0)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("angle", [0.3, 0.7, 1.1, 1.9])
 def test_a_plane_along_an_axis_holds_nothing_along_it(angle: float, form: str) -> None:

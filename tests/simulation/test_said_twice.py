@@ -130,7 +130,7 @@ RESTARTED = (
 )
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 @pytest.mark.parametrize("name", RESTARTED)
 def test_what_a_run_says_is_a_start(name: str, form: str) -> None:
@@ -146,7 +146,7 @@ def test_what_a_run_says_is_a_start(name: str, form: str) -> None:
         assert found[path][0] == pytest.approx(value, rel=1e-7, abs=1e-7), path
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 @pytest.mark.parametrize("name", [name for name in RESTARTED if name != "benchmark-bicycle"])
 def test_rounding_at_rest_is_no_contradiction(name: str, form: str) -> None:

@@ -165,6 +165,7 @@ class TestBands:
 
 
 class TestPotentials:
+    @pytest.mark.sample(4)
     @pytest.mark.parametrize(("form", "solver"), HAMILTONIAN)
     def test_an_edge_of_a_potential(self, form: str, solver: str) -> None:
         scene = moving(lambda x: absolute(x - 2.03), base=Hill)
@@ -189,6 +190,7 @@ class TestPotentials:
         result = simulate(scene, t_end=3.0, form=form, solver=solver, rtol=1e-9)
         assert result["bob.position.x"][-1] == pytest.approx(1.0 - (2.0 - math.pi / 100.0), abs=1e-6)
 
+    @pytest.mark.sample(5)
     @pytest.mark.parametrize(("form", "solver"), [one for one in HAMILTONIAN if one[1] != "taylor"])
     def test_a_law_without_a_value_behind_its_switch(self, form: str, solver: str) -> None:
         # A contact of Hertz: it lasts 2 d / v times the integral of 1 / sqrt(1 - s^(5/2)), at depth d at most.

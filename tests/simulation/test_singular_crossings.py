@@ -98,7 +98,7 @@ def test_rows_of_other_lengths_and_in_space(form: str, windows: int, space: str,
     assert np.max(np.abs(passed - [0.5 * np.pi, 1.5 * np.pi])) < 1e5 * rtol
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @needs_sundials
 @pytest.mark.parametrize("windows", [1, 2])
 @pytest.mark.parametrize("rtol", [1e-5, 1e-6, 1e-8])
@@ -121,6 +121,7 @@ def test_a_row_of_forty() -> None:
 # -- which way it goes -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sample(2)
 @needs_sundials
 @pytest.mark.parametrize(("form", "solver"), WAYS)
 @pytest.mark.parametrize("rtol", [1e-4, 1e-7, 1e-10])
@@ -154,7 +155,7 @@ def test_a_piston_passes_the_shaft_of_its_crank(form: str, rtol: float) -> None:
     assert np.max(np.abs(energy - energy[0])) < 3e3 * rtol
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @needs_sundials
 @pytest.mark.parametrize(("form", "solver"), WAYS)
 @pytest.mark.parametrize("longer", [1e-3, -1e-7, 4e-9])
@@ -226,6 +227,7 @@ def test_what_lies_behind_the_end_is_not_told() -> None:
         assert len(result.singular_crossings) == (end > 0.70845)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("outputs", [11, 201, 2001])
 def test_no_output_on_the_way_is_lost(outputs: int) -> None:
     for rtol in (1e-6, 1e-10):
@@ -241,7 +243,7 @@ def parallelogram_speed(start: float, turn: float) -> float:
     return math.sqrt(2.0 * 1.3 * 9.81 * (math.sin(turn) - math.sin(start)) / 1.2)
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(4)
 @needs_sundials
 @pytest.mark.parametrize(("form", "solver"), WAYS)
 @pytest.mark.parametrize("angle", [1e-2, 1e-3, 1e-5, -1e-4])
@@ -254,7 +256,7 @@ def test_a_start_near_the_place(form: str, solver: str, angle: float, rtol: floa
     assert np.max(np.abs(energy - energy[0])) < 1e3 * rtol
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("rtol", [1e-8, 1e-10])
 @pytest.mark.parametrize("t_end", [0.002, 0.02, 0.1])
 @pytest.mark.parametrize("angle", [1e-4, 1e-6, -1e-6, -1e-3])
@@ -354,6 +356,7 @@ class Gauge(Component):
         return self.point.acceleration
 
 
+@pytest.mark.sample(1)
 @needs_sundials
 @pytest.mark.parametrize("form", FORMS)
 def test_a_sample_at_the_very_place_is_a_good_one(form: str) -> None:
@@ -410,6 +413,7 @@ class Trip(Component):
         return self.frame.angle - self.angle
 
 
+@pytest.mark.sample(2)
 @needs_sundials
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("ahead", [0.05, -0.05, 0.2])

@@ -43,6 +43,7 @@ from atwood_library.scenes import (
 ORDERS = {2: (0.04, 0.02), 4: (0.1, 0.05), 6: (0.1, 0.05), 8: (0.2, 0.1), 10: (0.3, 0.2), 12: (0.4, 0.25)}
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("order", ORDERS)
 def test_the_order_is_that_of_the_method(order):
     scene, t = SimplePendulum(), np.linspace(0.0, 4.0, 41)
@@ -101,6 +102,7 @@ LONG = {
 }
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("case", LONG)
 def test_the_energy_error_does_not_grow(case):
     """Over a thousand periods; `benchmarks/symplectic.py` shows a hundred thousand."""
@@ -116,6 +118,7 @@ def test_the_energy_error_does_not_grow(case):
     assert first > 1e-12
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("scene", "path"),
     [

@@ -165,7 +165,7 @@ FORCES: dict[str, tuple[Function, Callable[[np.ndarray], np.ndarray]]] = {
 }
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(("form", "solver"), SOLVERS)
 @pytest.mark.parametrize("name", FORCES)
 def test_a_switch_is_exact_in_every_solver(name: str, form: str, solver: str) -> None:
@@ -300,6 +300,7 @@ def two_links(space: str, rotation: Function, size: float = 1.0, mass: float = 1
     return scene
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("space", "size", "mass"), [("plane", 1.0, 1.0), ("plane", 1e-3, 1e-6), ("space", 1e3, 1e6)])
 def test_a_motor_that_stops_at_once_is_the_same_impact_in_every_form_and_size(
     space: str, size: float, mass: float
@@ -328,6 +329,7 @@ def test_a_motor_that_jumps_is_refused_also_by_half_a_turn(form: str, space: str
     assert caught.value.where.startswith("drive.")
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("space", ["plane", "space"])
 def test_a_motor_in_a_loop_may_turn_back_at_once(space: str) -> None:
     def rows(form: str) -> np.ndarray:

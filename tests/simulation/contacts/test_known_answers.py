@@ -57,6 +57,7 @@ def start_at(scene: Scene, x: float, z: float, vx: float, vz: float) -> None:
     scene.start.update({"m.position.x": x, "m.position.z": z, "m.velocity.x": vx, "m.velocity.z": vz})
 
 
+@pytest.mark.sample(2)
 @FORMS
 @pytest.mark.parametrize("size", [1.0, 1e3, 1e-3])
 def test_a_ball_bounces_and_comes_to_rest(form: str, size: float) -> None:
@@ -71,6 +72,7 @@ def test_a_ball_bounces_and_comes_to_rest(form: str, size: float) -> None:
     assert result["c.gap_state"][-1] == 1.0
 
 
+@pytest.mark.sample(1)
 @FORMS
 def test_a_ball_in_a_box_is_reflected_as_light_is(form: str) -> None:
     """Unfolded, its way is straight: after 432.1 s the place is that of a triangle wave of each coordinate."""
@@ -228,6 +230,7 @@ def test_a_stick_that_falls_slips(form: str) -> None:
     assert times(run(scene, form, 0.6), "slips") == [pytest.approx(0.4962296185, abs=1e-9)]
 
 
+@pytest.mark.sample(1)
 @FORMS
 def test_a_block_rocks(form: str) -> None:
     """G. Housner's block (Bull. Seism. Soc. Am. 53, 1963): each impact leaves 1 - 3/2 sin^2(alpha) of the rate."""

@@ -60,7 +60,7 @@ def borne(scene: Scene, form: str) -> tuple[dict[str, float], float]:
     return found, float(np.linalg.norm(along.multipliers))
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("angle", [0.0, 0.3, 2.1])
 @pytest.mark.parametrize("count", [2, 3])
 @pytest.mark.parametrize("form", FORMS)

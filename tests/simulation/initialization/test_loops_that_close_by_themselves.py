@@ -40,6 +40,7 @@ def test_a_door_starts_where_it_is_guessed(form: str, hinges: int, place: tuple[
     assert start.coordinates[:1] == pytest.approx(0.7, abs=1e-9)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_a_door_goes_on_as_it_is_pushed(form: str) -> None:
     scene = door(2, (0.0, 0.0, 0.0))

@@ -65,7 +65,7 @@ def same(one: Result, other: Result) -> None:
     assert (one.status, one.message) == (other.status, other.message)
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("chunk", [1, 7, 500])
 def test_filled_tables_are_what_single_advances_give(name: str, chunk: int, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -56,7 +56,7 @@ def same(one: Result, other: Result, path: str) -> None:
     assert_allclose(one.energy.total, other.energy.total, rtol=0.0, atol=1e-11)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", SCENES)
 def test_runs_with_other_options_and_values_are_those_of_new_assemblies(name: str) -> None:
     make, parameter, values, path = SCENES[name]
@@ -71,6 +71,7 @@ def test_runs_with_other_options_and_values_are_those_of_new_assemblies(name: st
         same(ran(varied[k], options), alone[key], path)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", SCENES)
 def test_a_run_that_was_broken_off_leaves_nothing_behind(name: str) -> None:
     make, _, _, path = SCENES[name]

@@ -28,6 +28,7 @@ def four_bar(size: float) -> Scene:
     return scene
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("level", "size"), [("index1-projected", 1e-3), ("ggl", 1e-7)])
 def test_steps_do_not_depend_on_the_size_of_the_scene(level: str, size: float) -> None:
     steps, ends = [], []

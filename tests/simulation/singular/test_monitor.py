@@ -306,6 +306,7 @@ def test_a_failure_is_explained_only_where_it_was_at_a_singular_position() -> No
     assert "near t = 1.5" in str(error)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("solver", ["auto", "ida"])
 def test_no_output_is_lost_where_a_way_begins_with_half_of_it(solver: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where arcs are to be more accurate, the first covers half of the way: a way began behind outputs to come."""
