@@ -48,6 +48,7 @@ def spun(convention: str) -> Scene:
     return scene
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("convention", CONVENTIONS)
 def test_euler_angles_of_every_convention(convention: str) -> None:
     result = simulate(spun(convention), t_end=0.5, rtol=1e-10, outputs=201)

@@ -219,6 +219,7 @@ def _cos(x: Any) -> Any:
     return cos(x)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize(("domain", "form", "space"), combinations())
 def test_play_is_passed_freely_and_the_contact_is_half_an_oscillation(domain: str, form: str, space: str) -> None:
     """To and fro between two elastic ends: twice the free way and twice half a period of the contact."""

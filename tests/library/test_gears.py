@@ -203,7 +203,7 @@ def epicyclic(space: str, axis: tuple[float, float, float]) -> Scene:
     return scene
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("space", "axis"), SPACES)
 def test_an_epicyclic_gear_with_planets(space: str, axis: tuple[float, float, float], form: str) -> None:

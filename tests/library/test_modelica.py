@@ -67,7 +67,7 @@ def differences(name: str, result: Result) -> dict[str, np.ndarray]:
     }
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 @pytest.mark.parametrize("name", [name for name, example in EXAMPLES.items() if not example.long])
 def test_trajectories_meet_those_of_modelica(name: str, form: str) -> None:

@@ -99,6 +99,7 @@ ROWS = [
 ]  # fmt: skip
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("package", TABLE)
 def test_parts_are_found_by_the_full_names_of_modelica(package: str) -> None:
     for _, name, parts in (row for row in ROWS if row[0] == package):

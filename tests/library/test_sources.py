@@ -61,6 +61,7 @@ FUNCTIONS: dict[str, tuple[Component, Callable[[np.ndarray], np.ndarray]]] = {
 }  # fmt: skip
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", FUNCTIONS)
 @pytest.mark.parametrize(("form", "solver"), [("reduced", "explicit"), ("reduced", "taylor"), ("dae", "ida")])
 def test_a_source_is_its_function_and_is_integrated_across_all_its_switches(name: str, form: str, solver: str) -> None:
@@ -125,6 +126,7 @@ def driven(interpolation: str, form: str, solver: str) -> Any:
     return simulate(scene, t_end=2.5, form=form, solver=solver, rtol=1e-11, outputs=101)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("interpolation", ["linear", "akima", "cubic"])
 def test_a_table_drives_with_its_rates(interpolation: str) -> None:
     from scipy.integrate import solve_ivp

@@ -97,6 +97,7 @@ def where_shaken(interpolation: str, times: np.ndarray, mass: float = 1.0) -> np
     return np.array(found)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("interpolation", ["linear", "akima", "cubic"])
 @pytest.mark.parametrize(
     ("form", "solver"),
@@ -172,6 +173,7 @@ def hoisted(space: str, rows: Any = STOPS, when_slack: str = "slack") -> Scene:
     return scene
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("space", ["line", "plane", "space"])
 @pytest.mark.parametrize("form", FORMS)
 def test_a_load_goes_on_where_its_rope_is_no_longer_wound_in(space: str, form: str) -> None:
@@ -274,6 +276,7 @@ def test_a_drive_that_stops_at_the_same_moment_jerks_what_else_is_held(form: str
     assert result.energy.max_drift < 1e-6
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("space", ["plane", "space"])
 def test_a_start_with_a_table_on_a_rope_is_reported(space: str) -> None:
     scene = hoisted(space)
