@@ -75,3 +75,29 @@ def test_what_was_there_before_is_kept_where_several_sets_fit() -> None:
         found = find_states(contacts, one.states)
         assert found is not None
         assert found.states == one.states
+
+
+def places_on_one_body(seed: int, count: int) -> Contacts:
+    """Return gaps with friction in space below one rigid body on a floor: more rows than it has velocities."""
+    chance = np.random.default_rng([seed, count])
+    places = np.column_stack([chance.uniform(-0.3, 0.3, (count, 2)), np.full(count, -0.15)])
+    rows = [np.concatenate([axis, np.cross(place, axis)]) for axis in np.eye(3)[[2, 0, 1]] for place in places]
+    slopes = np.array(rows)[[k + count * i for i in range(3) for k in range(count)]]
+    inverse = np.diag(1.0 / np.concatenate([np.ones(3), chance.uniform(0.01, 0.2, 3)]))
+    force = np.concatenate([chance.normal(0.0, 3.0, 2), [-9.81], chance.normal(0.0, 0.3, 3)])
+    units = [Unit((k,), False, (0.0,), -1) for k in range(count)]
+    units += [Unit((count + k, 2 * count + k), True, (0.0, 0.0), k) for k in range(count)]
+    shares, none = np.zeros((2 * count, 3 * count)), np.zeros(2 * count)
+    shares[range(count, 2 * count), range(count)] = chance.uniform(0.0, 1.0)
+    free = slopes @ inverse @ force
+    return Contacts(slopes @ inverse @ slopes.T, free, tuple(units), Limits(none, shares, none, shares))
+
+
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_a_body_that_rests_on_many_places_is_always_solved(count: int) -> None:
+    """What is at rest can always stick, slip or lift off (no wedges: all gaps can open together)."""
+    for seed in range(10):
+        contacts = places_on_one_body(seed, count)
+        found = find_states(contacts, [(STICKS, (0.0,) * len(unit.rows)) for unit in contacts.units])
+        assert found is not None, seed
+        laws_hold(contacts, found.states, found.forces, found.motions)

@@ -82,7 +82,7 @@ def draw(seed: int) -> Draft:
     random = np.random.default_rng(seed)
     space = "space" if random.random() < 0.3 else "plane"
     count = int(random.integers(1, 4 if space == "plane" else 3))
-    kinds = ["mass", "disc", "box", "link"] if space == "plane" else ["mass", "disc", "box"]
+    kinds = ["mass", "disc", "box", "link"] if space == "plane" else ["mass", "mass", "disc", "disc", "box"]
     bodies = []
     for i in range(count):
         x = -1.5 + 1.5 * i + random.uniform(-0.2, 0.2)
@@ -319,7 +319,7 @@ def check(seed: int) -> Trial:
                 findings.append(Finding("refused", f"{form}: {type(error).__name__}", f"{error}\n{drawn}"))
                 continue
             if result.status != "finished":
-                findings.append(Finding("hang", f"{form}: {result.status}", f"{result.time[-1]}\n{drawn}"))
+                findings.append(Finding("hang", f"{form}: {result.status}", f"{drawn}"))
                 continue
             findings += laws_missed(made, result, drawn)
             runs.append((drawn, made, result))

@@ -6,6 +6,7 @@ from atwood.expr.core.analysis import (
     depends_on,
     evaluate,
     live,
+    read_by,
     substitute,
 )
 from atwood.expr.core.arithmetic import DivisionByExactZeroError
@@ -84,6 +85,7 @@ __all__ = [
     "log",
     "maximum",
     "minimum",
+    "read_by",
     "select",
     "sign",
     "sin",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, solve, substitute
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, read_by, solve, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import internal_reactions_of, to_maximal
@@ -24,13 +24,13 @@ def event_program(
     """Return the program of (t, q, u, shift) with the values of events, each with its shift added."""
     equations = assembly.own_equations
     known: dict[Expression, Expression] = {}
-    symbols = [one.symbol for one in assembly.reactions if any(depends_on(value, [one.symbol]) for value in values)]
+    symbols = read_by(values, [one.symbol for one in assembly.reactions])
     if symbols:
         found = _reactions(assembly, set(symbols), kept_maximal)
         if found is None:
             return None
         known.update(found)
-    if any(depends_on(value, equations.accelerations) for value in values):
+    if depends_on(values, equations.accelerations):
         solved = _solve(equations, kept)
         if solved is None:
             return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from atwood.errors import DeclarationError
-from atwood.expr import Expression, Graph, depends_on, live, substitute
+from atwood.expr import Expression, Graph, live, read_by, substitute
 from atwood.lazy_dataclasses import replace
 from atwood.mechanics.constraints.elimination import (
     SOLVED,
@@ -238,7 +238,7 @@ def _resolved(mechanism: Mechanism, site: Site, kinematics: Kinematics) -> dict[
 
 def _in_turn(mechanism: Mechanism, raw: Mapping[Expression, Expression]) -> dict[Expression, Expression]:
     """Return what inputs stand for without other inputs in it."""
-    reads = {symbol: [other for other in raw if depends_on(value, [other])] for symbol, value in raw.items()}
+    reads = {symbol: read_by([value], raw) for symbol, value in raw.items()}
     found: dict[Expression, Expression] = {}
     while len(found) < len(raw):
         ready = [one for one in raw if one not in found and all(other in found for other in reads[one])]

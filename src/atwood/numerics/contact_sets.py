@@ -33,6 +33,12 @@ _MOST_SETS = 20_000
 _CLEAR = 1e-8
 """A pivot of scaled rows that is no larger may be rounding: rows then depend on each other."""
 
+_SWEEPS = 5000
+"""So often all forces are projected; each time takes some ten microseconds for each."""
+
+_STILL = 1e-12
+"""Directions that change by so little are found."""
+
 _TURNS = 60
 """So many turns find the direction in which something begins to slip."""
 
@@ -67,6 +73,11 @@ class Unit:
         """Whether it is not at rest."""
         return any(self.given)
 
+    @property
+    def is_free_cone(self) -> bool:
+        """Whether it may begin to slip in any direction."""
+        return len(self.rows) == 2 and not self.is_given
+
 
 @dataclass(frozen=True, eq=False)
 class Limits:
@@ -94,11 +105,12 @@ class Contacts:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """States that contradict nothing, the forces f, and the motions a."""
+    """States that contradict nothing, the forces f, the motions a, and whether redundant forces are the least."""
 
     states: tuple[State, ...]
     forces: FloatArray
     motions: FloatArray
+    is_least: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +145,13 @@ def is_back(direction: Direction) -> bool:
 def find_states(contacts: Contacts, states: Sequence[State]) -> Found | None:
     """Return states that contradict nothing, near to those given; None where there are none."""
     present = tuple(_allowed(unit, *one) for unit, one in zip(contacts.units, states, strict=True))
-    found = _improved(_listed(contacts), present)
+    listed = _listed(contacts)
+    closed = tuple(_allowed(unit, STICKS, (0.0,) * len(unit.rows)) for unit in contacts.units)
+    found = _improved(listed, present) or _improved(listed, closed)
+    if found is not None:
+        return found
+    states, forces = _relaxed(contacts)
+    found = _improved(listed, states) or _shared(listed, states, forces)
     if found is not None:
         return found
     every = [
@@ -143,6 +161,55 @@ def find_states(contacts: Contacts, states: Sequence[State]) -> Found | None:
     return min(every, key=lambda one: one[:2])[2] if every else None
 
 
+def _relaxed(contacts: Contacts) -> tuple[tuple[State, ...], FloatArray]:
+    """Return states, and forces that are projected one by one on what they may be (Jean and Moreau, 1992).
+
+    Where there are no such forces they grow without bound.
+    """
+    response, free = contacts.response, contacts.free
+    forces = np.zeros(len(free))
+    states: list[State] = []
+    steps = [1.0 / (float(np.linalg.norm(response[np.ix_(one.rows, one.rows)], 2)) or 1.0) for one in contacts.units]
+    usual = float(np.max(np.abs(free), initial=0.0)) * max(steps)
+    small = SLACK * float(np.max(np.abs(free), initial=0.0))
+    for _ in range(_SWEEPS):
+        states, last = [], forces.copy()
+        for k, (unit, step) in enumerate(zip(contacts.units, steps, strict=True)):
+            rows, none = list(unit.rows), (0.0,) * len(unit.rows)
+            motion = free[rows] + response[rows] @ forces
+            pushed = forces[rows] - step * motion
+            limits = contacts.backwards or contacts.limits if is_back(tuple(-pushed)) else contacts.limits
+            limit = max(0.0, float(limits.free[k] + limits.shares[k] @ forces))
+            size = math.hypot(*pushed)
+            if not unit.is_slip:
+                least = -float(limits.static_free[k] + limits.static_shares[k] @ forces)
+                forces[rows] = pushed if pushed[0] > least else 0.0
+                states.append((STICKS if pushed[0] > least else OPEN, none))
+            elif unit.is_given or size > limit:
+                way = np.array(unit.given) if unit.is_given else -pushed / (size or 1.0)
+                forces[rows] = -limit * way
+                is_still = not unit.is_given and math.hypot(*motion) <= small
+                states.append((STICKS, none) if is_still else (GOES_ON, tuple(way.tolist())))
+            else:
+                forces[rows] = pushed
+                states.append((STICKS, none))
+        most = float(np.max(np.abs(forces)))
+        if float(np.max(np.abs(forces - last))) <= 1e-3 * SLACK * most or most > usual / SLACK:
+            break
+    return tuple(states), forces
+
+
+def _shared(contacts: _Listed, states: tuple[State, ...], forces: FloatArray) -> Found | None:
+    """Return these states if forces near to those given contradict nothing, though the least ones may."""
+    acting, rows, right = _equations(contacts, states)
+    given = forces[acting]
+    more = _solved(rows, (np.array(right) - np.array(rows).reshape(len(rows), len(rows)) @ given).tolist())
+    found, motions = _moved(contacts, acting, (given + np.array(more)).tolist())
+    if _contradiction(contacts, states, found, motions)[0] >= 0:
+        return None
+    return Found(states, np.array(found), np.array(motions), is_least=False)
+
+
 def all_states(contacts: Contacts) -> Iterator[Found]:
     """Yield every set of states that contradicts nothing; nothing where there are too many sets."""
     choices = [_choices(unit) for unit in contacts.units]
@@ -150,16 +217,9 @@ def all_states(contacts: Contacts) -> Iterator[Found]:
         return
     listed = _listed(contacts)
     for tried in product(*choices):
-        states = tried
-        for _ in range(_TURNS):
-            forces, motions = _solve(listed, states)
-            number, better = _contradiction(listed, states, forces, motions)
-            if number < 0:
-                yield Found(states, np.array(forces), np.array(motions))
-                break
-            if len(listed.units[number].rows) < 2 or better[0] != states[number][0]:
-                break
-            states = (*states[:number], better, *states[number + 1 :])
+        states, forces, motions = _met(listed, tried)
+        if _contradiction(listed, states, forces, motions)[0] < 0:
+            yield Found(states, np.array(forces), np.array(motions))
 
 
 def _allowed(unit: Unit, state: int, direction: Direction) -> State:
@@ -187,7 +247,7 @@ def _improved(contacts: _Listed, tried: tuple[State, ...]) -> Found | None:
     seen: set[tuple[State, ...]] = set()
     while tried not in seen and len(seen) < _TURNS * (1 + len(contacts.units)):
         seen.add(tried)
-        forces, motions = _solve(contacts, tried)
+        tried, forces, motions = _met(contacts, tried)
         number, better = _contradiction(contacts, tried, forces, motions)
         if number < 0:
             return Found(tried, np.array(forces), np.array(motions))
@@ -200,8 +260,47 @@ def _is_loose(states: Sequence[State], unit: Unit) -> bool:
     return unit.is_slip and unit.at >= 0 and states[unit.at][0] == OPEN
 
 
-def _solve(contacts: _Listed, states: Sequence[State]) -> tuple[list[float], list[float]]:
-    """Return the forces and motions of a set of states."""
+def _met(contacts: _Listed, states: tuple[State, ...]) -> tuple[tuple[State, ...], Sequence[float], Sequence[float]]:
+    """Return states with the directions that cones of two rows take, and their forces and motions.
+
+    What begins to slip goes the way of its motion a, which depends on the force: ``f + L(f) a/|a| = 0``, by Newton's
+    method. Where the motion turns round there is no such direction, and it is left as it is.
+    """
+    acting, rows, right = _equations(contacts, states)
+    forces, motions = _moved(contacts, acting, _solved(rows, right))
+    slipping = zip(contacts.units, states, strict=True)
+    cones = [k for k, (unit, state) in enumerate(slipping) if state[0] == GOES_ON and unit.is_free_cone]
+    cones = [k for k in cones if not _is_loose(states, contacts.units[k])]
+    for _ in range(_TURNS if cones else 0):
+        turned, most = list(states), 0.0
+        for k in cones:
+            pair = contacts.units[k].rows
+            size = math.hypot(*(motions[row] for row in pair))
+            way = tuple(motions[row] / size for row in pair) if size else (0.0, 0.0)
+            if not way[0] * states[k][1][0] + way[1] * states[k][1][1] > 0.0:
+                return states, forces, motions
+            most = max(most, *(abs(new - old) for new, old in zip(way, states[k][1], strict=True)))
+            turned[k] = (GOES_ON, way)
+        if most <= _STILL:
+            break
+        states = tuple(turned)
+        acting, rows, right = _equations(contacts, states)
+        for k in cones:
+            first, second = contacts.units[k].rows
+            (c, s), share = states[k][1], _limits(contacts.sides[0], k, forces)[0]
+            share /= math.hypot(motions[first], motions[second])
+            across = [c * y - s * x for x, y in zip(contacts.response[first], contacts.response[second], strict=True)]
+            before = sum(by * force for by, force in zip(across, forces, strict=True))
+            for row, part in ((first, -s), (second, c)):
+                place = acting.index(row)
+                rows[place] = [x + share * part * across[i] for x, i in zip(rows[place], acting, strict=True)]
+                right[place] += share * part * before
+        forces, motions = _moved(contacts, acting, _solved(rows, right))
+    return states, forces, motions
+
+
+def _equations(contacts: _Listed, states: Sequence[State]) -> tuple[list[int], list[list[float]], list[float]]:
+    """Return the rows that act, and the equations for their forces."""
     acting: list[int] = []
     rows: list[list[float]] = []
     right: list[float] = []
@@ -219,8 +318,13 @@ def _solve(contacts: _Listed, states: Sequence[State]) -> tuple[list[float], lis
                 turned[row] += 1.0
                 rows.append(turned)
                 right.append(-part * limits[k])
+    return acting, [[one[i] for i in acting] for one in rows], right
+
+
+def _moved(contacts: _Listed, acting: list[int], given: list[float]) -> tuple[list[float], list[float]]:
+    """Return the forces of all rows, and how all rows move by those that act."""
     forces, motions = [0.0] * len(contacts.free), list(contacts.free)
-    for row, force in zip(acting, _solved([[one[i] for i in acting] for one in rows], right), strict=True):
+    for row, force in zip(acting, given, strict=True):
         forces[row] = force
         for i, by in enumerate(contacts.response):
             motions[i] += by[row] * force
@@ -272,8 +376,7 @@ def _contradiction(
         f, a = [forces[i] / pushes for i in unit.rows], [motions[i] / moves for i in unit.rows]
         side = contacts.sides[is_back(state[1] if state[0] == GOES_ON else tuple(-x for x in f))]
         limit, static = (one / pushes for one in _limits(side, k, forces))
-        by = max(contacts.response[i][i] for i in unit.rows) * pushes / moves
-        for miss, other in _misses(unit, state, f, a, limit, static, any(side[1][k]), by):
+        for miss, other in _misses(unit, state, f, a, limit, static, any(side[1][k])):
             if miss > worst:
                 worst, number, better = miss, k, other
     return number, better
@@ -294,12 +397,10 @@ def _misses(
     limit: float,
     static: float,
     reads: bool,
-    by: float,
 ) -> Iterator[tuple[float, State]]:
     """Yield by how much a state contradicts each law, and the state that does not.
 
-    A limit that reads forces is zero now and then, and what has it rubs all the same. A direction is turned towards
-    that of the motion as an augmented Lagrangian turns it, by what the limit itself moves: lest it swings.
+    A limit that reads forces is zero now and then, and what has it rubs all the same.
     """
     none = (0.0,) * len(f)
     if not unit.is_slip:
@@ -322,13 +423,14 @@ def _misses(
             yield -limit, (OPEN, none)
         if unit.is_given:
             return
+        # Where nothing moves after all there is no direction, and the equations for it do not hold.
+        yield math.hypot(*(x + limit * d for x, d in zip(f, state[1], strict=True))), (STICKS, none)
         along = sum(x * d for x, d in zip(a, state[1], strict=True))
         if along <= 0.0:
             yield -along, (STICKS, none)
             return
         size = math.hypot(*a)
         across = math.hypot(*(x - along * d for x, d in zip(a, state[1], strict=True)))
-        turned = [x / max(size, limit * by) + d for x, d in zip(a, state[1], strict=True)]
-        yield across, (GOES_ON, tuple(x / math.hypot(*turned) for x in turned))
+        yield across, (GOES_ON, tuple(x / size for x in a))
         return
     yield max(limit, static, float(reads)), (GOES_ON, unit.given) if unit.is_given else (STICKS, none)

@@ -19,6 +19,7 @@ from atwood.numerics.matrices import least_norm, to_array
 from atwood.result.part_connectors import Connectors, Ends
 from atwood.result.part_energy import PartEnergies, PartEnergy
 from atwood.result.work import integral_in_steps, integral_of_samples, nodes_in_steps, samples_in_steps
+from atwood.simulation.contacts.values import ContactValues
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.reactions import ReactionSolver, maximal_state
 from atwood.simulation.dynamics.scales import motion_scales, multiplier_sizes, scene_length
@@ -40,6 +41,9 @@ _DRIVES = 1e-6
 
 _FREE = 1e-7
 """Of what multipliers of a size do in general: what those that nothing determines do, if it is more than rounding."""
+
+_MET = 1e-5
+"""Of the extent of the scene: what is as near as that takes part in an impact."""
 
 _LOOKS = (0.25, 0.6, 1.0)
 """Where along a segment it is looked whether reactions determine the work."""
@@ -285,19 +289,31 @@ def _impulses(before: SegmentRecord, after: SegmentRecord, connectors: Connector
     if not np.max(np.abs(jump) / sizes, initial=0.0) > _STILL * np.max(np.abs(u_was) / sizes, initial=0.0):
         return {}
     balance = balance_of(assembly, "dae").at(float(t[0]), q[:, 0], u_now[:, 0])
+    keys = [one.key[0] for one in assembly.maximal.constraints]
     slope, weights = to_array(balance.jacobian), multiplier_sizes(assembly, "dae")
+    contacts = assembly.maximal.contacts
+    if contacts:
+        state = after.coordinates[:, 0], after.speeds[:, 0]
+        met = ContactValues(assembly, float(t[0]), *state, scene_length(assembly))
+        touching = met.touching(_MET)
+        slope = np.concatenate([slope, met.slopes * touching[:, None]])
+        weights = np.concatenate([weights, touching])
+        keys += [one.row.key[0] for one in contacts]
     matrix, momenta = sizes * slope.T * weights, sizes[:, 0] * (to_array(balance.mass) @ jump[:, 0])
     impulses = (least_norm(matrix, momenta) if matrix.size else np.zeros(len(slope))) * weights
+    struck_by = np.split(impulses, [len(slope) - len(contacts)])
     program = assembly.shared.get(
         _IMPULSES, lambda: part_powers(assembly.mechanism, assembly.maximal, assembly.parameters, of_impulses=True)
     )
     struck, idle = (
-        _rows(assembly, program.program, t, q, middle, factor * jump, factor * impulses[:, None])[:, 0]
+        _rows(assembly, program.program, t, q, middle, factor * jump, *(factor * one[:, None] for one in struck_by))[
+            :, 0
+        ]
         for factor in (1.0, 0.0)
     )
     found = _sorted(program.flows, struck - idle, connectors)
-    for one, power in zip(assembly.maximal.constraints, impulses * (slope @ middle[:, 0]), strict=True):
-        key = "impacts", one.key[0], ""
+    for path, power in zip(keys, impulses * (slope @ middle[:, 0]), strict=True):
+        key = "impacts", path, ""
         found[key] = found.get(key, np.zeros(())) + power
     return found
 

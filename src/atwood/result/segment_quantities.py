@@ -17,7 +17,7 @@ from atwood.simulation.run.recorder import SegmentRecord
 
 def reads(assembly: Assembly, paths: Sequence[str], symbols: Sequence[Expression]) -> bool:
     """Return whether a quantity depends on any of some symbols."""
-    return any(depends_on(one.value, symbols) for one in find_observables(assembly, paths))
+    return depends_on([one.value for one in find_observables(assembly, paths)], symbols)
 
 
 def quantities_at(

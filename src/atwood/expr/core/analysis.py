@@ -61,10 +61,16 @@ def dependencies(outputs: Sequence[Expression | float], symbols: Sequence[Expres
     return [frozenset(symbol for i, symbol in enumerate(symbols) if mask >> i & 1) for mask in masks]
 
 
-def depends_on(expression: Expression | float, symbols: Collection[Expression]) -> bool:
-    """Return whether an expression depends on any of the symbols."""
+def depends_on(values: Expression | float | Iterable[Expression | float], symbols: Collection[Expression]) -> bool:
+    """Return whether an expression, or any of several, depends on any of the symbols."""
     wanted = _to_look_up(symbols)
-    return any(node in wanted for node in live([expression]))
+    return any(node in wanted for node in live([values] if isinstance(values, Expression | float) else values))
+
+
+def read_by(values: Iterable[Expression | float], symbols: Iterable[Expression]) -> list[Expression]:
+    """Return those of some symbols on which any of several expressions depends."""
+    reached = set(live(values))
+    return [symbol for symbol in symbols if symbol in reached]
 
 
 def _to_look_up(expressions: Iterable[Expression]) -> Collection[Expression]:

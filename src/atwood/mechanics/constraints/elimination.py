@@ -47,7 +47,7 @@ def check_held(
         own = [q[number] for number in one.coordinates]
         if one.body in pulled:
             continue
-        if not on_velocities and not any(depends_on(value, own) for _, _, value in values):
+        if not on_velocities and not depends_on([value for _, _, value in values], own):
             raise TopologyError(
                 "the body is free to move and has no mass: any force would accelerate it without bound",
                 where=mechanism.bodies.bodies[one.body].name,

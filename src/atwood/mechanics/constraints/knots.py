@@ -44,7 +44,7 @@ def linear_knots(
         (slope,) = jvp([force], {own: 1.0})
         if not slope.is_parametric or not decide(derivation, partial(_size, Places(state, derivation.time), slope)):
             continue
-        if any(depends_on(value, [own]) for _, _, value in values):
+        if depends_on([value for _, _, value in values], [own]):
             continue
         value = -substitute([force], {own: force.graph.zero})[0] / slope
         found = dict(zip(found, substitute(list(found.values()), {own: value}), strict=True))
@@ -159,7 +159,7 @@ def _size(places: Places, slope: Expression, mechanism: Mechanism) -> float:
 
 def _bends(force: Expression, speeds: Sequence[Expression]) -> bool:
     """Return whether a force is not affine in the speeds."""
-    return any(depends_on(one, speeds) for one in jacobian([force], list(speeds)).entries)
+    return depends_on(jacobian([force], list(speeds)).entries, speeds)
 
 
 def _part_of(mechanism: Mechanism, name: str) -> str:

@@ -149,7 +149,7 @@ def _spread(local: LocalPart) -> Iterator[tuple[str, LocalConnector]]:
 
 
 def _depends(values: Sequence[Expression], symbols: tuple[Expression, ...]) -> bool:
-    return any(depends_on(value, list(symbols)) for value in values)
+    return depends_on(values, list(symbols))
 
 
 @dataclass(frozen=True, eq=False)

@@ -127,6 +127,10 @@ class _System:
         The diagonal of C; empty where it is zero. A row of a gap that is open says that its multiplier is zero.
     masses
         Number of accelerations.
+    of_contacts
+        The rows of gaps and slips.
+    is_regular
+        Whether nothing on the diagonal is zero, so that the system can be solved in any order.
     """
 
     def __init__(
@@ -150,6 +154,20 @@ class _System:
         self.diagonal: list[Expression] = []
         if contacts:
             self.diagonal = [*([zero] * count), *(1.0 - one.mask for one in contacts)]
+        self.is_regular = False
+        self.of_contacts = range(self.masses + count, len(self.right)) if contacts else range(0)
+
+    def times(self, solved: Sequence[Expression], diagonal: Sequence[Expression]) -> list[Expression]:
+        """Return the left-hand side for some accelerations and multipliers, with a diagonal of its own."""
+        found = [solved[0].graph.zero] * len(solved)
+        for (r, c), entry in self.mass.items():
+            found[r] = found[r] + entry * solved[c]
+        for (r, c), entry in self.slopes.items():
+            found[c] = found[c] - entry * solved[r]
+            found[r] = found[r] + entry * solved[c]
+        for r, entry in enumerate(diagonal, self.masses):
+            found[r] = found[r] + entry * solved[r]
+        return found
 
 
 def _close_loops(mechanism: Mechanism, constraints: Sequence[Constraint]) -> bool:
@@ -199,13 +217,12 @@ def _without_choice(system: _System, speeds: Sequence[Expression]) -> list[Expre
             diagonal[r - n] = diagonal[r - n] + entry * entry / system.mass[c, c]
     added = [_ADDED * one if not one.is_zero else graph.constant(_ADDED) for one in diagonal]
     masked = system.diagonal or [graph.zero] * len(added)
+    system.is_regular = True
     system.diagonal = [more if one.is_zero else one + more for one, more in zip(masked, added, strict=True)]
-    right = list(system.right)
-    solved = _solve_system(system)
+    solved, right = _solve_system(system), list(system.right)
     for _ in range(_TIMES - 1):
-        kept = [c * multiplier for c, multiplier in zip(system.diagonal, solved[n:], strict=True)]
-        system.right = [*right[:n], *(side + one for side, one in zip(right[n:], kept, strict=True))]
-        solved = _solve_system(system)
+        system.right = [side - one for side, one in zip(right, system.times(solved, masked), strict=True)]
+        solved = [one + more for one, more in zip(solved, _solve_system(system), strict=True)]
     return solved
 
 
@@ -216,6 +233,8 @@ def _solve_system(system: _System) -> list[Expression]:
     upper = {(r, c): e for (r, c), e in full.items() if r <= c} | {(c, r): e for (r, c), e in system.slopes.items()}
     upper |= {(n + i, n + i): one for i, one in enumerate(system.diagonal) if not one.is_zero}
     order = [*range(n), *(i for i in minimum_degree(_after(list(upper), n, size), size) if i >= n)]
+    if all((i, i) in upper for i in system.of_contacts) and system.is_regular:  # many at a body of few coordinates
+        order = [*system.of_contacts, *(i for i in order if i not in system.of_contacts)]
     if all((i, i) in full for i in range(n)) and fill_of(list(upper), order) <= _LARGEST_FILL:
         try:
             steps = eliminate(SymmetricSystem(upper, right, [1] * n + [-1] * (size - n)), order)
@@ -259,7 +278,7 @@ def _fixed_point(
     graph, count = rest[0].graph, len(unknowns)
     slopes = jacobian(list(forces), list(unknowns))
     turns = slopes.by_place
-    is_affine = not any(depends_on(entry, list(unknowns)) for entry in turns.values())
+    is_affine = not depends_on(turns.values(), list(unknowns))
 
     def times(matrix: Mapping[tuple[int, int], Expression], vector: Sequence[Expression]) -> list[Expression]:
         total = [graph.zero] * count

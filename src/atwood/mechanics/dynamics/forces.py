@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import field
 
 from atwood.errors import TopologyError
-from atwood.expr import Expression, Graph, Scalar, depends_on, is_zero, jvp, substitute, vjp
+from atwood.expr import Expression, Graph, Scalar, depends_on, is_zero, jvp, read_by, substitute, vjp
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.kinematics.orientation import NodeTurn, node_axes, spin_in_world, torque_components
 from atwood.mechanics.kinematics.positions import Kinematics, Placements
@@ -325,7 +325,7 @@ def joint_gradients(local: LocalPart, value: Expression) -> list[tuple[Expressio
     """Return the derivatives of a function with respect to the joint coordinates that it depends on."""
     if not local.formulas or not depends_on(value, list(local.formulas)):
         return []
-    read = [symbol for symbol in local.formulas if depends_on(value, [symbol])]
+    read = read_by([value], local.formulas)
     return list(zip(read, vjp([value], [value.graph.constant(1.0)], read), strict=True))
 
 

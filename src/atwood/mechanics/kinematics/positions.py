@@ -310,7 +310,7 @@ def reads_axes(joint: LocalJoint) -> bool:
     """Return whether a joint's displacement depends on how its frames are turned."""
     symbols = [component for axes in joint.axes for axis in axes for component in axis]
     shift = [s for s in joint.placement.displacement if isinstance(s, Expression)]
-    return bool(symbols) and any(depends_on(s, symbols) for s in shift)
+    return bool(symbols) and depends_on(shift, symbols)
 
 
 def displaced(

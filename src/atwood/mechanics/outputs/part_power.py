@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import Literal
 
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, Scalar, depends_on, jvp
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, Scalar, depends_on, jvp, substitute
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
@@ -21,6 +21,7 @@ from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.mechanics.kinematics.positions import body_point_of
 from atwood.mechanics.outputs.reactions import add_inertia, add_reactions, multipliers_by_part
 from atwood.mechanics.outputs.totals import part_energies
+from atwood.model.local.contacts import powers
 from atwood.model.local.moving_mass import inertial_energy
 from atwood.model.local.parts import LocalPart
 
@@ -47,7 +48,10 @@ class Flow:
 
 @dataclass(frozen=True)
 class PartPowers:
-    """Program of (t, q, u, a, multipliers), in maximal coordinates, with a row for each flow, W."""
+    """Program of (t, q, u, a, multipliers), in maximal coordinates, with a row for each flow, W.
+
+    That of impulses has those of gaps and slips as an input of their own.
+    """
 
     program: Program
     flows: tuple[Flow, ...]
@@ -74,7 +78,9 @@ def part_powers(
         add_inertia(mechanism, equations, path, total)
         add_reactions(part, multipliers, total)
         if of_impulses:
-            part_forces(replace(part, local=replace(laws, potentials=())), total)
+            struck = {one.stand_in: one.multiplier for one in local.contacts}
+            laws = replace(laws, potentials=(), dissipations=powers(local.contacts), stand_ins=struck)
+            part_forces(replace(part, local=laws), total)
         else:
             part_forces(replace(part, local=laws), total)
             for flow, some, sign in ((Flow("supplied", path), loaded, 1.0), (Flow("dissipated", path), damped, -1.0)):
@@ -87,8 +93,16 @@ def part_powers(
         for flow, power in _given_at(equations, path, total).items():
             _add(found, flow, -power)
     kept = {flow: value for flow, value in found.items() if not value.is_zero}
-    outputs = (OutputGroup("p", tuple(kept.values())),)
-    return PartPowers(Program("powers by part", _inputs(equations), tuple(parameters), outputs), tuple(kept))
+    inputs, values = _inputs(equations), list(kept.values())
+    of_contacts = tuple(symbol for one in equations.contacts for symbol in (one.row.multiplier, one.read))
+    if of_impulses:
+        inputs = (*inputs, InputGroup("impulses of contacts", of_contacts[::2]))
+    else:
+        values = substitute(
+            values, {symbol: equations.read[symbol] for symbol in of_contacts if symbol in equations.read}
+        )
+    outputs = (OutputGroup("p", tuple(values)),)
+    return PartPowers(Program("powers by part", inputs, tuple(parameters), outputs), tuple(kept))
 
 
 def _inputs(equations: Equations) -> tuple[InputGroup, ...]:
@@ -110,8 +124,9 @@ def _by_kind(local: LocalPart) -> tuple[LocalPart, LocalPart, LocalPart]:
     """Return a part with its potentials and Lagrangians alone, with its loads alone, and with its dampers alone."""
     loads: list[Expression] = []
     dampers: list[Expression] = []
-    for value in local.dissipations:  # loads on joint coordinates are among them
-        (loads if depends_on(value, list(local.stand_ins)) else dampers).append(value)
+    given = [one for one in local.stand_ins if one not in {contact.stand_in for contact in local.contacts}]
+    for value in local.dissipations:  # loads on joint coordinates are among them; friction dissipates
+        (loads if depends_on(value, given) else dampers).append(value)
     none = replace(local, potentials=(), lagrangians=(), dissipations=(), loads=())
     return (
         replace(none, potentials=local.potentials, lagrangians=local.lagrangians),

@@ -287,7 +287,7 @@ def _check_reads(
     """Refuse energies that depend on velocities, and Rayleigh functions that do not: their forces would be lost."""
     velocities = [symbol for one in connectors.values() for symbol in one.velocity]
     velocities += [symbol for one in connectors.values() for symbol in one.spin]
-    if any(depends_on(value, velocities) for value in potentials):
+    if depends_on(potentials, velocities):
         raise DeclarationError(
             "a potential depends on positions, angles and time, not on velocities",
             where=part.path,

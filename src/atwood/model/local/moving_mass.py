@@ -32,7 +32,7 @@ def check_lagrangians(
         relations = value.graph.relations
         switches = () if relations is None else relations.symbols
         momenta = vjp([value], [value.graph.constant(1.0)], velocities) if switches else []
-        if any(depends_on(one, switches) for one in momenta):
+        if depends_on(momenta, switches):
             raise UnsupportedError(
                 "the momenta of a Lagrangian switch by the clock, which would be an impact",
                 where=path,

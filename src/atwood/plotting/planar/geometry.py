@@ -348,7 +348,7 @@ def _between(
         return [Shape(path, "link", ends)]
     if local.potentials or local.dissipations:
         places = [symbol for symbols in local.connectors.values() for symbol in (*symbols.position, *symbols.velocity)]
-        if not any(depends_on(one, places) for one in (*local.potentials, *local.dissipations)):
+        if not depends_on((*local.potentials, *local.dissipations), places):
             return [Shape(path, "spiral", ends)] if mechanism.space.is_planar else []
         return [Shape(path, "spring" if local.potentials else "damper", ends)]
     if joints:

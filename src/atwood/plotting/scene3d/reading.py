@@ -324,9 +324,9 @@ def _ties(path: str, local: LocalPart, nodes: Mapping[str, int]) -> list[Tie]:
         return [Tie(path, "rope" if local.part.component.modes else "rod", ends)]
     kinds: list[TieKind] = []
     symbols = [symbol for one in local.connectors.values() for symbol in one.position]
-    if any(depends_on(one, symbols) for one in local.potentials):
+    if depends_on(local.potentials, symbols):
         kinds.append("spring")
-    if any(depends_on(one, symbols) for one in local.dissipations):
+    if depends_on(local.dissipations, symbols):
         kinds.append("damper")
     return [Tie(path, kind, ends) for kind in kinds]
 

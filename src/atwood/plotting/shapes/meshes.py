@@ -195,7 +195,7 @@ def _ends(mechanism: Mechanism, path: str) -> tuple[float, float]:
 
 def depends(expressions: Sequence[Expression], symbol: Expression) -> bool:
     """Return whether one of some expressions depends on a symbol."""
-    return any(depends_on(one, [symbol]) for one in expressions)
+    return depends_on(expressions, [symbol])
 
 
 def joint_shift(

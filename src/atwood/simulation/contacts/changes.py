@@ -281,6 +281,8 @@ class _Moment:
         found = self._found(chosen, states, given)
         if found is None:
             found = self._jammed(chosen)
+        if not found.is_least:
+            raise self._contradiction("friction depends on how forces are shared, which nothing determines", chosen)
         self._take(chosen, found)
         held = [row for k, one in zip(chosen, found.states, strict=True) if one[0] == STICKS for row in self.units[k]]
         if held:  # what holds from now on holds to rounding

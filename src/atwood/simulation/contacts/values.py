@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, substitute
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, read_by, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.loose import state_paths
@@ -87,7 +87,7 @@ def _layout(assembly: Assembly) -> Layout:
     none = graph.zero
     limits = [[one.towards(way)[i] for one in contacts] for way in (1.0, -1.0) for i in (0, 1)]
     own, every = [one.read for one in contacts], [limit for some in limits for limit in some]
-    read = tuple(x for x in (*own, *equations.multipliers) if any(depends_on(limit, [x]) for limit in every))
+    read = tuple(read_by(every, [*own, *equations.multipliers]))
     found = [jacobian(some, list(read)) for some in limits]
     values = [none if one.row.value is None else one.row.value for one in contacts]
     outputs = (
@@ -112,7 +112,7 @@ def _layout(assembly: Assembly) -> Layout:
         (slopes.rows, slopes.columns),
         read,
         tuple(tuple(zip(one.rows, one.columns, strict=True)) for one in found),
-        any(depends_on(entry, list(read)) for one in found for entry in one.entries),
+        depends_on([entry for one in found for entry in one.entries], list(read)),
         any(x not in own for x in read),
         contacts,
         tuple(map(tuple, units.values())),
@@ -141,7 +141,7 @@ class ContactValues:
     """
 
     def __init__(self, assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length: float) -> None:
-        self.assembly, self.t, self.layout = assembly, t, layout_of(assembly)
+        self.assembly, self.t, self.length, self.layout = assembly, t, length, layout_of(assembly)
         self.contacts, self.units, self.gap_of = self.layout.contacts, self.layout.units, self.layout.gap_of
         if assembly.form == "reduced":
             q, u = (np.array(x) for x in assembly.kernel(to_maximal(assembly))([t], q, u))
@@ -169,6 +169,16 @@ class ContactValues:
         self._limits, self._shares, self.restitution = limits[:4], limits[4:8], limits[8]
         self.slopes = np.zeros((len(self.contacts), len(u)))
         self.slopes[self.layout.slopes] = slopes
+
+    def touching(self, near: float) -> FloatArray:
+        """Return 1 for each gap that is as near to zero, in units of the scene, and for the slips at it; else 0."""
+        found = np.zeros(len(self.contacts))
+        for rows, at in zip(self.units, self.gap_of, strict=True):
+            gap = self.units[at][0] if at >= 0 else rows[0]
+            one = self.contacts[gap]
+            size = self.length if one.law.options.unit == "N" else 1.0
+            found[list(rows)] = not one.is_slip and self.values[gap] <= near * size
+        return found
 
     @cached_property
     def _now(self) -> BalanceValues:

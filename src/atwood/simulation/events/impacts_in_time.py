@@ -190,7 +190,7 @@ def _switching(assembly: Assembly) -> list[str]:
     for path, local in assembly.mechanism.locals_.items():
         held = (one.symbol for one in assembly.discrete_states)
         read = (*assembly.mechanism.relations.symbols, *held, *local.signal_symbols.values())
-        if any(depends_on(one.value, read) for one in local.constraints):
+        if depends_on([one.value for one in local.constraints], read):
             found.append(path)
     read = (*assembly.mechanism.relations.symbols, *(one.symbol for one in assembly.discrete_states))
     for one in assembly.maximal.constraints:

@@ -27,6 +27,7 @@ from atwood.mechanics.outputs.event_functions import (
     EventFunction,
     list_event_functions,
 )
+from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.orientation_coordinates import (
     COORDINATE_SWITCH,
     switch_functions,
@@ -111,8 +112,8 @@ class _Needs:
 def _find_needs(assembly: Assembly, event_functions: Sequence[EventFunction]) -> _Needs:
     symbols, accelerations = [one.symbol for one in assembly.reactions], assembly.own_equations.accelerations
     return _Needs(
-        any(depends_on(one.value, symbols) for one in event_functions),
-        any(depends_on(one.value, accelerations) for one in event_functions),
+        depends_on([one.value for one in event_functions], symbols),
+        depends_on([one.value for one in event_functions], accelerations),
     )
 
 
@@ -124,6 +125,9 @@ _TINY = 1e-300
 
 _RUNS = 1000.0
 """Times what is small: slips in two directions that are faster than this may come to rest again."""
+
+_MOMENT = 1e-12
+"""In units of the scene's time: so much later it is seen whether something slows down."""
 
 _PASSED = 0.9
 """What has passed zero by this share of its margin at the start of a mode happens there.
@@ -198,17 +202,31 @@ class EventProbe:
         opening = self._opening(t, q, u, small) & (np.abs(values) <= small)
         self.shift = np.where(opening, np.where(values > 0.0, 0.0, 2.0 * np.abs(values) + _TINY), self.shift)
         happened &= ~opening
-        self._arm(values, small, happened)
+        self._arm(values, small, happened, (t, q, u))
         self.broken = next((one for one, has in zip(self.event_functions, happened, strict=True) if has), None)
 
-    def _arm(self, values: FloatArray, small: FloatArray, happened: BoolArray) -> None:
+    def _arm(
+        self, values: FloatArray, small: FloatArray, happened: BoolArray, state: tuple[float, FloatArray, FloatArray]
+    ) -> None:
         """Look for slips in two directions to fall below what is small; of those that begin, first to rise above it."""
+        later = None
         for i, one in enumerate(self.event_functions):
             if one.target in (RESTS, RUNS):
-                runs = abs(values[i]) > _RUNS * small[i]
+                size = abs(values[i])
+                runs = size > _RUNS * small[i]
+                if small[i] < size <= _RUNS * small[i]:  # several come to rest together, and one of them is first
+                    later = self._soon(*state) if later is None else later
+                    runs = abs(later[i]) < size
                 is_off = runs == (one.target == RUNS)
-                self.shift[i] = (2.0 * abs(values[i]) + 2.0) if is_off else -small[i] if runs else _RUNS * small[i]
+                self.shift[i] = (2.0 * size + 2.0) if is_off else -small[i] if runs else _RUNS * small[i]
                 happened[i] = False
+
+    def _soon(self, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
+        """Return the values a moment later."""
+        moment = _MOMENT * self.plan.scales.time
+        rates = kinematic_map_of(self.assembly, self.assembly.form).rates(t, q, u)
+        accelerations, _ = self.plan.balance.accelerate(t, q, u, self.plan.kept)
+        return self.values(t + moment, q + moment * rates, u + moment * accelerations) - self.shift
 
     def _opening(self, t: float, q: FloatArray, u: FloatArray, small: FloatArray) -> BoolArray:
         """Return which gaps are at zero and open with a speed: they need no margin."""

@@ -420,16 +420,16 @@ def velocity_jacobian(assembly: Assembly, equations: Equations, path: str) -> tu
         raise UsageError("there is no such quantity", where=path, advice=suggestion_in_parts(path, known))
     values = [observables[one].value for one in ([path] if path in observables else vector)]
     others = [*e.accelerations, *(one.symbol for one in assembly.reactions)]
-    if any(depends_on(value, others) for value in values):
+    if depends_on(values, others):
         raise UsageError(
             "it depends on accelerations or reactions, and has no derivative of motion",
             where=path,
             advice="Ask for a position, an angle or a velocity.",
         )
-    if not any(depends_on(value, e.speeds) for value in values):
+    if not depends_on(values, e.speeds):
         values = jvp(values, {e.time: 1.0, **dict(zip(e.coordinates, e.rates, strict=True))})
     entries = jacobian_by_rows(values, e.speeds)
-    if any(depends_on(one, e.speeds) for one in dict.fromkeys(entries)):
+    if depends_on(entries, e.speeds):
         raise UsageError("it is not linear in the speeds", where=path, advice="Ask for a position or a velocity.")
     shape = (len(e.speeds),)
     return entries, shape if path in observables else (len(vector), *shape)

@@ -9,7 +9,7 @@ from typing import Any
 
 from atwood.arguments import optional
 from atwood.errors import UsageError, suggestion
-from atwood.expr import Expression, depends_on, substitute
+from atwood.expr import Expression, read_by, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian
 from atwood.lazy_dataclasses import dataclass, replace
@@ -284,7 +284,7 @@ def _worked_out(
                 substitute([made], values)[0].value, values[one.expression]
             ):
                 found[one.expression] = made
-    return found, [one for symbol, one in more.items() if any(depends_on(made, [symbol]) for made in found.values())]
+    return found, [more[symbol] for symbol in read_by(found.values(), more)]
 
 
 def _coordinates(found: Lagrangian) -> list[_Wanted]:

@@ -123,7 +123,7 @@ class LegendreTransform:
     @cached_property
     def has_moving_mass(self) -> bool:
         """Whether L is not quadratic in the velocities."""
-        return any(depends_on(one, self.velocity_symbols) for one in self._inertia)
+        return depends_on(self._inertia, self.velocity_symbols)
 
     @cached_property
     def _inertia(self) -> list[Expression]:

@@ -264,7 +264,7 @@ def parts_of(assembly: Assembly, along: int, t: float) -> PartsAt:
     n = len(found.velocities)
     still: dict[Expression, Expression | float] = dict.fromkeys(found.velocities, 0.0)
     mass = jacobian_by_rows(found.momenta, found.velocities)
-    if any(depends_on(one, found.velocities) for one in mass):
+    if depends_on(mass, found.velocities):
         raise UnsupportedError(
             "its Lagrangian is no polynomial of second degree in the velocities",
             where=assembly.flat.name,

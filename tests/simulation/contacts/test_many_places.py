@@ -1,0 +1,70 @@
+"""Bodies that touch in many places at once: all that a box can do on a floor, and what becomes of the energy."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from atwood import Scene, simulate
+from atwood_library import BallContact, Box, BoxContact, Disc, Ground
+
+G = 9.81
+FORMS = pytest.mark.parametrize("form", ["reduced", "dae"])
+
+
+def crate(spin: float = 0.0) -> Scene:
+    """Return a crate that slides on a floor on four corners of eight."""
+    scene = Scene(space="space")
+    ground = scene.add("ground", Ground())
+    box = scene.add("box", Box(mass=1.0, length_x=0.5, length_y=0.4, length_z=0.3))
+    floor = scene.add("floor", BoxContact(length=0.5, width=0.4, height=0.3, corners=8, friction=0.3))
+    scene.connect(ground.frame, floor.plane)
+    scene.connect(box.frame, floor.box)
+    place, speed = {"x": 0.0, "y": 0.0, "z": 0.15}, {"x": 1.2, "y": 0.5, "z": 0.0}
+    scene.start.update({f"box.position.{axis}": value for axis, value in place.items()})
+    scene.start.update({f"box.velocity.{axis}": value for axis, value in speed.items()})
+    scene.start.update({f"box.angular_velocity.{axis}": spin * (axis == "z") for axis in "xyz"})
+    return scene
+
+
+@pytest.mark.sample(1)
+@FORMS
+def test_a_crate_slides_until_friction_stops_it(form: str) -> None:
+    result = simulate(crate(), form=form, t_end=1.0, rtol=1e-10, outputs=[0.0, 1.0])
+    stops = [one.time for one in result.events if one.kind == "sticks"]
+    assert stops == pytest.approx([1.3 / (0.3 * G)] * 4, abs=1e-9)
+    way = 1.3**2 / (2.0 * 0.3 * G)
+    assert math.hypot(result["box.position.x"][-1], result["box.position.y"][-1]) == pytest.approx(way, abs=1e-9)
+    assert sum(result[f"floor.corner[{k}].normal_force"][-1] for k in range(8)) == pytest.approx(G, abs=1e-9)
+
+
+def test_a_crate_that_spins_comes_to_rest_in_all_corners_together() -> None:
+    """Sliding and spinning end together (Z. Farkas and others, Physical Review Letters 90, 248302, 2003)."""
+    result = simulate(crate(0.5), t_end=1.0, rtol=1e-9, max_seconds=60.0)
+    assert result.status == "finished"
+    assert [one.kind for one in result.events].count("sticks") == 4
+    assert abs(result["box.angular_velocity.z"][-1]) < 1e-12
+    assert result.statistics.steps < 1000
+
+
+@FORMS
+def test_energies_of_parts_know_impacts_and_friction(form: str) -> None:
+    scene = Scene()
+    ground, ball = scene.add("ground", Ground()), scene.add("ball", Disc(mass=1.0, radius=0.1))
+    floor = scene.add("floor", BallContact(radius=0.1, restitution=0.5, friction=0.3))
+    scene.connect(ground.frame, floor.plane)
+    scene.connect(ball.frame, floor.ball)
+    scene.start.update({"ball.position.x": 0.0, "ball.position.z": 0.6, "ball.angle": 0.0})
+    scene.start.update({"ball.velocity.x": 9.0, "ball.velocity.z": 0.0, "ball.angular_velocity.y": 0.0})
+    result = simulate(scene, form=form, t_end=3.0, rtol=1e-10)
+    assert {"impact", "rests", "sticks"} <= {one.kind for one in result.events}
+    parts = result.energy.parts
+    lost = result.energy.total[-1] - result.energy.total[0]
+    assert parts["floor"].impacts[-1] - parts["floor"].dissipated[-1] == pytest.approx(lost, rel=1e-9)
+    assert parts["floor"].dissipated[-1] > 0.001
+    assert np.all(np.diff(parts["floor"].dissipated) >= -1e-12)
+    for one in (parts["ball"], parts["floor"]):
+        given = sum(one.work.values()) + one.supplied - one.dissipated + one.constraints + one.impacts
+        assert one.gained == pytest.approx(given, abs=1e-9)
