@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from atwood_library.contacts.lossy_gear import LossyGear as LossyGear
     from atwood_library.contacts.one_way_clutch import OneWayClutch as OneWayClutch
     from atwood_library.contacts.point_contact import PointContact as PointContact
+    from atwood_library.contacts.ratchet import Ratchet as Ratchet
     from atwood_library.contacts.rotational_friction import RotationalFriction as RotationalFriction
     from atwood_library.contacts.rotational_stop import RotationalStop as RotationalStop
     from atwood_library.contacts.surface_contact import SurfaceContact as SurfaceContact
@@ -209,6 +210,7 @@ _MODULES = {
     "Quintic": "sources.quintic",
     "RackAndPinion": "joints.rack_and_pinion",
     "Ramp": "sources.ramp",
+    "Ratchet": "contacts.ratchet",
     "RelativePositionSensor": "sensors.relative_position_sensor",
     "RigidBody": "parts.rigid_body",
     "Rim": "parts.rim",
