@@ -119,3 +119,16 @@ def test_parts_are_found_by_the_last_word_alone() -> None:
 def test_what_is_no_part_is_not_found() -> None:
     for name in ("Modelica.Mechanics.MultiBody.Joints.Hovercraft", "Rotational", "Components"):
         assert not parts_called(name), name
+
+
+@pytest.mark.parametrize(
+    ("word", "part"),
+    [
+        *(("friction", "RotationalFriction"), ("friction", "TranslationalFriction"), ("contact", "PointContact")),
+        *(("clutch", "RotationalFriction"), ("brake", "RotationalFriction"), ("backlash", "RotationalStop")),
+        *(("stop", "TranslationalStop"), ("impact", "PointContact"), ("freewheel", "OneWayClutch")),
+        *(("capstan", "RoughPulley"), ("pawl", "Ratchet"), ("worm gear", "LossyGear")),
+    ],
+)
+def test_one_sided_parts_are_found_by_what_people_call_them(word: str, part: str) -> None:
+    assert part in parts_called(word)

@@ -13,7 +13,15 @@ __all__ = ["PointContact"]
 class PointContact(OnPlane):
     """A point, or the centre of a smooth ball, that cannot pass a plane, with dry friction where it touches."""
 
-    synonyms: ClassVar[tuple[str, ...]] = ("Contact", "Floor", "Wall", "Unilateral constraint", "Support", "Belt")
+    synonyms: ClassVar[tuple[str, ...]] = (
+        "Contact",
+        "Impact",
+        "Floor",
+        "Wall",
+        "Unilateral constraint",
+        "Support",
+        "Belt",
+    )
 
     radius: Number = parameter(0.0, unit="m", minimum=0.0, doc="Radius of a smooth ball about the point.")
     point: Point = connector(Point, "What touches it.")

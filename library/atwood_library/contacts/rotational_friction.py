@@ -19,7 +19,7 @@ class RotationalFriction(Rubbing):
     """
 
     synonyms: ClassVar[tuple[str, ...]] = (
-        *("Clutch", "BearingFriction", "Bearing friction", "Dry friction", "Coulomb friction"),
+        *("Friction", "Clutch", "BearingFriction", "Bearing friction", "Dry friction", "Coulomb friction"),
         *("Rotational.Components.Brake", "Rotational.Components.Clutch"),
     )
     spaces: ClassVar[tuple[str, ...]] = ("plane", "space")

@@ -19,7 +19,7 @@ class TranslationalFriction(Rubbing):
     """
 
     synonyms: ClassVar[tuple[str, ...]] = (
-        *("SupportFriction", "Translational.Components.Brake", "Guide friction", "Stick-slip"),
+        *("Friction", "SupportFriction", "Translational.Components.Brake", "Guide friction", "Stick-slip"),
     )
     spaces: ClassVar[tuple[str, ...]] = ("plane", "space")
 
