@@ -50,8 +50,11 @@ def loosened(assembly: Assembly, values: Sequence[Expression]) -> list[Expressio
     """Return expressions as they are in the present states, if these are all zero; else as they stand."""
     if not is_loose(assembly):
         return list(values)
-    states, zero = assembly.discrete_states, assembly.own_equations.graph.zero
-    return substitute(list(values), {states[i].symbol: zero for i in _states(assembly)})
+    equations, states = assembly.own_equations, assembly.discrete_states
+    known = {equations.read.get(x, x) for one in equations.contacts for x in (one.row.multiplier, one.read)}
+    zeros = {one: equations.graph.zero for one in known if not one.is_constant}
+    without = substitute(list(values), zeros)
+    return substitute(without, {states[i].symbol: equations.graph.zero for i in _states(assembly)})
 
 
 def loose_equations(assembly: Assembly, rows: Sequence[Expression]) -> tuple[Equations, tuple[Expression, ...]]:

@@ -69,6 +69,11 @@ class LocalContact:
         """Whether it is a slip, and not a gap."""
         return self.limit is not None
 
+    @property
+    def is_free(self) -> bool:
+        """Whether it is a slip that nothing ever holds."""
+        return all(one is not None and one.is_zero for one in (self.limit, self.static_limit))
+
 
 def local_contacts(
     part: Part,
@@ -85,6 +90,8 @@ def local_contacts(
     pressing = {one.row.reaction: one.read for one in gaps}  # zero where the gap is open
     bound = bind(part.component, replace(binding, reactions={**binding.reactions, **never, **pressing}))
     slips = [one for law in laws if law.kind == "friction" for one in _slip(part, law, bound, graph)]
+    never |= {one.row.reaction: 0.0 for one in slips if one.is_free}
+    slips = [one for one in slips if not one.is_free]
     forces = {one.row.reaction: one.force for one in (*gaps, *slips)}
     return (*gaps, *slips), replace(binding, reactions={**binding.reactions, **never, **forces})
 
