@@ -9,6 +9,7 @@ import pytest
 
 import atwood as aw
 from atwood import Scene, simulate
+from atwood.simulation.events.modes import find_event_functions
 from atwood_library import (
     BallContact,
     Box,
@@ -382,3 +383,30 @@ def test_contacts_are_the_same_however_a_scene_is_turned(turned: float) -> None:
     assert len(known_impacts) == 3
     assert place == pytest.approx(known, abs=1e-9)
     assert impacts == pytest.approx(known_impacts, abs=1e-9)
+
+
+@FORMS
+def test_what_is_far_away_takes_no_step_more_and_is_watched_by_its_gap_alone(form: str) -> None:
+    def away(count: int) -> tuple[int, int, int]:
+        scene = Scene()
+        m = scene.add("m", PointMass(mass=1.0))
+        for i in range(count):
+            ground = scene.add(f"ground_{i}", Ground(position=(0.0, 0.0, -100.0 - i)))
+            floor = scene.add(f"c_{i}", PointContact(friction=0.3))
+            scene.connect(ground.frame, floor.plane)
+            scene.connect(m.point, floor.point)
+        start_at(scene, 0.0, 0.0, 1.0, 2.0)
+        result = run(scene, form, 1.0)
+        statistics = result.statistics
+        return statistics.steps, statistics.residual_evaluations, len(find_event_functions(result.run.assembly))
+
+    steps, evaluations, _ = away(1)
+    assert away(5) == (steps, evaluations, 5)
+
+
+def test_without_friction_nothing_slips() -> None:
+    scene = on_plane(PointMass(mass=2.0), PointContact())
+    start_at(scene, 0.0, 0.1, 0.3, 0.0)
+    result = run(scene, "reduced", 1.0)
+    assert [one.kind for one in result.events] == ["impact", "closes"]
+    assert [result[f"c.{name}"][-1] for name in ("slip", "slip_state", "friction_force")] == [0.3, 0.0, 0.0]
