@@ -10,6 +10,7 @@ import numpy as np
 
 from atwood.errors import AtwoodError
 from atwood.result.result import Result
+from atwood.simulation.events.modes import EventRecord
 
 
 def versions() -> dict[str, str]:
@@ -33,6 +34,12 @@ def solver_name(result: Result) -> str:
     return ", then ".join(dict.fromkeys(one.name for one in result.run.choices))
 
 
+def _describe_event(event: EventRecord) -> dict[str, Any]:
+    what = {"time": event.time, "part": event.part, "what": event.message, "mode": event.target, "kind": event.kind}
+    struck = event.struck
+    return what if struck is None else {**what, "impulse": struck.impulse, "loss": struck.loss}
+
+
 def describe_run(result: Result) -> dict[str, Any]:
     """Return everything about a run but its trajectories, as plain data."""
     statistics, options, flat = result.statistics, result.run.options, result.assembly.flat
@@ -47,9 +54,7 @@ def describe_run(result: Result) -> dict[str, Any]:
         "message": result.message,
         "t_start": float(result.start.time),
         "t_end": float(result.time[-1]),
-        "happenings": [
-            {"time": one.time, "part": one.part, "what": one.message, "mode": one.target} for one in result.events
-        ],
+        "happenings": [_describe_event(one) for one in result.events],
         "singular_positions": [
             {"time": one.time, "ways": one.ways, "parts": list(one.parts), "what": one.describe()}
             for one in result.singular_crossings

@@ -26,7 +26,7 @@ from atwood.result.turns import TurnCounter
 from atwood.result.work import find_ledger
 from atwood.simulation.dynamics.numerical_failure import named
 from atwood.simulation.dynamics.orientation_coordinates import CoordinateSwitch
-from atwood.simulation.events.modes import EventRecord
+from atwood.simulation.events.modes import EventRecord, Impact
 from atwood.simulation.initialization.mobility import Immobile, find_immobile
 from atwood.simulation.initialization.report import InitializationReport, report_initialization
 from atwood.simulation.initialization.start import Start, own_state
@@ -132,6 +132,11 @@ class Result(Trajectories):
     def events(self) -> tuple[EventRecord, ...]:
         """Events on the way, in order."""
         return self.run.events
+
+    @property
+    def impacts(self) -> tuple[Impact, ...]:
+        """Impacts of gaps in order, with impulses, speeds and what was lost; of those that accumulate the first."""
+        return tuple(one.struck for one in self.events if one.struck is not None)
 
     @property
     def singular_crossings(self) -> tuple[SingularCrossing, ...]:

@@ -64,6 +64,15 @@ def test_energies_of_parts_know_impacts_and_friction(form: str) -> None:
     lost = result.energy.total[-1] - result.energy.total[0]
     assert parts["floor"].impacts[-1] - parts["floor"].dissipated[-1] == pytest.approx(lost, rel=1e-9)
     assert parts["floor"].dissipated[-1] > 0.001
+    first = result.impacts[0]
+    fall = math.sqrt(2.0 * G * 0.5)
+    assert (first.part, first.law, first.before) == ("floor", "gap", pytest.approx(-fall, abs=1e-9))
+    assert first.after == pytest.approx(0.5 * fall, abs=1e-9)
+    assert first.impulse == pytest.approx(1.5 * fall, abs=1e-9)
+    slip = 9.0 - 0.5 * 3.0 * 0.3 * first.impulse  # a disc's slip changes by 3 f/m
+    assert first.friction == pytest.approx((-0.3 * first.impulse,), abs=1e-9)
+    lost = 0.5 * 0.75 * fall**2 + 0.3 * first.impulse * slip
+    assert first.loss == pytest.approx(lost, abs=1e-8)
     assert np.all(np.diff(parts["floor"].dissipated) >= -1e-12)
     for one in (parts["ball"], parts["floor"]):
         given = sum(one.work.values()) + one.supplied - one.dissipated + one.constraints + one.impacts

@@ -33,7 +33,7 @@ from atwood.simulation.contacts.values import ContactValues
 from atwood.simulation.dynamics.orientation_coordinates import to_regular
 from atwood.simulation.dynamics.scales import Scales
 from atwood.simulation.events.mode_change import generalized_speeds
-from atwood.simulation.events.modes import EventRecord
+from atwood.simulation.events.modes import EventRecord, Impact
 
 _NEAR = 10.0
 """Times the relative tolerance, in sizes of the scene: what is nearer to zero is there."""
@@ -235,10 +235,20 @@ class _Moment:
             )
         self.u = self.u + values.speeds_by(impulses)
         for k in touching:
-            speed = -self.rate(k, rates)
-            if speed > self.slow[k]:
-                said = f"an impact at {speed:.6g} {ALONG[self.first[k].law.options.unit]}/s"
-                self._tell(k, said, "impact")
+            if -self.rate(k, rates) > self.slow[k]:
+                rubs = [row for j in chosen if values.gap_of[j] == k for row in self.units[j]]
+                self._tell_impact(k, rubs, impulses, rates, after, work)
+
+    def _tell_impact(
+        self, k: int, rubs: list[int], impulses: FloatArray, before: FloatArray, after: FloatArray, work: FloatArray
+    ) -> None:
+        """Tell of an impact of a gap, with friction along some rows."""
+        (i,) = self.units[k]
+        self._tell(k, f"an impact at {-before[i]:.6g} {ALONG[self.first[k].law.options.unit]}/s", "impact")
+        friction, loss = tuple(map(float, impulses[rubs])), -float(np.sum(work[[i, *rubs]]))
+        key = self.first[k].row.key[:2]
+        struck = Impact(self.t, *key, float(impulses[i]), friction, float(before[i]), float(after[i]), loss)
+        self.events[-1] = replace(self.events[-1], struck=struck)
 
     def _impulses(self, chosen: list[int], free: FloatArray) -> FloatArray:
         """Return the impulses of all rows: velocities take the place of accelerations, and limits are of impulses."""

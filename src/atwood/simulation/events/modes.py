@@ -50,6 +50,36 @@ _IS_THERE: Key[Program] = Key("whether an event is there")
 
 
 @dataclass(frozen=True)
+class Impact:
+    """What happened where a gap closed with a speed.
+
+    Attributes
+    ----------
+    time
+        s.
+    part, law
+        The component, and its gap.
+    impulse
+        Along the gap, N s or N m s.
+    friction
+        Impulses along its slips.
+    before, after
+        Rates of the gap, m/s or rad/s; the first is negative.
+    loss
+        Energy that was lost, J, also by friction.
+    """
+
+    time: float
+    part: str
+    law: str
+    impulse: float
+    friction: tuple[float, ...]
+    before: float
+    after: float
+    loss: float
+
+
+@dataclass(frozen=True)
 class EventRecord:
     """An event that has happened.
 
@@ -68,6 +98,8 @@ class EventRecord:
     kind
         ``"event"`` for one that a part declares. Of gaps and slips ``"impact"``, ``"closes"``, ``"opens"``,
         ``"slips"``, ``"sticks"``, ``"reverses"`` (of a slip), ``"rests"`` (impacts have accumulated) or ``"jams"``.
+    struck
+        Of an impact of a gap its impulses, speeds and loss.
     """
 
     time: float
@@ -77,6 +109,7 @@ class EventRecord:
     target: str
     impact: bool
     kind: str = "event"
+    struck: Impact | None = None
 
     def describe(self) -> str:
         """Return what happened, where and when."""
