@@ -74,7 +74,7 @@ def rendered(chapter: str) -> str:
     return "\n".join(blocks)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("chapter", COMMANDS)
 def test_the_page_of_a_chapter_is_as_it_was_read(chapter: str) -> None:
     assert rendered(chapter) == (HERE / f"{chapter}.tex").read_text(encoding="utf-8")

@@ -62,6 +62,7 @@ def test_derivatives_of_s_are_momentum_and_energy():
     assert by_time == pytest.approx(-0.125, abs=1e-5)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     "scene",
     [pendulum(), DoublePendulum(), ElasticPendulum(), ChargedParticle(), DrivenPendulum()],

@@ -130,7 +130,7 @@ def along(name: str) -> tuple[Separation, list[dict[Any, float]], Scene]:
     return found, states, scene
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", CASES)
 def test_constants_and_betas_stay_along_a_run(name: str) -> None:
     found, states, _ = along(name)
@@ -174,7 +174,7 @@ def difference(function: Any, q: Any, start: float, end: float) -> float:
     return total
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", CASES)
 def test_the_equation_of_hamilton_and_jacobi_holds(name: str) -> None:
     """``H(q, dW/dq) = E``, with W differentiated, at 50 digits."""
@@ -292,6 +292,7 @@ def test_a_top_keeps_a_quadrature_of_its_cubic() -> None:
     assert vanishes([part.quadrature.square - expected]).proven
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("scene", "new", "left"),
     [
@@ -336,6 +337,7 @@ def test_turned_moved_and_scaled_scenes_have_the_same_integral() -> None:
     assert set(map(str, renamed.constants)) == {"p_a", "E"}
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("law", "place", "speed"),
     [

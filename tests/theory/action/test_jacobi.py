@@ -96,7 +96,7 @@ def test_the_separated_momentum_in_symbols():
     assert float(there.subs({"r": 1.0})) == pytest.approx(0.25)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("amplitude", [0.5, 1.0, 2.5, 3.1])
 def test_the_pendulum_that_swings(amplitude):
     """``T = 4 K(k)/w`` and ``J = 16 w (E(k) - (1 - k^2) K(k))`` with ``k = sin(amplitude/2)`` for m = l = 1."""
@@ -208,6 +208,7 @@ def well(energy: Callable[..., Any], place: float, speed: float) -> Scene:
     return scene
 
 
+@pytest.mark.sample(2)
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(("place", "share"), [(0.5, 1.0), (2.0**0.5, 0.0), (0.0, 0.0), (-0.7, -1.0)])
 def test_on_a_separatrix_nothing_has_a_period(place: float, share: float) -> None:
@@ -224,7 +225,7 @@ TOPS = {
 }
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
     ("name", "size", "height", "off"),
@@ -258,6 +259,7 @@ def test_a_separatrix_is_one_whatever_its_size_and_place(name: str, size: float,
             action_angle(well(energy, off, 1.01 * speeds[0.0]))
 
 
+@pytest.mark.sample(2)
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("angle", [0.0, 0.3, np.pi])
 def test_a_pendulum_that_comes_to_stand_has_no_period(angle: float) -> None:

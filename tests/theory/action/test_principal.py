@@ -38,6 +38,7 @@ BOOK = {
 }
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("kind", BOOK)
 def test_the_principal_function_of_one_coordinate(kind: str) -> None:
     """Landau and Lifshitz, Mechanics, section 43, and Goldstein, section 10.2; the action of a run is its number."""

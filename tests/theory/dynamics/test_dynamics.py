@@ -24,7 +24,7 @@ def around(name: str, form: str, count: int = 3) -> tuple[Dynamics, Any, list[tu
     return dynamics(prepared.assembly), prepared, states
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("name", "form"), [(name, form) for name in SCENES for form in ("reduced", "dae")])
 def test_they_are_the_balance_of_forces(name: str, form: str) -> None:
     found, prepared, states = around(name, form)
@@ -50,7 +50,7 @@ def test_they_are_the_balance_of_forces(name: str, form: str) -> None:
         assert np.array_equal(gammas[k], found.constraint_bias(q, u))
 
 
-@pytest.mark.sample(7)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("name", "form"), [(name, form) for name in SCENES for form in ("reduced", "dae")])
 def test_forward_dynamics_undoes_inverse_dynamics(name: str, form: str) -> None:
     found, prepared, _ = around(name, form, 1)
@@ -72,6 +72,7 @@ def test_forward_dynamics_undoes_inverse_dynamics(name: str, form: str) -> None:
     assert work == pytest.approx(0.0, abs=1e-7 * max(1.0, float(tau @ (pushed[1] - a))))
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("name", "path"),
     [

@@ -36,7 +36,7 @@ def check(scene: Scene, form: str, share: float = 0.02) -> None:
     assert found.y[:, -1] == pytest.approx(states[:, -1], rel=2e-6, abs=2e-6)
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 @pytest.mark.parametrize("name", [name for name in SCENES if name not in REFUSED])
 def test_a_module_is_what_runs(name: str, form: str) -> None:

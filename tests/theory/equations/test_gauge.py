@@ -27,6 +27,7 @@ def read(text: str, eq: object) -> sympy.Expr:
     return sympy.sympify(text, known | {"t": t})
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(("kind", "gauge"), CASES, ids=[one.__name__ for one, _ in CASES])
 def test_the_equations_stay_and_momenta_and_h_change(kind: type, gauge: str) -> None:
     """``p + df/dq`` in place of p, and ``H(q, p - df/dq) - df/dt``; of a sympy expression as of text."""

@@ -48,6 +48,7 @@ def values_along(scene: Scene, path: str, form: str = "reduced") -> tuple[np.nda
     return np.broadcast_to(found, result.time.shape), result[path]
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize(
     ("name", "path"),
     [

@@ -20,6 +20,7 @@ SCENES_AND_FORMS = [
 ]
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize(("name", "form"), SCENES_AND_FORMS)
 def test_the_terms_of_the_parts_add_up_to_the_whole(name: str, form: str) -> None:
     eq = equations(SCENES[name](), form=form)
@@ -29,6 +30,7 @@ def test_the_terms_of_the_parts_add_up_to_the_whole(name: str, form: str) -> Non
         assert sympy.expand(sum(one.rows[k] for one in parts) - row, trig=True) == 0
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(("name", "form"), SCENES_AND_FORMS)
 def test_a_term_names_the_parts_without_which_it_would_be_another(name: str, form: str) -> None:
     """What the parts have that a term names, and they alone, adds up to its coefficient of what moves."""

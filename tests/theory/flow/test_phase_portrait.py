@@ -29,7 +29,7 @@ TURN = round(math.pi, 9)
 KINDS = {"free": [], "harmonic": ["centre"], "inverted": ["saddle"], "pendulum": ["saddle", "centre", "saddle"]}
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("kind", ENERGIES)
 def test_curves_keep_the_energy_of_textbook_oscillators(kind: str) -> None:
     found = phase_portrait(Oscillators(kind=kind))
@@ -69,8 +69,13 @@ def test_over_the_momentum_curves_are_level_sets_of_h() -> None:
     assert "homoclinic" in {one.kind for one in hoop.named if one.begin == pytest.approx(math.pi)}
 
 
-def test_motions_run_in_their_sense() -> None:
-    for curve in phase_portrait(SimplePendulum()).curves:
+@pytest.fixture(scope="module")
+def portrait() -> PhasePortrait:
+    return phase_portrait(SimplePendulum())
+
+
+def test_motions_run_in_their_sense(portrait: PhasePortrait) -> None:
+    for curve in portrait.curves:
         ahead = np.diff(curve, axis=0)
         fast = np.abs(curve[:-1, 1]) > 1.0
         assert np.all(ahead[fast, 0] * curve[:-1, 1][fast] > 0.0)
@@ -120,8 +125,7 @@ def test_what_has_no_portrait_is_said() -> None:
         phase_portrait(machine)
 
 
-def test_pictures_show_curves_and_points(tmp_path) -> None:
-    portrait: PhasePortrait = phase_portrait(SimplePendulum())
+def test_pictures_show_curves_and_points(portrait: PhasePortrait, tmp_path) -> None:
     figure = atwood.plot_phase_portrait(portrait, tmp_path / "phase.png")
     assert len(figure.axes[0].lines) == len(portrait.curves) + len(portrait.separatrices) + len(portrait.rest_points)
     assert (tmp_path / "phase.png").stat().st_size > 10_000

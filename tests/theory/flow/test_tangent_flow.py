@@ -50,6 +50,7 @@ def test_linear_oscillators_have_their_closed_forms() -> None:
     assert oscillation("free")[-1] == pytest.approx(np.array([[1.0, 2.0], [0.0, 1.0]]), abs=1e-12)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("solver", ["explicit", "taylor", "ida"])
 def test_neighbours_of_a_double_pendulum_move_as_it_says(solver: str) -> None:
     scene, t_end, eps = DoublePendulum(), 3.0, 1e-5
@@ -85,6 +86,7 @@ def test_friction_shrinks_volumes_at_its_rate() -> None:
     assert flow.density * flow.volume == pytest.approx(1.0)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     "scene",
     [FourBar(), FourBarRow(windows=1, space="space"), FreeBody(), LagrangeTop()],

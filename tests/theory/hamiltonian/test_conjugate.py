@@ -11,6 +11,7 @@ from atwood.theory.hamiltonian.phase_space import vanishes
 m, c, l, g, v, x, y, p, q, theta = sympy.symbols("m c l g v x y p q theta")
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("function", "between", "expected", "goes"),
     [

@@ -110,6 +110,7 @@ def test_jacobi_s_identity() -> None:
     assert vanishes([b(f, b(g, h)) + b(g, b(h, f)) + b(h, b(f, g))]).proven
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("f", "kind", "old"),
     [

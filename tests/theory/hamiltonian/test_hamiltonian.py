@@ -59,6 +59,7 @@ def _state(h, seed=1):
     return q + random.uniform(0.1, 0.4, len(q)), random.uniform(-1.0, 1.0, len(q)), 0.3
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("case", CASES)
 def test_symbols_say_what_numbers_do(case):
     """H, its derivatives and Hamilton's equations by sympy are those by the Legendre transform in numbers."""

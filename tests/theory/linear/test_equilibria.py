@@ -48,7 +48,7 @@ WELLS: dict[str, tuple[Callable[[Any, Any], Any], str, int]] = {
 }
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("name", "size"), [*((name, 1.0) for name in WELLS), ("x^4 + z^2", 1e-6), ("x^3 + z^2", 1e6)])
 def test_what_the_linear_model_does_not_decide_higher_derivatives_do(name: str, size: float) -> None:
     energy, stability, family = WELLS[name]
@@ -66,6 +66,7 @@ def test_what_stands_where_it_starts_is_put_into_the_balance() -> None:
     assert max(map(abs, one.values.values())) < 1e-6
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("stiffness", "length", "mass"), [(0.5, 0.1, 20.0), (2.0, 0.75, 1.0), (39.24, 0.1, 1.0)])
 def test_a_soft_spring_sags_by_many_times_its_length(stiffness: float, length: float, mass: float) -> None:
     [one] = equilibria(ElasticPendulum(stiffness=stiffness, natural_length=length, mass=mass))
@@ -115,6 +116,7 @@ def test_hoop_about_its_critical_rate(ratio: float) -> None:
     np.testing.assert_allclose([angle for angle, _ in angles], [angle for angle, _ in sorted(expected)], atol=1e-7)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("coordinates", ["angles", "places"])
 def test_spherical_pendulum_hangs_and_stands(coordinates: str) -> None:
     found = equilibria(SphericalPendulum(coordinates=coordinates))

@@ -44,7 +44,7 @@ def arm() -> Scene:
     return scene
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("make", "time", "drives"),
     [

@@ -38,6 +38,7 @@ def four(model: atwood.LinearModel) -> np.ndarray:
     return model.spectrum.others
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("heading", [0.0, 0.7, -2.9])
 def test_the_benchmark_bicycle_has_its_published_eigenvalues(heading: float) -> None:
     assembly = atwood.assemble(bicycle(heading, (1.3, -0.4)))
@@ -77,7 +78,7 @@ def test_weave_and_capsize_speeds_of_the_bicycle() -> None:
     assert capsize == pytest.approx(6.024262015, abs=1e-9)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("hole", "factor"), [(0.0, 1.0 / 3.0), (0.2, 0.25)])
 @pytest.mark.parametrize("heading", [0.0, 1.1])
 def test_a_disc_that_rolls_falls_below_its_critical_speed(hole: float, factor: float, heading: float) -> None:

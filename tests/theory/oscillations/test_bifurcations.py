@@ -103,6 +103,7 @@ def test_a_charge_on_a_hill_is_held_by_a_field_from_a_strength_on() -> None:
     assert is_at(one.condition, 4 * sympy.Symbol("e") ** 2 - m)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("scene", [DoublePendulum, WilberforcePendulum, ElasticPendulum])
 def test_where_nothing_branches_off_nothing_is_said(scene: type) -> None:
     found = atwood.equilibria(scene(), symbolic=True)

@@ -39,6 +39,7 @@ def pendulum(angle: float, rate: float = 0.0) -> Scene:
     return scene
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("amplitude", [1e-7, 1e-3, 1.0, 2.5, 3.1])
 def test_the_period_of_the_pendulum_is_its_elliptic_integral(amplitude: float) -> None:
     scene = pendulum(amplitude)
@@ -109,6 +110,7 @@ def test_lagrange_s_top_in_its_four_motions(motion: str) -> None:
     assert along["top.euler.phi"] - along["top.euler.phi"][0] == pytest.approx(phi - phi[0], abs=1e-10)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", ["rotating-hoop-driven", "rotating-hoop-free", "pendulum-on-cart"])
 def test_against_runs(name: str) -> None:
     deviations = against_a_run(SCENES[name]())
@@ -143,6 +145,7 @@ def orbit(eccentricity: float, speed_up: float = 1.0) -> Scene:
     return scene
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("eccentricity", [0.1, 0.5, 0.9])
 def test_kepler_s_orbits_close(eccentricity: float) -> None:
     found = reduced(orbit(eccentricity))

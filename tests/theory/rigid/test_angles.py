@@ -28,7 +28,7 @@ def is_zero(value: sympy.Matrix) -> bool:
     return all(abs(one) < sympy.Float("1e-45", 50) for one in value)
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("turns", ["moving", "fixed"])
 @pytest.mark.parametrize("angles", SEQUENCES)
 def test_matrix_angular_velocity_and_rates_belong_together(angles: str, turns: str) -> None:
@@ -94,6 +94,7 @@ def test_quaternions() -> None:
         assert is_zero(at(sheet[name], motion).subs(values).evalf(50) - left)
 
 
+@pytest.mark.sample(13)
 @pytest.mark.parametrize("kind", ["quaternion", *(f"euler-{one}" for one in SEQUENCES)])
 def test_the_rates_are_those_of_a_scene(kind: str) -> None:
     assembly = atwood.assemble(FreeBody(), orientation=kind)

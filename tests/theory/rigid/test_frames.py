@@ -23,6 +23,7 @@ def test_the_expansion_of_small_swings() -> None:
     assert float(off[1] / off[0]) == pytest.approx(1e-5, rel=0.01)  # what is left is of fifth order
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 def test_the_amplitude_along_a_run(form: str) -> None:
     scene = FoucaultPendulum(length=1.0, amplitude=0.2, rate=0.01)

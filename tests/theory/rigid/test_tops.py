@@ -75,7 +75,7 @@ def test_it_sleeps_from_that_spin_on() -> None:
         assert bool(np.max(result["top.theta"]) < 0.05) is stable
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 @pytest.mark.parametrize("motion", ["cusps", "loops", "waves", "steady"])
 def test_the_four_motions_of_a_scene(motion: str, form: str) -> None:
@@ -125,7 +125,7 @@ def test_the_four_in_one_figure() -> None:
     plt.close(figure)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("motion", ["cusps", "loops", "waves", "steady"])
 def test_the_path_of_its_constants_is_that_of_a_run(motion: str) -> None:
     scene = LagrangeTop(motion=motion)

@@ -168,6 +168,7 @@ def hanging(turn: np.ndarray, shift: np.ndarray) -> Scene:
     return scene
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_scene_turned_in_space_keeps_what_it_kept(seed: int) -> None:
     shift = np.array([0.3, -0.2, 0.5])
@@ -200,6 +201,7 @@ def test_what_falls_keeps_its_momentum_across(seed: int) -> None:
     assert abs(np.dot(about.direction, down)) == pytest.approx(1.0, abs=1e-9)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("away", [100.0, 1e4, -3e6])
 def test_far_from_the_origin_nothing_else_is_conserved(away: float) -> None:
     shift = np.array([away, 0.5 * away, 3.0])
@@ -208,6 +210,7 @@ def test_far_from_the_origin_nothing_else_is_conserved(away: float) -> None:
     assert found["L.z"].point == pytest.approx((away, 0.5 * away, 0.0), rel=1e-9)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("size", "mass", "constant"), [(1e-9, 1e-26, 1.0), (1e11, 1e30, 6.67e-11)])
 def test_atoms_and_planets(size: float, mass: float, constant: float) -> None:
     scene = SCENES["two-body"](mass1=2.0 * mass, mass2=mass, constant=constant, semi_major_axis=size)
@@ -237,6 +240,7 @@ def test_what_is_damped_or_pushed_later_is_not_conserved() -> None:
     assert {"P.y", "P.z", "K.y"} <= set(conserved(pushed).names)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", ["four-bar", "rolling-ball", "chaplygin-sleigh", "slider-crank"])
 def test_loops_and_rolling_keep_their_energy(name: str) -> None:
     found = conserved(SCENES[name]())

@@ -46,6 +46,7 @@ def falling() -> atwood.Scene:
     return scene
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "scene", [Kepler(), ChargedParticle(), SimplePendulum(), PendulumOnCart(), FallingWithDrag(), hinged()]
 )

@@ -116,6 +116,7 @@ def test_pseudo_momenta_whatever_the_gauge(gauge: str) -> None:
     kept(scene, found)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("scale", [1.0, 1e-3, 1e4])
 def test_the_monopole_s_three_angular_momenta(scale: float) -> None:
     """J = m r x v - e g r/|r| (Goldstein, chapter 3, exercise)."""
