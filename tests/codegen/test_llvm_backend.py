@@ -14,7 +14,8 @@ from atwood.codegen.llvm.engine import sincos_name
 from atwood.codegen.llvm.module import CodeOptions, Part, write_module
 from atwood.errors import KernelEvaluationError, UnsupportedError, UsageError
 from atwood.pipeline import assemble
-from atwood_library.scenes import SCENES
+
+from ..helpers.smooth import SMOOTH as SCENES
 
 _OPERATIONS = (
     lambda a, b: a + b,

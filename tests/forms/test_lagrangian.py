@@ -12,9 +12,9 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian, lagrangian_of
 from atwood.model.compose.composite import Model
 from atwood_library import Damper, Force, Ground, Link, Pivot, PointMass, RigidBody, Rod, Slider, Spherical, Spring
-from atwood_library.scenes import SCENES
 
 from ..helpers.lagrangians import BurningBody, CrankInertia, LagrangianBody, LagrangianPoint, LeakingBucket, PumpedPoint
+from ..helpers.smooth import SMOOTH as SCENES
 
 
 class Brake(Component):

@@ -27,8 +27,9 @@ from atwood.integrators.taylor.stepper import (
 from atwood.pipeline import assemble
 from atwood.simulation.problem.taylor_scene import recurrences
 from atwood_library import Force, Ground, PointMass, Slider, Spring
-from atwood_library.scenes import SCENES, Atwood, Chain, DoublePendulum
+from atwood_library.scenes import Atwood, Chain, DoublePendulum
 
+from ..helpers.smooth import SMOOTH as SCENES
 from .taylor_reference import ReferenceStepper, power_of_two
 
 Kind = Literal["compiled", "reference"]

@@ -25,6 +25,8 @@ from atwood_library import (
 )
 from atwood_library.scenes import SCENES, Chain, FourBarRow
 
+from ..helpers.smooth import SMOOTH
+
 MORE = 1.02
 """So many times the operations may be needed at most."""
 
@@ -130,7 +132,7 @@ LARGER: dict[str, tuple[Callable[[], Scene], tuple[int, int, int, int]]] = {
 
 
 def test_every_scene_in_a_plane_or_on_a_line_is_here() -> None:
-    assert set(RECORDED) == {name for name, make in SCENES.items() if make().space != "space"}
+    assert set(RECORDED) == {name for name, make in SMOOTH.items() if make().space != "space"}
 
 
 @pytest.mark.sample(12)

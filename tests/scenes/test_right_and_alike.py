@@ -8,10 +8,11 @@ import pytest
 from atwood import Result, Scene, report, simulate
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.reactions import maximal_state
-from atwood_library.scenes import SCENES, Bricard, FourBarRow
+from atwood_library.scenes import Bricard, FourBarRow
 
 from ..helpers.arcs import by_arcs
 from ..helpers.runs import FORMS
+from ..helpers.smooth import SMOOTH as SCENES
 
 TIGHT = 1e-12
 

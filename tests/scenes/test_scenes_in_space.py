@@ -21,6 +21,7 @@ from atwood_library.scenes import (
     UniversalShaft,
 )
 
+from ..helpers.smooth import SMOOTH
 from ..references.bricard import Bricard as ExactBricard
 from ..references.foucault import PolarFoucault
 from ..references.free_body import FreeBody as ExactBody, PlateSeparatrix
@@ -78,7 +79,7 @@ def axes(result: Result, body: str) -> Any:
 
 
 def test_every_scene_in_space_is_here() -> None:
-    assert set(SIZES) == {name for name, make in SCENES.items() if make().space == "space"}
+    assert set(SIZES) == {name for name, make in SMOOTH.items() if make().space == "space"}
 
 
 @pytest.mark.sample(3)

@@ -30,9 +30,9 @@ from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.problem.preparation import make_problem
 from atwood.simulation.run.choice import ASKED, stiffness_of
 from atwood_library import Damper, Force, Ground, PointMass, Spring
-from atwood_library.scenes import SCENES
 
 from ..helpers.mechanisms import pendulum_on_a_string
+from ..helpers.smooth import SMOOTH as SCENES
 
 SMOOTH = ("simple-pendulum", "double-pendulum", "pendulum-on-cart", "mass-spring-chain", "chain", "double-atwood")
 """Scenes without loops, without dampers, and without laws that switch."""

@@ -13,7 +13,8 @@ from atwood.forms.assembly import Assembly
 from atwood.simulation.initialization import positions, positions as speeds
 from atwood.simulation.initialization.start import Start, find_start
 from atwood_library import Ground, PointMass, Rod
-from atwood_library.scenes import SCENES
+
+from ...helpers.smooth import SMOOTH as SCENES
 
 
 def rods(start: dict[str, Any], guess: dict[str, Any] | None = None) -> Assembly:

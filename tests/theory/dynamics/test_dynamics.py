@@ -12,7 +12,8 @@ from atwood.forms.quantities import observer
 from atwood.model.declare.law_results import Load
 from atwood.theory.dynamics.dynamics import Dynamics
 from atwood_library import Drag, Force, Ground, PointMass, Rod
-from atwood_library.scenes import SCENES
+
+from ...helpers.smooth import SMOOTH as SCENES
 
 
 def around(name: str, form: str, count: int = 3) -> tuple[Dynamics, Any, list[tuple[Any, Any]]]:

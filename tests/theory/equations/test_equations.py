@@ -42,7 +42,8 @@ from atwood_library import (
     RotaryDrive,
     Spring,
 )
-from atwood_library.scenes import SCENES
+
+from ...helpers.smooth import SMOOTH as SCENES
 
 t = Symbol("t")
 

@@ -9,7 +9,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from atwood import Scene, UnsupportedError, assemble, equations, simulate
-from atwood_library.scenes import SCENES
+
+from ...helpers.smooth import SMOOTH as SCENES
 
 REFUSED = {"cart-pole": r"regulator\.y"}
 """Scenes with values that are held from sample to sample."""

@@ -9,7 +9,9 @@ from click.testing import CliRunner
 from atwood import equations, hamiltonian
 from atwood.cli import main
 from atwood.theory.formulas.printers import objects
-from atwood_library.scenes import SCENES, ChargedParticle, DoublePendulum, PendulumOnCart, RollingDisc, SliderCrank
+from atwood_library.scenes import ChargedParticle, DoublePendulum, PendulumOnCart, RollingDisc, SliderCrank
+
+from ...helpers.smooth import SMOOTH as SCENES
 
 SCENES_AND_FORMS = [
     *((name, form) for name in ("double-pendulum", "pendulum-on-cart", "slider-crank") for form in ("reduced", "dae")),

@@ -36,7 +36,8 @@ from atwood.model.declare.law_results import Load
 from atwood.theory.equations.equations import EquationsOfMotion
 from atwood.theory.formulas.printers import code
 from atwood_library import PointMass
-from atwood_library.scenes import SCENES
+
+from ...helpers.smooth import SMOOTH as SCENES
 
 CASES = [
     *((name, form, "quaternion") for name in SCENES for form in ("reduced", "dae")),
