@@ -24,6 +24,7 @@ both points with these slopes (Hermite), and both parts are judged in the same w
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache
 from math import inf, isnan, sqrt
 
 import numpy as np
@@ -150,6 +151,7 @@ class EventLocator:
         self._origin = [0.0] * problem.event_count  # what its value was then
         self._blind = [-inf] * problem.event_count  # until when its value is not looked at
         self._last: Point | None = None
+        self._known: dict[float, list[float]] = {}  # values at the times that were read
         self.evaluations = 0
 
     @property
@@ -164,7 +166,7 @@ class EventLocator:
 
     def restart(self, state: State) -> None:
         """Take the signs from a new start of the solution."""
-        t = state[0]
+        t, self._known = state[0], {}
         is_first, given, self._given = bool(self._given), self._given or self.handed_on(t), ()
         values, noise = self._values(state), self._noise(state, 0.0)
         at_zero = [abs(value) <= least for value, least in zip(values, noise, strict=True)]
@@ -189,7 +191,8 @@ class EventLocator:
 
         After a root the search can go on from the root's time.
         """
-        self._settling, self._end = False, end
+        self._settling, self._end, self._known = False, end, {}
+        at = cache(at)  # the ends of parts of a step are read more than once
         if any(self._unsure):
             self._settle(begin, at)
         clear = min(max(self._blind), end)
@@ -231,6 +234,8 @@ class EventLocator:
         return least
 
     def _values(self, state: State) -> list[float]:
+        if (known := self._known.get(state[0])) is not None:
+            return known
         self.evaluations += 1
         try:
             values = _listed(self._function(*state))
@@ -239,6 +244,7 @@ class EventLocator:
         for i, value in enumerate(values):
             if isnan(value):
                 raise KernelEvaluationError(f"event function {i} has no value at t = {state[0]:.9g}")
+        self._known[state[0]] = values
         return values
 
     def _nothing_changed(self, state: State) -> bool:
