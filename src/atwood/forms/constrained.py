@@ -106,7 +106,22 @@ def _accelerations(
     places = {(c, n + k): e for k, row in enumerate(slopes) for c, e in row.items()}
     right = [-one for one in (*bias, *gamma)]
     signs = [1] * n + [-1] * len(constraints)
-    return _solved(SymmetricSystem({**entries, **places}, right, signs))[:n]
+    found = _solved(SymmetricSystem({**entries, **places}, right, signs))[:n]
+    return _without_rounding(equations, found, sizes) if equations.contacts else found
+
+
+def _without_rounding(
+    equations: Equations, accelerations: Sequence[Expression], sizes: Sequence[Expression]
+) -> list[Expression]:
+    """Return accelerations without what rounding leaves of them along gaps and slips that hold.
+
+    Forces that balance leave some 1e-16 of what they are. Where nothing moves steps become long, and add that up.
+    """
+    rows = [one.row for one in equations.contacts]
+    known = dict(zip(equations.accelerations, accelerations, strict=True))
+    misses, masks = substitute([row.second for row in rows], known), [one.mask for one in equations.contacts]
+    changed = _nearest(_slopes(equations, rows), misses, sizes, masks)
+    return [a - one * size for a, one, size in zip(accelerations, changed, sizes, strict=True)]
 
 
 def _slopes(equations: Equations, rows: Sequence[Constraint]) -> list[dict[int, Expression]]:

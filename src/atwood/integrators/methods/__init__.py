@@ -7,7 +7,20 @@ from atwood.integrators.methods.symplectic import COMPOSITION, GAUSS
 from atwood.integrators.methods.taylor import TAYLOR
 from atwood.integrators.methods.tsitouras import TSITOURAS
 
-__all__ = ["AUTO", "EXPLICIT", "GAUSS", "IDA", "IDA_SUNDAE", "LEAST", "METHODS", "TAYLOR", "Method", "Task", "advise"]
+__all__ = [
+    "AUTO",
+    "EXPLICIT",
+    "GAUSS",
+    "IDA",
+    "IDA_SUNDAE",
+    "LEAST",
+    "METHODS",
+    "TAYLOR",
+    "TSITOURAS",
+    "Method",
+    "Task",
+    "advise",
+]
 
 AUTO = "auto"
 """What asks for the method that suits a scene."""

@@ -14,7 +14,7 @@ from atwood.arguments import each, instance, takes, whole
 from atwood.errors import AtwoodError
 from atwood.forms.canonical import is_canonical
 from atwood.forms.residuals import LEVELS
-from atwood.integrators.methods import EXPLICIT, GAUSS, METHODS
+from atwood.integrators.methods import EXPLICIT, GAUSS, METHODS, TSITOURAS
 from atwood.integrators.protocol import Statistics
 from atwood.lazy_dataclasses import replace
 from atwood.model.compose.composite import Model
@@ -169,10 +169,13 @@ def _kinds(assembled: Assembled, forms: Sequence[str], levels: Sequence[str]) ->
     """Yield forms with their levels and solvers; without constraints the levels of the dae form are all one.
 
     IDA solves every form, so that form and method are told apart; the explicit method comes on top where it can, and
-    the symplectic one where the scene has a Hamiltonian.
+    the symplectic one where the scene has a Hamiltonian. With gaps and slips there are explicit methods alone.
     """
     shared = implicit_solver()
     assembly = assembled("dae", "ggl")
+    if assembly.maximal.contacts:
+        yield from ((form, "", solver.key) for form in forms for solver in (EXPLICIT, TSITOURAS))
+        return
     if "reduced" in forms:
         yield "reduced", "", shared
         if assembly.reduced.coordinates:
