@@ -160,3 +160,54 @@ def test_a_heavy_rope_in_one_part() -> None:
     assert result.energy.max_drift < 1e-7
     assert result["rope.mass"][0] == pytest.approx(1.2)
     assert result["rope.knot[4].position.x"][0] == pytest.approx(2.0 * math.sin(0.3))
+
+
+def double_machine(aside: float = 0.0) -> Scene:
+    """Return Atwood's double machine in the plane: ropes wound on two wheels, of which one hangs on the other."""
+    scene = Scene()
+    ground, hinge = scene.add("ground", lib.Ground()), scene.add("hinge", lib.Pivot())
+    outer = scene.add("outer", lib.RigidBody(mass=1.0, moments=(0.0, 0.05, 0.0)))
+    inner = scene.add("inner", lib.RigidBody(mass=0.5, moments=(0.0, 0.004, 0.0)))
+    scene.connect(ground.frame, hinge.a)
+    scene.connect(hinge.b, outer.frame)
+    balls = {name: scene.add(name, lib.PointMass(mass=mass)) for name, mass in (("m0", 3.0), ("m1", 2.0), ("m2", 1.0))}
+    hung = (
+        ("left", outer, 0.4, balls["m0"].point, "counter-clockwise"),
+        ("right", outer, 0.4, inner.frame, "clockwise"),
+        ("first", inner, 0.15, balls["m1"].point, "counter-clockwise"),
+        ("second", inner, 0.15, balls["m2"].point, "clockwise"),
+    )
+    for name, wheel, radius, end, way in hung:
+        rope = scene.add(name, lib.WoundRope(radius=radius, length=2.0, unwinds=way))
+        scene.connect(wheel.frame, rope.drum)
+        scene.connect(end, rope.end)
+    scene.start.update({"hinge.angle": 0.0, "hinge.angular_velocity": 0.0, "inner.angle": 0.0})
+    scene.start["inner.angular_velocity.y"] = 0.0
+    places = {"m0": (-0.4, -2.0), "inner": (0.4, -2.0), "m1": (0.25, -4.0), "m2": (0.55, -4.0)}
+    for name, (x, z) in places.items():
+        scene.start.update({f"{name}.position.x": x, f"{name}.velocity.x": aside * (name == "m1")})
+        scene.guess[f"{name}.position.z"] = z
+    return scene
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_the_double_machine_in_the_plane(form: str) -> None:
+    """The weight m0 sinks with a, m1 past the inner wheel with b; wheels count by J/R^2 each (Goldstein, section 1.4)."""
+    result = simulate(double_machine(), form=form, t_end=0.4, rtol=1e-10)
+    g, w0, w1 = 9.81, 0.05 / 0.4**2, 0.004 / 0.15**2
+    # (m0 + M + m1 + m2 + w0) a - (m1 - m2) b = (m0 - M - m1 - m2) g;  -(m1 - m2) a + (m1 + m2 + w1) b = (m1 - m2) g
+    a, b = np.linalg.solve([[6.5 + w0, -1.0], [-1.0, 3.0 + w1]], [-0.5 * g, g])
+    half = 0.5 * result.time**2
+    assert np.max(np.abs(result["m0.position.z"] + 2.0 + a * half)) < 1e-8
+    assert np.max(np.abs(result["m1.position.z"] + 4.0 + (b - a) * half)) < 1e-8
+    assert np.max(np.abs(result["left.tension"] - 3.0 * (g - a))) < 1e-6
+    assert np.max(np.abs(result["first.tension"] - 2.0 * (g - (b - a)))) < 1e-6
+    assert np.max(np.abs(result["second.tension"] - 1.0 * (g + b + a))) < 1e-6
+
+
+def test_the_double_machine_swings_alike_in_both_forms() -> None:
+    runs = [simulate(double_machine(0.8), form=form, t_end=0.4, rtol=1e-10, outputs=[0.0, 0.2, 0.4]) for form in FORMS]
+    assert abs(runs[0]["first.swing"][-1]) > 0.1
+    for path in ("m1.position.x", "m2.position.z", "inner.position.x", "left.tension"):
+        assert runs[0][path] == pytest.approx(runs[1][path], abs=1e-7)
+    assert max(one.energy.max_drift for one in runs) < 1e-8
