@@ -192,7 +192,7 @@ def double_machine(aside: float = 0.0) -> Scene:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_the_double_machine_in_the_plane(form: str) -> None:
-    """The weight m0 sinks with a, m1 past the inner wheel with b; wheels count by J/R^2 each (Goldstein, section 1.4)."""
+    """The weight m0 sinks with a, m1 past the inner wheel with b; wheels count by J/R^2 (Goldstein, section 1.4)."""
     result = simulate(double_machine(), form=form, t_end=0.4, rtol=1e-10)
     g, w0, w1 = 9.81, 0.05 / 0.4**2, 0.004 / 0.15**2
     # (m0 + M + m1 + m2 + w0) a - (m1 - m2) b = (m0 - M - m1 - m2) g;  -(m1 - m2) a + (m1 + m2 + w1) b = (m1 - m2) g
