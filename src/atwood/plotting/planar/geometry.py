@@ -342,6 +342,8 @@ def _between(
 ) -> list[Shape]:
     """Return what a part with two ends looks like."""
     joints = list(local.joints)
+    if local.contacts:  # nothing is between what touches only now and then
+        return []
     if grooves or (local.constraints and not joints):
         return [Shape(path, "rope", (ends[0], *grooves, ends[1]))]
     if any(joint.law.options.rigid for joint in joints):

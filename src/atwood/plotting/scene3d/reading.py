@@ -318,7 +318,7 @@ def _lump(reading: Reading, path: str, node: int, mass: float, center: FloatArra
 def _ties(path: str, local: LocalPart, nodes: Mapping[str, int]) -> list[Tie]:
     """Return what a part that only pulls or pushes between its nodes looks like."""
     ends = tuple(dict.fromkeys(nodes.values()))
-    if local.joints or len(ends) < 2:
+    if local.joints or local.contacts or len(ends) < 2:
         return []
     if any(holds_distance(local, one.value) for one in local.constraints):
         return [Tie(path, "rope" if local.part.component.modes else "rod", ends)]
