@@ -254,14 +254,16 @@ def laws_missed(made: Made, result: aw.Result, draft: Draft) -> list[Finding]:
     slips = ("slip",) if draft.space == "plane" else ("slip_in_space_1", "slip_in_space_2")
     names = ("friction_force",) if draft.space == "plane" else ("friction_1", "friction_2")
     law = "slip" if draft.space == "plane" else "slip_in_space"
+    every = ("gap", "normal_force", "gap_state", *slips, *names, f"{law}_state")
+    values = result.table([f"{path}.{name}" for path, _ in made.gaps for name in every])
     for path, body in made.gaps:
-        gap, pressed, closed = (result[f"{path}.{name}"] for name in ("gap", "normal_force", "gap_state"))
+        gap, pressed, closed = (values[f"{path}.{name}"] for name in ("gap", "normal_force", "gap_state"))
         most = max(force, float(np.max(pressed)))
-        speed = np.hypot.reduce([result[f"{path}.{name}"] for name in slips])
-        rubs = np.hypot.reduce([result[f"{path}.{name}"] for name in names])
+        speed = np.hypot.reduce([values[f"{path}.{name}"] for name in slips])
+        rubs = np.hypot.reduce([values[f"{path}.{name}"] for name in names])
         fast = max(draft.size, float(np.max(speed)))
-        state = result[f"{path}.{law}_state"]
-        along = sum(result[f"{path}.{a}"] * result[f"{path}.{b}"] for a, b in zip(slips, names, strict=True))
+        state = values[f"{path}.{law}_state"]
+        along = sum(values[f"{path}.{a}"] * values[f"{path}.{b}"] for a, b in zip(slips, names, strict=True))
         static = body.friction if body.static is None else body.static
         for what, miss in (
             ("a gap is negative", -gap / draft.size),
@@ -316,6 +318,8 @@ def check(seed: int) -> Trial:
                     raise Discarded("starts inside") from None
                 raise
             except AtwoodError as error:
+                if "how forces are shared" in str(error):
+                    raise Discarded("shares of forces that nothing determines") from None
                 findings.append(Finding("refused", f"{form}: {type(error).__name__}", f"{error}\n{drawn}"))
                 continue
             if result.status != "finished":

@@ -10,14 +10,21 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.expr import Expression, depends_on
 from atwood.forms.assembly import Assembly
+from atwood.forms.caches import Key
 from atwood.forms.quantities import find_observables, observer
 from atwood.simulation.dynamics.reactions import ReactionSolver
 from atwood.simulation.run.recorder import SegmentRecord
 
+_READS: Key[bool] = Key("whether quantities depend on symbols")
+
 
 def reads(assembly: Assembly, paths: Sequence[str], symbols: Sequence[Expression]) -> bool:
     """Return whether a quantity depends on any of some symbols."""
-    return depends_on([one.value for one in find_observables(assembly, paths)], symbols)
+    return assembly.shared.get(
+        _READS,
+        lambda: depends_on([one.value for one in find_observables(assembly, paths)], symbols),
+        (tuple(paths), tuple(symbols)),
+    )
 
 
 def quantities_at(

@@ -56,6 +56,8 @@ _SEEN = 2.0
 _MOST_TURNS = 50
 """Limits that are curved in the forces are met in so many turns at most."""
 
+_CONTRADICT = "Contacts contradict each other here: look at what moves them, and at their friction."
+
 _MOST_IMPACTS = 1000
 """So many impacts one after the other happen at one moment at most."""
 
@@ -292,7 +294,8 @@ class _Moment:
         if found is None:
             found = self._jammed(chosen)
         if not found.is_least:
-            raise self._contradiction("friction depends on how forces are shared, which nothing determines", chosen)
+            what = "friction depends on how forces are shared, which nothing determines"
+            raise self._contradiction(what, chosen, "Give one of them no friction, or put a spring where it is stiff.")
         self._take(chosen, found)
         held = [row for k, one in zip(chosen, found.states, strict=True) if one[0] == STICKS for row in self.units[k]]
         if held:  # what holds from now on holds to rounding
@@ -400,12 +403,12 @@ class _Moment:
         part, law, _ = self.first[k].row.key
         self.events.append(EventRecord(self.t, part, law, said, "", kind in ("impact", "jams", "rests"), kind))
 
-    def _contradiction(self, what: str, chosen: list[int]) -> SolveError:
+    def _contradiction(self, what: str, chosen: list[int], advice: str = _CONTRADICT) -> SolveError:
         names = ", ".join(dict.fromkeys(self.first[k].row.key[0] for k in chosen))
         return SolveError(
             f"at t = {self.t:.9g} {what} ({names})",
             where=self.first[chosen[0]].row.key[0] if chosen else "",
-            advice="Contacts contradict each other here: look at what moves them, and at their friction.",
+            advice=advice,
         )
 
     def check_start(self) -> None:
