@@ -24,8 +24,9 @@ from atwood.pipeline import assemble
 from atwood.plotting.canvas import check_picture
 from atwood.ranges import range_of
 from atwood.table import Shown
-from atwood.theory.formulas.described import Described, Page, attributes, is_formula, is_theory, page_of
+from atwood.theory.formulas.described import Described, Page, Paged, attributes, is_formula, is_theory, page_of
 from atwood.theory.formulas.mathml import document
+from atwood.theory.formulas.named import NAMED
 from atwood.theory.formulas.notation import notation_of
 from atwood.theory.formulas.tree import Symbol
 from atwood.theory.hamiltonian.hamiltonian import read_hamiltonian
@@ -69,7 +70,7 @@ def theory_command(name: str, module: str, function: str) -> click.Command:
     made = [vars(importlib.import_module(module)).get(one) for one in of]
     written = [one for one in _WRITTEN if one != "python" or any(hasattr(kind, one) for kind in made)]
     more: dict[str, tuple[Kind, Any]] = dict.fromkeys(written, (FLAG, False))
-    more["plot"] = FILE, None
+    more |= {"plot": (FILE, None), "named": (NAMED, None)}
     special, own = _SPECIAL.get(name, (None, {}))
 
     def run(request: Request) -> None:
@@ -77,17 +78,23 @@ def theory_command(name: str, module: str, function: str) -> click.Command:
         if len(written) > 1:
             names = " and ".join(f"--{one.removeprefix('as_')}" for one in written)
             raise UsageError(f"{names} do not go together", advice="Give one of them.")
+        if request.named and {"python", "as_json"}.intersection(written):
+            raise UsageError(
+                "there names stand as they are", where="--named", advice="Give --latex or --html, or none."
+            )
         if request.plot is not None:
             check_picture(request.plot)
         asked, scene = _read(found, request)
         value = _called(found, scene, asked) if special is None else special(found, scene, asked, request)
         if request.plot is not None:
             _draw(value, name, scene, request.plot, asked.get("t_end"))
+        if request.named:
+            value = [_page(one, scene).named(request.named) for one in _each(value)]
         _show(value, name, scene, written[0] if written else "", request.plot)
 
     run.__doc__ = inspect.cleandoc((special or found).__doc__ or "").partition("\n\nParameters\n")[0]
     told = [*([special] if special else []), _show, found]
-    names = {"plot": "--bode,--plot"} if of == ["LinearModel"] else {}
+    names = {"named": "--named"} | ({"plot": "--bode,--plot"} if of == ["LinearModel"] else {})
     return command(name, run, *told, more=more | own, names=names)
 
 
@@ -203,7 +210,9 @@ def _each(value: Any) -> Sequence[Any]:
 
 
 def _page(value: Any, assembly: Assembly) -> Page:
-    """Return the page of what a value holds, in the letters of its scene."""
+    """Return the page of what a value holds, in the letters of its scene, or its own."""
+    if isinstance(value, Paged) and not isinstance(value, Described):
+        return value._page  # type: ignore[no-any-return]
 
     def known() -> dict[str, Symbol]:
         return {one.name: one for one in notation_of(assembly, lagrangian_of(assembly, assembly.form)).legend}

@@ -13,11 +13,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
+from atwood.arguments import check
 from atwood.docstrings import documented, first_sentence
 from atwood.errors import AtwoodError
-from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.table import Shown, Table, table
 from atwood.theory.formulas.mathml import as_mathml
+from atwood.theory.formulas.named import NAMED, with_given_names
 from atwood.theory.formulas.page import (
     Line,
     Matrix,
@@ -101,6 +103,10 @@ class Page:
         symbols = [table(("symbol", "stands for", "unit", "value>"), rows)] if self.symbols else []
         return as_mathml(self.title, self.sections, [one.html() for one in (*symbols, *self._told)], self.by_part)
 
+    def named(self, names: Mapping[str, Any]) -> Page:
+        """Return it with names for sub-expressions; see `Paged.named`."""
+        return replace(self, sections=tuple(with_given_names(self.sections, check(NAMED, names, "names"), self.title)))
+
     def notebook(self) -> str:
         """Return it for a notebook, with formulas between dollar signs; symbols say themselves on other pages."""
         return as_html(self.title, self.sections, [one.html() for one in self._told], self.by_part)
@@ -128,6 +134,23 @@ class Paged:
     def html(self) -> str:
         """Return it as HTML, with formulas in MathML, which browsers show as they are."""
         return str(self._page.html())
+
+    def named(self, names: Mapping[str, Any]) -> Page:
+        """Return the page of it on which sub-expressions have names.
+
+        Parameters
+        ----------
+        names
+            By name what it stands for, as text or in sympy, in the letters of the formulas and of the names before it:
+            ``{"Delta": "m1 + m2*sin(theta1 - theta2)^2"}``. It is found wherever all its terms stand, with whatever
+            factor is before them.
+
+        Raises
+        ------
+        UsageError
+            If a name stands for something already, or what it is to stand for is in no formula.
+        """
+        return self._page.named(names)  # type: ignore[no-any-return]
 
     def _repr_html_(self) -> str:
         return str(self._page.notebook())
