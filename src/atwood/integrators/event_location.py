@@ -2,7 +2,8 @@
 
 A step of the integrator leaves an interpolant behind.  The watch compares the sign of each event function with
 the sign that it last had for certain, and narrows the interpolant down to the first change.  It needs nothing
-from the integrator but the interpolant, so that a root beyond the next output time can simply wait.
+from the integrator but the interpolant, so that a root beyond the next output time can simply wait.  Where both are
+compiled, routines do the same (`atwood.integrators.event_routines`).
 
 The rules, which decide the cases on the edge:
 
@@ -38,18 +39,18 @@ from atwood.lazy_dataclasses import dataclass
 Interpolant = Callable[[float], State]
 
 ROUNDING = float(np.finfo(np.float64).eps)
-_FARTHER = 4.0
+FARTHER = 4.0
 """Signs near zero are read at times of which each is so many times as far from there as the one before."""
 
-_NOISE = 16.0
+NOISE = 16.0
 """A value has a sign from so many times its change on, when the state changes by rounding."""
 
 
-_HALF = 0.5
-_MOST = 200
+HALF = 0.5
+MOST = 200
 """A step is read at no more places than these: what then is left is a touch, not a passage."""
 
-_SHORTEST = 1e-6
+SHORTEST = 1e-6
 """Parts of a step that are shorter than this share are not divided: there the depth is rounding."""
 
 
@@ -79,9 +80,9 @@ def _may(a: float, b: float, down: float, up: float, share: float) -> bool:
 
 def find_dip(first: Point, last: Point, signs: Sequence[float], read: Callable[[float, float], Point]) -> float | None:
     """Return a time at which one of the functions has lost its sign between two points; None if none does."""
-    shortest = _SHORTEST * (last.time - first.time)
+    shortest = SHORTEST * (last.time - first.time)
     parts, count, share = [(first, last)], 0, FULL
-    while parts and count < _MOST:
+    while parts and count < MOST:
         a, b = parts.pop()
         width = b.time - a.time
         suspects = [i for i, may in enumerate(may_dip(a, b, signs, share)) if may]
@@ -92,7 +93,7 @@ def find_dip(first: Point, last: Point, signs: Sequence[float], read: Callable[[
         if any(sign and sign * value <= 0.0 for sign, value in zip(signs, point.values, strict=True)):
             return point.time
         parts += [(point, b), (a, point)]
-        count, share = count + 1, _HALF
+        count, share = count + 1, HALF
     return None
 
 
@@ -216,7 +217,7 @@ class EventLocator:
                     self._signs[i], self._blind[i], self._unsure[i] = _sign(value), time, False
             if time >= self._end:
                 break
-            past *= _FARTHER
+            past *= FARTHER
 
     def _noise(self, state: State, width: float) -> list[float]:
         """Return how large values can be that are zero but for rounding, in a step of some width."""
@@ -230,7 +231,7 @@ class EventLocator:
             except ArithmeticError:
                 continue
             self.evaluations += 1
-            least = [max(m, _NOISE * abs(b - a)) for m, a, b in zip(least, values, others, strict=True)]
+            least = [max(m, NOISE * abs(b - a)) for m, a, b in zip(least, values, others, strict=True)]
         return least
 
     def _values(self, state: State) -> list[float]:
@@ -386,10 +387,10 @@ def _listed(values: Values) -> list[float]:
     return values.tolist() if isinstance(values, np.ndarray) else [float(value) for value in values]
 
 
-_LARGEST = float(np.finfo(np.float64).max)
+LARGEST = float(np.finfo(np.float64).max)
 
 
 def _slope(change: float, width: float) -> float:
     """Return a rate of change, zero where there is none."""
     slope = change / width
-    return 0.0 if isnan(slope) else min(max(slope, -_LARGEST), _LARGEST)
+    return 0.0 if isnan(slope) else min(max(slope, -LARGEST), LARGEST)

@@ -14,7 +14,8 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import StartError, UsageError
-from atwood.integrators.event_location import ROUNDING
+from atwood.integrators.compiled_location import CompiledLocator
+from atwood.integrators.event_location import ROUNDING, EventLocator
 from atwood.integrators.protocol import (
     Budget,
     ExplicitProblem,
@@ -64,6 +65,9 @@ class ExplicitSession(SteppingSession):
         The last time that will be asked for; events behind it are not looked for.
     """
 
+    _problem: ExplicitProblem
+    _compiled: CompiledLocator | None
+
     def __init__(
         self,
         problem: ExplicitProblem,
@@ -75,10 +79,10 @@ class ExplicitSession(SteppingSession):
         on_stiff: OnStiff | None = None,
         end: float = inf,
     ) -> None:
-        super().__init__(problem, options.horizon, budget)
-        self._stepper = stepper
+        self._stepper, self._compiled = stepper, None
         events = problem.compiled_events
         self._notices = events is not None and stepper.watch(events)  # whether the stepper looks for events by itself
+        super().__init__(problem, options.horizon, budget)
         if on_stiff is not None:
             stepper.watch_stiffness()
         self._is_watched = False
@@ -110,6 +114,15 @@ class ExplicitSession(SteppingSession):
         self._stepper.renew(horizon, absolute)
         self._begin_count(horizon, budget, signs)
         self._begin(t, y, on_stiff, end)
+
+    def _new_locator(self, horizon: float, signs: tuple[int, ...] | None) -> EventLocator | None:
+        """Return what finds events in a new run: routines where events and what is between two steps are compiled."""
+        problem, events, read = self._problem, self._problem.compiled_events, self._stepper.interpolation()
+        if self._compiled is not None:
+            self._compiled.begin(horizon, signs)
+        elif events is not None and self._notices and read is not None:
+            self._compiled = CompiledLocator(problem, events, read, horizon, signs)
+        return self._compiled or super()._new_locator(horizon, signs)
 
     def set_monitor(self, monitor: StepMonitor) -> bool:
         """Let the motion be looked at, and end with `Status.NOTICED` where something is seen; return whether it can."""

@@ -124,8 +124,12 @@ class SteppingSession(Session):
         """Begin a run that has cost nothing so far, and knows those signs of events that it is handed."""
         self.budget = budget or Budget()
         self._opened, self._seconds, self._starts = 0.0, 0.0, 0
+        self._locator = self._new_locator(horizon, signs)
+
+    def _new_locator(self, horizon: float, signs: tuple[int, ...] | None) -> EventLocator | None:
+        """Return what finds events in a new run; None where there are none."""
         problem = self._problem
-        self._locator = None if problem.events is None else EventLocator(problem, horizon, signs)
+        return None if problem.events is None else EventLocator(problem, horizon, signs)
 
     @property
     def handed_on(self) -> tuple[int, ...]:

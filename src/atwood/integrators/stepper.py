@@ -98,6 +98,13 @@ class Stepper(ABC):
         """Come back with `Outcome.NOTICED` after a step in which an event may have happened; return whether it can."""
         return False
 
+    def interpolation(self) -> tuple[int, int] | None:
+        """Return the addresses of the function that reads the last step, and of its session; None where there is none.
+
+        It calls nothing in Python.
+        """
+        return None
+
     def expect(self, signs: FloatArray) -> None:
         """Learn which sign each event has; where it is zero, every step is noticed."""
         return
@@ -343,6 +350,11 @@ class NativeStepper(Stepper):
         if code == _NO_VALUE:
             raise self._no_interpolation(float(times[filled]))
         return y[:filled], yp[:filled], Outcome(code)
+
+    def interpolation(self) -> tuple[int, int] | None:
+        """Return the addresses of the function that reads the last step, and of its session."""
+        function: Any = self._functions["interpolate"]
+        return ctypes.cast(function, c_void_p).value or 0, self._session
 
     def _no_interpolation(self, t: float) -> KernelEvaluationError:
         """Return the error of a step within which there is no value."""

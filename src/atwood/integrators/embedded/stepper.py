@@ -128,6 +128,10 @@ class CompiledStepper(NativeStepper):
         self._set(event_count=events.count)
         return True
 
+    def interpolation(self) -> tuple[int, int] | None:
+        """Return the addresses of the function that reads the last step, and of its session."""
+        return None if self._calls_python else super().interpolation()
+
     def expect(self, signs: FloatArray) -> None:
         """Say which sign each event has; where it is zero, every step is noticed."""
         self._signs[:] = signs

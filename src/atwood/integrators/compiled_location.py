@@ -1,0 +1,164 @@
+"""Events of compiled functions, located by routines on the dense output: nothing of a search runs in Python."""
+
+from __future__ import annotations
+
+import ctypes
+from ctypes import c_double, c_int, c_void_p
+from math import nan
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.codegen.llvm.build import RoutineSource, build_code, once
+from atwood.codegen.llvm.module import CodeOptions
+from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Kind
+from atwood.errors import KernelEvaluationError
+from atwood.integrators.event_location import MOST, ROUNDING, EventLocator, Interpolant, Root
+from atwood.integrators.protocol import ExplicitProblem, State
+
+if TYPE_CHECKING:
+    from atwood.codegen.llvm.build import Built
+    from atwood.codegen.sundials.events import EventData
+
+FIELDS: dict[str, Kind] = {
+    **dict.fromkeys(("interpolate", "session", "events", "data", "y", "yp", "shifted", "turns", "rows"), ADDRESS),
+    **dict.fromkeys(("moment", "start", "end", "here", "fired_at", "root", "before", "after", "dip"), NUMBER),
+    **dict.fromkeys(("size", "count", "settling", "evaluations", "is_first", "bad"), INTEGER),
+}
+"""The memory of a search. `here` is the time that was read, `root` the last that was tried, `bad` what has no value."""
+
+ROWS = {
+    name: k
+    for k, name in enumerate(
+        (
+            *("sign", "direction", "rough", "carried", "unsure", "origin", "blind", "fired", "given", "found"),
+            *("noise", "known", "others", "lower", "upper", "crossed", "later", "old", "dipping"),
+        )
+    )
+}
+"""Rows with a number for each event; behind them come points: time, values and slopes of each."""
+
+FIRST, LAST, STACK = range(3)
+"""Points: the first and the last of a part of a step, and those that are still to come."""
+
+FOUND, NO_STATE, NO_VALUE = 1, 2, 3
+"""How a search ends that finds an event, cannot read a state, or an event function."""
+
+_PLACES = {name: k for k, name in enumerate(FIELDS)}
+_FILES = ("codegen/tangents.py", *(f"integrators/{name}.py" for name in ("compiled_location", "event_location")))
+_SEARCH = ctypes.CFUNCTYPE(c_int, c_void_p, c_double, c_double)
+_RESTART = ctypes.CFUNCTYPE(c_int, c_void_p, c_double)
+
+
+@once
+def _routines() -> Built:
+    source = RoutineSource("integrators.event_routines", _FILES)
+    return build_code([], CodeOptions(level=2), exports=("search", "restart"), routines=source)
+
+
+class CompiledLocator(EventLocator):
+    """The same as an `EventLocator`, by routines.
+
+    Parameters
+    ----------
+    problem
+        The problem, with its events and their directions.
+    events
+        The compiled events.
+    interpolation
+        The addresses of a function ``int (void *session, double t, double *y, double *yp)`` and of its session.
+    horizon, signs
+        As of `EventLocator`.
+    """
+
+    def __init__(
+        self,
+        problem: ExplicitProblem,
+        events: EventData,
+        interpolation: tuple[int, int],
+        horizon: float,
+        signs: tuple[int, ...] | None,
+    ) -> None:
+        count, size = events.count, problem.size
+        self._own = problem.event_signs
+        turns, rows, points = len(FIELDS) + 3 * size, len(FIELDS) + 5 * size, (STACK + MOST + 2) * (1 + 2 * count)
+        self._numbers = memory = np.zeros(rows + len(ROWS) * count + points)
+        self._integers = memory.view(np.int64)
+        self._state = memory[len(FIELDS) : turns - size].reshape(2, size)
+        memory[turns:rows].reshape(2, size)[:] = [turn(1.0 + 2.4 * np.arange(size)) for turn in (np.cos, np.sin)]
+        self._rows = memory[rows : rows + len(ROWS) * count].reshape(len(ROWS), count)
+        self._row("direction")[:] = problem.event_directions or 0.0
+        self._row("rough")[list(problem.event_rough)] = 1.0
+        self._place = begin = memory.ctypes.data
+        arrays = {name: begin + 8 * (len(FIELDS) + k * size) for k, name in enumerate(("y", "yp", "shifted", "turns"))}
+        self._set(interpolate=interpolation[0], session=interpolation[1], events=events.plain, data=events.address)
+        self._set(**arrays, rows=begin + 8 * rows, size=size, count=count)
+        self._keep = events
+        addresses = _routines().code.addresses
+        self._search, self._restart = _SEARCH(addresses["search"]), _RESTART(addresses["restart"])
+        self.begin(horizon, signs)
+
+    def begin(self, horizon: float, signs: tuple[int, ...] | None) -> None:
+        """Begin another run, as a new locator would."""
+        self._given = self._own if signs is None else signs
+        self._row("sign")[:] = self._row("fired")[:] = 0.0
+        self.evaluations = 0
+        self._set(moment=100 * ROUNDING * horizon, fired_at=nan, settling=1, evaluations=0)
+
+    def _row(self, name: str) -> FloatArray:
+        row: FloatArray = self._rows[ROWS[name]]
+        return row
+
+    def _set(self, **fields: float) -> None:
+        for name, value in fields.items():
+            (self._numbers if FIELDS[name] is NUMBER else self._integers)[_PLACES[name]] = value
+
+    @property
+    def signs(self) -> FloatArray:
+        """The sign that each event last had for certain; zero where it is not known."""
+        return self._row("sign")
+
+    @property
+    def is_settling(self) -> bool:
+        """Whether nothing is known yet of the first step after a restart."""
+        return bool(self._integers[_PLACES["settling"]])
+
+    def restart(self, state: State) -> None:
+        """Take the signs from a new start of the solution."""
+        given, self._given = self._given, ()
+        self._row("given")[:] = given or self.handed_on(state[0])
+        self._set(is_first=int(bool(given)))
+        self._checked(self._restart(self._place, state[0]))
+
+    def handed_on(self, t: float, ahead: Root | None = None) -> tuple[int, ...]:
+        """Return what a start at a time is to know of each event: its sign, or that it has just happened."""
+        has_fired = t == self._numbers[_PLACES["fired_at"]]
+        self._signs = _whole(self._row("sign"))
+        self._fired, self._fired_at = [has_fired and one != 0.0 for one in self._row("fired").tolist()], t
+        return super().handed_on(t, ahead)
+
+    def search(self, begin: float, end: float, at: Interpolant) -> Root | None:
+        """Return the first root between two times of the last step, or `None`."""
+        if not self._checked(self._search(self._place, begin, end)):
+            return None
+        y, yp = self._state
+        state = float(self._numbers[_PLACES["root"]]), y.copy(), yp.copy()
+        return Root(state, tuple(_whole(self._row("found"))))
+
+    def _checked(self, code: int) -> int:
+        """Return a code, or raise what it says."""
+        self.evaluations = int(self._integers[_PLACES["evaluations"]])
+        if code in (NO_STATE, NO_VALUE):
+            time, bad = self._numbers[_PLACES["root"]], int(self._integers[_PLACES["bad"]])
+            what = (
+                "the right-hand side has no value within a step,"
+                if code == NO_STATE
+                else f"event function {bad} has no value"
+            )
+            raise KernelEvaluationError(f"{what} at t = {time:.9g}")
+        return code
+
+
+def _whole(values: FloatArray) -> list[int]:
+    return [int(one) for one in values.tolist()]
