@@ -106,7 +106,7 @@ def own_rates_on_constraints(
     plan: SceneProblem, t: float, y: FloatArray
 ) -> tuple[CompiledAccelerations, OwnRates] | None:
     """Return the same of a scene whose constraints stay; its parameters are those of `values_on_constraints`."""
-    program = _program(plan, t, y)
+    program = program_on_constraints(plan, t, y)
     code = plan.assembly.shared.get(_COMPILED_ON_CONSTRAINTS, lambda: _code(program), program)
     return None if code is None or plan.not_compilable else (code, code.open(plan.holds))
 
@@ -138,7 +138,7 @@ def constrained_problem(
     directions: tuple[int, ...] = (),
 ) -> ExplicitProblem:
     """Return the equations of a scene for an explicit method, with ``y = (q, u)`` on its constraints."""
-    assembly, program = plan.assembly, _program(plan, t, y)
+    assembly, program = plan.assembly, program_on_constraints(plan, t, y)
     n, m = plan.program.coordinates, plan.program.speeds
     values = values_on_constraints(plan)
     kernel = assembly.compiled(program.accelerations).bind(values)
@@ -162,11 +162,12 @@ def nearest_place(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) ->
     """Return the coordinates nearest to others at which the constraints, and the gaps that are closed, are met."""
     y = np.concatenate([q, u])
     values = values_on_constraints(plan)
-    nearer = plan.assembly.compiled(_program(plan, t, y).projection).bind(values)
+    nearer = plan.assembly.compiled(program_on_constraints(plan, t, y).projection).bind(values)
     return _projected(nearer, t, y, len(q))[: len(q)]
 
 
-def _program(plan: SceneProblem, t: float, y: FloatArray) -> ConstrainedProgram:
+def program_on_constraints(plan: SceneProblem, t: float, y: FloatArray) -> ConstrainedProgram:
+    """Return accelerations and projections of a scene whose constraints stay."""
     assembly, kept = plan.assembly, plan.finding.kept
     light = assembly.kept.get(_LIGHT, lambda: _light_speeds(plan, t, y))
     rows = assembly.rows if assembly.form == "reduced" else assembly.maximal.rows

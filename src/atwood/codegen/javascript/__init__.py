@@ -1,0 +1,1 @@
+"""Programs and routines as JavaScript, for pages that compute a motion themselves."""

@@ -1,0 +1,113 @@
+"""Numbers of a scene that can be changed while it goes on, and zeros that stay in its equations for that."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from atwood.errors import ParameterError, suggestion_in_parts
+from atwood.expr import Expression, depends_on
+from atwood.forms.assembly import Assembly
+from atwood.forms.other_values import Slot, find_slots
+from atwood.lazy_dataclasses import replace
+from atwood.model.values.units import parse_unit
+
+_TRIALS = 1.0, 0.5, 0.1, -1.0
+
+
+def with_sliders(assembly: Assembly, sliders: Sequence[str]) -> Assembly:
+    """Return a scene in whose equations some parameters stay that are zero, with the values that it has.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such parameter, or it shapes the equations.
+    """
+    slots = {slot.path: slot for _, slot in find_slots(assembly.flat)} | dict(find_slots(assembly.flat))
+    zeros: dict[str, Slot] = {}
+    for path in sliders:
+        if path not in slots:
+            raise ParameterError(
+                "there is no such parameter", where=path, advice=suggestion_in_parts(path, slots, "has")
+            )
+        value = slots[path].read(assembly.flat)
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or _is_structural(assembly, slots[path]):
+            raise ParameterError(
+                "it shapes the equations, so that a page cannot change it",
+                where=path,
+                advice="Make a page for each of its values.",
+            )
+        if value == 0.0:
+            zeros[path] = slots[path]
+    if not zeros:
+        return assembly
+    made = assembly.with_values({path: _trial(assembly, slot) for path, slot in zeros.items()})
+    names = {name: slot.path for name, slot in find_slots(assembly.flat)}
+    known = [0.0 if names.get(symbol.name) in zeros else value for symbol, value in made.known_values.items()]
+    return replace(made, given_values=np.array(known))
+
+
+def _is_structural(assembly: Assembly, slot: Slot) -> bool:
+    specs = assembly.flat.parts[slot.part].component.parameter_specs() if slot.part else {}
+    return slot.name in specs and specs[slot.name].structural
+
+
+def _trial(assembly: Assembly, slot: Slot) -> float:
+    """Return a value that a parameter may have, not zero."""
+    low, high, _ = _bounds(assembly, slot)
+    for one in _TRIALS:
+        if (low is None or one >= low) and (high is None or one <= high):
+            return one
+    return 0.5 * high if high else low or 1.0
+
+
+def _bounds(assembly: Assembly, slot: Slot) -> tuple[float | None, float | None, bool]:
+    """Return the least and the largest value, and whether the least is none itself."""
+    specs = assembly.flat.parts[slot.part].component.parameter_specs() if slot.part else {}
+    spec = specs.get(slot.name)
+    if spec is None:
+        return None, None, False
+    return (spec.minimum if spec.above is None else spec.above), spec.maximum, spec.above is not None
+
+
+def live_parameters(assembly: Assembly) -> list[dict[str, Any]]:
+    """Return the parameters that can be changed, with the number of each among all parameters.
+
+    Constants of integration and times of switches were found with the values that there are: what these read stays.
+    """
+    if assembly.mechanism.constants:
+        return []
+    slots = dict(find_slots(assembly.flat))
+    fixed = [one.difference for one in assembly.relations]
+    return [
+        _parameter(assembly, slots[symbol.name], number, value)
+        for number, (symbol, value) in enumerate(assembly.known_values.items())
+        if symbol.name in slots and not _moves(fixed, symbol)
+    ]
+
+
+def _moves(expressions: Iterable[Expression], symbol: Expression) -> bool:
+    found = list(expressions)
+    return bool(found) and depends_on(found, [symbol])
+
+
+def _parameter(assembly: Assembly, slot: Slot, number: int, value: float) -> dict[str, Any]:
+    low, high, is_open = _bounds(assembly, slot)
+    kind, unit = "gravity", parse_unit("m/s^2")
+    if slot.part:
+        component = assembly.flat.parts[slot.part].component
+        is_input = slot.name in component.signal_specs() and slot.name not in component.parameter_specs()
+        kind = "input" if is_input else "parameter"
+        unit = (component.signal_specs() if is_input else component.parameter_specs())[slot.name].unit
+    return {
+        "path": slot.path,
+        "value": value,
+        "unit": unit.text,
+        "low": low,
+        "high": high,
+        "lower_open": is_open,
+        "kind": kind,
+        "number": number,
+    }
