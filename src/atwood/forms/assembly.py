@@ -286,7 +286,7 @@ class Assembly:
             if path not in self.start_observables and path not in (*self.flat.start, *self.flat.guess):
                 raise no_start_quantity(path, self.start_observables)
         scene = self.source.changed(values or {}, start or {}, guess or {})
-        flat = replace(flatten(scene, self.flat.name), varied=self.flat.varied)
+        flat = replace(flatten(scene, self.flat.name), varied=self.flat.varied, contact_states=self.flat.contact_states)
         return self.with_flat(flat, replace(self.source, scene=scene))
 
     def with_rows(self, rows: FloatArray) -> Assembly:

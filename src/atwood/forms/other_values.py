@@ -169,6 +169,8 @@ def _changed_parts(flat: FlatScene, other: FlatScene) -> str:
     for path, part in flat.parts.items():
         if type(part.component) is not type(other.parts[path].component):
             return f"{path} is another component"
+    if flat.contact_states != other.contact_states:
+        return "other gaps are closed, or other slips stick"
     if (flat.connections, flat.links, flat.varied) != (other.connections, other.links, other.varied):
         return "it has other connections"
     if [tuple(one) for one in flat.space.basis] != [tuple(one) for one in other.space.basis]:

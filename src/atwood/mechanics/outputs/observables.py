@@ -365,7 +365,13 @@ class Reader:
         """Return the forces of gaps and slips of a part, by the name of the reaction."""
         rows = [one for one in self._equations.contacts if one.row.key[0] == path]
         forces = substitute([one.force for one in rows], dict(self._equations.read)) if rows else []
-        return dict(zip((one.row.reaction for one in rows), forces, strict=True))
+        found = dict(zip((one.row.reaction for one in rows), forces, strict=True))
+        local, kinematics = self._mechanism.locals_[path], self._equations.kinematics
+        if local.rubs:
+            forces, _ = in_joint_coordinates(local, kinematics, list(local.rubs.values()))
+            placed = place_part(self._equations.site, local, kinematics, self._signals).put(forces)
+            found |= dict(zip(local.rubs, placed, strict=True))
+        return found
 
     def _around_part(self, local: LocalPart) -> Mapping[str, Any]:
         owner = local.part.component._parent

@@ -198,7 +198,8 @@ def list_reactions(mechanism: Mechanism) -> tuple[Reaction, ...]:
     graph, found = mechanism.table.graph, []
     reported = {f".{'xyz'[i]}" for i in mechanism.space.reported_axes}
     for path, local in mechanism.locals_.items():
-        for law in local.part.component.laws("constraint"):
+        held = dict.fromkeys(c.law for c in local.constraints if c.law.kind in ("unilateral", "friction"))
+        for law in (*local.part.component.laws("constraint"), *held):
             if not law.holds_in(mechanism.space.name):
                 continue
             options = law.options
@@ -210,8 +211,8 @@ def list_reactions(mechanism: Mechanism) -> tuple[Reaction, ...]:
                 if any(name.endswith(f".{axis}") for axis in "xyz") and name[-2:] not in reported:
                     continue
                 full = f"{path}.{name}"
-                symbol = graph.symbol(f"reaction:{full}")
-                found.append(Reaction(full, options.unit, options.doc, symbol, (path, law.name, index), options.sign))
+                symbol, sign = graph.symbol(f"reaction:{full}"), 1.0 if law in held else options.sign
+                found.append(Reaction(full, options.unit, options.doc, symbol, (path, law.name, index), sign))
         for joint in local.joints:
             options = joint.law.options
             if not (options.rigid and options.reaction_doc):

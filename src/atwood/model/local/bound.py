@@ -53,6 +53,8 @@ def bind_part(
         is_varied = (part.path, name) in flat.varied
         values[name] = value + read_variation(f"{part.path}.{name}", flat, table) if is_varied else value
     values |= state_values(part, graph)
+    chosen = flat.contact_states
+    values |= {name: chosen[path] for name in values if (path := f"{part.path}.{name}") in chosen}
     connectors = {
         name: _local_connector(f"{part.path}.{name}", isinstance(one, Frame), space, graph)
         for name, one in component.connectors().items()

@@ -96,6 +96,16 @@ def local_contacts(
     return (*gaps, *slips), replace(binding, reactions={**binding.reactions, **never, **forces})
 
 
+def in_chosen_set(
+    contacts: tuple[LocalContact, ...], states: Mapping[str, float]
+) -> tuple[tuple[LocalContact, ...], list[LocalConstraint], list[LocalContact]]:
+    """Return what is a gap or a slip still, what holds in a set that is chosen, as constraints, and what rubs in it."""
+    if not states:
+        return contacts, [], []
+    held = [one.row for one in contacts if not one.mask.is_zero]
+    return (), held, [one for one in contacts if one.mask.is_zero and not one.force.is_zero]
+
+
 def _value(part: Part, law: Law, bound: Any, name: str, graph: Graph) -> Expression:
     def evaluated() -> Expression:
         given = getattr(bound, name)
@@ -127,6 +137,7 @@ def _gap(
     row = LocalConstraint(law, 0, value, law.options.reactions[0], 1.0)
     pull = _named(part, law, bound, law.options.adhesion, graph) if law.options.adhesion else None
     force = mask * multiplier
+    read = force if mask.is_constant else read
     return LocalContact(row, multiplier, read, mask, force, rate, stand_in, static_limit=pull, restitution=share)
 
 
@@ -153,6 +164,7 @@ def _slip(part: Part, law: Law, bound: Any, graph: Graph) -> list[LocalContact]:
     for i, (name, value, way) in enumerate(zip(names, values, _ways(values, held), strict=True)):
         multiplier, read, stand_in = _symbols(part, law, graph, i)
         force = mask * multiplier - way * limit
+        read = force if mask.is_constant else read
         row = LocalConstraint(law, i, value, name, 1.0)
         found.append(LocalContact(row, multiplier, read, mask, force, value, stand_in, held[i], limit, static))
     return found

@@ -78,6 +78,9 @@ class FlatScene:
         second derivative.
     symbols
         Letters in formulas by path.
+    contact_states
+        States and directions of all gaps and slips by path, where one set of them is chosen: what holds in it is an
+        ordinary constraint, and what slips an ordinary load.
     """
 
     name: str
@@ -94,6 +97,7 @@ class FlatScene:
     guess: Mapping[str, float]
     varied: frozenset[tuple[str, str]] = frozenset()
     symbols: Mapping[str, str] = field(default_factory=dict)
+    contact_states: Mapping[str, float] = field(default_factory=dict)
 
 
 def flatten(scene: Model, name: str | None = None) -> FlatScene:

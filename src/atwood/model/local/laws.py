@@ -31,7 +31,7 @@ from atwood.model.declare.law_results import (
 )
 from atwood.model.declare.laws import Law, scalars
 from atwood.model.local.bound import ParameterTable, bind_part
-from atwood.model.local.contacts import LocalContact, local_contacts, powers
+from atwood.model.local.contacts import LocalContact, in_chosen_set, local_contacts, powers
 from atwood.model.local.flatten import FlatScene, Part
 from atwood.model.local.joint_coordinates import (
     JointCoordinateUse,
@@ -143,12 +143,11 @@ def _localize_part(
     formulas = formulas_of(part, bound, coordinates, graph) if space.is_spatial else {}
     # Only forces may read reactions: they are solved for together with the accelerations.
     binding = replace(binding, reactions=_readable_reactions(part, constraints, mode, space, graph))
-    contacts, binding = local_contacts(part, binding, connectors, graph, laws.hold)
-    acting = bind(component, binding)
-    given = _forces_of(laws, acting, contacts)
-    acted = [*potentials, *lagrangians, *(graph.convert(one) for one in given.values)]
-    acted += _linked_outputs(part, flat, acting, graph) if formulas else []
-    turns = turns_read(part, formulas, acted)
+    every, binding = local_contacts(part, binding, connectors, graph, laws.hold)
+    contacts, held, rubbing = in_chosen_set(every, flat.contact_states)
+    acting, constraints = bind(component, binding), [*constraints, *held]
+    given = _forces_of(laws, acting, (*contacts, *rubbing))
+    turns = turns_read(part, formulas, [*potentials, *lagrangians, *_acting(laws, flat, acting, given, formulas)])
     counted = {*counted, *(symbol.name.rpartition(".")[2] for symbol in turns)}
     _check_reads(part, connectors, potentials, given.dissipations)
     return LocalPart(
@@ -172,8 +171,9 @@ def _localize_part(
         reads=_multipliers_read(part, constraints, contacts, given.values, graph),
         stand_ins=given.stand_ins,
         states=given.states,
-        discrete_states=discrete_states(part, graph),
+        discrete_states=discrete_states(part, graph, flat.contact_states),
         contacts=contacts,
+        rubs={one.row.reaction: one.force for one in rubbing},
     )
 
 
@@ -230,6 +230,12 @@ def _coordinate_loads(
             stand_ins[symbol] = value
             along.append(-(symbol * load.at.rate))
     return stand_ins, along
+
+
+def _acting(laws: _Laws, flat: FlatScene, acting: Any, given: _Forces, is_linked: object) -> list[Expression]:
+    """Return what forces of a part consist of, and what of it acts elsewhere by what is linked to it."""
+    linked = _linked_outputs(laws.part, flat, acting, laws.graph) if is_linked else []
+    return [*(laws.graph.convert(one) for one in given.values), *linked]
 
 
 def _linked_outputs(part: Part, flat: FlatScene, acting: Any, graph: Graph) -> list[Expression]:

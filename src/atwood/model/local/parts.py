@@ -164,6 +164,8 @@ class LocalPart:
         Those of its potentials that act in some of its modes only.
     contacts
         Its gaps and slips.
+    rubs
+        In a set of contacts that is chosen, the friction of what slips, by the name of the reaction.
     """
 
     part: Part
@@ -188,6 +190,7 @@ class LocalPart:
     states: tuple[LocalState, ...] = ()
     discrete_states: tuple[DiscreteState, ...] = ()
     contacts: tuple[LocalContact, ...] = ()
+    rubs: Mapping[str, Expression] = field(default_factory=dict)
 
     @property
     def asks(self) -> list[str]:
@@ -235,13 +238,14 @@ def declared_starts(parts: Mapping[str, Part], t_start: float, is_discrete: bool
     }
 
 
-def discrete_states(part: Part, graph: Graph) -> tuple[DiscreteState, ...]:
-    """Return the states of a part that change at moments only."""
+def discrete_states(part: Part, graph: Graph, known: Collection[str] = ()) -> tuple[DiscreteState, ...]:
+    """Return the states of a part that change at moments only, but for those whose values are known by path."""
     return tuple(
         DiscreteState(f"{part.path}.{name}", symbol)
         for spec in part.component.state_specs().values()
         if spec.is_discrete
         for name, symbol in zip(spec.names(part.values), _symbols(part, spec, graph), strict=True)
+        if f"{part.path}.{name}" not in known
     )
 
 

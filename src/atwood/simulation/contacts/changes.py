@@ -29,7 +29,7 @@ from atwood.numerics.contact_sets import (
     is_back,
 )
 from atwood.numerics.matrices import least_norm
-from atwood.simulation.contacts.values import ContactValues
+from atwood.simulation.contacts.values import ContactValues, Layout
 from atwood.simulation.dynamics.orientation_coordinates import to_regular
 from atwood.simulation.dynamics.scales import Scales
 from atwood.simulation.events.mode_change import generalized_speeds
@@ -93,18 +93,12 @@ class _Moment:
         self.first, self.places = self.layout.first, self.layout.places
         self.u = values.u.copy()
         self.held = list(values.assembly.held_now)
-        self.before = [self._state(k) for k in range(len(self.units))]
+        self.before = states_of(self.layout, self.held)
         near = _NEAR * max(relative, 1e-13)
         self.small = np.array([near * scales.of(ALONG[one.law.options.unit]) for one in self.first])
         self.slow = self.small / scales.time
         self.triggers = {(one.part, one.law): one.target for one in triggers}
         self.events: list[EventRecord] = []
-
-    def _state(self, k: int) -> State:
-        state, *way = (self.held[place] for place in self.places[k])
-        if self.first[k].is_slip:
-            return int(state), tuple(way)
-        return (STICKS if state else OPEN), (0.0,)
 
     def trigger(self, k: int) -> str:
         """Return the target of the event of a unit; empty where it has none now."""
@@ -336,23 +330,7 @@ class _Moment:
 
     def _yielding(self, k: int) -> tuple[float, ...]:
         """Return the direction in which what sticks begins to slip: against the force that could hold it no longer."""
-        values, free = self.values, self.values.accelerations()
-        forces, count = np.zeros(len(self.contacts)), len(self.contacts)
-        for _ in range(_MOST_TURNS):
-            limits = values.limits_at(forces)
-            matrix, right = np.eye(count), np.zeros(count)
-            for number, (rows, (state, way)) in enumerate(zip(self.units, self.before, strict=True)):
-                for row, part in zip(rows, way, strict=True):
-                    if state == STICKS:
-                        matrix[row], right[row] = values.response[row], -free[row]
-                    elif state == GOES_ON:
-                        side = limits[is_back(way)]
-                        matrix[row] = matrix[row] + part * side.shares[number]
-                        right[row] = -part * side.free[number]
-            last, forces = forces, least_norm(matrix, right)
-            if not self.layout.is_curved or _is_same(last, forces):
-                break
-        own = forces[list(self.units[k])]
+        own = forces_in(self.values, self.before)[list(self.units[k])]
         return tuple(-float(x) / (math.hypot(*own) or 1.0) for x in own)
 
     def _jammed(self, chosen: list[int]) -> Found:
@@ -435,6 +413,36 @@ def _of_impulses(limits: tuple[Limits, Limits]) -> tuple[Limits, Limits]:
     none = np.zeros_like(limits[0].free)
     ahead, back = (Limits(none, one.shares, none, one.static_shares) for one in limits)
     return ahead, back
+
+
+def states_of(layout: Layout, held: Sequence[float]) -> list[State]:
+    """Return the states of all units that discrete states say."""
+    found: list[State] = []
+    for one, places in zip(layout.first, layout.places, strict=True):
+        state, *way = (held[place] for place in places)
+        found.append((int(state), tuple(way)) if one.is_slip else ((STICKS if state else OPEN), (0.0,)))
+    return found
+
+
+def forces_in(values: ContactValues, states: Sequence[State]) -> FloatArray:
+    """Return the forces of all rows in some states of the units, whatever their signs and sizes are."""
+    free, count = values.accelerations(), len(values.contacts)
+    forces = np.zeros(count)
+    for _ in range(_MOST_TURNS):
+        limits = values.limits_at(forces)
+        matrix, right = np.eye(count), np.zeros(count)
+        for number, (rows, (state, way)) in enumerate(zip(values.units, states, strict=True)):
+            for row, part in zip(rows, way, strict=True):
+                if state == STICKS:
+                    matrix[row], right[row] = values.response[row], -free[row]
+                elif state == GOES_ON:
+                    side = limits[is_back(way)]
+                    matrix[row] = matrix[row] + part * side.shares[number]
+                    right[row] = -part * side.free[number]
+        last, forces = forces, least_norm(matrix, right)
+        if not values.layout.is_curved or _is_same(last, forces):
+            break
+    return forces
 
 
 def _is_same(last: FloatArray, now: FloatArray) -> bool:

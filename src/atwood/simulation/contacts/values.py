@@ -209,6 +209,11 @@ class ContactValues:
         """Accelerations and multipliers of joints without these forces."""
         return self._moved(np.concatenate([-self._now.bias, -self._now.gamma])[:, None])[:, 0]
 
+    @property
+    def falling(self) -> FloatArray:
+        """Accelerations without these forces."""
+        return self._free[: len(self.u)]
+
     @cached_property
     def _by_each(self) -> FloatArray:
         """Accelerations and multipliers of joints by a unit of each force."""
@@ -224,7 +229,7 @@ class ContactValues:
 
     def accelerations(self) -> FloatArray:
         """Return how the rows accelerate without these forces."""
-        found: FloatArray = self.slopes @ self._free[: len(self.u)] + self.seconds
+        found: FloatArray = self.slopes @ self.falling + self.seconds
         return found
 
     def speeds_by(self, forces: FloatArray) -> FloatArray:

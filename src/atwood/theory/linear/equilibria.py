@@ -186,7 +186,7 @@ def equilibria(
 
 def numeric_equilibria(scene: Model | Assembly, region: Mapping[str, Any] | None = None) -> Equilibria:
     """Return the states of rest of a scene in a region, found by Newton's method."""
-    point = find_operating_point(scene, {}, ())
+    point = find_operating_point(smooth_assembly_of(scene), {}, ())
     point = replace(point, scene=point.scene.sized(_length(point)))
     bounds = _bounds(point, region or {})
     lengths = [k for _, k in point.scene.tangents.plain if point.scene.tangents.names[k] in (region or {})]

@@ -22,6 +22,7 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import scipy
 from atwood.numerics.matrices import least_squares
 from atwood.numerics.rank import decompose, null_space, rank, span
+from atwood.simulation.contacts.chosen import words_text
 from atwood.table import Shown, Table, facts, table
 
 
@@ -51,6 +52,8 @@ class LinearModel(Shown):
         Form whose equations were linearised.
     about
         ``"rest"``, ``"steady motion"`` or ``"motion"``, for a state of a run, where A holds at that time alone.
+    contacts
+        The set of contacts that it holds in: what each gap and slip does, by path.
     error, sizes
         How far rounding can have taken the entries of A, and what is large for each state.
     """
@@ -69,6 +72,7 @@ class LinearModel(Shown):
     about: str
     error: FloatArray = field(repr=False)
     sizes: FloatArray = field(repr=False)
+    contacts: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property
     def spectrum(self) -> Spectrum:
@@ -179,7 +183,19 @@ class LinearModel(Shown):
 
     def to_data(self) -> dict[str, Any]:
         """Return it as plain data, for JSON."""
-        names = ("scene", "form", "about", "values", "states", "inputs", "outputs", "units", *"ABCD", "eigenvalues")
+        names = (
+            "scene",
+            "form",
+            "about",
+            "contacts",
+            "values",
+            "states",
+            "inputs",
+            "outputs",
+            "units",
+            *"ABCD",
+            "eigenvalues",
+        )
         return data_of(self, *names)
 
     def tables(self) -> tuple[Table, ...]:
@@ -190,6 +206,7 @@ class LinearModel(Shown):
             ("inputs", ", ".join(self.inputs) or "none: name some with --input"),
             ("outputs", ", ".join(self.outputs) or "none: name some with --output"),
             ("eigenvalues", ", ".join(complex_text(value) for value in self.spectrum.others) + f" 1/s{zeros}"),
+            *([("contacts", words_text(self.contacts))] if self.contacts else []),
             ("stability", "no deviation grows" if self.is_stable else "some deviations grow"),
         ]
         title = f"{self.scene} ({self.form}), linear about a {self.kind}"

@@ -171,6 +171,7 @@ def _model(
         about=about,
         error=error,
         sizes=np.concatenate([space.sizes, driven]),
+        contacts=point.contacts,
     )
 
 

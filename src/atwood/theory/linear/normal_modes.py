@@ -22,9 +22,10 @@ from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import scipy
 from atwood.model.compose.composite import Model
 from atwood.numerics.rank import null_space
-from atwood.pipeline import SCENE, smooth_assembly_of
+from atwood.pipeline import SCENE, assembly_of, smooth_assembly_of
 from atwood.ranges import values_of
 from atwood.result.result import Result
+from atwood.simulation.contacts.chosen import words_text
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.initialization.start import Start
 from atwood.simulation.problem.options import RunOptions
@@ -78,6 +79,11 @@ class NormalModes(Shown):
         return len(self.angular_frequencies)
 
     @property
+    def contacts(self) -> Mapping[str, str]:
+        """The set of contacts that they hold in: what each gap and slip does, by path."""
+        return self.point.contacts
+
+    @property
     def frequencies(self) -> FloatArray:
         """Frequencies, Hz."""
         return self.angular_frequencies / (2.0 * np.pi)
@@ -120,7 +126,7 @@ class NormalModes(Shown):
     def to_data(self) -> dict[str, Any]:
         """Return them as plain data, for JSON."""
         shapes = [{path: _number(value) for path, value in shape.items()} for shape in self.shapes]
-        told = data_of(self, "scene", "values", "angular_frequencies", "growth_rates")
+        told = data_of(self, "scene", "contacts", "values", "angular_frequencies", "growth_rates")
         return {**told, "shapes": shapes, "spaces": plain(self.spaces)}
 
     def tables(self) -> tuple[Table, ...]:
@@ -135,6 +141,7 @@ class NormalModes(Shown):
             for group in self.spaces
             if len(group) > 1
         ]
+        notes += [f"Contacts: {words_text(self.contacts)}."] if self.contacts else []
         title = f"{self.scene}: {len(self)} modes about {values_text(self.values)}"
         return (table(("mode", "rad/s>", "Hz>", "growth, 1/s>", "shape"), rows, title, notes),)
 
@@ -477,10 +484,11 @@ def root_locus(
     AtwoodError
         As `linearize` does.
     """
-    base = smooth_assembly_of(scene)
+    base = assembly_of(scene)
     numbers = np.asarray(values, dtype=float)
     is_state = path in base.start_observables
     rows: list[ComplexArray] = []
+    contacts: Mapping[str, str] | None = None
     for value in numbers:
         if is_state:
             model = linearize(base, at={**(at or {}), path: float(value)})
@@ -489,6 +497,9 @@ def root_locus(
         rows.append(model.eigenvalues)
         if len(rows[-1]) != len(rows[0]):
             raise UsageError(f"at {value:g} the scene has another number of states", where=path)
+        contacts = model.contacts if contacts is None else contacts
+        if model.contacts != contacts:
+            raise UsageError(f"at {value:g} it is in another set of contacts: {words_text(model.contacts)}", where=path)
     return RootLocus(path, numbers, _followed(rows), base.flat.name)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,9 @@ from atwood.model.local.bound import variation_names
 from atwood.model.local.flatten import FlatScene
 from atwood.numerics.matrices import to_array
 from atwood.numerics.rank import decompose, lost_rank
-from atwood.pipeline import assemble, assemble_flat, refuse_contacts
+from atwood.pipeline import assemble, assemble_flat
 from atwood.result.result import Result
+from atwood.simulation.contacts.chosen import has_contacts, in_set, refuse_border, set_at, state_in_set
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.orientation_coordinates import to_regular
 from atwood.simulation.dynamics.redundancy import RankFinding
@@ -82,6 +84,8 @@ class OperatingPoint:
         What varies; the columns of each are three: by its value, its rate and its second derivative.
     is_from_result
         Whether it is a state of a motion, of which nothing says that it is steady.
+    contacts
+        State of each gap and slip in words, by path: the scene is that of this set.
     """
 
     assembly: Assembly
@@ -92,6 +96,7 @@ class OperatingPoint:
     finding: RankFinding
     inputs: tuple[InputPath, ...]
     is_from_result: bool
+    contacts: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def kept(self) -> tuple[int, ...]:
@@ -105,7 +110,6 @@ def find_operating_point(scene: Model | Assembly, at: At, inputs: Sequence[str])
         base = scene if scene.form == "reduced" else assemble(_scene_of(scene), name=scene.flat.name)
     else:
         base = assemble(_scene_of(scene) if isinstance(scene, Assembly) else scene)
-    refuse_contacts(base)
     found = input_paths(base.flat, inputs)
     if isinstance(at, tuple):
         return _at_time(base, *at, found)
@@ -113,7 +117,25 @@ def find_operating_point(scene: Model | Assembly, at: At, inputs: Sequence[str])
     if at is not None:
         assembly = start_at(assembly, at)
     start = find_start(assembly)
-    return _point(assembly, start.time, start.coordinates, start.speeds, found)
+    state = start.time, start.coordinates, start.speeds
+    return _in_set(assembly, *state, start.length, found) if has_contacts(assembly) else _point(assembly, *state, found)
+
+
+def _in_set(
+    assembly: Assembly,
+    t: float,
+    q: FloatArray,
+    u: FloatArray,
+    length: float,
+    inputs: tuple[InputPath, ...],
+    is_from_result: bool = False,
+) -> OperatingPoint:
+    """Return a state in the set of contacts that the scene is in there."""
+    found = set_at(assembly, t, q, u, length, is_from_result)
+    refuse_border(found)
+    made = in_set(assembly, found.states)
+    place, speeds = state_in_set(assembly, made, t, q, u, length)
+    return replace(_point(made, t, place, speeds, inputs, is_from_result), contacts=found.words)
 
 
 def _point(
@@ -160,8 +182,11 @@ def _at_time(base: Assembly, result: Result, time: float, inputs: tuple[InputPat
     keys = frozenset(key for one in inputs for key in one.keys)
     flat = replace(own.flat, varied=keys, t_start=t)
     assembly = assemble_flat(flat, modes=own.modes, line_signs=own.mechanism.line_signs) if keys else own
-    q = to_regular(own, segment.coordinates[:, near])
-    return _point(assembly, t, q, segment.speeds[:, near], inputs, is_from_result=True)
+    q, u = to_regular(own, segment.coordinates[:, near]), segment.speeds[:, near]
+    if has_contacts(assembly):
+        now = replace(assembly, held=own.held, given_relations=own.given_relations) if keys else own
+        return _in_set(now, t, q, u, result.start.length, inputs, is_from_result=True)
+    return _point(assembly, t, q, u, inputs, is_from_result=True)
 
 
 def moved_to(point: OperatingPoint, q: FloatArray, u: FloatArray) -> OperatingPoint:

@@ -24,7 +24,7 @@ from atwood.model.compose.composite import Model
 from atwood.numerics.matrices import least_norm, or_one
 from atwood.numerics.newton import Missing, largest, newton
 from atwood.numerics.rank import null_space
-from atwood.pipeline import SCENE
+from atwood.pipeline import SCENE, smooth_assembly_of
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.theory.linear.displacements import Minimal
 from atwood.theory.linear.operating_point import (
@@ -108,7 +108,8 @@ def find_steady(scene: LinearScene, flow: Flow, kept: Sequence[int]) -> Steady:
     extents = np.concatenate([scene.displacement_sizes, scene.sizes * pace])
     sizes = extents * pace
     goal = flow.field / sizes
-    if not scene.depends_on_time and np.all(np.abs(goal) <= _STEADY) and not np.any(flow.variation.u):
+    is_still = bool(np.all(np.abs(goal) <= _STEADY)) or len(kept) == len(scene.sizes)  # or all is held
+    if is_still and not scene.depends_on_time and not np.any(flow.variation.u):
         return still(flow)
     tiers = [[_time_shift(scene)], _shifts(scene), _rotations(scene), _own_rotations(scene)]
     found: list[_Field] = []
@@ -395,7 +396,7 @@ def trim(scene: Model | Assembly, *, at: At = None, inputs: Sequence[str] = (), 
     ParameterError
         If there is no such input or coordinate.
     """
-    point = find_operating_point(scene, at, inputs)
+    point = find_operating_point(smooth_assembly_of(scene), at, inputs)
     first = _trial(point, {one.path: 0.0 for one in point.inputs}, _free_numbers(point, free))
     found, left = newton(lambda one: one.missing, _moved, first, np.ones(1), steps=_STEPS, exact=tolerances.MET)
     if left.miss <= tolerances.MET:
