@@ -17,7 +17,7 @@ from atwood.plotting.comparison_page import _cost, write_page
 from atwood.plotting.plots.precision import plot_comparison, style_of
 from atwood.study.comparison.found import ComparisonRow
 from atwood.study.comparison.reference import Reference
-from atwood_library.scenes import FourBar, SimplePendulum
+from atwood_library.scenes import Chain, FourBar, SimplePendulum
 
 
 @pytest.fixture(scope="module")
@@ -39,6 +39,30 @@ def test_costs_are_told_apart(found):
         assert row.monitor_s >= 0.0
         assert row.outputs_s >= 0.0
         assert row.wall_s > 0.0
+
+
+def test_time_and_error_are_told_by_kind_of_work_and_by_part(found, tmp_path):
+    """The kinds add up to the time of the integration; the largest error of a part is that of the row."""
+    for row in found.rows:
+        works = (row.equations_s, row.jacobians_s, row.linear_s, row.projections_s, row.own_s)
+        is_implicit = row.solver == "SUNDIALS IDA"
+        assert (row.jacobians_s is not None, row.linear_s is not None) == (is_implicit, is_implicit)
+        assert (row.projections_s is not None) is ((row.form, row.level) == ("dae", ""))
+        assert row.equations_s > 0.0
+        total = sum(one for one in works if one is not None)
+        assert total == pytest.approx(row.wall_s, rel=1e-9) or (row.own_s == 0.0 and total < 2.0 * row.wall_s)
+        assert set(row.errors) <= {"crank", "coupler", "rocker", "ground", "pivot_a", "pivot_b", "hinge_a", "hinge_b"}
+        assert max(row.errors.values()) == row.error
+    _, shares = found.tables()
+    assert [row[-1] for row in shares.rows] == [max(one.errors, key=one.errors.get) for one in found.rows]
+    lines = list(csv.DictReader(found.save(tmp_path / "rows.csv").read_text().splitlines()))
+    assert float(lines[0]["linear_s"]) == found.rows[0].linear_s
+    assert found.to_dict()["rows"][0]["errors"] == found.rows[0].errors
+
+
+def test_larger_matrices_are_factorised_as_they_are_in_runs():
+    row = compare(Chain(), rtols=(1e-4,), forms=("dae",), levels=("index1",), t_end=0.1).rows[0]
+    assert 0.0 < row.linear_s < row.wall_s
 
 
 def test_looking_out_for_singular_positions_is_no_cost_of_a_form(monkeypatch):

@@ -61,6 +61,7 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {
     "SUNLinSol_Dense": (_P, _P, _P, _P),
     "SUNLinSolInitialize": (c_int, _P),
     "SUNLinSolSetup": (c_int, _P, _P),
+    "SUNLinSolSolve": (c_int, _P, _P, _P, _P, _D),
     "SUNLinSolFree": (c_int, _P),
     "SUNLinSolNewEmpty": (_P, _P),
     "SUNLinSolFreeEmpty": (None, _P),

@@ -28,11 +28,11 @@ from atwood.study.comparison.found import Comparison, ComparisonRow, environment
 from atwood.study.comparison.reference import (
     Assembled,
     Reference,
+    errors_by_part,
     find_reference,
     run_form,
-    scaled_difference,
-    table_at,
 )
+from atwood.study.comparison.work import shares_of
 
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 """Relative tolerances at which solvers are compared unless others are given: from a look at a motion to a reference."""
@@ -205,9 +205,8 @@ def _measure(
         return replace(row, reason=problem.message), None
     if result.status != "finished":
         return replace(row, reason=result.message or result.status.replace("_", " ")), None
-    error = scaled_difference(
-        reference.quantities, table_at(result, reference.quantities, reference.time), reference.scales
-    )
+    errors = errors_by_part(reference, result)
+    error = float(np.max([0.0, *errors.values()]))
     missed, done = result.constraint_max, result.statistics
     if not np.isfinite(error):
         return replace(row, reason="the motion is not finite"), None
@@ -225,6 +224,8 @@ def _measure(
         constraint_drift=max(missed["position"], missed["velocity"]),
         constraint_held=max(missed["held_position"], missed["held_velocity"]),
         within_reference=error <= 10.0 * reference.error,
+        errors=errors,
+        **shares_of(result, row.rtol, least.seconds - least.monitor_seconds),
     ), result
 
 

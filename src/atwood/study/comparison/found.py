@@ -34,6 +34,9 @@ RELATIVE = (
 
 _NUMBERS = ("rtol", "error", "estimate", "ms", "steps", "residuals", "Jacobians", "energy", "constraint")
 
+_WORK = ("equations", "jacobians", "linear", "projections", "own", "monitor", "outputs")
+"""Kinds of work of a run, each with a field of `ComparisonRow`."""
+
 
 @dataclass(frozen=True)
 class ComparisonRow:
@@ -63,12 +66,24 @@ class ComparisonRow:
         Time spent looking out for singular positions, s.
     outputs_s
         Time spent on handing out states, s: interpolation, projection onto the constraints, recording.
+    equations_s, jacobians_s
+        What of the time spent integrating went into evaluations of the equations and of their Jacobian, s: how often
+        there was one, times what one takes by itself. Explicit methods evaluate accelerations, in which the
+        elimination is. None where functions in Python are called, in runs with events, and where a method has programs
+        of its own.
+    linear_s, projections_s
+        The same of factorisations and solutions with them, of matrices that are not sparse, and of projections onto
+        the constraints at the ends of steps; None where there are none.
+    own_s
+        What is left of it: the method's own steps, predictions, error estimates.
     energy_drift
         Error of the energy, relative to what the scene exchanges; see `atwood.result.energy.EnergyLedger`.
     constraint_drift
         By how much the constraints are missed by what the run gives, relative to the scene's sizes.
     constraint_held
         The same for the solver's own states, before projection.
+    errors
+        The largest scaled difference from the reference in the quantities of each part, by path.
     within_reference
         Whether the error is not larger than ten times the reference's own.
     reason
@@ -87,9 +102,15 @@ class ComparisonRow:
     jacobians: int | None = None
     monitor_s: float | None = None
     outputs_s: float | None = None
+    equations_s: float | None = None
+    jacobians_s: float | None = None
+    linear_s: float | None = None
+    projections_s: float | None = None
+    own_s: float | None = None
     energy_drift: float | None = None
     constraint_drift: float | None = None
     constraint_held: float | None = None
+    errors: Mapping[str, float] = field(default_factory=dict)
     within_reference: bool = False
     reason: str = ""
 
@@ -109,6 +130,12 @@ class ComparisonRow:
         drifts = (f"{drift or 0.0:.1e}" for drift in (self.energy_drift, self.constraint_drift))
         told = estimate if estimate == "" else f"{estimate:.1e}"
         return (*form, f"{self.error or 0.0:.1e}{mark}", told, f"{wall:.3g}", *(str(one) for one in counts), *drifts)
+
+    def shares(self) -> tuple[str, ...]:
+        """Return form, tolerance, ms of each kind of work, and the part with the largest error, as texts."""
+        works = (getattr(self, f"{name}_s") for name in _WORK)
+        worst = max(self.errors, key=self.errors.__getitem__, default="")
+        return (self.label, f"{self.rtol:.0e}", *("" if s is None else f"{1e3 * s:.3g}" for s in works), worst)
 
 
 @dataclass(frozen=True)
@@ -148,7 +175,10 @@ class Comparison(Shown):
         told += ["* within ten times the error of the reference itself"] * near
         title, notes = f"{self.scene} to t = {self.t_end:g} s", [*filter(None, told), "", self.verdict]
         headings = ("form", *(f"{name}>" for name in _NUMBERS))
-        return (table(headings, [row.cells() for row in self.rows], title, notes),)
+        where = "Where the time goes, ms; outputs and the look-out for singular positions come on top; largest error"
+        names = ("form", "rtol>", *(f"{name}>" for name in _WORK), "in")
+        shares = table(names, [row.shares() for row in self.rows if not row.reason], where)
+        return table(headings, [row.cells() for row in self.rows], title, notes), shares
 
     __str__ = Shown.as_text
 
@@ -207,6 +237,7 @@ def write_rows(comparisons: Sequence[Comparison], file: str | os.PathLike[str]) 
     for one in comparisons:
         for row in one.rows:
             cells = (getattr(row, name) for name in names[2:])
+            cells = (" ".join(f"{k}={v:.3g}" for k, v in c.items()) if isinstance(c, dict) else c for c in cells)
             table.writerow([one.scene, one.t_end, *("" if cell is None else cell for cell in cells)])
     environment = comparisons[0].environment if comparisons else {}
     write_with_companion(target, text.getvalue().encode(), {"environment": environment})

@@ -187,6 +187,19 @@ def scaled_difference(
     return max((float(np.max(np.abs(one[path] - other[path]))) / scales[path] for path in one), default=0.0)
 
 
+def errors_by_part(reference: Reference, result: Result) -> dict[str, float]:
+    """Return the largest scaled difference from a reference in the quantities of each part."""
+    parts, found = result.assembly.mechanism.locals_, dict[str, float]()
+    given = table_at(result, reference.quantities, reference.time)
+    for path, known in reference.quantities.items():
+        part = path.rpartition(".")[0]
+        while part not in parts and "." in part:  # of a vector's component the vector is left out, too
+            part = part.rpartition(".")[0]
+        own = scaled_difference({path: known}, given, reference.scales)
+        found[part] = float(np.maximum(found.get(part, 0.0), own))
+    return found
+
+
 def _by_quadrature(
     assembled: Assembled, best: Result, time: FloatArray, paths: Sequence[str]
 ) -> tuple[dict[str, FloatArray], float] | None:
