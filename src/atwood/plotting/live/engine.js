@@ -1,324 +1,568 @@
-// The engine of a live page: it keeps the memory of the printed routines and says what became of each request.
+// The engine of a live page. It keeps the memory of the printed routines, sends their steps on, and says what became of
+// each request. FIELD, ROW, SOUGHT, SEARCHED, POINTS, steps and searches are printed before it.
 
-const STACK = 4096;                       // words for arrays of calls
-const [REACHED, USED_UP, TOO_SMALL, , , NOTICED] = [0, 1, 2, 3, 4, 5];
-const HELD = 1e-6;                        // what constraints may miss, in the scene's sizes
-const LOW = 0.6, NEARBY = 0.3, SINGULAR = 1e-3; // shares of what was left of constraints at most
+const STACK = 4096;                             // words for arrays of calls
+const TOO_SMALL = 2, FOUND = 1, HAPPENED = 2;   // how steps and searches end, and what a search is told of the start
+const HELD = 1e-6;                              // what constraints may miss, in the scene's sizes
+const MET = 1e-7;                               // the same of what a start is to fulfil
+const LOW = 0.6, NEARBY = 0.3, SINGULAR = 1e-3; // shares of the most that was left of constraints
+const ROUNDING = 2 ** -52;
 
 const status = (code, text = "") => ({code, text});
 const shown = t => Number(t.toPrecision(9)).toString();
+const largest = list => list.reduce((most, x) => Math.max(most, Math.abs(x)), 0);
 
 function near(word, known) {
   const parts = word.toLowerCase().split(".");
-  return known.map(one => [parts.filter(part => one.toLowerCase().includes(part)).length, one])
-    .filter(([count]) => count).sort((a, b) => b[0] - a[0]).slice(0, 3).map(([, one]) => one);
+  const found = known.map(one => [parts.filter(part => one.toLowerCase().includes(part)).length, one]);
+  const like = found.filter(([count]) => count).sort((a, b) => b[0] - a[0]).slice(0, 3).map(([, one]) => one);
+  return like.length ? `; perhaps ${like.join(", ")}` : "";
 }
 
-// The memory of a scene: one array, in which everything has its place.
-function memoryOf(model, length) {
-  const {words} = model.data;
+// The shortest x with rows x = right: rows are made square to each other, the largest first; what follows is left out.
+function leastNorm(rows, right) {
+  const left = rows.map((row, i) => {
+    const size = Math.hypot(...row) || 1;
+    return {row: row.map(x => x / size), value: right[i] / size};
+  });
+  const found = new Float64Array(rows.length ? rows[0].length : 0);
+  while (left.length) {
+    const sizes = left.map(one => Math.hypot(...one.row)), best = sizes.indexOf(Math.max(...sizes));
+    if (!(sizes[best] > 1e-10)) break;
+    const [chosen] = left.splice(best, 1), q = chosen.row.map(x => x / sizes[best]), value = chosen.value / sizes[best];
+    q.forEach((x, j) => { found[j] += value * x; });
+    for (const one of left) {
+      for (let pass = 0; pass < 2; pass++) {
+        const share = one.row.reduce((sum, x, j) => sum + x * q[j], 0);
+        one.row = one.row.map((x, j) => x - share * q[j]);
+        one.value -= share * value;
+      }
+    }
+  }
+  return found;
+}
+
+// The programs of one mode with their memory: one array, in which everything has its place.
+function openMode(mode, options) {
+  const {data} = mode, {words} = data, n = data.coordinates.length, m = data.speeds.length, size = n + m;
   let end = 16 + STACK;
   const room = count => { const at = end; end += count; return at; };
-  const places = {scratch: 0};
-  for (const [name, [derived, , ...groups]] of Object.entries(words)) {
-    places[name] = {derived: room(derived), outputs: groups.map(count => room(count))};
+  const count = data.events.length, padded = Math.ceil(size / 4) * 4, places = {};
+  for (const [name, one] of Object.entries(words)) {
+    places[name] = {derived: room(one.derived), outputs: one.outputs.map(room)};
   }
-  places.scratch = room(Math.max(...Object.values(words).map(one => one[1])));
-  const n = model.data.coordinates.length, m = model.data.speeds.length, size = n + m;
-  Object.assign(places, {
-    n, m, size, padded: Math.ceil(size / 4) * 4, values: room(length), rates: room(8), time: room(1), y: room(size),
-    yp: room(size), moved: room(size + m), session: room(Object.keys(FIELD).length + 8),
-  });
-  places.arrays = room(ROW.all * places.padded);
-  return {M: new Float64Array(end), places};
-}
-
-function createEngine(model, options = {}) {
-  const data = model.data, {M, places} = memoryOf(model, data.values.length);
-  const {n, m, size, session} = places, F = [null];
-  const rtol = options.rtol ?? 1e-8;
+  const scratch = room(Math.max(...Object.values(words).map(one => one.scratch)));
+  const [own, block, clock, y, yp, moved] = [data.values.length, 8, 1, size, size, size + m].map(room);
+  const session = room(Object.keys(FIELD).length), arrays = room(ROW.all * padded), shifts = room(count);
+  const sought = room(Object.keys(SOUGHT).length), [sy, syp, shifted, turns] = [size, size, size, 2 * size].map(room);
+  const rows = room(Object.keys(SEARCHED).length * count + POINTS * (1 + 2 * count));
+  const M = new Float64Array(end), F = [null], values = Float64Array.from(data.values);
   M[0] = 16;
-  const functions = model.open(M, F), method = steps(M, F);
-  const held = functions.held ? {most: new Float64Array(data.constraints.length), largest: 0} : null;
-  const values = Float64Array.from(data.values), own = Float64Array.from(data.values);
-  const parameters = data.parameters.map(one => ({...one}));
-  const starts = data.starts.map(one => ({...one}));
-  const paths = new Map(data.quantities.map((one, i) => [one.path, i]));
-  const state = new Float64Array(size);
-  let time = data.start_time, now = status("ready"), evaluated = NaN, events = [], started = false;
+  const functions = mode.open(M, F), method = steps(M, F), search = searches(M, F);
+  const held = words.held ? {most: new Float64Array(data.constraints.length), largest: 0} : null;
 
   const field = name => M[session + FIELD[name]];
-  const put = (name, value) => { M[session + FIELD[name]] = value; };
-  const row = name => places.arrays + places.padded * ROW[name];
-  const addressOf = f => F.push(f) - 1;
+  const put = fields => { for (const [name, one] of Object.entries(fields)) M[session + FIELD[name]] = one; };
+  const row = name => arrays + padded * ROW[name];
+  const seen = name => rows + count * SEARCHED[name];
+  const address = f => F.push(f) - 1;
+  const read = (from, length = size) => M.slice(from, from + length);
 
-  // Call a program at a time and state in memory; return whether it has values.
-  function call(name, t, y, more = 0) {
+  // Call a program of (t, q, u, more); false where a result is not finite.
+  function call(name, t, from = y, speeds = from + n, more = 0, target = null) {
     const top = M[0], {derived, outputs} = places[name];
     M[0] = top + 4 + outputs.length;
-    M[places.time] = t;
-    [places.time, y, y + n, more].forEach((at, i) => { M[top + i] = at; });
-    outputs.forEach((at, i) => { M[top + 4 + i] = at; });
-    const code = functions[name](top, derived, places.scratch, top + 4);
+    M[clock] = t;
+    [clock, from, speeds, more].forEach((at, i) => { M[top + i] = at; });
+    (target ?? outputs).forEach((at, i) => { M[top + 4 + i] = at; });
+    const code = functions[name](top, derived, scratch, top + 4);
     M[0] = top;
     return code === 0;
   }
 
-  const outputs = (name, k) => {
-    const count = data.words[name][2 + k], at = places[name].outputs[k];
-    return M.subarray(at, at + count);
+  const output = (name, k) => {
+    const at = places[name].outputs[k];
+    return M.subarray(at, at + words[name].outputs[k]);
   };
 
-  // Parameters go to all programs.
   function fill() {
-    M.set(values, places.values);
-    for (const name of Object.keys(data.words)) {
-      functions[`${name}_prologue`](places.values, places[name].derived, places.scratch);
-    }
-    evaluated = NaN;
+    M.set(values, own);
+    for (const name of Object.keys(words)) functions[`${name}_prologue`](own, places[name].derived, scratch);
   }
 
-  function open() {
-    const block = [places.kernel.derived, places.scratch];
-    if (functions.project) block.push(places.nearer.derived, places.scratch, places.moved);
-    block.forEach((one, i) => { M[places.rates + i] = one; });
-    put("arrays", places.arrays);
-    put("size", size);
-    put("padded", places.padded);
-    put("function", addressOf(functions.rates));
-    put("data", places.rates);
-    if (functions.project) {
-      put("project", addressOf(functions.project));
-      put("project_data", places.rates + 2);
-    }
-    put("relative", Math.max(rtol * data.relative, 1e-15));
-    put("longest", options.longest ?? Infinity);
-    put("horizon", data.end_time > data.start_time ? data.end_time - data.start_time : 1);
-    const absolute = row("absolute");
-    M.fill(1, absolute, absolute + places.padded);
-    data.tolerances.forEach((one, i) => { M[absolute + i] = (options.atol ?? rtol) * one; });
-    fill();
+  // Entries at their places in a matrix, each column in units of a size.
+  function matrix(entries, [at, columns], height, sizes) {
+    const made = Array.from({length: height}, () => new Array(sizes.length).fill(0));
+    at.forEach((i, k) => { made[i][columns[k]] = entries[k] * sizes[columns[k]]; });
+    return made;
   }
 
-  // Take a state onto the constraints, and begin there; what stands in the way is said.
-  function begin(t, y) {
-    normalize(y);
-    M.set(y, places.y);
-    if (functions.project && functions.project(t, places.y, places.rates + 2) !== 0) {
-      return status("failed", `at t = ${shown(t)} s the constraints cannot be met near this state`);
-    }
-    if (method.begin(session, t, places.y) !== 0) {
-      return status("failed", `at t = ${shown(t)} s the equations have no finite value`);
-    }
-    take(t, places.y);
-    return missed(t) ?? status("ready");
-  }
+  const constraints = (t, from) => {
+    if (!call("held", t, from)) return null;
+    const slopes = matrix(output("held", 1), data.slopes, data.constraints.length, data.sizes), drift = output("held", 2);
+    const rates = slopes.map((one, i) => one.reduce((sum, x, j) => sum + x * M[from + n + j] / data.sizes[j], drift[i]));
+    return {gaps: output("held", 0), rates, slopes};
+  };
 
-  function take(t, from) {
-    time = t;
-    evaluated = NaN;
-    state.set(M.subarray(from, from + size));
-  }
-
-  function normalize(y) {
-    for (const turn of data.turns) {
-      const length = Math.hypot(...turn.map(i => y[i]));
-      for (const i of turn) y[i] /= length;
-    }
-  }
-
-  // What is missed of all constraints, also of those that others make superfluous.
-  function missed(t) {
+  // Which constraint, also of those that follow from others, is missed; null where all are met.
+  function missed(t, from = y) {
     if (!held) return null;
-    if (!call("held", t, places.y)) return status("failed", `at t = ${shown(t)} s a constraint has no finite value`);
-    const [gaps, rates] = [outputs("held", 0), outputs("held", 1)], slopes = outputs("held", 2);
-    for (let i = 0; i < gaps.length; i++) {
-      let size = 0;
-      for (let j = 0; j < m; j++) size = Math.max(size, Math.abs(slopes[i * m + j] * data.sizes[j]));
-      size = Math.max(size, held.most[i] * NEARBY);
-      if (size > 0 && !(Math.abs(gaps[i]) <= HELD * size && Math.abs(rates[i]) * data.time <= HELD * size)) {
-        return status("failed", `at t = ${shown(t)} s ${data.constraints[i]} does not hold with these values`);
-      }
-    }
-    return null;
+    const found = constraints(t, from);
+    if (!found) return "a constraint, which has no finite value";
+    const off = found.slopes.findIndex((one, i) => {
+      const unit = Math.max(largest(one), NEARBY * held.most[i], 1e-12);
+      return !(Math.abs(found.gaps[i]) <= HELD * unit && Math.abs(found.rates[i]) * data.time <= HELD * unit);
+    });
+    return off < 0 ? null : data.constraints[off];
   }
 
-  // What is left of each kept constraint by the others: the least, as a share of the most that each has been.
-  function independence(t, y) {
-    if (!call("held", t, y)) return [0, 0];
-    const slopes = outputs("held", 2), rows = [];
-    for (const i of data.kept) {
-      const one = Float64Array.from({length: m}, (_, j) => slopes[i * m + j] * data.sizes[j]);
-      held.most[i] = Math.max(held.most[i], Math.hypot(...one));
-      rows.push([i, one.map(x => x / (held.most[i] || 1))]);
-    }
+  // What is left of each kept constraint by the others: the least share of the most that each has been, and whose.
+  function independence(t, from) {
+    const found = constraints(t, from);
+    if (!found) return [0, 0];
+    const left = data.kept.map(i => {
+      held.most[i] = Math.max(held.most[i], Math.hypot(...found.slopes[i]));
+      return [i, found.slopes[i].map(x => x / (held.most[i] || 1))];
+    });
     let least = Infinity, which = 0;
-    while (rows.length) {
-      let best = 0, squares = -1;
-      rows.forEach(([, one], k) => {
-        const square = one.reduce((sum, x) => sum + x * x, 0);
-        if (square > squares) [best, squares] = [k, square];
-      });
-      const [[i, pivot]] = rows.splice(best, 1);
-      if (squares < least) [least, which] = [squares, i];
-      for (const [, one] of rows) {
-        const share = one.reduce((sum, x, j) => sum + x * pivot[j], 0) / (squares || 1);
-        one.forEach((x, j) => { one[j] = x - share * pivot[j]; });
+    while (left.length) {
+      const squares = left.map(([, one]) => one.reduce((sum, x) => sum + x * x, 0)), most = Math.max(...squares);
+      const [[i, pivot]] = left.splice(squares.indexOf(most), 1);
+      if (most < least) [least, which] = [most, i];
+      for (const one of left) {
+        const share = one[1].reduce((sum, x, j) => sum + x * pivot[j], 0) / (most || 1);
+        one[1] = one[1].map((x, j) => x - share * pivot[j]);
       }
     }
-    return [Math.sqrt(Math.max(least, 0)), which];
+    return [Math.sqrt(least), which];
   }
 
-  // Whether a singular position lies within the last step: [time, constraint], or null.
-  function singular(before) {
-    const [t0, t1] = [field("t_old"), field("t")];
-    const [after] = independence(t1, row("y"));
-    held.largest = Math.max(held.largest, after);
-    const low = Math.min(before, after) < LOW * held.largest;
-    if (!low) return [after, null];
-    const at = t => (method.interpolate(session, t, places.y, places.yp) === 0 ? independence(t, places.y) : [Infinity, 0]);
-    const moments = Array.from({length: 13}, (_, k) => t0 + (t1 - t0) * k / 12), found = moments.map(t => at(t)[0]);
+  // The singular position within the last step: its time and a constraint; null where there is none.
+  function singular() {
+    const [t0, t1] = [field("t_old"), field("t")], before = held.last;
+    [held.last] = independence(t1, row("y"));
+    held.largest = Math.max(held.largest, held.last);
+    if (Math.min(before, held.last) >= LOW * held.largest) return null;
+    const at = t => (method.interpolate(session, t, y, yp) === 0 ? independence(t, y)[0] : Infinity);
+    const times = Array.from({length: 13}, (_, k) => t0 + (t1 - t0) * k / 12), found = times.map(at);
     const k = found.indexOf(Math.min(...found));
-    let [a, b] = [moments[Math.max(k - 1, 0)], moments[Math.min(k + 1, 12)]];
+    let [a, b] = [times[Math.max(k - 1, 0)], times[Math.min(k + 1, 12)]];
     for (let i = 0; i < 40 && found[k] < NEARBY * held.largest; i++) {
       const [left, right] = [a + 0.382 * (b - a), a + 0.618 * (b - a)];
-      if (at(left)[0] < at(right)[0]) b = right; else a = left;
+      if (at(left) < at(right)) b = right; else a = left;
     }
-    const middle = 0.5 * (a + b), [least, which] = at(middle);
-    return [after, least < SINGULAR * held.largest ? [middle, data.constraints[which]] : null];
+    const middle = 0.5 * (a + b), low = at(middle) < SINGULAR * held.largest;
+    return low ? {time: middle, constraint: data.constraints[independence(middle, y)[1]]} : null;
+  }
+
+  function normalize(state) {
+    for (const turn of data.turns) {
+      const length = Math.hypot(...turn.map(i => state[i]));
+      for (const i of turn) state[i] /= length;
+    }
+    return state;
+  }
+
+  const project = t => !functions.project || functions.project(t, y, block + 2) === 0;
+  const eventsAt = (t, from, target) => call("events", t, from, from + n, shifts, [target]);
+
+  // Begin at a state, taken onto the constraints; what stands in the way, or null.
+  function begin(t, state, fired = null) {
+    M.set(normalize(Float64Array.from(state)), y);
+    if (!project(t)) return "the constraints cannot be met near this state";
+    if (method.begin(session, t, y) !== 0) return "the equations have no finite value";
+    if (held) {
+      held.last = independence(t, y)[0];
+      held.largest = Math.max(held.largest, held.last);
+    }
+    return count ? listen(t, fired) : null;
+  }
+
+  // Take the signs of events at a start; those that start at zero have a margin to pass, in the direction that counts.
+  function listen(t, fired) {
+    M.fill(0, shifts, shifts + count);
+    if (!eventsAt(t, y, sy)) return "an event has no value";
+    data.events.forEach((one, i) => {
+      const small = one.small * options.rtol, at = M[sy + i];
+      M[shifts + i] = !one.noted && Math.abs(at) <= small ? -one.direction * small : 0;
+      M[seen("given") + i] = fired?.[i] ? HAPPENED : 0;
+      M[seen("direction") + i] = one.direction;
+    });
+    M.fill(0, seen("sign"), seen("sign") + count);
+    M[sought + SOUGHT.is_first] = 0;
+    return search.restart(sought, t) === 0 ? null : "an event has no value";
+  }
+
+  // The event that has happened where a mode begins; -1 where none has.
+  const broken = () => data.events.findIndex((one, i) => {
+    const small = one.small * options.rtol;
+    return !one.noted && one.direction * (M[seen("known") + i] - M[shifts + i]) > 0.9 * small;
+  });
+
+  // The first event between two times of the last step; null where there is none.
+  function event(from, to, began) {
+    if (!count || !(from < to)) return null;
+    const code = search.search(sought, from, to);
+    if (code === 0) return null;
+    const t = M[sought + SOUGHT.root];
+    if (code !== FOUND) return {time: t, failed: "an event has no value"};
+    const fired = data.events.map((_, i) => M[seen("found") + i] !== 0);
+    return {...withoutMargin(t, fired, began), found: t, fired};
+  }
+
+  // The same at the time at which its value was zero, where it came from the other side and the margin made it late.
+  function withoutMargin(t, fired, began) {
+    const plain = {time: t, state: read(sy)}, since = t - began, some = fired.flatMap((one, i) => (one ? [i] : []));
+    if (!some.every(i => M[shifts + i]) || !(since > 0)) return plain;
+    const [state, rates] = [read(sy), read(syp)], short = 1e-6 * since;
+    const back = by => {
+      M.set(state.map((x, i) => x - by * rates[i]), y);
+      eventsAt(t - by, y, yp);
+      return some.map(i => M[yp + i] - M[shifts + i]);
+    };
+    const now = back(0), before = back(short), slopes = now.map((x, k) => (x - before[k]) / short);
+    const late = now.map((x, k) => x / slopes[k]), earlier = Math.min(...late);
+    const clear = slopes.every((x, k) => x * M[shifts + some[k]] < 0 && Math.abs(now[k]) < 0.1 * since * Math.abs(x));
+    if (!clear || !(Math.max(...late) <= (1 + 1e-6) * earlier)) return plain;
+    return {time: t - earlier, state: state.map((x, i) => x - earlier * rates[i])};
+  }
+
+  // Take one step; what stands in the way, or null.
+  function step() {
+    const strays = turn => {
+      const square = turn.reduce((sum, i) => sum + M[row("y") + i] ** 2, 0);
+      return !(square > 0.25 && square < 4);
+    };
+    if (data.turns.some(strays)) begin(field("t"), read(row("y")));
+    put({limit: field("steps") + 1, stop: Infinity});
+    return method.run(session) === TOO_SMALL ? "no step is short enough: something has no value, or changes too fast" : null;
+  }
+
+  // The state at a time within the last step; null where there is none.
+  function at(t) {
+    if (method.interpolate(session, t, y, yp) !== 0) return null;
+    if (t !== field("t")) project(t);
+    return read(y);
+  }
+
+  function evaluate(t, state) {
+    M.set(state, y);
+    const is = functions.rates(t, y, yp, block) === 0 && call("quantities", t, y, y + n, yp + n);
+    call("places", t);
+    return is;
+  }
+
+  [places.kernel.derived, scratch, places.nearer?.derived, scratch, moved].forEach((one, i) => { M[block + i] = one ?? 0; });
+  put({arrays, size, padded, function: address(functions.rates), data: block});
+  if (functions.project) put({project: address(functions.project), project_data: block + 2});
+  put({relative: Math.max(options.rtol * data.relative, 1e-15), longest: options.longest ?? Infinity, horizon: options.horizon});
+  M.fill(1, row("absolute"), row("absolute") + padded);
+  M.set(data.tolerances.map(one => (options.atol ?? options.rtol) * one), row("absolute"));
+  if (count) {
+    const fields = {interpolate: address(method.interpolate), session, data: 0, y: sy, yp: syp, shifted, turns, rows, size, count};
+    fields.events = address((t, from, _, target) => (eventsAt(t, from, target) ? 0 : 1));
+    fields.moment = 100 * ROUNDING * options.horizon;
+    fields.fired_at = NaN;
+    for (const [name, one] of Object.entries(fields)) M[sought + SOUGHT[name]] = one;
+    for (let i = 0; i < size; i++) [M[turns + i], M[turns + size + i]] = [Math.cos(1 + 2.4 * i), Math.sin(1 + 2.4 * i)];
+  }
+  return {
+    data, M, n, m, y, values, fill, begin, broken, step, at, event, missed, singular, evaluate, call, output, matrix,
+    normalize, held, get time() { return field("t"); }, get begun() { return field("t_old"); },
+    get statistics() { return ["steps", "failures", "evaluations"].map(field); },
+  };
+}
+
+// Where a scene starts: conditions on places by Newton's method with steps of least norm, then those on speeds.
+function findStart(mode, start, t) {
+  const {M, y, data} = mode, [n, m] = start.counts, sizes = start.sizes;
+  const offset = (one, x) => (one.wrapped ? x - 2 * Math.PI * Math.round(x / (2 * Math.PI)) : x);
+  const normalize = q => {
+    for (const turn of start.turns) {
+      const length = Math.hypot(...turn.map(i => q[i]));
+      for (const i of turn) q[i] /= length;
+    }
+    return q;
+  };
+
+  function look(name, q, u, wanted) {
+    M.set(q, y);
+    M.set(u, y + n);
+    if (!mode.call(`start_${name}`, t, y, y + n)) return null;
+    const {constraints, targets, slopes} = start[name], found = mode.output(`start_${name}`, 0);
+    const rows = mode.matrix(mode.output(`start_${name}`, 1), slopes, found.length, sizes);
+    const off = i => (i < constraints ? found[i] : offset(targets[i - constraints], found[i] - targets[i - constraints].value));
+    const chosen = rows.map((_, i) => i).filter(i => wanted(i < constraints ? null : targets[i - constraints]));
+    return {rows: chosen.map(i => rows[i]), off: chosen.map(off), which: chosen};
+  }
+
+  function moved(q, step) {
+    if (!data.tangent) return q.map((x, i) => x - (step[i] ?? 0) * (sizes[i] ?? 0));
+    M.set(q, y);
+    M.fill(0, y + n, y + n + m);
+    mode.call("tangent", t, y, y + n);
+    const tangent = mode.matrix(mode.output("tangent", 1), data.tangent, n, sizes);
+    return normalize(q.map((x, i) => x - tangent[i].reduce((sum, one, j) => sum + one * step[j], 0)));
+  }
+
+  const still = new Float64Array(m);
+  function solve(q, wanted) {
+    for (let i = 0, last = Infinity; i < 60; i++) {
+      const now = look("places", q, still, wanted);
+      if (!now) return null;
+      const step = leastNorm(now.rows, now.off), far = largest(step);
+      if (!Number.isFinite(far)) return null;
+      q = moved(q, step.map(x => x * Math.min(1, 0.5 / (far || 1))));
+      if (far < 1e-15 || (far < 1e-12 && far >= last)) break;
+      last = far;
+    }
+    return q;
+  }
+
+  function unmet(name, q, u) {
+    const now = look(name, q, u, one => !one || one.fixed);
+    if (!now) return "a condition, which has no value";
+    const k = now.off.findIndex((x, i) => !(Math.abs(x) <= MET * Math.max(largest(now.rows[i]), 1e-6 * largest(sizes))));
+    const i = now.which[k] - start[name].constraints;
+    return k < 0 ? null : i < 0 ? "a constraint" : `${start[name].targets[i].path} = ${start[name].targets[i].value}`;
+  }
+
+  const direct = start.places.targets.every(one => one.direct >= 0);
+  function placed(from) {
+    let q = Float64Array.from(from);
+    for (const one of start.places.targets) if (one.direct >= 0) q[one.direct] = one.value;
+    q = normalize(q);
+    if (!direct) q = solve(q, one => one !== null);
+    q = q && solve(q, one => !one || one.fixed);
+    return [q, q ? unmet("places", q, still) : "a condition, which has no value"];
+  }
+  let [q, wrong] = placed(start.reference);
+  if (wrong) [q, wrong] = placed(start.place);
+  if (wrong) return {failed: wrong};
+  let u = new Float64Array(m);
+  for (const one of start.speeds.targets) if (one.direct >= 0) u[one.direct] = one.value;
+  const improve = wanted => {
+    const now = look("speeds", q, u, wanted);
+    if (now) u = u.map((x, j) => x - leastNorm(now.rows, now.off)[j] * sizes[j]);
+  };
+  if (start.speeds.targets.some(one => !one.fixed && one.direct < 0)) improve(one => one && !one.fixed);
+  for (let pass = 0; pass < 3 && (start.speeds.constraints || start.speeds.targets.length); pass++) improve(one => !one || one.fixed);
+  const speeds = unmet("speeds", q, u);
+  if (speeds) return {failed: speeds};
+  if (mode.M && mode.data.words.maximal) {
+    M.set(q, y);
+    M.set(u, y + n);
+    if (!mode.call("maximal", t, y, y + n)) return {failed: "the places of its bodies, which have no value"};
+    return {state: [...mode.output("maximal", 0), ...mode.output("maximal", 1)]};
+  }
+  return {state: [...q, ...u]};
+}
+
+function createEngine(model, options = {}) {
+  const {data} = model, span = data.end_time - data.start_time;
+  const settings = {...options, rtol: options.rtol ?? 1e-8, horizon: span > 0 ? span : 1};
+  const modes = model.modes.map(one => openMode(one, settings));
+  const parameters = data.parameters.map(one => ({...one})), starts = data.starts.map(one => ({...one}));
+  const paths = new Map(data.quantities.map((one, i) => [one.path, i]));
+  const first = {parameters: parameters.map(one => one.value), starts: starts.map(one => one.value)};
+  let mode = modes[0], time = data.start_time, state = Float64Array.from(mode.data.state), now = status("ready");
+  let events = [], started = false, evaluated = false, coming = null, searched = time, began = time;
+
+  const say = (code, text, t = time) => (now = status(code, text && `at t = ${shown(t)} s ${text}`));
+
+  function take(t, from) {
+    [time, state, evaluated] = [t, from, false];
+  }
+
+  // Relations of functions of time have the values that hold at a time and just after it.
+  function inPiece(t) {
+    const {times, values, first: place} = mode.data.schedule, piece = times.filter(one => one <= t).length;
+    mode.values.set(values[piece] ?? [], place);
+    mode.fill();
+  }
+
+  const nextPiece = t => mode.data.schedule.times.find(one => one > t) ?? mode.data.schedule.end ?? Infinity;
+
+  function begin(t, from, fired = null) {
+    inPiece(t);
+    const wrong = mode.begin(t, from, fired);
+    if (wrong) return say("failed", wrong, t);
+    take(t, mode.at(t));
+    [coming, searched, began] = [null, t, t];
+    const missed = mode.missed(t);
+    if (missed) return say("failed", `${missed} does not hold with these values`, t);
+    const broken = mode.broken();
+    return broken >= 0 && !fired ? happen(broken) : say("ready", "");
+  }
+
+  // What an event leads to.
+  function happen(i) {
+    const {part, law, message, target} = mode.data.events[i];
+    events.push({time, part, law, message, target});
+    return target === "stop" ? say("stopped", `${part}: ${message}`) : say("ready", "");
+  }
+
+  function apply() {
+    for (const one of modes) {
+      for (const each of parameters) {
+        const number = one.data.numbers[each.path];
+        if (number !== undefined) one.values[number] = each.value;
+      }
+      one.fill();
+    }
   }
 
   function restart() {
-    if (held) [held.largest] = [0];
-    events = [];
-    started = false;
-    return begin(data.start_time, Float64Array.from(data.state));
+    const same = (list, known) => list.every((one, i) => one.value === known[i]);
+    [mode, events, started] = [modes[0], [], false];
+    apply();
+    if (mode.held) mode.held.most.fill(mode.held.largest = 0);
+    let from = mode.data.state;
+    if (!same(parameters, first.parameters) || !same(starts, first.starts)) {
+      if (!data.start) return say("failed", "its start is known for the given values alone", data.start_time);
+      for (const level of [data.start.places, data.start.speeds]) {
+        for (const one of level.targets) one.value = starts.find(each => each.path === one.path)?.value ?? one.value;
+      }
+      inPiece(data.start_time);
+      const found = findStart(mode, data.start, data.start_time);
+      if (found.failed) return say("failed", `the start cannot be met: ${found.failed}`, data.start_time);
+      from = found.state;
+    }
+    return begin(data.start_time, from);
   }
 
-  function failure(t) {
-    return status("failed", `at t = ${shown(t)} s no step is short enough: something has no value there, or changes too fast`);
+  // Look for what happens up to the end of a step: an event, or a singular position.
+  function watch() {
+    const until = Math.min(mode.time, nextPiece(began));
+    coming = mode.event(searched, until, began);
+    if (mode.held) {
+      const low = mode.singular();
+      if (low && low.time <= (coming?.time ?? until)) coming = {time: low.time, singular: low.constraint};
+    }
+    searched = coming?.found ?? until;
+  }
+
+  // Go over what comes; a status where it ends there.
+  function pass() {
+    const one = coming;
+    if (one.failed) return say("failed", one.failed, one.time);
+    if (one.singular) {
+      take(one.time, mode.at(one.time));
+      return say("singular", `the position is singular: ${one.singular} follows from the other constraints`);
+    }
+    take(one.time, one.state);
+    const which = one.fired.flatMap((is, i) => (is ? [i] : [])), changing = which.find(i => mode.data.events[i].target);
+    for (const i of which) if (!mode.data.events[i].target) happen(i);
+    if (changing !== undefined) {
+      happen(changing);
+      return now;
+    }
+    watch();
+    return null;
+  }
+
+  function passPiece(t) {
+    if (t === mode.data.schedule.end) return say("stopped", "it is not known when its functions of time switch after this", t);
+    const from = mode.at(t);
+    if (!from) return say("failed", "the equations have no value within a step", t);
+    inPiece(t);
+    mode.M.set(from, mode.y);
+    const jumps = mode.missed(t);
+    return jumps ? say("failed", `the motion that ${jumps} prescribes jumps, which a page does not follow`, t) : begin(t, from);
   }
 
   function advance(target, limits = {}) {
     if (!Number.isFinite(target)) return (now = status("refused", "no time to go to"));
     if (["failed", "singular", "stopped"].includes(now.code)) return now;
     if (target < time) return (now = status("refused", `t = ${shown(target)} s lies before t = ${shown(time)} s: reset first`));
-    const until = performance.now() + (limits.milliseconds ?? Infinity), most = limits.steps ?? Infinity;
-    let left = held ? independence(field("t_old"), row("y_old"))[0] : 0;
-    if (held) held.largest = Math.max(held.largest, left);
-    put("stop", target);
+    const until = performance.now() + (limits.milliseconds ?? Infinity);
     started = true;
-    for (let count = 0; field("t") < target; count++) {
-      if (count >= most || performance.now() > until) {
-        take(field("t"), row("y"));
-        return (now = status("working"));
+    for (let count = 0; ;) {
+      const edge = nextPiece(began), here = Math.min(coming?.time ?? Infinity, edge);
+      if (here <= target && here <= mode.time) {
+        const said = coming && coming.time <= edge ? pass() : passPiece(edge);
+        if (said && said.code !== "ready") return said;
+        continue;
       }
-      const from = field("t"), turn = data.turns.some(strays);
-      if (turn) {
-        const y = M.slice(row("y"), row("y") + size);
-        normalize(y);
-        M.set(y, places.y);
-        method.begin(session, from, places.y);
+      if (mode.time >= target) break;
+      if (count++ >= (limits.steps ?? Infinity) || performance.now() > until) {
+        take(mode.time, mode.at(mode.time));
+        return say("working", "");
       }
-      put("limit", field("steps") + 1);
-      if (method.run(session) === TOO_SMALL) {
-        take(from, row("y"));
-        return (now = failure(from));
+      const wrong = mode.step();
+      if (wrong) {
+        take(mode.time, mode.at(mode.time) ?? state);
+        return say("failed", wrong);
       }
-      if (held) {
-        const [after, found] = singular(left);
-        left = after;
-        if (found && found[0] <= target) {
-          method.interpolate(session, found[0], places.y, places.yp);
-          take(found[0], places.y);
-          const text = `at t = ${shown(found[0])} s the position is singular: ${found[1]} follows from the other constraints`;
-          return (now = status("singular", text));
-        }
-      }
+      watch();
     }
-    if (field("t") === target) {
-      take(target, row("y"));
-    } else if (method.interpolate(session, target, places.y, places.yp) !== 0) {
-      return (now = status("failed", `the equations have no value within a step, at t = ${shown(target)} s`));
-    } else {
-      if (functions.project) functions.project(target, places.y, places.rates + 2);
-      take(target, places.y);
-    }
-    return (now = status("reached"));
+    const from = mode.at(target);
+    if (!from) return say("failed", "the equations have no value within a step", target);
+    take(target, from);
+    return say("reached", "");
   }
 
-  const strays = turn => {
-    const square = turn.reduce((sum, i) => sum + M[row("y") + i] ** 2, 0);
-    return !(square > 0.25 && square < 4);
-  };
-
-  // Quantities, energies, poses and places at the present state, worked out once.
   function evaluate() {
-    if (evaluated === time) return;
-    M.set(state, places.y);
-    functions.rates(time, places.y, places.yp, places.rates);
-    call("quantities", time, places.y, places.yp + n);
-    call("places", time, places.y);
-    evaluated = time;
+    if (!evaluated) mode.evaluate(time, state);
+    evaluated = true;
   }
 
   function value(path) {
     const i = paths.get(path);
-    if (i === undefined) {
-      const why = data.unknown[path], like = near(path, [...paths.keys()]);
-      throw new Error(`${path}: ${why ?? `there is no such quantity${like.length ? `; perhaps ${like.join(", ")}` : ""}`}`);
-    }
+    if (i === undefined) throw new Error(`${path}: ${data.unknown[path] ?? `there is no such quantity${near(path, [...paths.keys()])}`}`);
     evaluate();
-    return outputs("quantities", 0)[i];
+    return mode.output("quantities", 0)[i];
   }
 
   function set(path, number) {
-    const wanted = typeof path === "string" ? {[path]: number} : path, chosen = [];
-    for (const [name, one] of Object.entries(wanted)) {
-      const known = parameters.find(each => each.path === name);
-      if (!known) {
-        const like = near(name, parameters.map(each => each.path));
-        return status("refused", `${name}: it cannot be changed here${like.length ? `; perhaps ${like.join(", ")}` : ""}`);
-      }
-      const low = known.low === null || (known.lower_open ? one > known.low : one >= known.low);
-      if (!Number.isFinite(one) || !low || (known.high !== null && one > known.high)) {
+    const wanted = Object.entries(typeof path === "string" ? {[path]: number} : path), all = [...parameters, ...starts];
+    for (const [name, one] of wanted) {
+      const known = all.find(each => each.path === name);
+      if (!known) return status("refused", `${name}: it cannot be changed here${near(name, all.map(each => each.path))}`);
+      const {low = null, high = null, lower_open: open} = known;
+      if (!Number.isFinite(one) || (low !== null && !(open ? one > low : one >= low)) || (high !== null && one > high)) {
         return status("refused", `${name}: ${one} is not a value that it can have`);
       }
-      chosen.push([known, one]);
     }
-    const before = chosen.map(([known]) => [known, known.value]);
-    const apply = list => { for (const [known, one] of list) { known.value = one; values[known.number] = one; } fill(); };
-    apply(chosen);
-    if (!started) return (now = restart());
-    const [t, y] = [time, Float64Array.from(state)], made = begin(t, y);
-    if (made.code !== "failed") return (now = made);
-    apply(before);
-    begin(t, y);
-    return status("refused", made.text);
+    const before = all.map(one => one.value), [t, from, was] = [time, state, now];
+    for (const [name, one] of wanted) all.find(each => each.path === name).value = one;
+    const anew = !started || wanted.some(([name]) => starts.some(one => one.path === name));
+    const go = () => { if (anew) return restart(); apply(); return begin(t, from); };
+    const said = go();
+    if (said.code !== "failed") return said;
+    all.forEach((one, i) => { one.value = before[i]; });
+    if (go().code === "failed") return now;
+    now = was;
+    return status("refused", said.text);
   }
 
-  function setState(t, y) {
-    if (y.length !== size || ![t, ...y].every(Number.isFinite)) return status("refused", `a state is ${size} numbers`);
+  function setState(t, from) {
+    if (from.length !== mode.n + mode.m || ![t, ...from].every(Number.isFinite)) {
+      return status("refused", `a state is ${mode.n + mode.m} numbers`);
+    }
     started = true;
-    return (now = begin(t, Float64Array.from(y)));
+    return begin(t, from);
   }
 
-  open();
-  now = restart();
+  restart();
   return {
     model, parameters, starts, advance, value, set, setState,
     get time() { return time; },
     get state() { return Float64Array.from(state); },
     get status() { return now; },
     get events() { return events; },
-    get statistics() { return {steps: field("steps"), failures: field("failures"), evaluations: field("evaluations")}; },
-    reset: () => (now = restart()),
+    get mode() { return mode.data.modes; },
+    get statistics() {
+      const sums = modes.map(one => one.statistics).reduce((a, b) => a.map((x, i) => x + b[i]));
+      return {steps: sums[0], failures: sums[1], evaluations: sums[2]};
+    },
+    reset: restart,
     values: list => Float64Array.from(list, value),
-    poses() { evaluate(); return outputs("places", 0); },
-    places() { evaluate(); return outputs("places", 1); },
+    poses() { evaluate(); return mode.output("places", 0); },
+    places() { evaluate(); return mode.output("places", 1); },
     energy() {
       evaluate();
-      const [kinetic, potential] = outputs("quantities", 1);
+      const [kinetic, potential] = mode.output("quantities", 1);
       return {kinetic, potential, total: kinetic + potential};
     },
   };

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from atwood.errors import ParameterError, suggestion_in_parts
-from atwood.expr import Expression, depends_on
+from atwood.expr import depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.other_values import Slot, find_slots
 from atwood.lazy_dataclasses import replace
@@ -72,28 +72,29 @@ def _bounds(assembly: Assembly, slot: Slot) -> tuple[float | None, float | None,
     return (spec.minimum if spec.above is None else spec.above), spec.maximum, spec.above is not None
 
 
-def live_parameters(assembly: Assembly) -> list[dict[str, Any]]:
-    """Return the parameters that can be changed, with the number of each among all parameters.
+def find_parameters(assembly: Assembly) -> dict[str, tuple[int, Slot]]:
+    """Return the parameters that can be changed by path: where they stand, and their numbers among all parameters.
 
     Constants of integration and times of switches were found with the values that there are: what these read stays.
     """
     if assembly.mechanism.constants:
-        return []
+        return {}
     slots = dict(find_slots(assembly.flat))
     fixed = [one.difference for one in assembly.relations]
-    return [
-        _parameter(assembly, slots[symbol.name], number, value)
-        for number, (symbol, value) in enumerate(assembly.known_values.items())
-        if symbol.name in slots and not _moves(fixed, symbol)
-    ]
+    return {
+        slots[symbol.name].path: (number, slots[symbol.name])
+        for number, symbol in enumerate(assembly.mechanism.table.values)
+        if symbol.name in slots and not (fixed and depends_on(fixed, [symbol]))
+    }
 
 
-def _moves(expressions: Iterable[Expression], symbol: Expression) -> bool:
-    found = list(expressions)
-    return bool(found) and depends_on(found, [symbol])
+def live_parameters(assembly: Assembly) -> list[dict[str, Any]]:
+    """Return what pages know of the parameters that can be changed."""
+    values = assembly.parameter_values
+    return [_described(assembly, slot, float(values[number])) for number, slot in find_parameters(assembly).values()]
 
 
-def _parameter(assembly: Assembly, slot: Slot, number: int, value: float) -> dict[str, Any]:
+def _described(assembly: Assembly, slot: Slot, value: float) -> dict[str, Any]:
     low, high, is_open = _bounds(assembly, slot)
     kind, unit = "gravity", parse_unit("m/s^2")
     if slot.part:
@@ -104,10 +105,9 @@ def _parameter(assembly: Assembly, slot: Slot, number: int, value: float) -> dic
     return {
         "path": slot.path,
         "value": value,
-        "unit": unit.text,
+        "unit": "" if isinstance(slot.axis, str) else unit.text,
         "low": low,
         "high": high,
         "lower_open": is_open,
         "kind": kind,
-        "number": number,
     }

@@ -1,0 +1,215 @@
+"""The programs of a scene in one mode, and the data that go with them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.codegen.javascript.printer import BITS, print_routines
+from atwood.codegen.javascript.program import FUNCTIONS, print_program
+from atwood.codegen.llvm.linear_systems import write_elimination
+from atwood.errors import AtwoodError
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, Scalar, depends_on
+from atwood.forms.accelerations import accelerations_of
+from atwood.forms.program import state_groups
+from atwood.forms.quantities import find_observables
+from atwood.integrators.embedded.rates import write_routines as write_rates
+from atwood.mechanics.kinematics.mechanism import Mechanism, world_position
+from atwood.mechanics.outputs.observables import Observable
+from atwood.mechanics.outputs.totals import energies
+from atwood.model.values.space import planar_axes
+from atwood.plotting.live.parameters import find_parameters
+from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
+from atwood.simulation.events.modes import MARGIN, EventProbe
+from atwood.simulation.events.time_events import find_schedule
+from atwood.simulation.problem.explicit_scene import program_on_constraints
+from atwood.simulation.problem.problem import SceneProblem
+
+_BEYOND = 4.0
+"""So many times as long as the scene's run switches of functions of time are known beforehand."""
+
+
+class NotLiveError(AtwoodError):
+    """What a page cannot compute."""
+
+
+class ModeText:
+    """A scene in one mode as text, and what goes with it as data.
+
+    Parameters
+    ----------
+    plan, y
+        The scene, and a state that it may have in this mode.
+    quantities
+        Paths; None for all.
+
+    Attributes
+    ----------
+    programs
+        What is printed, by the names that routines and the engine call.
+    data
+        The data.
+    """
+
+    def __init__(self, plan: SceneProblem, y: FloatArray, quantities: Sequence[str] | None) -> None:
+        self.plan, self.assembly = plan, plan.assembly
+        self.equations, self.flat = self.assembly.own_equations, self.assembly.flat
+        self.programs: dict[str, Program] = {}
+        self.known: list[Observable] = []
+        self.unknown: dict[str, str] = {}
+        self.data: dict[str, Any] = {
+            "coordinates": [{"name": one.name, "unit": one.unit} for one in self.equations.names],
+            "speeds": [{"name": one.name, "unit": one.unit} for one in self.equations.speed_names],
+            "values": self.assembly.parameter_values.tolist(),
+            "numbers": {path: number for path, (number, _) in find_parameters(self.assembly).items()},
+            "modes": dict(self.assembly.modes),
+            "state": y.tolist(),
+        }
+        self._add_motion(y)
+        self._add_quantities(quantities)
+        self._add_pictures()
+        self._add_sizes()
+        self._add_schedule()
+        self._add_events(y)
+
+    def text(self) -> str:
+        """Return the JavaScript function that makes the functions of the mode, from memory and addresses."""
+        n, m = len(self.equations.coordinates), len(self.equations.speeds)
+        given, projects = len(self.programs["kernel"].outputs) == 2, "nearer" in self.programs
+        texts = [FUNCTIONS, BITS, print_routines([*write_elimination(), *write_rates(n, m, given, projects)])]
+        words = self.data["words"] = {}
+        for name, program in self.programs.items():
+            text, scratch = print_program(name, program)
+            texts.append(text)
+            sizes = [len(one.expressions) for one in program.outputs]
+            words[name] = {"derived": len(program.prologue), "scratch": scratch, "outputs": sizes}
+        names = [*self.programs, *(f"{name}_prologue" for name in self.programs), "rates"]
+        names += ["project"] if projects else []
+        body = "\n".join(texts)
+        return f"(M, F) => {{\n{body}\nreturn {{{', '.join(names)}}};\n}}"
+
+    def _add_motion(self, y: FloatArray) -> None:
+        """Add accelerations, and what keeps the state on the constraints."""
+        assembly, plan = self.assembly, self.plan
+        self.data["constraints"] = [one.label for one in self.equations.constraints]
+        self.data["kept"] = list(plan.finding.kept)
+        if assembly.form == "reduced" and not self.equations.constraints:
+            found = accelerations_of(assembly)
+            if found is None:
+                raise NotLiveError("its accelerations have no formulas")
+            self.programs["kernel"] = found.program
+            return
+        made = program_on_constraints(plan, self.flat.t_start, y)
+        self.data["values"] += plan.sizes.tolist()
+        self.programs["kernel"] = made.accelerations
+        if plan.holds:
+            balance = assembly.balance(assembly.form)
+            self.programs |= {"nearer": made.projection, "held": balance.constraints_alone}
+            self.data["slopes"] = [balance.jacobian_rows.tolist(), balance.jacobian_columns.tolist()]
+
+    def of_state(self, name: str, groups: Mapping[str, Sequence[Scalar]], more: Sequence[Expression] = ()) -> None:
+        """Add a program of (t, q, u), and of the accelerations where these are given."""
+        convert, parameters = self.equations.graph.convert, self.assembly.parameters
+        outputs = tuple(OutputGroup(key, tuple(map(convert, values))) for key, values in groups.items())
+        inputs = (*state_groups(self.equations), *([InputGroup("a", tuple(more))] if more else []))
+        self.programs[name] = Program(f"{self.flat.name} ({name})", inputs, parameters, outputs)
+
+    def _add_quantities(self, paths: Sequence[str] | None) -> None:
+        """Add the program of quantities and energies."""
+        symbols = [one.symbol for one in self.assembly.reactions]
+        found = find_observables(self.assembly, list(self.assembly.observables) if paths is None else paths)
+        reading = {one.path for one in found if symbols and depends_on([one.value], symbols)}
+        self.unknown = dict.fromkeys(sorted(reading), "it reads reactions, which pages do not solve for")
+        self.known = [one for one in found if one.path not in reading]
+        of = {"quantities": [one.value for one in self.known]}
+        of["energies"] = list(energies(self.assembly.mechanism, self.equations))
+        self.of_state("quantities", of, self.equations.accelerations)
+
+    def _add_pictures(self) -> None:
+        """Add the program of where bodies and nodes are."""
+        mechanism, space = self.assembly.mechanism, self.assembly.mechanism.space
+        placements = self.equations.kinematics.placements
+        poses: list[Scalar] = []
+
+        def place(node: int) -> tuple[Scalar, ...]:
+            return tuple(space.vector(world_position(mechanism, placements, node)))
+
+        for body in mechanism.bodies.bodies:
+            axes = placements.axes.get(body.index)
+            if axes is None and body.index in placements.angles:
+                axes = planar_axes(placements.angles[body.index])
+            columns = [tuple(axis) for axis in axes] if axes is not None else np.eye(3).tolist()
+            poses += [*place(body.root), *(columns[j][i] for i in range(3) for j in range(3))]
+        places = [one for node in nodes_of(self) for one in place(node)]
+        self.of_state("places", {"poses": poses, "places": places})
+
+    def _add_sizes(self) -> None:
+        """Add in which units errors are measured."""
+        plan, kinematic_map = self.plan, kinematic_map_of(self.assembly, self.assembly.form)
+        n, m = len(self.equations.coordinates), len(self.equations.speeds)
+        homogeneous = [one for one in kinematic_map.program.orientation_coordinates if one.is_homogeneous]
+        self.data |= {
+            "tolerances": plan.tolerances(1.0, {})[: n + m].tolist(),
+            "relative": plan.relative_share,
+            "sizes": plan.sizes.tolist(),
+            "time": plan.scales.time,
+            "turns": [list(one.coordinates) for one in homogeneous],
+        }
+
+    def _add_schedule(self) -> None:
+        """Add when relations of functions of time change, and their values."""
+        flat, assembly = self.flat, self.assembly
+        end = flat.t_end + _BEYOND * (flat.t_end - flat.t_start)
+        schedule = find_schedule(assembly, flat.t_start, end)
+        first = len(assembly.parameters) - len(assembly.relations)
+        self.data["schedule"] = {"times": schedule.times.tolist(), "values": schedule.values.T.tolist(), "first": first}
+        self.data["schedule"]["end"] = end if assembly.relations else None
+
+    def _add_events(self, y: FloatArray) -> None:
+        """Add the values of events."""
+        t, (q, u) = self.flat.t_start, self.plan.program.split(y)
+        probe = EventProbe(self.plan, t, q, u, 1e-12)
+        self.data["events"] = []
+        for one in probe.event_functions:
+            if one.target not in ("", "stop") or one.is_there is not None:
+                raise NotLiveError(f"{one.part}.{one.law} leads to another mode, which pages do not enter yet")
+        if not probe.event_functions:
+            return
+        program = probe.program()
+        if program is None:
+            raise NotLiveError("its events read reactions that have no formulas")
+        self.programs["events"] = program
+        self.data["events"] = [
+            {
+                "part": one.part,
+                "law": one.law,
+                "message": one.message,
+                "target": one.target,
+                "direction": one.direction,
+                "impact": one.impact,
+                "noted": one.is_noted,
+                "small": MARGIN * self.plan.scales.of(one.unit),
+            }
+            for one in probe.event_functions
+        ]
+
+
+def nodes_of(mode: ModeText) -> list[int]:
+    """Return the nodes of a scene in the order of their places."""
+    return sorted(mode.equations.kinematics.placements.positions)
+
+
+def bodies_of(mode: ModeText) -> dict[str, Any]:
+    """Return what bodies and nodes there are."""
+    mechanism: Mechanism = mode.assembly.mechanism
+    at: dict[int, list[str]] = {}
+    for (part, name), node in mechanism.graph.node_of.items():
+        at.setdefault(node, []).append(f"{part}.{name}")
+    body_of = mechanism.bodies.body_of
+    return {
+        "bodies": [{"index": one.index, "name": one.name, "root": one.root} for one in mechanism.bodies.bodies],
+        "nodes": [{"node": one, "body": body_of[one], "connectors": at.get(one, [])} for one in nodes_of(mode)],
+    }
