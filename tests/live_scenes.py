@@ -34,7 +34,7 @@ print(given.map(([name, span]) => {
 
 def compared(name: str, form: str, found: list[Any], span: float) -> str:
     """Return how far a page is from `simulate`."""
-    code, text, t, state, milliseconds, events = found
+    code, text, _, state, milliseconds, events = found
     if code != "reached":
         return f"{code}: {text}"
     tight, loose = (state_at(SCENES[name](), span, form=form, rtol=one) for one in (1e-12, RTOL))

@@ -69,7 +69,7 @@ class LiveProgram:
 def engine_script() -> str:
     """Return the JavaScript that runs every live scene: it defines ``createEngine``."""
     engine = files("atwood.plotting.live").joinpath("engine.js").read_text(encoding="utf-8")
-    names = {"FIELD": _numbered(FIELDS), "ROW": TABLEAU.rows, "SOUGHT": _numbered(SEARCH_FIELDS)}
+    names: dict[str, object] = {"FIELD": _numbered(FIELDS), "ROW": TABLEAU.rows, "SOUGHT": _numbered(SEARCH_FIELDS)}
     names |= {"SEARCHED": SEARCH_ROWS, "POINTS": _POINTS}
     return "\n".join(
         [
