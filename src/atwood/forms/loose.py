@@ -13,7 +13,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import replace
 from atwood.mechanics.dynamics.equations import ContactRow, Equations
-from atwood.model.declare.contact_laws import value_names
+from atwood.model.declare.contact_laws import state_names
 
 _STATES: Key[tuple[int, ...]] = Key("states of gaps and slips")
 _LOOSE: Key[bool] = Key("whether nothing touches")
@@ -21,9 +21,7 @@ _LOOSE: Key[bool] = Key("whether nothing touches")
 
 def state_paths(one: ContactRow) -> tuple[str, ...]:
     """Return the paths of the discrete states of a gap, or of a slip: its state, then its direction."""
-    part, law, _ = one.row.key
-    directions = value_names(one.law) if one.is_slip else ()
-    return (f"{part}.{law}_state", *(f"{part}.{name}_direction" for name in directions))
+    return tuple(f"{one.row.key[0]}.{name}" for name in state_names(one.law))
 
 
 def _states(assembly: Assembly) -> tuple[int, ...]:

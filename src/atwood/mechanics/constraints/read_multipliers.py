@@ -328,7 +328,8 @@ def with_known(equations: Equations, read: Mapping[Expression, Expression]) -> E
     known = substitute([*equations.rows, *equations.rates], dict(read))
     rows, rates = tuple(known[: len(equations.rows)]), tuple(known[len(equations.rows) :])
     made = replace(equations, rows=rows, rates=rates, read=dict(read))
-    own = {x: read[x] for one in equations.contacts for x in (one.row.multiplier, one.read) if x in read}
+    kept = set(equations.multipliers)  # those of what coordinates solve, and of gaps and slips, are nowhere else
+    own = {x: value for x, value in read.items() if x not in kept}
     left = substitute([*equations.rows, *equations.rates], own) if own else [*equations.rows, *equations.rates]
     return replace(
         made, rows_with_multipliers=tuple(left[: len(rows)]), rates_with_multipliers=tuple(left[len(rows) :])

@@ -56,6 +56,12 @@ def value_names(contact: Law) -> tuple[str, ...]:
     return (contact.name,) if count == 1 else tuple(f"{contact.name}_{i + 1}" for i in range(count))
 
 
+def state_names(contact: Law) -> tuple[str, ...]:
+    """Return the names of the discrete states of a one-sided law: its state, then the directions of a slip."""
+    directions = value_names(contact) if contact.kind == "friction" else ()
+    return (f"{contact.name}_state", *(f"{name}_direction" for name in directions))
+
+
 class ContactLaw(ObservableLaw[Any]):
     """A one-sided law in a class body: within a law its method, elsewhere the quantity that it returns."""
 

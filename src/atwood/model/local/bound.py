@@ -22,6 +22,7 @@ from atwood.model.local.joint_coordinates import (
 from atwood.model.local.parts import (
     LocalConnector,
     LocalPart,
+    contact_states,
     state_values,
 )
 from atwood.model.values.space import FIXED_AXES, Space, Vector, planar_axes
@@ -53,8 +54,8 @@ def bind_part(
         is_varied = (part.path, name) in flat.varied
         values[name] = value + read_variation(f"{part.path}.{name}", flat, table) if is_varied else value
     values |= state_values(part, graph)
-    chosen = flat.contact_states
-    values |= {name: chosen[path] for name in values if (path := f"{part.path}.{name}") in chosen}
+    if flat.contact_states:
+        values |= {name: flat.contact_states.get(f"{part.path}.{name}", 0.0) for name in contact_states(part)}
     connectors = {
         name: _local_connector(f"{part.path}.{name}", isinstance(one, Frame), space, graph)
         for name, one in component.connectors().items()

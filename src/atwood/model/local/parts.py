@@ -10,6 +10,7 @@ from atwood.errors import DeclarationError, suggestion
 from atwood.expr import Expression, Graph, Scalar
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.component import Binding
+from atwood.model.declare.contact_laws import state_names
 from atwood.model.declare.field_functions import StateSpec
 from atwood.model.declare.law_results import (
     Asked,
@@ -238,14 +239,20 @@ def declared_starts(parts: Mapping[str, Part], t_start: float, is_discrete: bool
     }
 
 
-def discrete_states(part: Part, graph: Graph, known: Collection[str] = ()) -> tuple[DiscreteState, ...]:
-    """Return the states of a part that change at moments only, but for those whose values are known by path."""
+def contact_states(part: Part) -> list[str]:
+    """Return the names of the states of gaps and slips of a part."""
+    return [name for law in part.component.contact_laws().values() for name in state_names(law)]
+
+
+def discrete_states(part: Part, graph: Graph, is_set_known: object = False) -> tuple[DiscreteState, ...]:
+    """Return the states of a part that change at moments only; not those of gaps and slips where a set is chosen."""
+    known = contact_states(part) if is_set_known else []
     return tuple(
         DiscreteState(f"{part.path}.{name}", symbol)
         for spec in part.component.state_specs().values()
         if spec.is_discrete
         for name, symbol in zip(spec.names(part.values), _symbols(part, spec, graph), strict=True)
-        if f"{part.path}.{name}" not in known
+        if name not in known
     )
 
 

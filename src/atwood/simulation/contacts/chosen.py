@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from atwood.arguments import BY_PATH
+from atwood.arguments import BY_PATH, optional
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError, suggestion
 from atwood.forms.assembly import Assembly
@@ -21,15 +21,20 @@ from atwood.forms.loose import state_paths
 from atwood.forms.reassembly import assembled
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.dynamics.equations import ContactRow
+from atwood.model.declare.contact_laws import value_names
+from atwood.model.declare.laws import Law
+from atwood.model.local.flatten import FlatScene
 from atwood.model.values.units import ALONG
 from atwood.numerics.contact_sets import GOES_ON, OPEN, STICKS, State
 from atwood.simulation.contacts.changes import forces_in, resolve, states_of
 from atwood.simulation.contacts.values import ContactValues, layout_of
+from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.dynamics.scales import Scales, find_scales
 from atwood.simulation.events.mode_change import generalized_state
+from atwood.simulation.initialization.start import find_start
 from atwood.tolerances import tolerances
 
-CONTACTS = replace(BY_PATH, word="GAP=STATE")
+CONTACTS = optional(replace(BY_PATH, word="GAP=STATE"))
 
 _IN_SET: Key[Assembly] = Key("the scene in one set of contacts")
 
@@ -96,21 +101,20 @@ def has_contacts(assembly: Assembly) -> bool:
     return any(local.contacts for local in assembly.mechanism.locals_.values())
 
 
-def in_set(assembly: Assembly, states: Mapping[str, float], is_integrated: bool = False) -> Assembly:
+def in_set(assembly: Assembly, states: Mapping[str, float]) -> Assembly:
     """Return a scene in one set of contacts, with ordinary constraints for what holds.
 
-    Its own start is that of the scene, and decides what constraints on velocities keep where these are integrated.
+    Constraints on velocities stay as they are, also those that could be integrated: what sticks may stick elsewhere.
     """
     flat = replace(assembly.flat, contact_states=dict(states))
     form = assembly.form, assembly.level, assembly.orientation.kind
     origin, signs = assembly.mechanism.origin, assembly.mechanism.line_signs
-    source = assembly.source if is_integrated else None
 
     def make() -> Assembly:
-        return assembled(type(assembly), flat, source, *form, assembly.modes, signs, origin=origin)
+        return assembled(type(assembly), flat, None, *form, assembly.modes, signs, origin=origin)
 
-    made = assembly.shared.get(_IN_SET, make, tuple(sorted(states.items())), is_integrated)
-    followed, _ = made.follow(flat, source)
+    made = assembly.shared.get(_IN_SET, make, tuple(sorted(states.items())))
+    followed, _ = made.follow(flat)
     found = make() if followed is None else followed
     now = dict(zip((one.path for one in assembly.discrete_states), assembly.held_now, strict=True))
     found = replace(found, held=tuple(now[one.path] for one in found.discrete_states), source=assembly.source)
@@ -151,7 +155,7 @@ def set_at(
             )
         held = changed.held
     states = states_of(values.layout, held)
-    return ContactSet(*_said(values.layout.first, states), _margins(values, states, scales))
+    return ContactSet(*_said(assembly.flat, values.layout.first, states), _margins(values, states, scales))
 
 
 def state_in_set(
@@ -183,25 +187,37 @@ def named_set(assembly: Assembly, given: Mapping[str, Any]) -> ContactSet:
             raise UsageError("it is no gap and no slip", where=path, advice=suggestion(path, list(known)))
     states: list[State] = []
     for path, one in known.items():
-        count, choices = len(one.law.options.reactions), _choices(one)
+        count, choices = len(one.law.options.reactions), _choices(one.law)
         gap = f"{one.row.key[0]}.{one.law.options.at}" if one.is_slip and one.law.options.at else ""
         default = "open" if not one.is_slip else "loose" if gap and given.get(gap, "open") == "open" else ""
         word = given.get(path, default)
         if word not in choices or (gap and word != "loose" and given.get(gap, "open") == "open"):
             said = f"it cannot be {word!r}" if word else "nothing says whether it slips"
-            raise UsageError(
-                said, where=path, advice=f"Say {', '.join(choices)}" + f"; {gap} must be closed." * bool(gap)
-            )
+            more = f", with {gap} closed" if gap else ""
+            raise UsageError(said, where=path, advice=f"Choose of {', '.join(choices)}{more}.")
         number = {"open": OPEN, "loose": OPEN, "closed": STICKS, "sticks": STICKS}.get(word, GOES_ON)
         way = (-1.0 if word == "slips backwards" else 1.0, 0.0)[:count] if number == GOES_ON else (0.0,) * count
         states.append((number, way))
-    return ContactSet(*_said(first, states))
+    return ContactSet(*_said(assembly.flat, first, states))
 
 
-def _choices(one: ContactRow) -> tuple[str, ...]:
-    if not one.is_slip:
+def words_of(flat: FlatScene) -> dict[str, str]:
+    """Return the set that is chosen for a scene in words: what each gap and slip does, by path."""
+    found: dict[str, str] = {}
+    for path, part in flat.parts.items():
+        for law in part.component.contact_laws().values():
+            state = flat.contact_states.get(f"{path}.{law.name}_state")
+            if state is not None:
+                back = flat.contact_states.get(f"{path}.{value_names(law)[0]}_direction", 0.0) < 0.0
+                number = {OPEN: 0, GOES_ON: 2, STICKS: 1}[int(state)] if law.kind == "friction" else int(state)
+                found[f"{path}.{law.name}"] = _choices(law)[3 if number == 2 and back else number]
+    return found
+
+
+def _choices(law: Law) -> tuple[str, ...]:
+    if law.kind == "unilateral":
         return "open", "closed"
-    ways = ("slips forwards", "slips backwards") if len(one.law.options.reactions) == 1 else ("slips",)
+    ways = ("slips forwards", "slips backwards") if len(law.options.reactions) == 1 else ("slips",)
     return "loose", "sticks", *ways
 
 
@@ -209,17 +225,15 @@ def _law(one: ContactRow) -> str:
     return ".".join(one.row.key[:2])
 
 
-def _said(first: Sequence[ContactRow], states: Sequence[State]) -> tuple[dict[str, str], dict[str, float]]:
+def _said(
+    flat: FlatScene, first: Sequence[ContactRow], states: Sequence[State]
+) -> tuple[dict[str, str], dict[str, float]]:
     """Return states in words, and as values of the discrete states."""
-    words: dict[str, str] = {}
     values: dict[str, float] = {}
     for one, (state, way) in zip(first, states, strict=True):
-        choices = _choices(one)
-        number = {OPEN: 0, STICKS: 1}.get(state, 3 if len(way) == 1 and way[0] < 0.0 else 2)
-        words[_law(one)] = choices[number]
         told = (float(state), *way) if one.is_slip else (float(state == STICKS),)
         values |= dict(zip(state_paths(one), told, strict=True))
-    return words, values
+    return words_of(replace(flat, contact_states=values)), values
 
 
 def _margins(values: ContactValues, states: Sequence[State], scales: Scales) -> tuple[Margin, ...]:
@@ -245,6 +259,24 @@ def _margins(values: ContactValues, states: Sequence[State], scales: Scales) -> 
             told = "the gap", float(values.values[rows[0]]), along
         found.append(Margin(one.row.key[0], _law(one), *told[:2], tolerances.CLOSED * scales.of(told[2]), told[2]))
     return tuple(found)
+
+
+def in_named_set(assembly: Assembly, given: Mapping[str, Any] | None) -> Assembly:
+    """Return a scene in the set that is meant, or in that of its start; as it is where it has no gaps and no slips."""
+    if given is not None:
+        return in_set(assembly, named_set(assembly, given).states)
+    if not has_contacts(assembly):
+        return assembly
+    start, whole = find_start(assembly), replace(assembly, form="reduced", level="")
+    q = from_regular(assembly, start.coordinates)
+    return in_set(assembly, set_at(whole, start.time, q, start.speeds, start.length).states)
+
+
+def loosened(assembly: Assembly) -> Assembly:
+    """Return a scene in generalized coordinates in which every gap is open and nothing rubs."""
+    whole = replace(assembly, form="reduced", level="")
+    paths = (path for one in whole.reduced.contacts for path in state_paths(one))
+    return in_set(whole, dict.fromkeys(paths, 0.0))
 
 
 def words_text(words: Mapping[str, str]) -> str:

@@ -19,7 +19,8 @@ from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
 from atwood.model.declare.connectors import PATHS
 from atwood.model.values.letters import SIGNED_LETTERS
-from atwood.pipeline import SCENE, smooth_assembly_of
+from atwood.pipeline import SCENE, assembly_of
+from atwood.simulation.contacts.chosen import CONTACTS, in_named_set
 from atwood.simulation.problem.arguments import FORM, ORIENTATION
 from atwood.theory.equations.formulas import EquationFormulas, Parameters, solve_closures
 from atwood.theory.equations.pages import (
@@ -416,6 +417,7 @@ PARAMETERS = one_of(("symbolic", "values"))
     solved=FLAG,
     quantities=PATHS,
     gauge=GAUGE,
+    contacts=CONTACTS,
 )
 def equations(
     scene: Model | Assembly,
@@ -428,6 +430,7 @@ def equations(
     solved: bool = False,
     quantities: Iterable[str] | None = None,
     gauge: Any = None,
+    contacts: Mapping[str, str] | None = None,
 ) -> EquationsOfMotion:
     """Return the equations of motion of a scene, to be read.
 
@@ -464,6 +467,10 @@ def equations(
     gauge
         A function f of coordinates and time whose rate df/dt is added to L, in the letters of the equations: text such
         as ``"m*x*t"`` or a sympy expression. It leaves the equations, and changes momenta and H.
+    contacts
+        Which gaps are ``"closed"``, and what ``"sticks"``, ``"slips forwards"`` or ``"slips backwards"`` (in two
+        directions ``"slips"``) or is ``"loose"``, by path: ``{"floor.gap": "closed", "floor.slip": "sticks"}``. Gaps
+        that are not named are open. If not given, what the scene does at its start.
 
     Returns
     -------
@@ -477,7 +484,7 @@ def equations(
         If orientations are in three coordinates that are no Euler angles, nothing has the path of a letter, or one
         letter would stand for two things.
     """
-    assembly = smooth_assembly_of(scene, form=form, orientation=orientation)
+    assembly = in_named_set(assembly_of(scene, form=form, orientation=orientation), contacts)
     chosen: Any = parameters
     made = read_equations(assembly, chosen, symbols, gauge)
     paths = tuple(quantities or ())

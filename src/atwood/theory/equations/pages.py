@@ -18,6 +18,7 @@ from atwood.expr import dependencies, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Lagrangian
 from atwood.lazy_dataclasses import dataclass
+from atwood.simulation.contacts.chosen import words_of, words_text
 from atwood.theory.formulas import page
 from atwood.theory.formulas.described import Page
 from atwood.theory.formulas.page import Line, Matrix, Section
@@ -45,7 +46,8 @@ def page_of_equations(eq: EquationsOfMotion, written: Written) -> Page:
 
 def _sections(eq: EquationsOfMotion, written: Written) -> list[Section]:
     found, notation = eq.expressions, eq.notation
-    sections = [_energies(written)]
+    contacts = words_text(words_of(eq.assembly.flat))
+    sections = [*([Section("Contacts", (), f"{contacts}.")] if contacts else []), _energies(written)]
     own = [notation.velocities[u][0] for u in found.velocities]
     for title, letter, formulas in (("Momenta", "p", eq.momenta_shown), ("Generalized forces", "Q", written.forces)):
         lines = [
@@ -69,8 +71,9 @@ def _sections(eq: EquationsOfMotion, written: Written) -> list[Section]:
         ]
         sections.append(Section("Kinematics", tuple(rates)))
     sections += asked_sections(eq)
-    sections.append(Section("Mass matrix", (Matrix(("M", "M"), eq.mass),)))
-    if written.constraints:
+    if eq.mass:
+        sections.append(Section("Mass matrix", (Matrix(("M", "M"), eq.mass),)))
+    if eq.mass and written.constraints:
         sections.append(Section("Constraint Jacobian", (Matrix(("G", "G"), eq.slopes),)))
     if eq.book.shared:
         sections.append(Section("Shared terms", tuple(page.line_for(*one) for one in eq.book.shared)))
@@ -118,6 +121,8 @@ def _shown(eq: EquationsOfMotion) -> list[Symbol]:
 def as_data(eq: EquationsOfMotion) -> dict[str, Any]:
     """Return equations as plain data; see `EquationsOfMotion.to_dict`."""
     made: dict[str, Any] = {"name": eq.name, "form": eq.form, "parameters": eq.parameters}
+    contacts = words_of(eq.assembly.flat)
+    made |= {"contacts": contacts} if contacts else {}
     made |= {"readable": eq.is_readable, "structure": eq.structure.to_dict()}
     if not eq.is_readable:
         return made

@@ -87,7 +87,7 @@ class Page:
 
     def latex(self) -> str:
         """Return its formulas as an aligned block of LaTeX for each heading, which is a comment."""
-        return "\n".join(f"% {one.title}\n{as_latex(one.lines, self.by_part)}" for one in self.sections)
+        return "\n".join(f"% {one.title}\n{as_latex(one.lines, self.by_part)}" for one in self.sections if one.lines)
 
     def markdown(self) -> str:
         """Return it as Markdown, with formulas between dollar signs."""

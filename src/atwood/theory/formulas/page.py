@@ -258,7 +258,7 @@ def as_markdown(title: str, sections: Sequence[Section], tables: Sequence[str] =
         blocks.append(f"## {section.title}")
         if section.note:
             blocks.append(section.note)
-        blocks.append(f"$$\n{as_latex(section.lines, by_part)}\n$$")
+        blocks += [f"$$\n{as_latex(section.lines, by_part)}\n$$"] * bool(section.lines)
     return "\n\n".join(blocks) + "\n"
 
 

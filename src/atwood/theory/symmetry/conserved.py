@@ -18,9 +18,10 @@ from atwood.forms.lagrangian import lagrangian_of
 from atwood.forms.program import state_groups
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
-from atwood.pipeline import SCENE, smooth_assembly_of
+from atwood.pipeline import SCENE, assembly_of
 from atwood.result.energy import ConservedLedger, ConservedValues
 from atwood.result.result import Result
+from atwood.simulation.contacts.chosen import has_contacts, loosened
 from atwood.simulation.dynamics.orientation_coordinates import from_regular, to_regular
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.events.mode_change import generalized_state
@@ -33,6 +34,7 @@ from atwood.theory.formulas.notation import SYMBOLS, notation_of
 from atwood.theory.formulas.page import Line, shared_lines
 from atwood.theory.formulas.printers import Sympy, latex, objects, text
 from atwood.theory.formulas.tree import Sum
+from atwood.theory.symmetry.contacts import pushes_of
 from atwood.theory.symmetry.find import Finding, find_conserved
 from atwood.theory.symmetry.proof import Prover
 from atwood.theory.symmetry.quantities import Quantities
@@ -294,7 +296,8 @@ def conserved(
     UsageError
         If a symmetry that is stated is none; the error has a state at which it fails.
     """
-    assembly = smooth_assembly_of(scene, orientation=orientation)
+    whole = assembly_of(scene, orientation=orientation)
+    assembly = loosened(whole) if has_contacts(whole) else whole
     found = lagrangian_of(assembly, "reduced")
     notation = notation_of(assembly, found, symbols)
     found = with_gauge(assembly, found, notation, gauge)
@@ -302,7 +305,8 @@ def conserved(
     prover, formulas = Prover(quantities, notation), EquationFormulas(assembly, found, notation)
     every: Any = symmetries
     stated = [check_symmetry(one, quantities, prover, formulas) for one in every]
-    findings = find_conserved(assembly, quantities, prover)
+    pushes = () if assembly is whole else pushes_of(whole, assembly)
+    findings = find_conserved(assembly, quantities, prover, pushes)
     made = [ConservedQuantity(**vars(one), formulas=formulas) for one in (*findings.items, *stated)]
     beyond = [_BEYOND, *([_ROLLING] if any(not one.holonomic for one in assembly.reduced.constraints) else [])]
     return Conserved(made, findings.notes, assembly.flat.name, beyond)
@@ -350,7 +354,8 @@ def _as_in(assembly: Assembly, segment: SegmentRecord) -> Assembly:
     its = segment.assembly
     if len(assembly.relations) == len(its.relations):
         assembly = assembly.with_relations(its.relation_values)
-    return assembly if its.held is None else assembly.with_held(its.held)
+    now = dict(zip((one.path for one in its.discrete_states), its.held_now, strict=True))
+    return assembly.with_held([now[one.path] for one in assembly.discrete_states]) if now else assembly
 
 
 def _states(assembly: Assembly, segment: SegmentRecord, length: float) -> tuple[FloatArray, FloatArray]:

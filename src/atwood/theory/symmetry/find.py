@@ -22,6 +22,7 @@ from atwood.numerics.matrices import least_norm, or_one
 from atwood.simulation.dynamics.orientation_coordinates import COORDINATE_SWITCH
 from atwood.simulation.events.modes import find_event_functions
 from atwood.theory.symmetry.ansatz import Integral, find_integrals
+from atwood.theory.symmetry.contacts import Push, Pushes
 from atwood.theory.symmetry.proof import Generator, Proof, Prover
 from atwood.theory.symmetry.quantities import (
     Quantities,
@@ -54,6 +55,9 @@ _INTEGRALS = {
     ),
 }
 """What integrals of an ansatz are called."""
+
+_STATES = 24
+"""At so many states it is looked whether gaps and slips leave a quantity alone."""
 
 _ALIKE = 1e-11
 """Relative to the largest: values of one quantity, computed in two ways."""
@@ -108,22 +112,55 @@ class Findings:
     notes: tuple[str, ...]
 
 
-def find_conserved(assembly: Assembly, quantities: Quantities, prover: Prover) -> Findings:
-    """Return what is conserved along all motions of a scene."""
-    return _Search(assembly, quantities, prover).run()
+def find_conserved(assembly: Assembly, quantities: Quantities, prover: Prover, pushes: Sequence[Push] = ()) -> Findings:
+    """Return what is conserved along all motions of a scene, with what gaps and slips may do besides."""
+    if not pushes:
+        return _Search(assembly, quantities, prover).run()
+    acting = Pushes(assembly, pushes)
+    return _through_contacts(quantities, prover, _Search(assembly, quantities, prover, acting).run(), acting)
+
+
+def _through_contacts(quantities: Quantities, prover: Prover, found: Findings, acting: Pushes) -> Findings:
+    """Return what gaps and slips leave conserved, and why the rest is not."""
+    values = quantities.on_speeds([one.value for one in found.items])
+    states = RandomStates(quantities.assembly, values).draw(_STATES, quantities.center[1]) if values else []
+    kept: list[Finding] = []
+    notes = list(found.notes)
+    for number, one in enumerate(found.items):
+        if one.kind in ("energy function", "total energy"):
+            losing = next((push for push in acting.pushes if push.takes_energy), None)
+            if losing is None and one.kind == "energy function":
+                kept.append(replace(one, evidence=f"{one.evidence}; impacts keep it, since restitution is 1"))
+            else:
+                why = f"{losing.path}: {losing.takes_energy}" if losing else "what moves does work in impacts"
+                notes.append(f"{one.name} ({one.meaning}) is conserved between events alone: {why}")
+            continue
+        by = acting.changed(states, number) if states else acting.pushes[0].path
+        if by:
+            notes.append(f"{one.name} ({one.meaning}) is conserved as long as {by} does not act")
+            continue
+        proof = acting.proof(prover, states, number)
+        how = "proven" if proof else f"checked at {len(states)} random states"
+        is_proven, evidence = one.proven and bool(proof), f"{one.evidence}; that contacts leave it is {how}"
+        kept.append(replace(one, proven=is_proven, evidence=evidence))
+    notes.append("in every set of contacts, and through impacts")
+    return Findings(tuple(kept), tuple(notes))
 
 
 class _Search:
     """The candidates of one scene, and the states that they are looked at."""
 
-    def __init__(self, assembly: Assembly, quantities: Quantities, prover: Prover) -> None:
-        self.assembly, self.quantities, self.prover = assembly, quantities, prover
+    def __init__(
+        self, assembly: Assembly, quantities: Quantities, prover: Prover, acting: Pushes | None = None
+    ) -> None:
+        self.assembly, self.quantities, self.prover, self.acting = assembly, quantities, prover, acting
         self.found = quantities.found
         self.items: list[Finding] = []
         self.notes: list[str] = []
         self._columns: list[FloatArray] = []  # values at the states of what was found, less their mean
         self._values: list[Expression] = []
         self.states: list[State] = []
+        self._plain: list[State] = []  # without what gaps and slips do
 
     def add(self, values: Sequence[Expression]) -> list[int]:
         """Note quantities that are to be looked at; return their numbers."""
@@ -153,6 +190,9 @@ class _Search:
         if not self.states:
             self.notes.append(f"nothing could be checked at random states near its start: {states.reason}")
             return Findings((), tuple(self.notes))
+        self._plain = self.states
+        if self.acting is not None:  # combinations are looked for that gaps and slips leave alone
+            self.states = [*self._plain, *self.acting.on(self._plain)]
         self._energy(energy, total, states.is_plain)
         for number, k in zip(momenta, plain, strict=True):
             self._momentum(number, k)
@@ -178,29 +218,29 @@ class _Search:
 
     def _energy(self, number: int, total: int, is_plain: bool) -> None:
         value, found = self.quantities.energy_function, self.found
-        kept = is_kept(self.states, number)
+        kept = is_kept(self._plain, number)
         # Of functions that are set free, that and their integrals need not belong together any more.
         proven = Proof.NONE
         if kept or not is_plain:
             proven = self.prover.along(value, dict(enumerate(found.velocities)), with_rates=True)
         if not proven and not kept:
-            worst = max(self.states, key=lambda one: abs(one.rates[total]) / (one.terms[total] or 1.0))
+            worst = max(self._plain, key=lambda one: abs(one.rates[total]) / (one.terms[total] or 1.0))
             told = "neither the energy function h nor T + V is conserved"
-            if is_kept(self.states, total):
+            if is_kept(self._plain, total):
                 self._take("T + V", "total energy", "J", "T + V", self.quantities.total_energy, Proof.NONE, total)
                 told = "the energy function h is not conserved, T + V is"
             else:
                 told += f": at t = {worst.t:.3g} s, at a random state, T + V changes at {worst.rates[total]:.3g} W"
             self.notes.append(told)
             return
-        size = max(abs(one.values[total]) for one in self.states)
+        size = max(abs(one.values[total]) for one in self._plain)
         alike = self.prover.is_zero(value - self.quantities.total_energy) or all(
-            abs(one.values[number] - one.values[total]) <= _ALIKE * size for one in self.states
+            abs(one.values[number] - one.values[total]) <= _ALIKE * size for one in self._plain
         )
         if alike:
             meaning = "energy function h = T + V"
         else:
-            rest = "T + V is conserved, too" if is_kept(self.states, total) else "T + V is not conserved"
+            rest = "T + V is conserved, too" if is_kept(self._plain, total) else "T + V is not conserved"
             meaning = f"energy function h (Jacobi integral), not T + V; {rest}"
         self._take("h", "energy function", "J", meaning, value, proven, number)
 
@@ -303,8 +343,8 @@ class _Search:
         linear: Sequence[int],
         angular: Sequence[int],
     ) -> None:
-        rates = np.array([one.rates[moments] - one.values[linear] for one in self.states]) @ axis
-        terms = np.array([one.terms[moments] + np.abs(one.values[linear]) for one in self.states]) @ np.abs(axis)
+        rates = np.array([one.rates[moments] - one.values[linear] for one in self._plain]) @ axis
+        terms = np.array([one.terms[moments] + np.abs(one.values[linear]) for one in self._plain]) @ np.abs(axis)
         if np.any(np.abs(rates) > KEPT * terms):
             return
         motions, found = self.quantities.motions, self.found
@@ -391,7 +431,7 @@ class _Search:
         unique = name if name not in names else next(f"{name}_{k}" for k in range(2, 99) if f"{name}_{k}" not in names)
         e = self.found.equations
         timely = ", at so many times" if depends_on(add_up([*e.rows]), [e.time]) else ""
-        evidence = self.prover.evidence(proven, len(self.states), timely)
+        evidence = self.prover.evidence(proven, len(self._plain), timely)
         self.items.append(Finding(unique, kind, unit, meaning, value, bool(proven), evidence, direction, point))
 
     def _caveats(self) -> None:
