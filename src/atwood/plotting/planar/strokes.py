@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from atwood.arrays import FloatArray
+from atwood.arrays import FloatArray, IndexArray
 from atwood.numerics.rank import decompose
 from atwood.plotting.canvas import COLOURS, GREY, INK
 from atwood.plotting.planar.geometry import Picture, Shape, hanging
+from atwood.plotting.shapes.meshes import Mesh
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -58,27 +60,31 @@ class Pen:
     # -- what is fixed ---------------------------------------------------------------------------------------------
 
     def _ground(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
-        x, z = points[0]
+        for line, width in self.ground_lines(shape, points[0]):
+            axes.plot(line[:, 0], line[:, 1], color=INK, linewidth=width, **{**look, "zorder": 2})
+
+    def ground_lines(self, shape: Shape, place: FloatArray) -> list[tuple[FloatArray, float]]:
+        """Return the lines that stand for what is fixed at a place, m, and their widths, points."""
+        x, z = place
         u = self.unit
-        look = {**look, "zorder": 2}
         direction = self.picture.direction
         if direction == "across":  # a wall
             middle = np.mean([p[:, 0].mean() for p in self.picture.points.values()])
             out = -1.0 if x <= middle else 1.0
-            axes.plot([x, x], [z - 5 * u, z + 5 * u], color=INK, linewidth=1.6, **look)
-            for k in np.linspace(-4, 5, 6):
-                axes.plot([x, x + 1.8 * u * out], [z + k * u, z + (k - 1.8) * u], color=INK, linewidth=0.9, **look)
-            return
+            wall = [([(x, z - 5 * u), (x, z + 5 * u)], 1.6)]
+            hatches = [[(x, z + k * u), (x + 1.8 * u * out, z + (k - 1.8) * u)] for k in np.linspace(-4, 5, 6)]
+            return [(np.array(line), width) for line, width in (*wall, *((one, 0.9) for one in hatches))]
         radius = max((self.picture.radii.get(node, 0.0) for node in self._grooves_at(shape)), default=0.0)
         side = 1.0 if direction or z >= self.middle else -1.0  # the mechanism hangs below it or stands on it
         top = z + (1.35 * radius if radius else 0.0) + (0.0 if direction else 2.6 * u * side)
-        axes.plot([x - 4 * u, x + 4 * u], [top, top], color=INK, linewidth=1.6, **look)
+        lines = [([(x - 4 * u, top), (x + 4 * u, top)], 1.6)]
         for k in np.linspace(-4, 2.4, 5):
-            axes.plot([x + k * u, x + (k + 1.6) * u], [top, top + 1.6 * u * side], color=INK, linewidth=0.9, **look)
+            lines.append(([(x + k * u, top), (x + (k + 1.6) * u, top + 1.6 * u * side)], 0.9))
         if radius:
-            axes.plot([x, x], [z, top], color=INK, linewidth=1.4, **look)
+            lines.append(([(x, z), (x, top)], 1.4))
         elif not direction:
-            axes.plot([x - 1.8 * u, x, x + 1.8 * u], [top, z, top], color=INK, linewidth=1.2, **look)
+            lines.append(([(x - 1.8 * u, top), (x, z), (x + 1.8 * u, top)], 1.2))
+        return [(np.array(line), width) for line, width in lines]
 
     def _grooves_at(self, shape: Shape) -> list[int]:
         """Return the grooves of the pulleys that a ground carries."""
@@ -128,15 +134,13 @@ class Pen:
         mesh, angle = shape.surface, float(self.picture.angles[shape.nodes[0]][moment])
         c, s = np.cos(angle), np.sin(angle)
         page = points[0] + mesh.vertices[:, [0, 2]] @ np.array([[c, s], [-s, c]])
-        front = mesh.normals[:, 1] < -1e-9  # the eye looks along y
-        ends, faces, _ = mesh.edges
-        borders = front[faces[:, 0]] != front[faces[:, 1]]
+        front, borders = seen_from_front(mesh)
         for tone, chosen in (("#c8d3de", front & ~mesh.marked), ("#b4c2cf", front & mesh.marked)):
             colour = self._tone(tone)
             flat = PolyCollection(list(page[mesh.faces[chosen]]), facecolors=[colour], edgecolors=[colour], **look)
             flat.set_linewidth(0.4)
             axes.add_collection(flat)
-        lines = list(page[ends[borders]])
+        lines = list(page[borders])
         axes.add_collection(LineCollection(lines, colors=[self._tone(INK)], linewidths=1.3, capstyle="round", **look))
 
     def _curve(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
@@ -205,23 +209,35 @@ class Pen:
         )
 
     def _mass(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
-        from matplotlib.patches import Circle, Rectangle
+        from matplotlib.patches import Circle, Polygon
 
-        x, z = points[0]
         if shape.size <= 0.0:
             return
+        style: dict[str, Any] = {"facecolor": self._tone(self.colour(shape)), "edgecolor": "white", "linewidth": 0.9}
+        style.update({**look, "zorder": look["zorder"] + 0.5})
+        half, corners = self.mass_outline(shape)
+        made = Circle(tuple(points[0]), half, **style) if corners is None else Polygon(points[0] + corners, **style)
+        axes.add_patch(made)
+
+    def mass_outline(self, shape: Shape) -> tuple[float, FloatArray | None]:
+        """Return half the size of a mass as it is drawn, m, and its corners from its place where it is no disc, m."""
         half = 3.4 * self.unit * (shape.size / self.heaviest) ** (1.0 / 3.0)
         half = max(half, 1.1 * self.unit)
         half *= min(1.0, 8.0 / len(self.heavy))
-        style: dict[str, Any] = {"facecolor": self._tone(self.colour(shape)), "edgecolor": "white", "linewidth": 0.9}
-        style.update({**look, "zorder": look["zorder"] + 0.5})
-        on_rail = shape.nodes[0] in self.sliding
         if self.picture.direction == "up":
-            axes.add_patch(Rectangle((x - half, z - 2.0 * half), 2.0 * half, 2.0 * half, **style))
-        elif self.picture.direction or on_rail:
-            axes.add_patch(Rectangle((x - 1.4 * half, z - half), 2.8 * half, 2.0 * half, **style))
+            low, high = (-half, -2.0 * half), (half, 0.0)
+        elif self.picture.direction or shape.nodes[0] in self.sliding:
+            low, high = (-1.4 * half, -half), (1.4 * half, half)
         else:
-            axes.add_patch(Circle((x, z), half, **style))
+            return half, None
+        return half, np.array([low, (high[0], low[1]), high, (low[0], high[1])])
+
+
+def seen_from_front(mesh: Mesh) -> tuple[NDArray[np.bool_], IndexArray]:
+    """Return which faces of a surface look towards the front, and the ends of the edges where these end."""
+    front = mesh.normals[:, 1] < -1e-9  # the eye looks along y
+    ends, faces, _ = mesh.edges
+    return front, ends[front[faces[:, 0]] != front[faces[:, 1]]]
 
 
 def draw_trace(axes: Axes, points: FloatArray, colour: str) -> None:

@@ -71,11 +71,14 @@ def _put_together(reading: Reading, shapes: tuple[BodyShape, ...], extent: float
     add_gimbals(bench)
     add_shafts(bench)
     _add_bodies(bench)
+    bench.part = ""
     _add_bars(bench)
     for joining in reading.joinings:
         if joining.part not in bench.drawn:
+            bench.part = joining.part
             _SYMBOLS[joining.kind](bench, joining)
     heavy = _add_masses(bench)
+    bench.part = ""
     _add_feet(bench)
     _add_tips(bench)
     return SpaceModel(reading, unit, tuple(bench.pieces), reading.ties, tuple(bench.tips), heavy, travels)
@@ -145,7 +148,7 @@ def _add_bodies(bench: Bench) -> None:
     bars = [shape for shape in bench.shapes if shape.is_long]
     compact = [shape for shape in bench.shapes if not shape.is_long]
     for shape in bench.shapes:
-        body = shape.lump.body
+        body, bench.part = shape.lump.body, shape.lump.part
         if shape.kind == "point" or body in bench.clad:
             continue
         made = shape.mesh()
@@ -321,6 +324,7 @@ def _add_masses(bench: Bench) -> tuple[tuple[int, str], ...]:
     for shape in points:
         radius = 3.4 * bench.unit * (shape.lump.mass / heaviest) ** (1.0 / 3.0) * min(1.0, 8.0 / len(points))
         colour = COLOURS[compact.index(shape) % len(COLOURS)] if len(compact) <= len(COLOURS) else COLOURS[0]
+        bench.part = shape.lump.part
         bench.ball(shape.lump.body, shape.center, max(radius, 1.1 * bench.unit), colour)
         heavy.append((shape.lump.node, colour))
     return tuple(heavy)

@@ -31,6 +31,8 @@ class Piece:
         Width of a line, points; radius of a ball, m.
     up
         Of a plane that others stand on, its normal; None for everything else.
+    part
+        Path of the part that it shows.
     """
 
     body: int
@@ -39,6 +41,7 @@ class Piece:
     points: FloatArray | None = None
     size: float = 0.0
     up: FloatArray | None = None
+    part: str = ""
 
     @property
     def corners(self) -> FloatArray:
@@ -113,6 +116,8 @@ class Bench:
         Places of nodes of the world, in world axes, m, and whether what stands there is drawn; by node.
     clad
         Bodies whose shapes are drawn in another way, or whose nodes need no bars.
+    part
+        The part that is being drawn.
     """
 
     reading: Reading
@@ -124,6 +129,7 @@ class Bench:
     drawn: set[str] = field(default_factory=set)
     feet: dict[int, list[FloatArray]] = field(default_factory=dict)
     clad: set[int] = field(default_factory=set)
+    part: str = ""
 
     def of_body(self, body: int) -> list[BodyShape]:
         """Return the shapes of a body that have an inertia."""
@@ -191,16 +197,16 @@ class Bench:
         length = float(np.linalg.norm(b - a))
         if length > 1e-9 * self.unit:
             made = cylinder(radius, length, around=16)
-            self.pieces.append(Piece(body, colour, made.placed(0.5 * (a + b), frame_along(b - a))))
+            self.pieces.append(Piece(body, colour, made.placed(0.5 * (a + b), frame_along(b - a)), part=self.part))
 
     def ball(self, body: int, center: FloatArray, radius: float, colour: str) -> None:
         """Put a ball on a body."""
-        self.pieces.append(Piece(body, colour, points=np.array([center]), size=radius))
+        self.pieces.append(Piece(body, colour, points=np.array([center]), size=radius, part=self.part))
 
     def line(self, body: int, points: FloatArray, width: float, colour: str) -> None:
         """Put a line on a body."""
-        self.pieces.append(Piece(body, colour, points=np.asarray(points, dtype=float), size=width))
+        self.pieces.append(Piece(body, colour, None, np.asarray(points, dtype=float), width, part=self.part))
 
     def surface(self, body: int, mesh: Mesh, colour: str, up: FloatArray | None = None) -> None:
         """Put a surface on a body; with its normal a plane that others stand on."""
-        self.pieces.append(Piece(body, colour, mesh, up=up))
+        self.pieces.append(Piece(body, colour, mesh, up=up, part=self.part))

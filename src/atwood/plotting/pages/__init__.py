@@ -1,0 +1,1 @@
+"""Pages that show scenes moving, each one file that needs nothing else."""

@@ -1,0 +1,101 @@
+// A live motion: an engine whose states become samples of a track.
+
+import { Track } from "./track.js";
+
+const MOST = 20000; // samples that are kept
+
+export class LiveMotion {
+  /** `engine` moves the model; `run` is the recorded run of the same scene. */
+  constructor(engine, run) {
+    this.engine = engine;
+    this.stage = run.stage;
+    this.paths = engine.model.data.quantities.map((one) => one.path);
+    this.track = new Track(run.stage.stride, run.stage.frames.keys.length, this.paths);
+    const { bodies, nodes } = engine.model.data;
+    const { keys, bodies: bodyOf, turns, columns } = run.stage.frames;
+    const bodyAt = new Map(bodies.map((one, k) => [one.index, k]));
+    const nodeAt = new Map(nodes.map((one, k) => [one.node, k]));
+    this.sources = run.stage.stride === 12
+      ? keys.map((key) => 12 * bodyAt.get(key))
+      : keys.map((key, k) => ({
+        place: 3 * nodeAt.get(key), body: 12 * bodyAt.get(bodyOf[k]), turn: turns[k], column: columns[key],
+      }));
+    this.energies = [];
+    this.begin();
+  }
+
+  get status() {
+    return this.engine.status;
+  }
+
+  get time() {
+    return this.engine.time;
+  }
+
+  begin() {
+    this.track.clear();
+    this.energies.length = 0;
+    this.sample();
+  }
+
+  /** Keep the present state as a sample. */
+  sample() {
+    const { track } = this;
+    if (track.times.length && track.last >= this.engine.time) {
+      for (const list of [track.times, track.poses, track.values, this.energies]) list.pop();
+    }
+    if (track.times.length >= MOST) {
+      for (const list of [track.times, track.poses, track.values, this.energies]) list.splice(0, MOST / 10);
+    }
+    track.add(this.engine.time, this.frames(), Float64Array.from(this.engine.values(this.paths)));
+    this.energies.push(this.engine.energy());
+  }
+
+  /** Return the frames of the stage, from where the engine says that bodies and nodes are. */
+  frames() {
+    const found = new Float64Array(this.track.width);
+    const poses = this.engine.poses();
+    if (this.stage.stride === 12) {
+      this.sources.forEach((from, k) => found.set(poses.subarray(from, from + 12), 12 * k));
+      return found;
+    }
+    const places = this.engine.places();
+    this.sources.forEach(({ place, body, turn, column }, k) => {
+      found[3 * k] = column ?? places[place];
+      found[3 * k + 1] = places[place + 2];
+      found[3 * k + 2] = Math.atan2(poses[body + 9], poses[body + 3]) + turn;
+    });
+    // Angles go on where they were, so that nothing turns back between two samples.
+    const { poses: before } = this.track;
+    if (before.length) {
+      const last = before[before.length - 1];
+      for (let k = 2; k < found.length; k += 3) {
+        found[k] += 2 * Math.PI * Math.round((last[k] - found[k]) / (2 * Math.PI));
+      }
+    }
+    return found;
+  }
+
+  /** Move on to a time, or as far as the milliseconds allow. */
+  advance(time, milliseconds) {
+    const status = this.engine.advance(time, { steps: 1e6, milliseconds });
+    if (this.engine.time > this.track.last) this.sample();
+    return status;
+  }
+
+  /** Set parameters, starts or inputs; what was before goes where the engine begins anew. */
+  set(path, value) {
+    const before = this.engine.time;
+    const status = this.engine.set(path, value);
+    if (status.code === "refused") return status;
+    if (this.engine.time < before || this.track.times.length < 2) this.begin();
+    else this.sample();
+    return status;
+  }
+
+  reset() {
+    const status = this.engine.reset();
+    this.begin();
+    return status;
+  }
+}

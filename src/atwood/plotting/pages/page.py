@@ -1,0 +1,323 @@
+"""A page of a scene that moves in the browser: one file, from results or from a scene."""
+
+from __future__ import annotations
+
+import base64
+import os
+import re
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from atwood.arguments import FILE, TEXT, Kind, Refused, each, one_of, optional, takes
+from atwood.errors import AtwoodError, UsageError, suggestion
+from atwood.files import check_directory, write_atomically
+from atwood.forms.assembly import Assembly
+from atwood.lazy_dataclasses import dataclass, replace
+from atwood.model.compose.composite import Model
+from atwood.model.declare.component import Component
+from atwood.pipeline import simulate
+from atwood.plotting.diagram import draw_diagram
+from atwood.plotting.pages.document import write_document
+from atwood.plotting.pages.stage import Stage, set_stage
+from atwood.plotting.pages.still import still_picture
+from atwood.reporting.parts import list_parameters
+from atwood.result.result import Result
+
+_LARGEST = 20e6
+"""Bytes of a page."""
+
+_LONG = 600
+"""A page shows no equations of more operations."""
+
+
+def _scene_or_results(value: Any) -> Any:
+    if isinstance(value, (Model, Assembly, Result)):
+        return value
+    values = list(value.items()) if isinstance(value, Mapping) else list(value) if isinstance(value, Sequence) else []
+    results = [one[1] if isinstance(one, tuple) else one for one in values]
+    if not results or not all(isinstance(one, Result) for one in results):
+        raise Refused("A result that was read from a file holds no scene.")
+    return value
+
+
+SHOWN = Kind("a scene, a Result, a list of them, or a dictionary of them by name", _scene_or_results)
+PATH_LIST = replace(each(TEXT, "paths of quantities, such as 'rod1.angle'"), word="PATH")
+SLIDERS = replace(each(TEXT, "paths, such as 'rod1.length' or 'rod1.length=0.5:2'"), word="PATH[=FROM:TO]")
+
+
+@dataclass(frozen=True, eq=False)
+class Page:
+    """A page; notebooks show it in a frame.
+
+    Attributes
+    ----------
+    html
+        The whole page.
+    mode
+        ``"live"`` where the browser solves the equations, else ``"recorded"``.
+    reason
+        Why it is recorded.
+    file
+        Where it was saved; None if it was not.
+    """
+
+    html: str
+    mode: str
+    reason: str = ""
+    file: Path | None = None
+
+    def save(self, file: str | os.PathLike[str]) -> Page:
+        """Save it as a file, and return the page with it."""
+        target = Path(file)
+        check_target(target)
+        write_atomically(target, lambda part: part.write_text(self.html, encoding="utf-8"))
+        return replace(self, file=target)
+
+    def __fspath__(self) -> str:
+        if self.file is None:
+            raise TypeError("this page was not saved: give it a file")
+        return str(self.file)
+
+    def __repr__(self) -> str:
+        return f"<Page, {self.mode}, {len(self.html) / 1000.0:.0f} kB{f', {self.file}' if self.file else ''}>"
+
+    def _repr_html_(self) -> str:
+        address = "data:text/html;base64," + base64.b64encode(self.html.encode()).decode()
+        return f'<iframe src="{address}" title="moving scene" style="width:100%;height:640px;border:0"></iframe>'
+
+
+@takes(
+    scene=SHOWN,
+    file=optional(FILE),
+    show=PATH_LIST,
+    sliders=SLIDERS,
+    live=one_of(("auto", "never")),
+)
+def page(
+    scene: Model | Assembly | Result | Sequence[Result] | Mapping[str, Result],
+    file: str | os.PathLike[str] | None = None,
+    *,
+    show: str | Sequence[str] = (),
+    sliders: str | Sequence[str] = (),
+    live: Literal["auto", "never"] = "auto",
+) -> Page:
+    """Return a page that shows a scene moving: picture, curves, values, energies, equations and parts, in one file.
+
+    The page asks for nothing from any network and needs no library beside it. Several results are shown together.
+
+    Parameters
+    ----------
+    scene
+        A scene, which is simulated; its assembly; a result; or several results, which may have names.
+    file
+        Where to save it (``.html``).
+    show
+        Paths of quantities whose curves and values are shown first.
+    sliders
+        What can be set by a slider, where the page is live: paths of parameters and starts, with bounds in SI units
+        where these are not those that are declared, such as ``"rod1.length=0.5:2"``.
+    live
+        ``"never"`` for a page that only plays what was recorded.
+
+    Returns
+    -------
+    Page
+        The page.
+
+    Raises
+    ------
+    UsageError
+        If a path is not known, bounds are the wrong way round, the file cannot be written, or the page would be larger
+        than 20 MB.
+    """
+    target = None if file is None else Path(file)
+    if target is not None:
+        check_target(target)
+    results = _results(scene)
+    for one in results.values():
+        if one.assembly.mechanism.space.name != next(iter(results.values())).assembly.mechanism.space.name:
+            raise UsageError("results in a plane and in space have no common picture", advice="Make a page of each.")
+    known = list(dict.fromkeys(path for one in results.values() for path in one.paths))
+    shown = [_known(path, known, "show") for path in ([show] if isinstance(show, str) else show)]
+    bounds = dict(_bounds(text) for text in ([sliders] if isinstance(sliders, str) else sliders))
+    made = _write(results, shown, bounds, live)
+    if len(made.html) > _LARGEST:
+        raise UsageError(
+            f"the page would have {len(made.html) / 1e6:.0f} MB, and at most {_LARGEST / 1e6:.0f} are written",
+            advice="Ask for fewer outputs of the run (outputs=201), or for fewer results.",
+        )
+    return made if target is None else made.save(target)
+
+
+def check_target(file: Path) -> None:
+    """Refuse a file that could not be written, before any work is done."""
+    if file.suffix.lower() not in (".html", ".htm"):
+        problem = f"the suffix {file.suffix!r} is not known" if file.suffix else "the name has no suffix"
+        raise UsageError(problem, where=str(file), advice="Use .html.")
+    check_directory(file)
+
+
+def _results(scene: Any) -> dict[str, Result]:
+    if isinstance(scene, (Model, Assembly, Result)):
+        result = scene if isinstance(scene, Result) else simulate(scene)
+        return {result.method: result}
+    if isinstance(scene, Mapping):
+        return {str(name): one for name, one in scene.items()}
+    names = [f"{one.assembly.flat.name}, {one.method}" for one in scene]
+    again = len(set(names)) < len(names)
+    labels = [f"{k}: {name}" if again else name for k, name in enumerate(names, 1)]
+    return dict(zip(labels, scene, strict=True))
+
+
+def _known(path: str, known: Sequence[str], where: str) -> str:
+    if path not in known:
+        raise UsageError(f"there is no quantity {path!r}", where=where, advice=suggestion(path, known))
+    return path
+
+
+_BOUNDS = re.compile(r"(?P<path>[^=]+)(=(?P<low>[^:=]+):(?P<high>[^:=]+))?")
+
+
+def _bounds(text: str) -> tuple[str, tuple[float, float] | None]:
+    """Return the path of a slider and its bounds, if it says any."""
+    found = _BOUNDS.fullmatch(text.strip())
+    try:
+        assert found is not None
+        limits = None if found["low"] is None else (float(found["low"]), float(found["high"]))
+    except (AssertionError, ValueError):
+        advice = "Write PATH or PATH=FROM:TO, with numbers in SI units, such as rod1.length=0.5:2."
+        raise UsageError(f"{text!r} is no slider", where="sliders", advice=advice) from None
+    if limits is not None and not -np.inf < limits[0] < limits[1] < np.inf:
+        raise UsageError(
+            f"its bounds {limits[0]:g} and {limits[1]:g} are the wrong way round, or the same",
+            where=f"sliders, {found['path']}",
+            advice="Write the lower one first.",
+        )
+    return found["path"].strip(), limits
+
+
+# -- what it holds --------------------------------------------------------------------------------------------------
+
+
+def _write(
+    results: Mapping[str, Result], shown: Sequence[str], bounds: Mapping[str, tuple[float, float] | None], live: str
+) -> Page:
+    first = next(iter(results.values()))
+    stages = [set_stage(one) for one in results.values()]
+    reason, modules = _live(results, bounds, live)
+    equations, latex = _equations(first)
+    name = first.assembly.flat.name
+    still = still_picture(stages[0], name)
+    payload = {
+        "title": name,
+        "name": re.sub(r"[^\w.-]+", "-", name),
+        "facts": _facts(first),
+        "reason": reason,
+        "rtol": first.run.options.relative_tolerance,
+        "show": list(shown) or _first_shown(first),
+        "sliders": {path: limits for path, limits in bounds.items() if limits is not None},
+        "runs": [_run(label, one, stage) for (label, one), stage in zip(results.items(), stages, strict=True)],
+        "equations": equations,
+        "latex": latex,
+        "diagram": draw_diagram(first.assembly),
+        "about": _about(first),
+        "report": repr(first),
+    }
+    html = write_document(payload, still, modules)
+    return Page(html, "live" if modules else "recorded", reason)
+
+
+def _live(results: Mapping[str, Result], bounds: Mapping[str, object], live: str) -> tuple[str, dict[str, str]]:
+    """Return why a page is recorded, or the modules that make it live."""
+    if live == "never":
+        return "this was asked for", {}
+    if len(results) > 1:
+        return "several results are compared", {}
+    return "", {}
+
+
+def _facts(result: Result) -> str:
+    ledger = result.energy
+    return f"{result.method}; energy drifts by {ledger.max_drift:.1e} of what is exchanged"
+
+
+def _first_shown(result: Result) -> list[str]:
+    """Return what is shown where nothing is asked for: the first coordinates."""
+    names = [one.name for one in result.assembly.own_equations.names]
+    found = [name for name in names if name in result]
+    return (found or list(result.paths))[:3]
+
+
+def _run(label: str, result: Result, stage: Stage) -> dict[str, Any]:
+    """Return what a page holds of a result."""
+    table = result.table()
+    ledger = result.energy
+    return {
+        "label": label,
+        "stage": stage.to_data(),
+        "time": result.time,
+        "poses": stage.poses.transpose(1, 2, 0).astype(np.float32),  # one number after another along the run
+        "quantities": {
+            "paths": list(table),
+            "units": [result.unit(path) for path in table],
+            "values": np.array(list(table.values())),
+        },
+        "events": [{"time": one.time, "part": one.part, "message": one.message} for one in result.events],
+        "energy": {"kinetic": ledger.kinetic, "potential": ledger.potential, "work": ledger.work},
+        "parts": _parts(result.assembly),
+    }
+
+
+def _parts(assembly: Assembly) -> list[dict[str, Any]]:
+    """Return what the parts are, with their parameters and connectors."""
+    found: dict[str, dict[str, Any]] = {}
+    for path, part in assembly.flat.parts.items():
+        component: Component = part.component
+        doc = (type(component).__doc__ or "").strip().split("\n", 1)[0]
+        names = list(component.connectors())
+        found[path] = {
+            "path": path,
+            "kind": type(component).__name__,
+            "doc": doc,
+            "connectors": names,
+            "parameters": [],
+        }
+    for one in list_parameters(assembly):
+        path, _, name = one.path.rpartition(".")
+        value = f"{one.value:.6g}" if isinstance(one.value, float) else str(one.value)
+        unit = "" if one.unit == "1" else one.unit
+        found[path]["parameters"].append({"name": name, "value": value, "unit": unit, "doc": one.meaning})
+    return list(found.values())
+
+
+def _equations(result: Result) -> tuple[str, str]:
+    """Return the equations of motion as MathML and as LaTeX, or why there are none here."""
+    from atwood.theory.equations import equations
+
+    try:
+        size = sum(result.first_plan.program.operations.values())
+        if size > _LONG:
+            told = f"They are too long to be read here ({size} operations); `atwood equations` writes them."
+            return f"<p>{told}</p>", ""
+        found = equations(result.assembly)
+        return found.html(), found.latex()
+    except AtwoodError as error:
+        return f"<p>{escape(str(error))}</p>", ""
+
+
+def _about(result: Result) -> list[list[str]]:
+    """Return a table of how the motion was found."""
+    return [
+        ["scene", result.assembly.flat.name],
+        ["form and solver", result.method],
+        ["why this solver", result.solver],
+        ["relative tolerance", f"{result.run.options.relative_tolerance:g}"],
+        ["time", f"{result.time[0]:g} to {result.time[-1]:g} s, {len(result.time)} output times"],
+        ["steps", str(result.statistics.steps)],
+        ["energy", result.energy.describe()],
+        ["status", result.status.replace("_", " ") + (f": {result.message}" if result.message else "")],
+    ]
