@@ -21,6 +21,7 @@ from atwood.model.compose.composite import Model
 from atwood.model.declare.component import Component
 from atwood.pipeline import simulate
 from atwood.plotting.diagram import draw_diagram
+from atwood.plotting.live import LiveProgram, engine_script, live_program
 from atwood.plotting.pages.document import write_document
 from atwood.plotting.pages.stage import Stage, set_stage
 from atwood.plotting.pages.still import still_picture
@@ -208,7 +209,13 @@ def _write(
 ) -> Page:
     first = next(iter(results.values()))
     stages = [set_stage(one) for one in results.values()]
-    reason, modules = _live(results, bounds, live)
+    program = _live(results, bounds, live)
+    modules = {}
+    if program.model:
+        modules = {
+            "engine": f"{engine_script()}\nexport {{ createEngine }};",
+            "model": f"export const model = {program.model};",
+        }
     equations, latex = _equations(first)
     name = first.assembly.flat.name
     still = still_picture(stages[0], name)
@@ -216,11 +223,14 @@ def _write(
         "title": name,
         "name": re.sub(r"[^\w.-]+", "-", name),
         "facts": _facts(first),
-        "reason": reason,
+        "reason": program.reason,
         "rtol": first.run.options.relative_tolerance,
         "show": list(shown) or _first_shown(first),
         "sliders": {path: limits for path, limits in bounds.items() if limits is not None},
-        "runs": [_run(label, one, stage) for (label, one), stage in zip(results.items(), stages, strict=True)],
+        "runs": [
+            _run(label, one, stage, not program.model)
+            for (label, one), stage in zip(results.items(), stages, strict=True)
+        ],
         "equations": equations,
         "latex": latex,
         "diagram": draw_diagram(first.assembly),
@@ -228,16 +238,18 @@ def _write(
         "report": repr(first),
     }
     html = write_document(payload, still, modules)
-    return Page(html, "live" if modules else "recorded", reason)
+    return Page(html, "live" if modules else "recorded", program.reason)
 
 
-def _live(results: Mapping[str, Result], bounds: Mapping[str, object], live: str) -> tuple[str, dict[str, str]]:
-    """Return why a page is recorded, or the modules that make it live."""
+def _live(results: Mapping[str, Result], bounds: Mapping[str, object], live: str) -> LiveProgram:
+    """Return the scene as a program of the page, or why it is none."""
+    first = next(iter(results.values()))
+    found = live_program(first.assembly, sliders=list(bounds))
     if live == "never":
-        return "this was asked for", {}
+        return replace(found, reason="this was asked for", model="")
     if len(results) > 1:
-        return "several results are compared", {}
-    return "", {}
+        return replace(found, reason="several results are compared", model="")
+    return found
 
 
 def _facts(result: Result) -> str:
@@ -252,22 +264,23 @@ def _first_shown(result: Result) -> list[str]:
     return (found or list(result.paths))[:3]
 
 
-def _run(label: str, result: Result, stage: Stage) -> dict[str, Any]:
-    """Return what a page holds of a result."""
+def _run(label: str, result: Result, stage: Stage, is_whole: bool) -> dict[str, Any]:
+    """Return what a page holds of a result; of one that it computes itself, how it begins."""
+    shown = slice(None) if is_whole else slice(0, 2)
     table = result.table()
     ledger = result.energy
     return {
         "label": label,
         "stage": stage.to_data(),
-        "time": result.time,
-        "poses": stage.poses.transpose(1, 2, 0).astype(np.float32),  # one number after another along the run
+        "time": result.time[shown],
+        "poses": stage.poses[shown].transpose(1, 2, 0).astype(np.float32),  # one number after another along the run
         "quantities": {
             "paths": list(table),
             "units": [result.unit(path) for path in table],
-            "values": np.array(list(table.values())),
+            "values": np.array(list(table.values()))[:, shown],
         },
         "events": [{"time": one.time, "part": one.part, "message": one.message} for one in result.events],
-        "energy": {"kinetic": ledger.kinetic, "potential": ledger.potential, "work": ledger.work},
+        "energy": {name: getattr(ledger, name)[shown] for name in ("kinetic", "potential", "work")},
         "parts": _parts(result.assembly),
     }
 

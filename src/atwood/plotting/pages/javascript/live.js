@@ -4,12 +4,19 @@ import { Track } from "./track.js";
 
 const MOST = 20000; // samples that are kept
 
+/** Return an angle, turned by whole turns to where it was before. */
+function goingOn(angle, before) {
+  return angle + 2 * Math.PI * Math.round((before - angle) / (2 * Math.PI));
+}
+
 export class LiveMotion {
   /** `engine` moves the model; `run` is the recorded run of the same scene. */
   constructor(engine, run) {
     this.engine = engine;
     this.stage = run.stage;
-    this.paths = engine.model.data.quantities.map((one) => one.path);
+    const { quantities } = engine.model.data;
+    this.paths = quantities.map((one) => one.path);
+    this.periodic = quantities.flatMap((one, k) => (one.periodic ? [k] : []));
     this.track = new Track(run.stage.stride, run.stage.frames.keys.length, this.paths);
     const { bodies, nodes } = engine.model.data;
     const { keys, bodies: bodyOf, turns, columns } = run.stage.frames;
@@ -47,7 +54,10 @@ export class LiveMotion {
     if (track.times.length >= MOST) {
       for (const list of [track.times, track.poses, track.values, this.energies]) list.splice(0, MOST / 10);
     }
-    track.add(this.engine.time, this.frames(), Float64Array.from(this.engine.values(this.paths)));
+    const values = Float64Array.from(this.engine.values(this.paths));
+    const last = track.values[track.values.length - 1];
+    if (last) for (const k of this.periodic) values[k] = goingOn(values[k], last[k]);
+    track.add(this.engine.time, this.frames(), values);
     this.energies.push(this.engine.energy());
   }
 
@@ -69,9 +79,7 @@ export class LiveMotion {
     const { poses: before } = this.track;
     if (before.length) {
       const last = before[before.length - 1];
-      for (let k = 2; k < found.length; k += 3) {
-        found[k] += 2 * Math.PI * Math.round((last[k] - found[k]) / (2 * Math.PI));
-      }
+      for (let k = 2; k < found.length; k += 3) found[k] = goingOn(found[k], last[k]);
     }
     return found;
   }

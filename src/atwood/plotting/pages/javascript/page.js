@@ -69,12 +69,8 @@ class Page {
         element("section", { class: "side", "aria-label": "Values and curves" }, ...this.tabs())),
     );
     this.watchPointer();
-    try {
-      this.view = new View(this.host, this.runs);
-    } catch (error) {
-      this.host.append(element("p", { class: "notice" }, `The picture needs WebGL, which this browser does not give: ${error.message}`));
-      this.host.append(still);
-    }
+    if (document.createElement("canvas").getContext("webgl2")) this.view = new View(this.host, this.runs);
+    else this.host.append(element("p", { class: "notice" }, "A moving picture needs WebGL, which this browser lacks."), still);
   }
 
   button(label, text, click, more = {}) {

@@ -116,7 +116,7 @@ export class Shapes {
 
 function triangles(item) {
   const corners = new Float32Array(3 * item.faces.length);
-  item.faces.forEach((vertex, k) => corners.set(item.vertices.subarray(3 * vertex, 3 * vertex + 3), 3 * k));
+  item.faces.forEach((vertex, k) => corners.set(item.vertices.slice(3 * vertex, 3 * vertex + 3), 3 * k));
   const geometry = new BufferGeometry();
   geometry.setAttribute("position", new BufferAttribute(corners, 3));
   geometry.computeVertexNormals();
