@@ -99,10 +99,18 @@ if TYPE_CHECKING:
         assemble as assemble,
         simulate as simulate,
     )
+    from atwood.plotting.diagram import (
+        Diagram as Diagram,
+        diagram as diagram,
+    )
     from atwood.plotting.drawing import (
         animate as animate,
         plot_mechanism as plot_mechanism,
         plot_mode as plot_mode,
+    )
+    from atwood.plotting.pages.page import (
+        Page as Page,
+        page as page,
     )
     from atwood.plotting.plots.energies import plot_energies as plot_energies
     from atwood.plotting.plots.linear import (
@@ -273,7 +281,9 @@ _ROOMS = {
     "atwood.model.compose.serialization": ("from_data", "load_scene", "save_scene", "to_data"),
     "atwood.pipeline": ("Assembly", "assemble", "simulate"),
     "atwood.plotting": ("animate", "plot", "plot_comparison", "plot_mechanism", "plot_sweep"),
+    "atwood.plotting.diagram": ("Diagram", "diagram"),
     "atwood.plotting.drawing": ("plot_mode",),
+    "atwood.plotting.pages.page": ("Page", "page"),
     "atwood.plotting.plots.energies": ("plot_energies",),
     "atwood.plotting.plots.linear": ("plot_bode", "plot_branches", "plot_nyquist", "plot_root_locus"),
     "atwood.plotting.plots.reduction": ("plot_effective_potential", "plot_top_path"),

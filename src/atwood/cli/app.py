@@ -18,8 +18,10 @@ from atwood.errors import near_matches
 _COMMANDS = {
     "check": ("atwood.cli.checking", "Check components of one's own."),
     "compare": ("atwood.cli.comparing", "Compare what each form costs for which error."),
+    "diagram": ("atwood.cli.pages", "Draw which parts of a scene are connected where."),
     "info": ("atwood.cli.info", "Say what a scene is made of, before any run."),
     "list": ("atwood.cli.listing", "List the scenes of the installed libraries."),
+    "page": ("atwood.cli.pages", "Write a page on which a scene moves."),
     "run": ("atwood.cli.running", "Simulate a scene."),
     "sweep": ("atwood.cli.sweeping", "Simulate a scene with many parameters and starts."),
 }
@@ -106,7 +108,8 @@ class _Commands(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Return a command by its name."""
         if cmd_name in _COMMANDS:
-            made: click.Command = importlib.import_module(_COMMANDS[cmd_name][0]).COMMAND
+            room = importlib.import_module(_COMMANDS[cmd_name][0])
+            made: click.Command = room.COMMAND if hasattr(room, "COMMAND") else room.COMMANDS[cmd_name]
             return made
         known = theory_functions()
         if cmd_name not in known:
@@ -163,6 +166,7 @@ def main() -> None:
     atwood equations double-pendulum     its equations of motion, as in a textbook
     atwood conserved pendulum-on-cart    what its motion conserves
     atwood run double-pendulum           its motion and its forces
+    atwood page double-pendulum -o page.html    its motion in the browser, live
     atwood compare double-pendulum       what each form costs for which error
     atwood sweep double-pendulum --vary mass2=0.5:2:16
     atwood equilibria pendulum-on-cart   where it can stay at rest, and whether it does

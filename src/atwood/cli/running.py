@@ -26,7 +26,7 @@ def run_scene(request: Request) -> None:
     """Simulate SCENE, and show where it ends and how accurate that is."""
     _check_files(request)
     with watching():  # from the scene on
-        result = _run(request)
+        result = run_of(request)
     _keep(result, request)
     if request.as_json:
         print_json(run_data(result, request))
@@ -39,17 +39,17 @@ def run_scene(request: Request) -> None:
         click.get_current_context().exit(INTERRUPTED)
 
 
-def _run(request: Request) -> Result:
+def run_of(request: Request) -> Result:
     """Return the run of a scene; what came before an error is kept where that was asked for."""
     scene, name = prepare(request.scene, request.settings, request.start_values)
     check_applies(scene, request.form, request.level, request.orientation)
     assembly = assemble(scene, name=name, **request.of(assemble))
-    if request.view is not None:
+    if getattr(request, "view", None) is not None:
         from atwood.plotting.camera import check_view
 
         check_view(assembly.mechanism.space.name, request.view)
     monitor = None
-    if request.conserved:
+    if getattr(request, "conserved", False):
         from atwood.theory.symmetry import conserved
 
         monitor = conserved(assembly)
@@ -98,6 +98,8 @@ def _save_with_energies(result: Result, file: Path) -> None:
 def _keep_what_came_before(error: AtwoodError, request: Request) -> None:
     """Save, plot and draw what came before an error, if that was asked for, and say so."""
     made = getattr(error, "run", None)
+    if not hasattr(request, "save"):
+        return
     files = [str(file) for file in (request.save, request.plot, request.draw) if file is not None]
     if made is None or not files:
         return

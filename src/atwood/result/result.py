@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import ItemsView, Iterable, Iterator, Mapping, ValuesView
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -371,6 +372,11 @@ class Result(Trajectories):
         from atwood.result.files import save_result
 
         return save_result(self, file, paths)
+
+    def to_html(self, file: str | os.PathLike[str], **options: Any) -> Path:
+        """Save a page on which the scene moves, and return its file; see `atwood.page`, also for the options."""
+        made = import_module("atwood.plotting.pages.page").page(self, file, **options)
+        return Path(made)
 
     def _about(self) -> Mapping[str, Any]:
         return {"scene": self.assembly.flat.name, "form": self.form, "level": self.level, "status": self.status}

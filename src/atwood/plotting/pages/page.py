@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import inspect
 import os
 import re
 from collections.abc import Mapping, Sequence
@@ -47,7 +48,7 @@ def _scene_or_results(value: Any) -> Any:
 
 SHOWN = Kind("a scene, a Result, a list of them, or a dictionary of them by name", _scene_or_results)
 PATH_LIST = replace(each(TEXT, "paths of quantities, such as 'rod1.angle'"), word="PATH")
-SLIDERS = replace(each(TEXT, "paths, such as 'rod1.length' or 'rod1.length=0.5:2'"), word="PATH[=FROM:TO]")
+SLIDERS = replace(each(TEXT, "paths, such as 'rod1.length' or 'rod1.length=0.5:2'"), word="PATH")
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,7 +227,7 @@ def _write(
         "reason": program.reason,
         "rtol": first.run.options.relative_tolerance,
         "show": list(shown) or _first_shown(first),
-        "sliders": {path: limits for path, limits in bounds.items() if limits is not None},
+        "sliders": bounds,
         "runs": [
             _run(label, one, stage, not program.model)
             for (label, one), stage in zip(results.items(), stages, strict=True)
@@ -290,7 +291,7 @@ def _parts(assembly: Assembly) -> list[dict[str, Any]]:
     found: dict[str, dict[str, Any]] = {}
     for path, part in assembly.flat.parts.items():
         component: Component = part.component
-        doc = (type(component).__doc__ or "").strip().split("\n", 1)[0]
+        doc = (inspect.getdoc(type(component)) or "").partition("\n")[0]
         names = list(component.connectors())
         found[path] = {
             "path": path,

@@ -243,8 +243,8 @@ def _flat_items(picture: Picture, pen: Pen, shape: Shape, number: Mapping[int, i
         ]
     if shape.kind == "mass":
         return _flat_mass(pen, shape, told)
-    ends = [{"frame": number[node], "radius": picture.radii.get(node, 0.0)} for node in shape.nodes]
-    item = {"kind": shape.kind, "part": shape.part, "ends": ends}
+    ends: list[Item] = [{"frame": number[node], "radius": picture.radii.get(node, 0.0)} for node in shape.nodes]
+    item: Item = {"kind": shape.kind, "part": shape.part, "ends": ends}
     if shape.kind == "rope":
         spare = [pen.picture.spare(shape, moment) for moment in range(len(picture.time))]
         item |= {"spare": np.array(spare)} if np.any(spare) else {}
@@ -274,7 +274,7 @@ def _flat_mass(pen: Pen, shape: Shape, told: Item) -> list[Item]:
     if shape.size <= 0.0:
         return []
     half, corners = pen.mass_outline(shape)
-    look = {**told, "colour": pen.colour(shape)}
+    look: Item = {**told, "colour": pen.colour(shape)}
     if corners is None:
         return [{**look, "kind": "disc", "size": half, "edge": "#ffffff"}]
     faces: Sequence[Sequence[int]] = [[0, 1, 2], [0, 2, 3]]

@@ -7,6 +7,7 @@ import { Plot, colourOf } from "./plots.js";
 import { View } from "./view.js";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10];
+const FIRST_SLIDERS = 8; // where none are asked for
 const FRAME_MS = 12; // what a frame may take for the motion
 
 class Page {
@@ -263,13 +264,19 @@ class Page {
   settings() {
     const { parameters, starts } = this.live.engine;
     const chosen = this.payload.sliders;
-    const rows = [...parameters, ...starts].map((one) => this.sliderOf(one, chosen[one.path])).filter(Boolean);
-    return element("div", { class: "settings" }, this.button("Back to what the scene says", "As the scene says", () => this.asScene()), ...rows);
+    const all = [...parameters, ...starts];
+    const asked = all.filter((one) => one.path in chosen);
+    const first = asked.length ? asked : all.slice(0, FIRST_SLIDERS);
+    const more = all.filter((one) => !first.includes(one));
+    const rows = (some) => some.map((one) => this.sliderOf(one, chosen[one.path]));
+    return element("div", { class: "settings" },
+      this.button("Back to what the scene says", "As the scene says", () => this.asScene()), ...rows(first),
+      more.length ? element("details", {}, element("summary", {}, `${more.length} more`), ...rows(more)) : null);
   }
 
   sliderOf(one, bounds) {
     const [low, high] = bounds ?? sliderRange(one);
-    const text = `${one.path}`;
+    const text = one.path;
     const number = element("input", { type: "number", step: "any", value: one.value, "aria-label": `${text}, number` });
     const range = element("input", { type: "range", min: low, max: high, step: "any", value: one.value, "aria-label": text });
     const apply = (value, source) => {
@@ -607,11 +614,13 @@ function vectorsOf(paths, units, stage) {
 }
 
 /** Return between what values a slider goes: declared bounds, or a few times the value. */
-function sliderRange({ value, low, high, unit }) {
-  const size = Math.abs(value) || (unit === "rad" ? Math.PI : 1);
-  const from = low ?? (unit === "rad" ? -Math.PI : value > 0 ? 0.1 * size : -3 * size);
-  const to = high ?? (unit === "rad" ? Math.PI : value < 0 ? -0.1 * size : 3 * size);
-  return [from, Math.max(to, from)];
+function sliderRange({ value, low, high, lower_open: lowerOpen, unit }) {
+  const isAngle = unit === "rad";
+  const size = Math.abs(value) || (isAngle ? Math.PI : 1);
+  const least = low === 0 || low === null || low === undefined ? (value > 0 && !isAngle ? 0 : -3 * size) : low;
+  const from = isAngle && low === null ? -Math.PI : Math.max(low ?? -Infinity, low === 0 ? 0 : least);
+  const to = high ?? (isAngle ? Math.PI : value < 0 ? 0 : 3 * size);
+  return [lowerOpen && from <= low ? low + 0.02 * (to - low) : from, Math.max(to, from)];
 }
 
 function copy(text, button) {
