@@ -20,7 +20,7 @@ from atwood.pipeline import assemble
 _LOOP, _FOREST, _OTHER = "#b23a48", "#1f5fa8", "#55626e"
 """Colours of joints that close loops, of those that bodies hang on, and of all other parts."""
 
-_STEP = 110.0
+_STEP = 75.0
 """Mean distance of what is connected, in the units of the picture."""
 
 
@@ -88,8 +88,9 @@ def draw_diagram(assembly: Assembly) -> str:
     network: nx.Graph[tuple[str, object]] = nx.Graph()
     for (part, _), node in mechanism.graph.node_of.items():
         network.add_edge(("part", part), ("node", node))
+    network.add_edges_from((("part", one.part), ("node", 0)) for one in mechanism.graph.joints if 0 in (one.a, one.b))
     network.add_nodes_from(("part", path) for path in assembly.flat.parts)
-    placed = nx.spring_layout(network, seed=1, k=1.6 / max(1.0, float(len(network))) ** 0.5, iterations=200)
+    placed = nx.spring_layout(network, seed=1, k=1.2 / max(1.0, float(len(network))) ** 0.5, iterations=300)
     names = list(placed)
     at = np.array([placed[name] for name in names]).reshape(-1, 2)
     lengths = [float(np.linalg.norm(placed[a] - placed[b])) for a, b in network.edges]
@@ -99,7 +100,9 @@ def draw_diagram(assembly: Assembly) -> str:
     lines = [_line(where[a], where[b]) for a, b in network.edges]
     colours = _colours(assembly)
     marks = [_mark(name, where[name], mechanism.graph.nodes, colours) for name in names]
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" role="img" viewBox="0 0 {width:.0f} {height:.0f}"'
+    head = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" role="img" viewBox="0 0 {width:.0f} {height:.0f}" width="{width:.0f}"'
+    )
     title = f"<title>Parts and connections of {escape(assembly.flat.name)}</title>"
     return f'{head} font-family="system-ui, sans-serif" font-size="12">{title}{"".join((*lines, *marks))}</svg>'
 

@@ -84,10 +84,19 @@ export class LiveMotion {
     return found;
   }
 
-  /** Move on to a time, or as far as the milliseconds allow. */
+  /** Move on to a time, or as far as the milliseconds allow, with samples on the way. */
   advance(time, milliseconds) {
-    const status = this.engine.advance(time, { steps: 1e6, milliseconds });
-    if (this.engine.time > this.track.last) this.sample();
+    const begun = performance.now();
+    const span = Math.max(1 / 60, (time - this.engine.time) / (MOST / 10));
+    let status = { code: "reached", text: "" };
+    while (this.engine.time < time) {
+      const left = milliseconds - (performance.now() - begun);
+      if (left <= 0) return { code: "working", text: "" };
+      const next = this.engine.time + span < time - 1e-9 * span ? this.engine.time + span : time;
+      status = this.engine.advance(next, { steps: 1e6, milliseconds: left });
+      if (this.engine.time > this.track.last) this.sample();
+      if (status.code !== "reached") break;
+    }
     return status;
   }
 

@@ -26,8 +26,6 @@ class Page {
     this.build();
     this.readLink();
     this.show();
-    document.documentElement.dataset.mode = this.mode;
-    if (this.reason) document.documentElement.dataset.reason = this.reason;
     if (!window.matchMedia("(prefers-reduced-motion: reduce)").matches && !this.linked) this.play(true);
   }
 
@@ -232,12 +230,14 @@ class Page {
       swatch.style.background = COLOURS[k % COLOURS.length];
       return [swatch, ` ${name}  `];
     }));
-    return element("div", {}, legend(["kinetic", "potential", "total less work"]), canvas, this.drift,
-      element("h2", {}, "By part"), legend(this.energyPaths()), stacked);
+    this.partLegend = element("div");
+    this.legend = legend;
+    return element("div", {}, legend(["kinetic", "potential", this.live ? "total" : "total less work"]), canvas, this.drift,
+      element("h2", {}, "By part"), this.partLegend, stacked);
   }
 
   energyPaths() {
-    return this.runs[0].quantities.paths.filter((path) => /\.(kinetic|potential)_energy$/.test(path)).slice(0, 24);
+    return [...this.track.places.keys()].filter((path) => /\.(kinetic|potential)_energy$/.test(path));
   }
 
   energyLines() {
@@ -250,13 +250,21 @@ class Page {
     return all.map((y, k) => ({ label: "", unit: "J", x, y: Array.from(y), colour: COLOURS[k] }));
   }
 
-  /** Return the energies of the parts, each from its least value on, so that they can stand on one another. */
+  /** Return the energies of the parts that change, each from its least value on, so that they can stand on one another. */
   partLines() {
-    return this.energyPaths().filter((path) => this.track.places.has(path)).map((path, k) => {
+    const all = this.energyPaths().map((path) => {
       const y = this.track.series(path);
       const least = Math.min(...y);
-      return { label: path, unit: "J", x: this.track.times, y: y.map((one) => one - least), colour: COLOURS[k % COLOURS.length] };
+      return { label: path, unit: "J", x: this.track.times, y: y.map((one) => one - least) };
     });
+    const sizes = all.map((line) => Math.max(...line.y));
+    const changing = all.filter((_, k) => sizes[k] > 1e-6 * Math.max(...sizes));
+    const told = changing.map((line) => line.label);
+    if (told.join() !== this.partsTold) {
+      this.partsTold = told.join();
+      this.partLegend.replaceChildren(this.legend(told));
+    }
+    return changing.map((line, k) => ({ ...line, colour: COLOURS[k % COLOURS.length] }));
   }
 
   // -- what can be set --------------------------------------------------------------------------------------------
@@ -488,7 +496,7 @@ class Page {
   tellDrift() {
     const totals = this.energyLines()[2].y;
     const drift = Math.max(...totals.map((one) => Math.abs(one - totals[0])));
-    this.drift.textContent = `Total less work has changed by ${shortNumber(drift, 2)} J.`;
+    this.drift.textContent = `${this.live ? "The total" : "Total less work"} has changed by ${shortNumber(drift, 2)} J.`;
   }
 
   presentVectors(track, sample) {
@@ -578,6 +586,7 @@ class Page {
       else if (key === "show") {
         const paths = text.split(",").filter(Boolean);
         this.shown = paths.filter((path) => this.units.has(path));
+        this.listValues();
         for (const path of paths) if (!this.units.has(path)) problems.push(this.unknown(path, [...this.units.keys()]));
       } else if (!settable.includes(key)) problems.push(this.unknown(key, settable));
       else {
@@ -647,5 +656,7 @@ export function start(payload, createEngine, model) {
     reset: () => page.reset(),
     play: (on) => page.play(on),
   };
+  if (page.reason) document.documentElement.dataset.reason = page.reason;
+  document.documentElement.dataset.mode = page.mode;
   return page;
 }
