@@ -19,9 +19,8 @@ _EXACT: dict[str, Any] = {"rtol": 1e-11, "outputs": 21}
 
 
 def _pixels(tab: Any) -> np.ndarray[Any, Any]:
-    tab.evaluate(
-        "document.querySelector('.view').style = 'position: fixed; left: 0; top: 0; width: 600px; height: 400px; z-index: 9'"
-    )
+    look = "position: fixed; left: 0; top: 0; width: 600px; height: 400px; z-index: 9"
+    tab.evaluate(f"document.querySelector('.view').style = '{look}'")
     tab.wait_for_timeout(200)
     shot: np.ndarray[Any, Any] = imread(io.BytesIO(tab.locator(".view").screenshot()))[:, :, :3]
     return shot
