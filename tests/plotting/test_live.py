@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from atwood import simulate
+from atwood import Scene, assemble, simulate
+from atwood.errors import ParameterError
 from atwood.plotting.live import LiveProgram, engine_script, live_program
+from atwood_library import Ground, PointMass, Rope, Spring
 from atwood_library.scenes import SCENES
 
 from ..helpers.node import run_node
@@ -121,3 +123,97 @@ def test_changed_values_are_those_of_simulate() -> None:
                 scene.set(path, value)
         expected = state_at(scene, 1.0, form=form, rtol=1e-12, solver="explicit")
         np.testing.assert_allclose(state, expected, rtol=0.0, atol=1e-8, err_msg=key)
+
+
+def slack_string() -> Scene:
+    """Return a bob on a string that goes slack and comes taut again."""
+    scene = Scene(t_end=1.6)
+    ground, rope = scene.add("ground", Ground()), scene.add("rope", Rope(length=1.0, when_slack="slack"))
+    bob = scene.add("bob", PointMass(mass=1.0))
+    scene.connect(ground.frame, rope.a)
+    scene.connect(rope.b, bob.point)
+    scene.start.update({"bob.position.x": 0.0, "bob.velocity.x": 6.0})
+    scene.guess["bob.position.z"] = -1.0
+    return scene
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+def test_modes_are_entered_at_their_times(form: str) -> None:
+    scenes = {"string": (slack_string, 2), "trebuchet": (SCENES["trebuchet"], 1), "wire": (SCENES["bead-on-wire"], 0)}
+    made = {name: live_program(scene(), form) for name, (scene, _) in scenes.items()}
+    script = """
+    print(Object.keys(models).map(name => {
+      const engine = start(name, {rtol: 1e-11}), said = engine.advance(1.6);
+      return [said.code, engine.events.map(one => one.time), Array.from(engine.state), engine.mode];
+    }));
+    """
+    for (scene, count), (code, times, state, modes) in zip(scenes.values(), played(made, script), strict=True):
+        run = simulate(scene(), form=form, t_end=1.6, rtol=1e-12, outputs=[0.0, 1.6]).run
+        assert (code, len(times), modes) == ("reached", count, dict(run.segments[-1].assembly.modes))
+        assert times == pytest.approx([one.time for one in run.events], abs=1e-9)
+        last = run.segments[-1]
+        np.testing.assert_allclose(state, [*last.coordinates[:, -1], *last.speeds[:, -1]], rtol=0.0, atol=2e-8)
+
+
+def test_what_is_wrong_is_said() -> None:
+    made = {"row": live_program(SCENES["four-bar-row"](), "reduced"), "arm": live_program(SCENES["four-bar"](), "dae")}
+    script = """
+    const row = start("row"), arm = start("arm");
+    const first = [row.advance(2.0), row.advance(2.0).code, row.reset().code, row.advance(0.1).code];
+    const refused = [arm.set("crank.lengt", 1.0), arm.set("crank.length", -1.0), arm.set("coupler.length", 9.0),
+                     arm.advance(NaN), arm.setState(0.0, [1.0])];
+    const before = Array.from(arm.state);
+    let said = "";
+    try { arm.value("coupler.angel"); } catch (error) { said = error.message; }
+    print([first, refused, before, arm.advance(1.0).code, arm.advance(0.5), said, arm.advance(2.0, {steps: 1}).code,
+           arm.set("crank.length", 1.05).code, arm.advance(2.0).code, arm.setState(0.0, before.map(x => x + 1.0))]);
+    """
+    first, refused, before, reached, back, said, working, changed, on, off = played(made, script)
+    assert first[0]["code"] == "singular"
+    assert "right[1].coincidence[0] follows from the other constraints" in first[0]["text"]
+    assert first[1:] == ["singular", "ready", "reached"]
+    assert [one["code"] for one in refused] == ["refused"] * 5
+    assert "perhaps crank.length" in refused[0]["text"]
+    assert "cannot be met" in refused[2]["text"]
+    np.testing.assert_allclose(before, made["arm"].model and live_state(made["arm"]), rtol=0.0, atol=1e-12)
+    assert (reached, back["code"], working, changed, on) == ("reached", "refused", "working", "ready", "reached")
+    assert "coupler.angel: there is no such quantity; perhaps" in said
+    assert off["code"] in ("ready", "failed")
+
+
+def live_state(live: LiveProgram) -> list[float]:
+    found: list[float] = played({"x": live}, "print(Array.from(start('x').state));")
+    return found
+
+
+def test_parameters_that_are_zero_stay_where_they_have_a_slider() -> None:
+    scene = Scene(t_end=1.0, gravity=0.0)
+    ground, spring = scene.add("ground", Ground()), scene.add("spring", Spring(stiffness=3.0, natural_length=0.0))
+    bob = scene.add("bob", PointMass(mass=1.0))
+    scene.connect(ground.frame, spring.a)
+    scene.connect(spring.b, bob.point)
+    scene.start.update({"bob.position.x": 1.0, "bob.position.z": 0.5})
+    plain, kept = live_program(scene), live_program(scene, sliders=["spring.natural_length"])
+    script = """
+    print(Object.keys(models).map(name => {
+      const engine = start(name), first = engine.advance(1.0).code, state = Array.from(engine.state);
+      const said = engine.set("spring.natural_length", 0.4);
+      engine.reset();
+      return [first, state, said.code, engine.advance(1.0).code, Array.from(engine.state)];
+    }));
+    """
+    [_, state, said, _, _], [_, other, set_, code, changed] = played({"plain": plain, "kept": kept}, script)
+    assert (said, set_, code) == ("refused", "ready", "reached")
+    np.testing.assert_allclose(other, state, rtol=0.0, atol=1e-12)
+    scene.set("spring.natural_length", 0.4)
+    np.testing.assert_allclose(changed, state_at(scene, 1.0, rtol=1e-12, solver="explicit"), rtol=0.0, atol=1e-9)
+    with pytest.raises(ParameterError, match="no such parameter"):
+        live_program(scene, sliders=["spring.stifness"])
+
+
+def test_scenes_that_are_not_live_say_why() -> None:
+    assert live_program(SCENES["bouncing-ball"]()).reason.startswith("floor.gap is a gap or dry friction")
+    hostile = live_program(assemble(SCENES["double-pendulum"](), name="</script><!-- "))
+    assert hostile.data["name"] == "</script><!-- "
+    assert "</script" not in hostile.model
+    assert "<!--" not in hostile.model

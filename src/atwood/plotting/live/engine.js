@@ -52,7 +52,7 @@ function openMode(mode, options) {
     places[name] = {derived: room(one.derived), outputs: one.outputs.map(room)};
   }
   const scratch = room(Math.max(...Object.values(words).map(one => one.scratch)));
-  const [own, block, clock, y, yp, moved] = [data.values.length, 8, 1, size, size, size + m].map(room);
+  const [own, block, clock, y, yp, nearer] = [data.values.length, 8, 1, size, size, size + m].map(room);
   const session = room(Object.keys(FIELD).length), arrays = room(ROW.all * padded), shifts = room(count);
   const sought = room(Object.keys(SOUGHT).length), [sy, syp, shifted, turns] = [size, size, size, 2 * size].map(room);
   const rows = room(Object.keys(SEARCHED).length * count + POINTS * (1 + 2 * count));
@@ -163,6 +163,16 @@ function openMode(mode, options) {
     return state;
   }
 
+  // Coordinates after a step back along the speeds, in units of their sizes.
+  function moved(t, q, step, sizes = data.sizes) {
+    if (!data.tangent) return q.map((x, i) => x - (step[i] ?? 0) * (sizes[i] ?? 0));
+    M.set(q, y);
+    M.fill(0, y + q.length, y + q.length + sizes.length);
+    call("tangent", t, y, y + q.length);
+    const tangent = matrix(output("tangent", 1), data.tangent, q.length, sizes);
+    return q.map((x, i) => x - tangent[i].reduce((sum, one, j) => sum + one * step[j], 0));
+  }
+
   const project = t => !functions.project || functions.project(t, y, block + 2) === 0;
   const eventsAt = (t, from, target) => call("events", t, from, from + n, shifts, [target]);
 
@@ -252,7 +262,7 @@ function openMode(mode, options) {
     return is;
   }
 
-  [places.kernel.derived, scratch, places.nearer?.derived, scratch, moved].forEach((one, i) => { M[block + i] = one ?? 0; });
+  [places.kernel.derived, scratch, places.nearer?.derived, scratch, nearer].forEach((one, i) => { M[block + i] = one ?? 0; });
   put({arrays, size, padded, function: address(functions.rates), data: block});
   if (functions.project) put({project: address(functions.project), project_data: block + 2});
   put({relative: Math.max(options.rtol * data.relative, 1e-15), longest: options.longest ?? Infinity, horizon: options.horizon});
@@ -268,7 +278,7 @@ function openMode(mode, options) {
   }
   return {
     data, M, n, m, y, values, fill, begin, broken, step, at, event, missed, singular, evaluate, call, output, matrix,
-    normalize, held, get time() { return field("t"); }, get begun() { return field("t_old"); },
+    normalize, held, moved, get time() { return field("t"); }, get begun() { return field("t_old"); },
     get statistics() { return ["steps", "failures", "evaluations"].map(field); },
   };
 }
@@ -296,15 +306,7 @@ function findStart(mode, start, t) {
     return {rows: chosen.map(i => rows[i]), off: chosen.map(off), which: chosen};
   }
 
-  function moved(q, step) {
-    if (!data.tangent) return q.map((x, i) => x - (step[i] ?? 0) * (sizes[i] ?? 0));
-    M.set(q, y);
-    M.fill(0, y + n, y + n + m);
-    mode.call("tangent", t, y, y + n);
-    const tangent = mode.matrix(mode.output("tangent", 1), data.tangent, n, sizes);
-    return normalize(q.map((x, i) => x - tangent[i].reduce((sum, one, j) => sum + one * step[j], 0)));
-  }
-
+  const moved = (q, step) => normalize(mode.moved(t, q, step, sizes));
   const still = new Float64Array(m);
   function solve(q, wanted) {
     for (let i = 0, last = Infinity; i < 60; i++) {
@@ -349,13 +351,93 @@ function findStart(mode, start, t) {
   for (let pass = 0; pass < 3 && (start.speeds.constraints || start.speeds.targets.length); pass++) improve(one => !one || one.fixed);
   const speeds = unmet("speeds", q, u);
   if (speeds) return {failed: speeds};
-  if (mode.M && mode.data.words.maximal) {
+  if (data.words.start_maximal) {
     M.set(q, y);
     M.set(u, y + n);
-    if (!mode.call("maximal", t, y, y + n)) return {failed: "the places of its bodies, which have no value"};
-    return {state: [...mode.output("maximal", 0), ...mode.output("maximal", 1)]};
+    if (!mode.call("start_maximal", t, y, y + n)) return {failed: "the places of its bodies, which have no value"};
+    return {state: [...mode.output("start_maximal", 0), ...mode.output("start_maximal", 1)]};
   }
   return {state: [...q, ...u]};
+}
+
+// Coordinates and speeds of all bodies in a state of a mode.
+function bodiesOf(mode, t, state) {
+  const {counts: [n], turns} = mode.data.passage;
+  if (!mode.data.words.maximal) return [state.slice(0, n), state.slice(n)];
+  mode.M.set(state, mode.y);
+  if (!mode.call("maximal", t)) return null;
+  const q = Float64Array.from(mode.output("maximal", 0));
+  for (const turn of turns) {
+    const length = Math.hypot(...turn.map(i => q[i]));
+    for (const i of turn) q[i] /= length;
+  }
+  return [q, Float64Array.from(mode.output("maximal", 1))];
+}
+
+// Velocities after a plastic impact: the nearest admissible ones in the metric of the masses; or what cannot be.
+function struck(mode, t, q, u) {
+  const {sizes, mass, slopes_of_constraints: place, refused, labels} = mode.data.passage, [n, m] = [q.length, u.length];
+  mode.M.set(q, mode.y);
+  mode.M.set(u, mode.y + n);
+  if (!mode.call("impact", t, mode.y, mode.y + n)) return {failed: "an impact, in which something has no value"};
+  const still = mode.output("impact", 6), masses = mode.matrix(mode.output("impact", 0), mass, m, sizes);
+  masses.forEach((row, i) => row.forEach((x, j) => { row[j] = x * sizes[i]; }));
+  const unit = Math.max(...masses.map(largest)) || 1, slopes = mode.matrix(mode.output("impact", 5), place, refused.length, sizes);
+  const units = slopes.map(row => largest(row) || 1), before = u.map((x, i) => x / sizes[i]);
+  const top = masses.map((row, i) => [...row.map(x => x / unit), ...slopes.map((one, k) => -one[i] / units[k])]);
+  const bottom = slopes.map((row, k) => [...row.map(x => x / units[k]), ...units.map(() => 0)]);
+  const right = masses.map(row => row.reduce((sum, x, j) => sum + x * before[j], 0) / unit);
+  const found = leastNorm([...top, ...bottom], [...right, ...units.map((one, k) => -still[k] / one)]);
+  const impulses = found.slice(m), most = largest(impulses);
+  const k = refused.findIndex((signs, i) => Math.abs(impulses[i] * unit) > 1e-9 * most * unit && signs.includes(Math.sign(impulses[i])));
+  if (k >= 0) return {failed: `an impact, in which ${labels[k]} would have to act against its one side`};
+  return {speeds: Float64Array.from(found.slice(0, m), (x, i) => x * sizes[i])};
+}
+
+// The state of a mode that gives coordinates and speeds of bodies, from a first guess of its coordinates.
+function stateOf(mode, t, guess, q, u) {
+  if (!mode.data.words.maximal) return {state: [...q, ...u]};
+  const {sizes, slopes, turned, turns, spins, along} = mode.data.passage, {M, y, n, m} = mode, own = mode.data.sizes;
+  for (const [i, k] of turned) guess[i] = q[k];
+  const signs = new Float64Array(q.length).fill(1), ones = new Array(m).fill(1);
+  const look = place => {
+    M.set(place, y);
+    M.fill(0, y + n, y + n + m);
+    if (!mode.call("maximal", t)) return null;
+    const found = Float64Array.from(mode.output("maximal", 0)), drift = Float64Array.from(mode.output("maximal", 1));
+    for (const turn of turns) {
+      const length = Math.hypot(...turn.map(i => found[i])), same = turn.reduce((sum, i) => sum + found[i] * q[i], 0);
+      for (const i of turn) [found[i], signs[i]] = [found[i] / length, same < 0 ? -1 : 1];
+    }
+    const rows = mode.matrix(mode.output("maximal", 2), slopes, sizes.length, own);
+    return {found, drift, rows: rows.map((row, i) => row.map(x => x / sizes[i]))};
+  };
+  // Displacements of bodies along their speeds: of quaternions twice the vector part of the turn, in axes of the body.
+  const apart = found => {
+    const off = new Array(sizes.length).fill(0);
+    for (const [i, j] of along) off[j] = found[i] - q[i];
+    turns.forEach((turn, k) => {
+      const [a, b, c, d] = turn.map(i => q[i]), [e, f, g, h] = turn.map(i => found[i] * signs[i]);
+      const turned = [a * f - b * e - c * h + d * g, a * g + b * h - c * e - d * f, a * h - b * g + c * f - d * e];
+      spins[k].forEach((j, axis) => { off[j] = 2 * turned[axis]; });
+    });
+    return off;
+  };
+  let place = mode.normalize(Float64Array.from(guess));
+  for (let i = 0, last = Infinity; i < 30; i++) {
+    const now = look(place);
+    if (!now) return {failed: "the new mode, in which something has no value"};
+    const step = leastNorm(now.rows, apart(now.found).map((x, k) => x / sizes[k])), far = largest(step);
+    place = mode.normalize(mode.moved(t, place, step));
+    if (far < 1e-15 || (far < 1e-11 && far >= last)) break;
+    last = far;
+  }
+  const now = look(place);
+  if (!now || !(largest(apart(now.found).map((x, k) => x / sizes[k])) <= HELD)) {
+    return {failed: "a change of mode, which would change a position at once"};
+  }
+  const speeds = leastNorm(now.rows, Array.from(u, (x, i) => (x - now.drift[i]) / sizes[i]));
+  return {state: [...place, ...Array.from(speeds, (x, j) => x * own[j])]};
 }
 
 function createEngine(model, options = {}) {
@@ -363,10 +445,10 @@ function createEngine(model, options = {}) {
   const settings = {...options, rtol: options.rtol ?? 1e-8, horizon: span > 0 ? span : 1};
   const modes = model.modes.map(one => openMode(one, settings));
   const parameters = data.parameters.map(one => ({...one})), starts = data.starts.map(one => ({...one}));
-  const paths = new Map(data.quantities.map((one, i) => [one.path, i]));
+  const numbers = modes.map(one => new Map(one.data.paths.map((path, i) => [path, i])));
   const first = {parameters: parameters.map(one => one.value), starts: starts.map(one => one.value)};
   let mode = modes[0], time = data.start_time, state = Float64Array.from(mode.data.state), now = status("ready");
-  let events = [], started = false, evaluated = false, coming = null, searched = time, began = time;
+  let events = [], started = false, evaluated = false, coming = null, searched = time, began = time, changes = 0, changed = -Infinity;
 
   const say = (code, text, t = time) => (now = status(code, text && `at t = ${shown(t)} s ${text}`));
 
@@ -399,7 +481,42 @@ function createEngine(model, options = {}) {
   function happen(i) {
     const {part, law, message, target} = mode.data.events[i];
     events.push({time, part, law, message, target});
-    return target === "stop" ? say("stopped", `${part}: ${message}`) : say("ready", "");
+    if (target === "stop") return say("stopped", `${part}: ${message}`);
+    return target ? enter(mode.data.events[i]) : say("ready", "");
+  }
+
+  // Go on in the mode that an event leads to.
+  function enter({part, message, target, impact}) {
+    const modesThen = {...mode.data.modes, [part]: target}, t = time;
+    const after = modes.find(one => Object.entries(modesThen).every(([key, is]) => one.data.modes[key] === is));
+    if (!after) return say("stopped", `${part}: ${message}; the motion after that is not in this page`);
+    [changes, changed] = [t - changed <= 1e-9 * settings.horizon ? changes + 1 : 0, t];
+    if (changes > 50) return say("failed", `${part} changes its mode endlessly`);
+    const whole = bodiesOf(mode, t, state), named = new Map(mode.data.coordinates.map((one, i) => [one.name, state[i]]));
+    if (!whole) return say("failed", "the bodies have no place");
+    const own = numbers[modes.indexOf(mode)];
+    const guess = after.data.coordinates.map(({name}, i) => named.get(name) ?? (own.has(name) ? value(name) : after.data.passage.reference[i]));
+    let [q, u] = whole;
+    mode = after;
+    inPiece(t);
+    if (impact) {
+      const hit = struck(mode, t, q, u);
+      if (hit.failed) return say("failed", hit.failed);
+      u = hit.speeds;
+    }
+    const found = stateOf(mode, t, guess, q, u);
+    if (found.failed) return say("failed", found.failed);
+    const said = begin(t, found.state);
+    return said.code === "ready" && !sided() ? say("failed", "parts have changed sides on their line") : said;
+  }
+
+  // Whether parts on a line are on the sides of each other that their equations were made for.
+  function sided() {
+    if (!mode.data.passage?.signs.length) return true;
+    evaluate();
+    const at = mode.output("places", 1), {line} = data;
+    const place = k => line.reduce((sum, x, j) => sum + x * at[3 * k + j], 0);
+    return mode.data.passage.signs.every(([a, b, sign]) => (place(b) - place(a)) * sign >= -1e-9 * mode.data.sizes[0]);
   }
 
   function apply() {
@@ -508,8 +625,8 @@ function createEngine(model, options = {}) {
   }
 
   function value(path) {
-    const i = paths.get(path);
-    if (i === undefined) throw new Error(`${path}: ${data.unknown[path] ?? `there is no such quantity${near(path, [...paths.keys()])}`}`);
+    const known = numbers[modes.indexOf(mode)], i = known.get(path);
+    if (i === undefined) throw new Error(`${path}: ${data.unknown[path] ?? `there is no such quantity${near(path, [...known.keys()])}`}`);
     evaluate();
     return mode.output("quantities", 0)[i];
   }

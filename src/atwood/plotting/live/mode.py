@@ -120,13 +120,15 @@ class ModeText:
     def _add_quantities(self, paths: Sequence[str] | None) -> None:
         """Add the program of quantities and energies."""
         symbols = [one.symbol for one in self.assembly.reactions]
-        found = find_observables(self.assembly, list(self.assembly.observables) if paths is None else paths)
+        every = self.assembly.observables
+        found = find_observables(self.assembly, list(every) if paths is None else paths)
         reading = {one.path for one in found if symbols and depends_on([one.value], symbols)}
         self.unknown = dict.fromkeys(sorted(reading), "it reads reactions, which pages do not solve for")
         self.known = [one for one in found if one.path not in reading]
         of = {"quantities": [one.value for one in self.known]}
         of["energies"] = list(energies(self.assembly.mechanism, self.equations))
         self.of_state("quantities", of, self.equations.accelerations)
+        self.data["paths"] = [one.path for one in self.known]
 
     def _add_pictures(self) -> None:
         """Add the program of where bodies and nodes are."""
@@ -174,8 +176,8 @@ class ModeText:
         probe = EventProbe(self.plan, t, q, u, 1e-12)
         self.data["events"] = []
         for one in probe.event_functions:
-            if one.target not in ("", "stop") or one.is_there is not None:
-                raise NotLiveError(f"{one.part}.{one.law} leads to another mode, which pages do not enter yet")
+            if one.is_there is not None:
+                raise NotLiveError(f"{one.part}.{one.law} is an event with a condition, which pages do not read")
         if not probe.event_functions:
             return
         program = probe.program()

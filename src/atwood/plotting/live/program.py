@@ -28,6 +28,7 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import assembly_of
 from atwood.plotting.live.mode import ModeText, NotLiveError, bodies_of
+from atwood.plotting.live.modes import add_modes
 from atwood.plotting.live.parameters import live_parameters, with_sliders
 from atwood.plotting.live.start import add_start, add_tangent
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
@@ -117,8 +118,9 @@ def live_program(
         plan, y = _prepared(assembly, start)
         mode = ModeText(plan, y, quantities)
         data = _data(mode, start)
-        body = mode.text()
-        text = f"{{data: {_json(data)},\nmodes: [{{data: {_json(mode.data)},\nopen: {body}}}]}}"
+        modes = [(one.text(), one.data) for one in add_modes(mode, start, quantities)]
+        texts = ", ".join(f"{{data: {_json(own)},\nopen: {text}}}" for text, own in modes)
+        text = f"{{data: {_json(data)},\nmodes: [{texts}]}}"
         return LiveProgram(assembly.flat.name, assembly.form, "", text, data)
     except NotLiveError as error:
         return LiveProgram(assembly.flat.name, assembly.form, error.message)
@@ -163,6 +165,7 @@ def _data(mode: ModeText, start: Start) -> dict[str, Any]:
         "parameters": live_parameters(mode.assembly),
         "starts": [{name: one[name] for name in ("path", "value", "unit", "fixed")} for one in said if one["settable"]],
         "start": begins,
+        "line": [float(x) for x in mode.assembly.mechanism.space.line or ()],
         "quantities": [{name: getattr(one, name) for name in _OF_QUANTITIES} for one in mode.known],
         "unknown": mode.unknown,
         **bodies_of(mode),

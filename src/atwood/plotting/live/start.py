@@ -49,7 +49,7 @@ def add_start(mode: ModeText, start: Start) -> dict[str, Any] | None:
             "slopes": [rows, columns],
         }
     if assembly.form == "dae":
-        mode.programs["maximal"] = to_maximal(assembly, "regular")
+        mode.programs["start_maximal"] = to_maximal(assembly, "regular")
     return data
 
 

@@ -105,17 +105,17 @@ def plastic_impact(
     velocities, impulses = _solve_impact(now, u, sizes, balance.row_scales(now, t, q, sizes))
     size = float(np.max(np.abs(impulses), initial=0.0))
     for one, impulse in zip(after.maximal.constraints, impulses, strict=True):
-        refusing = _refusing(after, one, state, one.sign * impulse) if abs(impulse) > 1e-9 * size else None
-        if refusing is not None:
+        refused_by = refusing(after, one, state, one.sign * impulse) if abs(impulse) > 1e-9 * size else None
+        if refused_by is not None:
             error = LetsGo(
                 f"at t = {t:.6g} the impact ({event.message}, {event.part}) needs an impulse of the sign that "
                 "this one-sided constraint cannot transmit: a rope would have to push",
                 where=one.key[0],
                 advice="Simultaneous impacts of several one-sided constraints, some of which open, are not supported.",
             )
-            if refusing.target in ("", UPDATE):
+            if refused_by.target in ("", UPDATE):
                 raise SolveError(error.message, where=error.where, advice=error.advice)
-            error.event = EventRecord(t, refusing.part, refusing.law, refusing.message, refusing.target, False)
+            error.event = EventRecord(t, refused_by.part, refused_by.law, refused_by.message, refused_by.target, False)
             raise error
     return velocities
 
@@ -124,7 +124,7 @@ _SIZES = (1e-9, 1e9)
 """Between these, beside the impulses, lies any force that an event could compare a reaction with."""
 
 
-def _refusing(
+def refusing(
     after: Assembly, constraint: Constraint, state: tuple[float, FloatArray, FloatArray], impulse: float
 ) -> EventFunction | None:
     """Return the event of its part that lets go of a constraint for a reaction of this sign, however small or large.
@@ -197,7 +197,7 @@ def generalized_state(
     """Return the generalized coordinates and speeds, with quaternions, that give the same maximal ones."""
     equations = after.regular
     reduced_map, maximal_map = kinematic_map_of(after, "regular"), kinematic_map_of(after, "dae")
-    program, rows, columns = _maximal_places(after)
+    program, rows, columns = maximal_places(after)
     kernel = after.kernel(program)
     names = tuple(c.name for c in equations.names)
     known = [name for name in names if name in before.observables]
@@ -229,14 +229,14 @@ def generalized_state(
 
 def generalized_speeds(after: Assembly, t: float, q: FloatArray, speeds: FloatArray, sizes: FloatArray) -> FloatArray:
     """Return the generalized speeds, with quaternions, that give the same speeds in maximal coordinates."""
-    program, rows, columns = _maximal_places(after)
+    program, rows, columns = maximal_places(after)
     still = np.zeros(len(after.regular.speeds))
     matrix = np.zeros((len(sizes), len(still)))
     _, explicit_rate, matrix[rows, columns] = after.kernel(program)([t], q, still)
     return least_norm(matrix / sizes[:, None], (speeds - np.asarray(explicit_rate)) / sizes)
 
 
-def _maximal_places(after: Assembly) -> tuple[Program, tuple[int, ...], tuple[int, ...]]:
+def maximal_places(after: Assembly) -> tuple[Program, tuple[int, ...], tuple[int, ...]]:
     """Return the program that gives maximal coordinates, their speeds, the Jacobian of these, and its pattern.
 
     Speeds of bodies change with generalized speeds as their places do with displacements along these.

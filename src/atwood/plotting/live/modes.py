@@ -1,0 +1,130 @@
+"""The modes that a scene can get into, each with programs of its own, and how a state passes from one to another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.errors import AtwoodError
+from atwood.forms.assembly import Assembly
+from atwood.pipeline import simulate
+from atwood.plotting.live.mode import ModeText, NotLiveError, bodies_of, nodes_of
+from atwood.plotting.live.start import add_tangent
+from atwood.simulation.dynamics.kinematic_map import reference_coordinates
+from atwood.simulation.dynamics.reactions import maximal_state
+from atwood.simulation.dynamics.scales import motion_scales
+from atwood.simulation.events.mode_change import maximal_places, refusing
+from atwood.simulation.initialization.start import Start, actual_line_signs, find_start, settle
+from atwood.simulation.problem.preparation import problem_of_run
+from atwood.simulation.problem.problem import SceneProblem
+
+_MOST = 16
+"""So many modes are prepared; what leads to another one ends the motion of a page."""
+
+Modes = tuple[tuple[str, str], ...]
+
+
+def add_modes(first: ModeText, start: Start, quantities: Sequence[str] | None) -> list[ModeText]:
+    """Return the modes that events lead to, the first among them, with what passes a state between them."""
+    found = {_key(first.assembly.modes): first}
+    waiting = [first]
+    met: dict[Modes, tuple[SceneProblem, FloatArray]] | None = None
+    while waiting and len(found) < _MOST:
+        for modes in _ahead(waiting.pop(0)):
+            if _key(modes) in found or len(found) >= _MOST:
+                continue
+            met = _met(first.assembly) if met is None else met
+            state = met.get(_key(modes)) or _started(first, start, modes)
+            if state is None or not len(state[1]):  # nothing is free to move there
+                continue
+            made = found[_key(modes)] = ModeText(*state, quantities)
+            if bodies_of(made) != bodies_of(first):
+                raise NotLiveError("its parts make other bodies in other modes, which pages do not draw")
+            waiting.append(made)
+    every = list(found.values())
+    for one in every if len(every) > 1 else ():
+        if one is not first:
+            add_tangent(one)
+        _add_passage(one, start.length)
+    return every
+
+
+def _key(modes: Mapping[str, str]) -> Modes:
+    return tuple(sorted(modes.items()))
+
+
+def _ahead(mode: ModeText) -> Iterator[dict[str, str]]:
+    """Yield the modes that events of a mode lead to."""
+    for one in mode.data["events"]:
+        if one["target"] not in ("", "stop"):
+            yield {**mode.assembly.modes, one["part"]: one["target"]}
+
+
+def _met(assembly: Assembly) -> dict[Modes, tuple[SceneProblem, FloatArray]]:
+    """Return the modes that a run of the scene gets into, each with a state there."""
+    try:
+        segments = simulate(assembly).run.segments
+    except AtwoodError as error:
+        segments = getattr(getattr(error, "run", None), "segments", ())
+    states = ((one.plan, np.concatenate([one.coordinates[:, 0], one.speeds[:, 0]])) for one in segments)
+    return {_key(plan.assembly.modes): (plan, y) for plan, y in reversed(list(states))}
+
+
+def _started(first: ModeText, start: Start, modes: Mapping[str, str]) -> tuple[SceneProblem, FloatArray] | None:
+    """Return a state of a mode in which no run has been: the start that the scene would have in it."""
+    assembly = first.assembly
+    q, u = first.plan.program.split(np.array(first.data["state"]))
+    signs = actual_line_signs(assembly, start.time, q, u, assembly.form)
+    try:
+        after = assembly.other_mode(modes, signs)
+        after, q, u = settle(after, find_start(after), after.other_mode)
+        plan = problem_of_run(after, start.time, q, u, start.length, after.flat.t_end - start.time)
+        plan.keep_better(start.time, q)
+    except AtwoodError:
+        return None
+    return plan, np.concatenate([q, u])
+
+
+def _add_passage(mode: ModeText, length: float) -> None:
+    """Add what takes a state into a mode through maximal coordinates, and velocities through an impact there."""
+    assembly, equations = mode.assembly, mode.assembly.own_equations
+    maximal, t = assembly.maximal, mode.flat.t_start
+    data: dict[str, Any] = {"sizes": motion_scales(maximal, length).tolist()}
+    data["reference"] = reference_coordinates(equations).tolist()
+    data["turned"] = []
+    if assembly.form == "reduced":
+        mode.programs["maximal"], rows, columns = maximal_places(assembly)
+        data["slopes"] = [list(rows), list(columns)]
+        bodies = {one.body: list(one.coordinates) for one in maximal.orientation_coordinates}
+        for one in equations.orientation_coordinates:
+            data["turned"] += zip(one.coordinates, bodies.get(one.body, ()), strict=False)
+    data["counts"] = [len(maximal.coordinates), len(maximal.speeds)]
+    data["turns"] = [list(one.coordinates) for one in maximal.orientation_coordinates]
+    data["spins"] = [list(one.speeds) for one in maximal.orientation_coordinates]
+    speeds = {symbol: j for j, symbol in enumerate(maximal.speeds)}
+    data["along"] = [(i, speeds[rate]) for i, rate in enumerate(maximal.rates) if rate in speeds]
+    balance = assembly.balance("dae")
+    mode.programs["impact"] = balance.program
+    data["mass"] = [balance.mass_rows.tolist(), balance.mass_columns.tolist()]
+    data["slopes_of_constraints"] = [balance.jacobian_rows.tolist(), balance.jacobian_columns.tolist()]
+    q, u = mode.plan.program.split(np.array(mode.data["state"]))
+    big_q, big_u = (one[:, 0] for one in maximal_state(assembly, np.array([t]), q[:, None], u[:, None]))
+    data["refused"] = [
+        [one.sign * sign for sign in (1.0, -1.0) if refusing(assembly, one, (t, big_q, big_u), sign) is not None]
+        for one in maximal.constraints
+    ]
+    data["labels"] = [one.label for one in maximal.constraints]
+    data["signs"] = list(_signs(mode))
+    mode.data["passage"] = data
+
+
+def _signs(mode: ModeText) -> Iterator[tuple[int, int, float]]:
+    """Yield pairs of nodes on a line, by their places, and on which side of the first the second is taken to be."""
+    order = {node: i for i, node in enumerate(nodes_of(mode))}
+    node_of = mode.assembly.mechanism.graph.node_of
+    for path, local in mode.assembly.mechanism.locals_.items():
+        for (a, b), sign in (local.binding.line_signs or {}).items():
+            yield order[node_of[path, a]], order[node_of[path, b]], sign
