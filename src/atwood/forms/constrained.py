@@ -15,16 +15,16 @@ A state is projected by the shortest displacement along the speeds, each measure
 from __future__ import annotations
 
 import heapq
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 
-from atwood.expr import Expression, OutputGroup, Program, jacobian, solve, substitute
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, jacobian, solve, substitute
 from atwood.forms.caches import derive_once
 from atwood.forms.program import rates_are_speeds, state_groups
 from atwood.forms.residuals import keep_constraints
 from atwood.lazy_dataclasses import dataclass, names_of
 from atwood.mechanics.dynamics.augmented import SymmetricSystem, back_substitute, eliminate, fill_of
-from atwood.mechanics.dynamics.equations import Constraint, Equations
+from atwood.mechanics.dynamics.equations import Constraint, ContactRow, Equations
 
 _LARGEST_FILL = 60_000
 """More products than these are left to a loop when the program runs."""
@@ -36,6 +36,7 @@ _NOT_READ = ("locals_", "site", "masses", "shapes", "decisions", "constants")
 """What equations were made of; their derivation reads what was made."""
 
 Place = tuple[int, int]
+_Slopes = dict[int, Expression]
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,24 +90,78 @@ def constrained_program(
     )
 
 
-def _accelerations(
-    equations: Equations, rows: Sequence[Expression], sizes: Sequence[Expression], light: Sequence[int]
-) -> list[Expression]:
-    n, constraints = len(equations.speeds), equations.constraints
-    at_rest = dict.fromkeys(equations.accelerations, 0.0)
+def impact_program(
+    name: str,
+    equations: Equations,
+    rows: Sequence[Expression],
+    gaps: Sequence[ContactRow],
+    parameters: Sequence[Expression],
+    kept: Sequence[int],
+    light: Sequence[int],
+) -> Program:
+    """Return the program of what an impact at one gap alone makes of a state, by Newton's law and without friction.
+
+    Its inputs are (t, q, u, pick), the last 1 for the gap and 0 for the others; its outputs are coordinates, with the
+    gap closed to rounding, and speeds, the rates of all gaps before and after, how these move by a unit of impulse, and
+    the impulse. Its parameters are those of `ConstrainedProgram`.
+    """
+    graph, held = equations.graph, keep_constraints(equations, kept)
+    sizes = tuple(graph.symbol(f"size of {one.name}") for one in equations.speed_names)
+    picks = tuple(graph.symbol(f"pick of gap {i}") for i in range(len(gaps)))
+    slopes = _slopes(equations, [one.row for one in gaps])
+
+    def picked(values: Iterable[Expression | None]) -> Expression:
+        terms = (pick * value for pick, value in zip(picks, values, strict=True) if value is not None)
+        return sum(terms, graph.zero)
+
+    push = [-picked(row.get(i, graph.zero) for row in slopes) for i in range(len(equations.speeds))]
+    by_unit = _balanced(*_masses(held, rows), push, [graph.zero] * len(held.constraints), sizes, light)
+    response = [sum((entry * by_unit[i] for i, entry in row.items()), graph.zero) for row in slopes]
+    before = [one.row.rate for one in gaps]
+    back = picked(response)
+    impulse = -(1.0 + picked(one.restitution for one in gaps)) * picked(before) / back
+    share = -picked(one.row.value for one in gaps) / back
+    coordinates = _moved(equations, [share * one for one in by_unit])
+    speeds = [u + impulse * one for u, one in zip(equations.speeds, by_unit, strict=True)]
+    after = [rate + impulse * one for rate, one in zip(before, response, strict=True)]
+    found = (*coordinates, *speeds, *before, *after, *response, impulse)
+    groups = (*state_groups(equations), InputGroup("pick", picks))
+    return Program(f"{name} (impact)", groups, (*parameters, *sizes), (OutputGroup("impact", found),))
+
+
+def _masses(equations: Equations, rows: Sequence[Expression]) -> tuple[dict[Place, Expression], list[_Slopes]]:
+    """Return the entries of the mass matrix, and the rows of the constraint Jacobian."""
     mass = jacobian(list(rows), list(equations.accelerations))
-    entries = {(r, c): e for r, c, e in mass.triples if r <= c}
-    slopes = _slopes(equations, constraints)
-    bias = substitute(list(rows), at_rest)
-    gamma = substitute([one.second for one in constraints], at_rest)
-    bare = set(light)
+    return {(r, c): e for r, c, e in mass.triples if r <= c}, _slopes(equations, equations.constraints)
+
+
+def _balanced(
+    entries: dict[Place, Expression],
+    slopes: Sequence[_Slopes],
+    bias: list[Expression],
+    gamma: Sequence[Expression],
+    sizes: Sequence[Expression],
+    light: Sequence[int],
+) -> list[Expression]:
+    """Return the accelerations of ``M a - G^T lambda = -bias``, ``G a = -gamma``."""
+    n, bare = len(bias), set(light)
     carrying = [k for k, row in enumerate(slopes) if not bare.isdisjoint(row)]
     if carrying:
         bias = _stiffen(entries, bias, [slopes[k] for k in carrying], [gamma[k] for k in carrying], sizes)
     places = {(c, n + k): e for k, row in enumerate(slopes) for c, e in row.items()}
     right = [-one for one in (*bias, *gamma)]
-    signs = [1] * n + [-1] * len(constraints)
-    found = _solved(SymmetricSystem({**entries, **places}, right, signs))[:n]
+    signs = [1] * n + [-1] * len(slopes)
+    return _solved(SymmetricSystem({**entries, **places}, right, signs))[:n]
+
+
+def _accelerations(
+    equations: Equations, rows: Sequence[Expression], sizes: Sequence[Expression], light: Sequence[int]
+) -> list[Expression]:
+    at_rest = dict.fromkeys(equations.accelerations, 0.0)
+    balance = _masses(equations, rows)
+    bias = substitute(list(rows), at_rest)
+    gamma = substitute([one.second for one in equations.constraints], at_rest)
+    found = _balanced(*balance, bias, gamma, sizes, light)
     return _without_rounding(equations, found, sizes) if equations.contacts else found
 
 
@@ -124,10 +179,10 @@ def _without_rounding(
     return [a - one * size for a, one, size in zip(accelerations, changed, sizes, strict=True)]
 
 
-def _slopes(equations: Equations, rows: Sequence[Constraint]) -> list[dict[int, Expression]]:
+def _slopes(equations: Equations, rows: Sequence[Constraint]) -> list[_Slopes]:
     """Return the rows of the constraint Jacobian by column."""
     found = jacobian([one.rate for one in rows], list(equations.speeds))
-    slopes: list[dict[int, Expression]] = [{} for _ in rows]
+    slopes: list[_Slopes] = [{} for _ in rows]
     for row, column, entry in found.triples:
         if not entry.is_zero:
             slopes[row][column] = entry

@@ -46,7 +46,8 @@ FOUND, NO_STATE, NO_VALUE = 1, 2, 3
 """How a search ends that finds an event, cannot read a state, or an event function."""
 
 _PLACES = {name: k for k, name in enumerate(FIELDS)}
-_FILES = ("codegen/tangents.py", *(f"integrators/{name}.py" for name in ("compiled_location", "event_location")))
+_OWN = ("compiled_location", "event_location", "protocol")
+_FILES = ("codegen/tangents.py", *(f"integrators/{name}.py" for name in _OWN))
 _SEARCH = ctypes.CFUNCTYPE(c_int, c_void_p, c_double, c_double)
 _RESTART = ctypes.CFUNCTYPE(c_int, c_void_p, c_double)
 
@@ -70,6 +71,11 @@ class CompiledLocator(EventLocator):
         The addresses of a function ``int (void *session, double t, double *y, double *yp)`` and of its session.
     horizon, signs
         As of `EventLocator`.
+
+    Attributes
+    ----------
+    place, functions
+        The addresses of its memory, and of the routines that search and start anew.
     """
 
     def __init__(
@@ -90,20 +96,20 @@ class CompiledLocator(EventLocator):
         self._rows = memory[rows : rows + len(ROWS) * count].reshape(len(ROWS), count)
         self._row("direction")[:] = problem.event_directions or 0.0
         self._row("rough")[list(problem.event_rough)] = 1.0
-        self._place = begin = memory.ctypes.data
+        self.place = begin = memory.ctypes.data
         arrays = {name: begin + 8 * (len(FIELDS) + k * size) for k, name in enumerate(("y", "yp", "shifted", "turns"))}
         self._set(interpolate=interpolation[0], session=interpolation[1], events=events.plain, data=events.address)
         self._set(**arrays, rows=begin + 8 * rows, size=size, count=count)
         self._keep = events
         addresses = _routines().code.addresses
-        self._search, self._restart = _SEARCH(addresses["search"]), _RESTART(addresses["restart"])
+        self.functions = addresses["search"], addresses["restart"]
+        self._search, self._restart = _SEARCH(self.functions[0]), _RESTART(self.functions[1])
         self.begin(horizon, signs)
 
     def begin(self, horizon: float, signs: tuple[int, ...] | None) -> None:
         """Begin another run, as a new locator would."""
         self._given = self._own if signs is None else signs
         self._row("sign")[:] = self._row("fired")[:] = 0.0
-        self.evaluations = 0
         self._set(moment=100 * ROUNDING * horizon, fired_at=nan, settling=1, evaluations=0)
 
     def _row(self, name: str) -> FloatArray:
@@ -120,6 +126,11 @@ class CompiledLocator(EventLocator):
         return self._row("sign")
 
     @property
+    def evaluations(self) -> int:
+        """How often events have been evaluated."""
+        return int(self._integers[_PLACES["evaluations"]])
+
+    @property
     def is_settling(self) -> bool:
         """Whether nothing is known yet of the first step after a restart."""
         return bool(self._integers[_PLACES["settling"]])
@@ -129,7 +140,7 @@ class CompiledLocator(EventLocator):
         given, self._given = self._given, ()
         self._row("given")[:] = given or self.handed_on(state[0])
         self._set(is_first=int(bool(given)))
-        self._checked(self._restart(self._place, state[0]))
+        self._checked(self._restart(self.place, state[0]))
 
     def handed_on(self, t: float, ahead: Root | None = None) -> tuple[int, ...]:
         """Return what a start at a time is to know of each event: its sign, or that it has just happened."""
@@ -140,15 +151,23 @@ class CompiledLocator(EventLocator):
 
     def search(self, begin: float, end: float, at: Interpolant) -> Root | None:
         """Return the first root between two times of the last step, or `None`."""
-        if not self._checked(self._search(self._place, begin, end)):
+        return self.found(self._search(self.place, begin, end))
+
+    @property
+    def last(self) -> float:
+        """The time of the event that was found last."""
+        return float(self._numbers[_PLACES["root"]])
+
+    def found(self, code: int) -> Root | None:
+        """Return what a search has found that ended so."""
+        if not self._checked(code):
             return None
         y, yp = self._state
-        state = float(self._numbers[_PLACES["root"]]), y.copy(), yp.copy()
+        state = self.last, y.copy(), yp.copy()
         return Root(state, tuple(_whole(self._row("found"))))
 
     def _checked(self, code: int) -> int:
         """Return a code, or raise what it says."""
-        self.evaluations = int(self._integers[_PLACES["evaluations"]])
         if code in (NO_STATE, NO_VALUE):
             time, bad = self._numbers[_PLACES["root"]], int(self._integers[_PLACES["bad"]])
             what = (

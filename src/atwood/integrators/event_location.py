@@ -153,7 +153,12 @@ class EventLocator:
         self._blind = [-inf] * problem.event_count  # until when its value is not looked at
         self._last: Point | None = None
         self._known: dict[float, list[float]] = {}  # values at the times that were read
-        self.evaluations = 0
+        self._evaluations = 0
+
+    @property
+    def evaluations(self) -> int:
+        """How often events have been evaluated."""
+        return self._evaluations
 
     @property
     def signs(self) -> FloatArray:
@@ -230,14 +235,14 @@ class EventLocator:
                 others = _listed(self._function(t, y + size * turn(1.0 + 2.4 * np.arange(len(y))), yp))
             except ArithmeticError:
                 continue
-            self.evaluations += 1
+            self._evaluations += 1
             least = [max(m, NOISE * abs(b - a)) for m, a, b in zip(least, values, others, strict=True)]
         return least
 
     def _values(self, state: State) -> list[float]:
         if (known := self._known.get(state[0])) is not None:
             return known
-        self.evaluations += 1
+        self._evaluations += 1
         try:
             values = _listed(self._function(*state))
         except ArithmeticError as error:
@@ -250,7 +255,7 @@ class EventLocator:
 
     def _nothing_changed(self, state: State) -> bool:
         """Tell quickly, for the many steps without events, that all signs are still the same."""
-        self.evaluations += 1
+        self._evaluations += 1
         try:
             values = self._function(*state)
         except ArithmeticError:
@@ -333,7 +338,7 @@ class EventLocator:
         """Return values and slopes, the latter over a small part of a width that begins at the state."""
         t, y, yp = state
         values, past = self._values(state), SECANT * width
-        self.evaluations += 1
+        self._evaluations += 1
         try:
             others = _listed(self._function(t + past, y + past * yp, yp))
         except ArithmeticError:

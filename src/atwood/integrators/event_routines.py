@@ -28,7 +28,7 @@ from atwood.integrators.event_location import FARTHER, HALF, LARGEST, MOST, NOIS
 from atwood.integrators.protocol import JUST_HAPPENED
 
 
-class _Search(Record):
+class Search(Record):
     """The memory of a search within a routine."""
 
     def row(self, name: str) -> Value:
@@ -49,9 +49,9 @@ class _Search(Record):
 
 def _open(
     name: str, more: Mapping[str, Kind] | None = None, result: Kind = CODE, exported: bool = False
-) -> tuple[Routine, _Search, list[Value]]:
+) -> tuple[Routine, Search, list[Value]]:
     routine = Routine(name, {"place": ADDRESS, **(more or {})}, result, exported)
-    return routine, _Search(routine.arguments[0], FIELDS), routine.arguments[1:]
+    return routine, Search(routine.arguments[0], FIELDS), routine.arguments[1:]
 
 
 def _do(r: Routine, name: str, *arguments: Operand) -> None:
@@ -69,7 +69,7 @@ def _flag(r: Routine, condition: Value) -> Value:
     return r.choose(condition, 1.0, 0.0)
 
 
-def _values(r: Routine, m: _Search, time: Value, state: Value, target: str) -> None:
+def _values(r: Routine, m: Search, time: Value, state: Value, target: str) -> None:
     m.evaluations = m.evaluations + 1
     r.call(m.events, time, state, m.yp, m.row(target), m.data)
 
@@ -283,7 +283,7 @@ def _narrow() -> Routine:
     return r
 
 
-def _guess(r: Routine, m: _Search, last: Value, lower: Value, upper: Value, crossed: Value) -> Value:
+def _guess(r: Routine, m: Search, last: Value, lower: Value, upper: Value, crossed: Value) -> Value:
     """Return the share of the earliest zero of the chords of the event functions that have passed zero at the end."""
     least = r.variable(1.0)
     r.call("crossings", r.arguments[0], last, upper, crossed)
@@ -293,7 +293,7 @@ def _guess(r: Routine, m: _Search, last: Value, lower: Value, upper: Value, cros
     return least.now
 
 
-def _learn(r: Routine, m: _Search, time: Value) -> None:
+def _learn(r: Routine, m: Search, time: Value) -> None:
     """Take the signs of all values that have one."""
     sign, blind, known = m.row("sign"), m.row("blind"), m.row("known")
     with r.count(m.count) as i, r.when((time > blind[i]) & (known[i] != 0.0)):
@@ -395,7 +395,7 @@ def _search() -> Routine:
     return r
 
 
-def _any(r: Routine, m: _Search, row: Value, some: Variable) -> None:
+def _any(r: Routine, m: Search, row: Value, some: Variable) -> None:
     with r.count(m.count) as i:
         some.now = some.now | (row[i] != 0.0)
 

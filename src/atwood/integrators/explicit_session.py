@@ -14,8 +14,9 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import StartError, UsageError
-from atwood.integrators.compiled_location import CompiledLocator
-from atwood.integrators.event_location import ROUNDING, EventLocator
+from atwood.integrators.compiled_location import FOUND, CompiledLocator
+from atwood.integrators.event_location import ROUNDING, EventLocator, Root
+from atwood.integrators.jumps import Jump
 from atwood.integrators.protocol import (
     Budget,
     ExplicitProblem,
@@ -85,7 +86,7 @@ class ExplicitSession(SteppingSession):
         super().__init__(problem, options.horizon, budget)
         if on_stiff is not None:
             stepper.watch_stiffness()
-        self._is_watched = False
+        self._is_watched, self._jumps = False, problem.jumps
         self._chunk = max(1, FIRST_CHUNK // problem.size)
         self._begin(t, y, on_stiff, end)
 
@@ -93,7 +94,36 @@ class ExplicitSession(SteppingSession):
         """Start a run that has cost nothing so far."""
         self._end = end
         self._on_stiff, self._judged, self._is_left = on_stiff, 0, False
+        self._leaps = False
         self.reinitialize(t, y)
+        if self._compiled is not None and self._jumps is not None:
+            self._leaps = self._stepper.leap(self._compiled, self._jumps, end)
+
+    def take_jumps(self) -> list[Jump]:
+        """Return the jumps since this was last asked, in order."""
+        made = [] if self._jumps is None else self._jumps.take()
+        self._starts += len(made)
+        return made
+
+    @property
+    def handed_on(self) -> tuple[int, ...]:
+        """What a start from here is to know of the events; see `EventLocator.handed_on`."""
+        if self._stepper.waits and self._compiled is not None:
+            return self._compiled.handed_on(self._here[0], self._compiled.found(FOUND))
+        return super().handed_on
+
+    def _find_root(self, t_out: float = inf) -> Root | None:
+        """Return the first root in the part of the last step that has not been handed out; jumps before are made."""
+        located = self._compiled
+        while located is not None and self._stepper.waits:
+            if t_out < located.last:
+                return None
+            self._take(t_out, 0)
+        code = self._stepper.take_event() if self._root is None else None
+        if located is not None and code is not None:
+            self._root = located.found(code)
+            self._searched = self._reached if self._root is None else self._root.state[0]
+        return super()._find_root(t_out)
 
     def begin_again(
         self,
@@ -127,6 +157,7 @@ class ExplicitSession(SteppingSession):
     def set_monitor(self, monitor: StepMonitor) -> bool:
         """Let the motion be looked at, and end with `Status.NOTICED` where something is seen; return whether it can."""
         self._is_watched = self._stepper.set_monitor(monitor)
+        self._leaps = self._leaps and not self._is_watched
         return self._is_watched
 
     @property
@@ -198,11 +229,11 @@ class ExplicitSession(SteppingSession):
 
         def fill() -> None:
             nonlocal filled
-            while filled < len(times) and self._find_root() is None:
+            while filled < len(times) and (self._stepper.waits or self._find_root() is None):
                 is_ahead = times[-1] > self._newest[0]
                 if is_ahead and self._limit() is not None:
                     break
-                if is_ahead and self._locator is not None and self._locator.is_settling:
+                if is_ahead and self._locator is not None and self._locator.is_settling and not self._leaps:
                     outcome = self._take(float(times[-1]), 1)
                 else:
                     count, outcome = self._fill(times[filled:], values[filled:], rates[filled:])
@@ -224,6 +255,7 @@ class ExplicitSession(SteppingSession):
         self._take_up(outcome)
         if count:
             self._here = (float(times[count - 1]), y[-1].copy(), yp[-1].copy())
+        self._pass_jumps()
         return count, outcome
 
     def _take(self, t_out: float, steps: int) -> Outcome:
@@ -233,7 +265,15 @@ class ExplicitSession(SteppingSession):
         outcome = self._stepper.run(t_out, steps)
         self._learn(time.perf_counter() - looked, outcome)
         self._take_up(outcome)
+        self._pass_jumps()
         return outcome
+
+    def _pass_jumps(self) -> None:
+        """Stand behind the last jump: a run that is stopped ends no earlier."""
+        if self._leaps and self._jumps is not None:
+            t, y = self._jumps.last
+            if t > self._here[0]:
+                self._here = t, y, np.array(self._problem.rates(t, y))
 
     def _tell_signs(self) -> None:
         if self._notices and self._locator is not None:
@@ -245,7 +285,7 @@ class ExplicitSession(SteppingSession):
         self._newest = self._stepper.state()
         self._reached = min(self._newest[0], self._end)
         self._sees = self._sees or (self._is_watched and self._stepper.has_noticed())
-        if self._locator is None:
+        if self._locator is None or self._leaps:
             self._searched = self._newest[0]
         elif self._notices and self._newest[0] > before and not self._locator.is_settling:
             last = self._newest[0] if outcome is not Outcome.NOTICED else self._stepper.begin_of_step()
@@ -267,7 +307,8 @@ class ExplicitSession(SteppingSession):
     def _allowed(self) -> int:
         """Return how many steps may be taken before the next look at limits and events."""
         locator = self._locator
-        if self.budget.poll is not None or (locator is not None and (not self._notices or locator.is_settling)):
+        settles = locator is not None and locator.is_settling and not self._leaps
+        if self.budget.poll is not None or (locator is not None and not self._notices) or settles:
             return 1
         if self.budget.max_steps is None:
             return self._chunk

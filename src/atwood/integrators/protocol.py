@@ -27,6 +27,7 @@ from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventData
+    from atwood.integrators.jumps import Jumps
     from atwood.numerics.fixed_pivots import FixedPivots
 
 State: TypeAlias = tuple[float, FloatArray, FloatArray]
@@ -480,6 +481,8 @@ class ExplicitProblem:
         are none.
     guard
         What judges steps besides their error; None where there is nothing to be missed.
+    jumps
+        What is done at some of the compiled events without Python; None where nothing is.
     """
 
     size: int
@@ -493,6 +496,7 @@ class ExplicitProblem:
     compiled_events: EventData | None = None
     project: Callable[[float, FloatArray], Values] | None = None
     guard: StepGuard | None = None
+    jumps: Jumps | None = None
 
     def __post_init__(self) -> None:
         _check_watch(self)

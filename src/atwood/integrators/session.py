@@ -13,6 +13,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, UsageError
 from atwood.integrators.event_location import EventLocator, Root
+from atwood.integrators.jumps import Jump
 from atwood.integrators.protocol import (
     Budget,
     ExplicitProblem,
@@ -86,6 +87,10 @@ class Session(ABC):
         It is what single advances would give, without their looks at what cannot have changed.
         """
         return np.empty((0, len(self._here[1])))
+
+    def take_jumps(self) -> list[Jump]:
+        """Return the jumps that were made without stopping since this was last asked, in order."""
+        return []
 
     def set_monitor(self, monitor: StepMonitor) -> bool:
         """Let the motion be looked at, and end with `Status.NOTICED` where something is seen; return whether it can."""

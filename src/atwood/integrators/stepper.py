@@ -26,6 +26,8 @@ from atwood.lazy_dataclasses import dataclass, names_of
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventData
     from atwood.integrators.batch import BatchPlaces
+    from atwood.integrators.compiled_location import CompiledLocator
+    from atwood.integrators.jumps import Jumps
 
 
 class Outcome(IntEnum):
@@ -103,6 +105,19 @@ class Stepper(ABC):
 
         It calls nothing in Python.
         """
+        return None
+
+    def leap(self, locator: CompiledLocator, jumps: Jumps, last: float) -> bool:
+        """Locate events without Python, up to a last time, and make the jumps that can be made so; whether it can."""
+        return False
+
+    @property
+    def waits(self) -> bool:
+        """Whether an event is located that nobody has seen to yet."""
+        return False
+
+    def take_event(self) -> int | None:
+        """Return what came of the search for an event that is left to Python, once; None where there is none."""
         return None
 
     def expect(self, signs: FloatArray) -> None:

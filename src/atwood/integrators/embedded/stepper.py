@@ -44,14 +44,23 @@ from atwood.lazy_dataclasses import names_of
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventData
     from atwood.integrators.batch import BatchPlaces
+    from atwood.integrators.compiled_location import CompiledLocator
+    from atwood.integrators.jumps import Jumps
 
 FIELDS = fields_of(
     (
         *("function", "data", "arrays", "events", "events_data", "values", "signs"),
         *("project", "project_data", "watch", "watch_data", "due", "guard", "guard_data"),
+        *("search", "restart", "locator", "jump", "jump_data"),
     ),
-    ("t", "t_old", "h", "next", "stop", "relative", "longest", "horizon", "first", "looked", "likeness", "tried"),
-    ("size", "padded", "is_dense", "edgy", "calm", "event_count", "watches_stiffness", "seen", "looks"),
+    (
+        *("t", "t_old", "h", "next", "stop", "relative", "longest", "horizon", "first", "looked", "likeness", "tried"),
+        *("last", "finish"),
+    ),
+    (
+        *("size", "padded", "is_dense", "edgy", "calm", "event_count", "watches_stiffness", "seen", "looks"),
+        *("waits", "found"),
+    ),
 )
 
 
@@ -136,9 +145,32 @@ class CompiledStepper(NativeStepper):
         """Say which sign each event has; where it is zero, every step is noticed."""
         self._signs[:] = signs
 
+    def leap(self, locator: CompiledLocator, jumps: Jumps, last: float) -> bool:
+        """Locate events without Python, up to a last time, and make the jumps that can be made so."""
+        if self._count("locator") != locator.place:
+            self._keep = (self._keep, locator, jumps)
+        search, restart = locator.functions
+        self._set(search=search, restart=restart, locator=locator.place, signs=locator.signs.ctypes.data)
+        self._set(jump=jumps.function, jump_data=jumps.data)
+        self._set(last=last, finish=self._number("t") + self._number("horizon"))
+        return True
+
+    @property
+    def waits(self) -> bool:
+        """Whether an event is located that nobody has seen to yet."""
+        return self._count("waits") == 1
+
+    def take_event(self) -> int | None:
+        """Return what came of the search for an event that is left to Python, once; None where there is none."""
+        if self._count("waits") != 2:
+            return None
+        self._set(waits=0)
+        return self._count("found")
+
     def set_monitor(self, monitor: StepMonitor) -> bool:
         """Let the motion be looked at, and come back with `Outcome.NOTICED` where something is seen."""
         self._keep = (self._keep, monitor)
+        self._set(jump=0)  # what looks at the motion starts anew at each event
         self._set(watch=monitor.look, watch_data=monitor.data, due=monitor.due_at)
         return True
 
@@ -227,8 +259,7 @@ class CompiledStepper(NativeStepper):
 
 _FILES = (
     *(f"integrators/embedded/{name}.py" for name in ("dense_output", "stepper", "tableau")),
-    "integrators/protocol.py",
-    "integrators/stepper.py",
+    *(f"integrators/{name}.py" for name in ("compiled_location", "event_location", "protocol", "stepper")),
 )
 
 

@@ -10,10 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from math import inf, prod
 
-from atwood.codegen.routines import ADDRESS, BOOLEAN, INTEGER, NUMBER, Lanes, Routine, Value
+from atwood.codegen.routines import ADDRESS, BOOLEAN, INTEGER, NUMBER, Lanes, Record, Routine, Value
+from atwood.integrators.compiled_location import FIELDS as LOCATOR, FOUND, NO_STATE
 from atwood.integrators.embedded.dense_output import slopes, weighted, write_dense_output
 from atwood.integrators.embedded.stepper import open_routine
 from atwood.integrators.embedded.tableau import Tableau
+from atwood.integrators.event_location import ROUNDING
 from atwood.integrators.stepper import CALM, SAMPLE_ARGUMENTS, STIFF, WIDTH, Memory, write_sample
 
 SAFETY = 0.9
@@ -155,7 +157,7 @@ def _begin(pair: Tableau) -> Routine:
     """Start anew from a state."""
     r, m, (t, start) = open_routine(pair, "begin", {"t": NUMBER, "start": ADDRESS}, exported=True)
     m.t, m.t_old, m.looked, m.likeness = t, t, t, 0.0
-    m.edgy, m.calm, m.looks = 0, 0, m.steps
+    m.edgy, m.calm, m.looks, m.waits = 0, 0, m.steps, 0
     r.copy(m.row("y"), start, m.size)
     r.copy(m.row("y_old"), start, m.size)
     with r.when(r.call("evaluate", m.session, t, m.row("y"), m.row("end slope")) != 0):
@@ -330,7 +332,13 @@ def _attempt(pair: Tableau) -> Routine:
 def _run(pair: Tableau) -> Routine:
     """Take steps until one ends at or after the time to stop at."""
     r, m, () = open_routine(pair, "run", exported=True)
-    with r.forever():
+    with r.forever() as steps:
+        with r.when(m.waits != 0):
+            with r.when((m.waits == 1) & (m.stop < Record(m.locator, LOCATOR).root)):
+                r.give(_REACHED)
+            with r.when(r.call("leap", m.session) != 0):
+                r.give(_NOTICED)
+            r.repeat(steps)
         t = m.t
         with r.when(t >= m.stop):
             r.give(_REACHED)
@@ -350,8 +358,55 @@ def _run(pair: Tableau) -> Routine:
         t_new = m.t
         is_seen = r.call("watched", m.session, t_new) != 0
         happens = r.call("look", m.session, t_new) != 0
-        with r.when(happens | stiffens | is_seen):
+        locates = ~r.is_null(m.jump)
+        with r.when(locates & (happens | (r.call("settles", m.session) != 0))):
+            r.call("seek", m.session)
+        with r.when((happens & ~locates) | stiffens | is_seen | (m.waits == 2)):
             r.give(_NOTICED)
+    return r
+
+
+def _settles(pair: Tableau) -> Routine:
+    """Tell whether nothing is known yet of the first step after a start."""
+    r, m, () = open_routine(pair, "settles")
+    with r.when(r.is_null(m.jump)):
+        r.give(0)
+    r.give((Record(m.locator, LOCATOR).settling != 0).code())
+    return r
+
+
+def _seek(pair: Tableau) -> Routine:
+    """Locate the first event in the last step; it then waits until the run comes there, or until Python asks."""
+    r, m, () = open_routine(pair, "seek")
+    until = r.least(m.t, m.last)
+    with r.when(m.t_old < until):
+        found = r.call(m.search, m.locator, m.t_old, until)
+        m.found, m.waits = found.integer(), r.choose(found == 0, 0, r.choose(found == FOUND, 1, 2, INTEGER), INTEGER)
+    r.give(0)
+    return r
+
+
+def _leap(pair: Tableau) -> Routine:
+    """Make the jump at the event that waits, and start anew behind it; 1 where Python is to see to it."""
+    r, m, () = open_routine(pair, "leap")
+    with r.when(m.waits == 2):
+        r.give(1)
+    own = Record(m.locator, LOCATOR)
+    root = own.root
+    m.waits = 2
+    with r.when(r.call(m.jump, m.jump_data, m.locator, root) != 0):
+        r.give(1)
+    horizon = r.choose(m.finish > root, m.finish - root, 1.0)
+    m.horizon, own.moment = horizon, horizon * (100.0 * ROUNDING)
+    m.found = NO_STATE
+    with r.when(r.call("begin", m.session, root, own.y) != 0):
+        r.give(1)
+    code = r.call(m.restart, m.locator, root)
+    m.found = code.integer()
+    with r.when(code != 0):
+        r.give(1)
+    m.waits = 0
+    r.give(0)
     return r
 
 
@@ -367,6 +422,6 @@ def write_routines(pair: Tableau) -> list[Routine]:
     They take the address of a session; see `atwood.integrators.embedded.stepper`.
     """
     ends = (_begin, _run, _sample)
-    inner = (_evaluate, _attempt, _error, _stability, _project, _guarded, _look, _watched)
+    inner = (_evaluate, _attempt, _error, _stability, _project, _guarded, _look, _watched, _settles, _seek, _leap)
     stages = [_stage(pair, stage) for stage in range(1, len(pair.nodes))]
     return [*(write(pair) for write in (*ends, *inner)), *stages, *write_dense_output(pair)]

@@ -35,13 +35,13 @@ from atwood.simulation.dynamics.scales import Scales
 from atwood.simulation.events.mode_change import generalized_speeds
 from atwood.simulation.events.modes import EventRecord, Impact
 
-_NEAR = 10.0
+NEAR = 10.0
 """Times the relative tolerance, in sizes of the scene: what is nearer to zero is there."""
 
 _SPANS = 3, 12
 """At least and at most so many intervals between impacts say how fast these follow each other."""
 
-_LEFT = 100.0
+LEFT = 100.0
 """Times the root of the tolerance, in units of the scene's time: so long may impacts still go on that are summed.
 
 What still rises in one interval rises by some tolerances, and rounding does not tell in its intervals yet.
@@ -94,7 +94,7 @@ class _Moment:
         self.u = values.u.copy()
         self.held = list(values.assembly.held_now)
         self.before = states_of(self.layout, self.held)
-        near = _NEAR * max(relative, 1e-13)
+        near = NEAR * max(relative, 1e-13)
         self.small = np.array([near * scales.of(ALONG[one.law.options.unit]) for one in self.first])
         self.slow = self.small / scales.time
         self.triggers = {(one.part, one.law): one.target for one in triggers}
@@ -189,9 +189,9 @@ class _Moment:
             return None
         share = (spans[0] / spans[-1]) ** (1.0 / (len(spans) - 1))
         left: float = spans[0] * share / (1.0 - share)
-        if not left < _LEFT * unit:
+        if not left < LEFT * unit:
             return None
-        self.small, self.slow = _NEAR_REST / _NEAR * self.small, _NEAR_REST / _NEAR * self.slow
+        self.small, self.slow = _NEAR_REST / NEAR * self.small, _NEAR_REST / NEAR * self.slow
         return left
 
     def stop(self, left: float) -> None:
@@ -199,7 +199,7 @@ class _Moment:
         still = [k for k, one in enumerate(self.first) if one.is_slip and self.before[k][0] == STICKS]
         held = [row for k in (*self.touching, *still) for row in self.units[k]]
         self._hold(held)
-        self.slow = _NEAR / _NEAR_REST * self.slow
+        self.slow = NEAR / _NEAR_REST * self.slow
         for k in self.touching[:1]:
             self._tell(k, "impacts have accumulated: it rests", "rests")
             self.events[-1] = replace(self.events[-1], time=self.t + left)
@@ -240,11 +240,9 @@ class _Moment:
     ) -> None:
         """Tell of an impact of a gap, with friction along some rows."""
         (i,) = self.units[k]
-        self._tell(k, f"an impact at {-before[i]:.6g} {ALONG[self.first[k].law.options.unit]}/s", "impact")
-        friction, loss = tuple(map(float, impulses[rubs])), -float(np.sum(work[[i, *rubs]]))
-        key = self.first[k].row.key[:2]
-        struck = Impact(self.t, *key, float(impulses[i]), friction, float(before[i]), float(after[i]), loss)
-        self.events[-1] = replace(self.events[-1], struck=struck)
+        one, acting = self.first[k], map(float, impulses[[i, *rubs]])
+        speeds, loss = (float(before[i]), float(after[i])), -float(np.sum(work[[i, *rubs]]))
+        self.events.append(told_impact(self.t, one.row.key[:2], one.law.options.unit, tuple(acting), speeds, loss))
 
     def _impulses(self, chosen: list[int], free: FloatArray) -> FloatArray:
         """Return the impulses of all rows: velocities take the place of accelerations, and limits are of impulses."""
@@ -406,6 +404,25 @@ class _Moment:
                     where=one.row.key[0],
                     advice="Start where the gap is zero or positive.",
                 )
+
+
+def told_impact(
+    t: float,
+    key: tuple[str, str],
+    unit: str,
+    impulses: tuple[float, ...],
+    speeds: tuple[float, float],
+    loss: float | None = None,
+) -> EventRecord:
+    """Return the event of an impact at a gap: impulses along it and along its slips, its rates before and after.
+
+    Without friction the loss follows from these.
+    """
+    before, after = speeds
+    loss = -0.5 * impulses[0] * (before + after) if loss is None else loss
+    struck = Impact(t, *key, impulses[0], impulses[1:], before, after, loss)
+    said = f"an impact at {-before:.6g} {ALONG[unit]}/s"
+    return EventRecord(t, *key, said, "", True, "impact", struck)
 
 
 def _of_impulses(limits: tuple[Limits, Limits]) -> tuple[Limits, Limits]:

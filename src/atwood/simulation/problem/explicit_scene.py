@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,13 +19,17 @@ from atwood.errors import KernelEvaluationError
 from atwood.forms.accelerations import AccelerationProgram, accelerations_of
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
-from atwood.forms.constrained import ConstrainedProgram, constrained_program
+from atwood.forms.constrained import ConstrainedProgram, constrained_program, impact_program
 from atwood.forms.loose import is_loose, loose_equations
 from atwood.forms.quantities import to_maximal
 from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
 from atwood.integrators.protocol import MET, STEPS, CompiledRates, ExplicitProblem, Values
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.topology.graph import connected_groups
+
+if TYPE_CHECKING:
+    from atwood.integrators.jumps import JumpCode
+    from atwood.mechanics.dynamics.equations import ContactRow
 
 _EXTERNAL: Key[bool] = Key("whether accelerations call functions in Python")
 _COMPILED: Key[CompiledAccelerations] = Key("machine code of accelerations")
@@ -122,6 +127,7 @@ def _compiles(assembly: Assembly, found: AccelerationProgram) -> bool:
     return not assembly.shared.get(_EXTERNAL, lambda: any(node.operation == "external" for node in nodes), found)
 
 
+_IMPACTS: Key[JumpCode | None] = Key("machine code of impacts")
 _PROGRAM: Key[ConstrainedProgram] = Key("accelerations and projections")
 _COMPILED_ON_CONSTRAINTS: Key[CompiledAccelerations | None] = Key("machine code of accelerations and projections")
 _LIGHT: Key[tuple[int, ...]] = Key("what has no inertia of its own")
@@ -156,6 +162,25 @@ def constrained_problem(
         compiled=_compiled_on_constraints(plan, program, values),
         project=project if plan.holds else None,
     )
+
+
+def impact_code(plan: SceneProblem, t: float, y: FloatArray, gaps: Sequence[ContactRow]) -> JumpCode | None:
+    """Return what an impact at one gap alone does where nothing touches, as machine code; None where there is none.
+
+    Its parameters are those of `values_on_constraints`.
+    """
+    assembly, kept = plan.assembly, plan.finding.kept
+    light = assembly.kept.get(_LIGHT, lambda: _light_speeds(plan, t, y))
+    rows = assembly.rows if assembly.form == "reduced" else assembly.maximal.rows
+
+    def make() -> JumpCode | None:
+        from atwood.integrators.jumps import JumpCode
+
+        equations, loose = loose_equations(assembly, rows)
+        program = impact_program(assembly.flat.name, equations, loose, gaps, assembly.parameters, kept, light)
+        return None if any(node.operation == "external" for node in program.nodes) else JumpCode(program)
+
+    return assembly.shared.get(_IMPACTS, make, assembly.form, kept, light)
 
 
 def nearest_place(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> FloatArray:

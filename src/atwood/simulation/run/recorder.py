@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -17,6 +18,7 @@ from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.projection import misses_of, project_safely, project_states
 
 if TYPE_CHECKING:
+    from atwood.integrators.jumps import Jump
     from atwood.simulation.singular.crossing import SingularCrossing
 
 
@@ -101,6 +103,7 @@ class Recorder:
     def __init__(self, plan: SceneProblem) -> None:
         self.plan = plan
         self.singular_crossings: list[SingularCrossing] = []
+        self._jumps: list[float] = []
         # What is done, and states that wait: changed together, so that an interruption loses and repeats nothing.
         self._samples: tuple[tuple[_Block, ...], list[tuple[float, FloatArray, bool]]] = ((), [])
 
@@ -134,9 +137,22 @@ class Recorder:
         if len(pending) >= _PENDING:
             self.settle()
 
-    def take_many(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_]) -> None:
-        """Record states of the solver after the last sample, one row each."""
+    def take_many(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_], jumps: Sequence[Jump] = ()) -> None:
+        """Record states of the solver after the last sample, one row each, with those at jumps among them."""
         pending = self._samples[1]
+        if jumps:
+            times = np.repeat([one.time for one in jumps], 2)
+            places, states = np.searchsorted(t, times), np.concatenate([one.states for one in jumps])
+            t, y, shown = (
+                np.insert(t, places, times),
+                np.insert(y, places, states, axis=0),
+                np.insert(shown, places, True),
+            )
+            once = np.append(
+                [True, True], (t[2:] != t[1:-1]) | (t[2:] != t[:-2])
+            )  # an output at a jump is that after it
+            t, y, shown = t[once], y[once], shown[once]
+            self._jumps += times[::2].tolist()
         if len(t) and pending:  # projected together
             t = np.concatenate([[one[0] for one in pending], t])
             y = np.concatenate([[one[1] for one in pending], y])
@@ -208,15 +224,30 @@ class Recorder:
         """Whether nothing has been recorded, and nothing waits."""
         return not any(self._samples)
 
-    def segment(self, impact: bool, after_time_event: bool = False) -> SegmentRecord:
-        """Return what was recorded."""
+    def segments(self, impact: bool, after_time_event: bool = False) -> list[SegmentRecord]:
+        """Return what was recorded, from jump to jump."""
         self.settle()
         blocks = self._samples[0]
         q, u, held = (np.concatenate([getattr(one, name) for one in blocks], axis=1) for name in ("q", "u", "held"))
         time, shown = (np.concatenate([getattr(one, name) for one in blocks]) for name in ("time", "shown"))
         # A path may lead over a place behind the end, or behind an event.
         crossings = tuple(one for one in self.singular_crossings if one.path is None or one.time <= time[-1])
-        return SegmentRecord(self.plan, impact, time, q, u, shown, held, crossings, after_time_event)
+        cuts = np.searchsorted(time, self._jumps) + 1 if self._jumps else ()
+        ends = [0, *(int(one) for one in cuts if one < len(time)), len(time)]
+        return [
+            SegmentRecord(
+                self.plan,
+                impact or first > 0,
+                time[first:last],
+                q[:, first:last],
+                u[:, first:last],
+                shown[first:last],
+                held[:, first:last],
+                crossings,
+                after_time_event and first == 0,
+            )
+            for first, last in pairwise(ends)
+        ]
 
     def _finish(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_], waiting: _Waiting = ()) -> None:
         q, u = (part.copy() for part in self.plan.program.split(y.T))

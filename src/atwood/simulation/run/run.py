@@ -172,6 +172,7 @@ class _Walk:
             recorder, outcome = self._segment()
             self.t, self._handed = outcome.t, outcome.handed
             self.events += outcome.noted
+            self._remember(outcome.noted)
             is_short = outcome.t - before < shortest_mode(recorder.plan, self.options, self.start.time)
             chatter = chatter + 1 if is_short else 0
             if outcome.event is None:
@@ -212,6 +213,7 @@ class _Walk:
         t, q, u = self.t, self.q, self.u
         assert self.plan is not None
         assert self.probe is not None
+        self._kept.impacts = None if self.sampler.updates else self._impacts
         limit = min(schedule.next(t, options.t_end), self.sampler.next(t, options.t_end))
         ahead = self.samples.until(t, limit)
         if limit < options.t_end or (t < limit and self.sampler.due_at(limit)):  # the state just after it is shown
@@ -223,8 +225,8 @@ class _Walk:
             raise outcome.error
         if recorder.is_empty:  # nor was there time to
             return recorder, outcome
-        record = recorder.segment(self.impact, after_time_event)
-        self.segments.append(self._sides.recorded(record, self.plan, self.assembly, bool(outcome.sides)))
+        for record in recorder.segments(self.impact, after_time_event):
+            self.segments.append(self._sides.recorded(record, self.plan, self.assembly, bool(outcome.sides)))
         self.statistics = self.statistics + outcome.statistics
         for choice in outcome.choices:
             if not self.choices or not choice.is_like(self.choices[-1]):
@@ -287,7 +289,7 @@ class _Walk:
             is_start,
         )
         events = list(changed.events)
-        self._impacts = [*self._impacts[-_IMPACTS:], *((one.time, one.part) for one in events if one.kind == "impact")]
+        self._remember(events)
         self.events += events if not is_start else [one for one in events if one.impact]
         self.impact |= any(one.impact for one in events)
         self.u, self.held = changed.speeds, changed.held
@@ -297,6 +299,11 @@ class _Walk:
         self.assembly = self.assembly.with_held(self.held)
         self.probe, self._plans, self._handed = None, {}, ()
         return plan.in_piece(self._sides.like(self.assembly, plan))
+
+    def _remember(self, events: Sequence[EventRecord]) -> None:
+        """Remember the impacts among some events."""
+        self._impacts += [(one.time, one.part) for one in events if one.kind == "impact"]
+        del self._impacts[:-_IMPACTS]
 
     def _plan(self) -> SceneProblem:
         assembly = self._sides.in_pieces(self.assembly, self.t, self.q, self.u)

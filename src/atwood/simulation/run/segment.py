@@ -343,7 +343,12 @@ class _Runner:
             times = samples.times[done : ends[np.searchsorted(ends, done, side="right")]]
             y, _, step_result = session.sample(times)
             count = len(y)
-            self.recorder.take_many(times[:count], y, segment.samples.shown[done : done + count])
+            jumps = session.take_jumps()
+            if jumps:
+                from atwood.simulation.contacts.bounces import told_bounces
+
+                self.noted += told_bounces(jumps, segment.plan, segment.probe)
+            self.recorder.take_many(times[:count], y, segment.samples.shown[done : done + count], jumps)
             done += count
             if step_result.status is not Status.REACHED:
                 return done, step_result

@@ -48,6 +48,9 @@ if TYPE_CHECKING:
     from atwood.simulation.problem.closed_loops import Solved
 
 
+_MANY_IMPACTS = 3
+"""From so many on it pays to compile what an impact does."""
+
 _OF_CONTACTS = 0.01
 """Of the tolerance, where gaps and slips decide how the motion goes on."""
 
@@ -225,11 +228,19 @@ class KeptSession:
     ----------
     kept
         What sessions were opened with, the sessions, and what gives their functions the parameters of a request.
+    impacts
+        Times and parts of the impacts so far, to which steps may add; None where each is looked at.
     """
 
     kept: list[tuple[tuple[object, ...], ExplicitSession, Callable[[SolverRequest], object]]] = field(
         default_factory=list
     )
+    impacts: list[tuple[float, str]] | None = None
+
+    @property
+    def has_impacts(self) -> bool:
+        """Whether there were so many impacts that steps are to add to them."""
+        return self.impacts is not None and len(self.impacts) >= _MANY_IMPACTS
 
     def begin_again(
         self, request: SolverRequest, method: Method, t: float, y: FloatArray, on_stiff: OnStiff | None
@@ -253,7 +264,8 @@ class KeptSession:
 def _opened_with(request: SolverRequest, method: Method, on_stiff: OnStiff | None) -> tuple[object, ...]:
     plan = request.plan
     scene = plan.assembly.shared, is_loose(plan.assembly), request.probe.code(for_ida=False)
-    return method, *scene, plan.program, request.options, plan.scales, plan.sizes, on_stiff is None, plan.finding
+    made = plan.program, request.options, plan.scales, plan.sizes, plan.finding
+    return method, *scene, *made, on_stiff is None, request.kept.has_impacts
 
 
 def _can_be_kept(problem: ExplicitProblem, method: Method) -> bool:
@@ -301,10 +313,15 @@ def _filling(
     values: Callable[[SolverRequest], FloatArray],
 ) -> Callable[[SolverRequest], None]:
     """Return what gives rates, and events if there are any, the parameters of a request."""
-    events = problem.compiled_events
+    events, jumps = problem.compiled_events, problem.jumps
 
     def fill(request: SolverRequest) -> None:
         code.fill(rates, values(request))
+        if jumps is not None:
+            from atwood.simulation.contacts.bounces import fill_bounces
+
+            relative = request.options.relative_tolerance
+            fill_bounces(jumps, request.plan, request.probe, relative, request.kept.impacts or ())
         found = None if events is None else request.probe.code(for_ida=False)
         if found is not None and events is not None:
             found.fill(events, request.plan.assembly.parameter_values, request.probe.shift)
@@ -352,6 +369,10 @@ def _open_on_constraints(
     settings = replace(settings, absolute_tolerances=absolute)
     explicit = _watched(request, problem, method)
     own = own_rates_on_constraints(plan, t, y) if _can_be_kept(explicit, method) else None
+    if own is not None and explicit.compiled_events is not None and kept.has_impacts:
+        from atwood.simulation.contacts.bounces import bounces_of
+
+        explicit = replace(explicit, jumps=bounces_of(plan, probe, t, y, explicit.compiled_events))
     fill = None if own is None else _filling(*own, explicit, lambda one: values_on_constraints(one.plan))
     if own is not None and fill is not None:
         fill(request)

@@ -1,0 +1,147 @@
+"""Jumps at events that are made without Python: a state that passes one zero of its own, and goes on with other speeds.
+
+What a jump is tells a program; see `atwood.forms.constrained.impact_program`. Whatever else happens at that moment, or
+has happened before ever faster, is left to Python.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from atwood.arrays import FloatArray
+from atwood.codegen.llvm.build import RoutineSource, build_code, default_options
+from atwood.codegen.llvm.module import Part
+from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Kind
+from atwood.expr.core.program import Program
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from atwood.codegen.sundials.events import EventData
+
+FIELDS: dict[str, Kind] = {
+    **dict.fromkeys(("derived", "scratch", "shift", "seen", "table", "parts", "moved", "room", "log"), ADDRESS),
+    "left": NUMBER,
+    **dict.fromkeys(("gaps", "log_stride", "logged", "capacity"), INTEGER),
+}
+"""The memory of jumps; `left` is how long they may go on, s, if each is a share of the time before it."""
+
+TABLE = ("row", "small", "slow")
+"""Of each event: which row of the program it is, or -1; values and rates that are zero but for errors."""
+
+ENTRY = ("time", "event", "part", "impulse", "before", "after")
+"""What begins an entry of the log; states before and after follow."""
+
+_PAST, _ROOM = 64, 1024
+"""So many jumps before are known at most, and so many are made without Python."""
+
+_PLACES = {name: k for k, name in enumerate(FIELDS)}
+
+
+class Jump(NamedTuple):
+    """A jump at an event, by its number: impulse and rates, and the states before and after."""
+
+    time: float
+    event: int
+    impulse: float
+    before: float
+    after: float
+    states: FloatArray
+
+
+class JumpCode:
+    """Jumps as machine code, for any parameter values.
+
+    Parameters
+    ----------
+    program
+        A program of (t, q, u, pick).
+    """
+
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        _, self.coordinates, self.speeds, self.gaps = (len(group.symbols) for group in program.inputs)
+        part = Part("kernel", program)
+        files = tuple(f"integrators/{name}.py" for name in ("compiled_location", "event_routines", "jumps"))
+        routines = RoutineSource("integrators.jump_routines", files, (self.coordinates, self.speeds))
+        self.built = build_code([part], default_options([part]), exports=["jump"], routines=routines)
+
+
+class Jumps:
+    """The jumps of one session.
+
+    Parameters
+    ----------
+    code
+        What they are.
+    events
+        The events at which they happen.
+    """
+
+    def __init__(self, code: JumpCode, events: EventData) -> None:
+        self.code, self._size, count = code, code.coordinates + code.speeds, events.count
+        self._stride = len(ENTRY) + 2 * self._size
+        room = self._size + 4 * code.gaps + 1  # what the program gives, and what it is asked
+        counts = (
+            len(FIELDS),
+            len(code.program.prologue),
+            code.built.scratch,
+            len(TABLE) * count,
+            *[code.gaps] * 2,
+            room,
+        )
+        ends = np.cumsum((*counts, self._stride * (_PAST + _ROOM)))
+        memory = np.zeros(int(ends[-1]))
+        pieces = np.split(memory, ends[:-1])
+        self._numbers, self._derived, _, table, self._parts, _, _, log = pieces
+        self._integers, self._keep = self._numbers.view(np.int64), (memory, events)
+        self._table, self._log = table.reshape(len(TABLE), count), log.reshape(-1, self._stride)
+        places = (one.ctypes.data for one in pieces[1:])
+        names = ("derived", "scratch", "table", "parts", "moved", "room", "log")
+        self._set(**dict(zip(names, places, strict=True)), gaps=code.gaps, log_stride=self._stride)
+        self._set(shift=events.arrays[1].ctypes.data, seen=events.memory.ctypes.data)
+        self.function, self.data = code.built.code.addresses["jump"], self._numbers.ctypes.data
+
+    def _set(self, **fields: int) -> None:
+        for name, value in fields.items():
+            self._integers[_PLACES[name]] = value
+
+    def fill(
+        self,
+        parameter_values: ArrayLike,
+        table: ArrayLike,
+        parts: ArrayLike,
+        left: float,
+        past: Sequence[tuple[float, int]],
+    ) -> None:
+        """Begin again with other parameters, and with jumps that have been: their times and parts."""
+        self._derived[:] = self.code.built.derive("kernel", self.code.program, parameter_values)[0]
+        self._table[:], self._parts[:] = table, parts
+        known = past[-_PAST:]
+        self._log[: len(known), [0, 2]] = np.reshape(known, (-1, 2))
+        self._numbers[_PLACES["left"]] = left
+        self._told = len(known)
+        self._set(logged=self._told, capacity=self._told + _ROOM)
+
+    @property
+    def last(self) -> tuple[float, FloatArray]:
+        """Time and state after the last jump; minus infinity where there has been none."""
+        logged = int(self._integers[_PLACES["logged"]])
+        entry = self._log[logged - 1]
+        return (float(entry[0]) if logged > self._told else -inf), entry[-self._size :].copy()
+
+    def take(self) -> list[Jump]:
+        """Return the jumps since this was last asked."""
+        first, self._told = self._told, int(self._integers[_PLACES["logged"]])
+        return [
+            Jump(time, int(event), impulse, before, after, states)
+            for (time, event, _, impulse, before, after), states in zip(
+                self._log[first : self._told, : len(ENTRY)].tolist(),
+                self._log[first : self._told, len(ENTRY) :].reshape(-1, 2, self._size).copy(),
+                strict=True,
+            )
+        ]

@@ -1,0 +1,78 @@
+"""Impacts at one gap where nothing else touches: steps go on behind them without Python.
+
+They are those of `atwood.simulation.contacts.changes`, which sees to all others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.codegen.sundials.events import EventData
+from atwood.forms.loose import is_loose
+from atwood.integrators.jumps import Jump, Jumps
+from atwood.mechanics.dynamics.equations import ContactRow
+from atwood.mechanics.outputs.event_functions import CLOSES
+from atwood.model.values.units import ALONG
+from atwood.simulation.contacts.changes import LEFT, NEAR, told_impact
+from atwood.simulation.events.modes import EventProbe, EventRecord
+from atwood.simulation.problem.explicit_scene import impact_code, values_on_constraints
+from atwood.simulation.problem.problem import SceneProblem
+
+
+def _gaps(plan: SceneProblem) -> list[ContactRow]:
+    return [one for one in plan.assembly.own_equations.contacts if not one.is_slip]
+
+
+def _plain(plan: SceneProblem) -> dict[tuple[str, str], int]:
+    """Return the numbers of the gaps without friction whose impacts are Newton's."""
+    rubs = {(one.row.key[0], one.law.options.at) for one in plan.assembly.own_equations.contacts if one.is_slip}
+    keys = {one.row.key[:2]: (i, one.law.options.impact_law) for i, one in enumerate(_gaps(plan))}
+    return {key: i for key, (i, law) in keys.items() if law == "newton" and key not in rubs}
+
+
+def bounces_of(plan: SceneProblem, probe: EventProbe, t: float, y: FloatArray, events: EventData) -> Jumps | None:
+    """Return the impacts of a session; None where there are none that can be made so.
+
+    Nothing but gaps on places may be watched, and no friction may act that needs no gap.
+    """
+    assembly, equations = plan.assembly, plan.assembly.own_equations
+    always = [one for one in equations.contacts if one.is_speed or (one.is_slip and not one.law.options.at)]
+    is_watched = any(one.target != CLOSES for one in probe.event_functions)
+    holds = plan.balance.constraints or equations.orientation_coordinates or assembly.sides
+    if always or is_watched or holds or not is_loose(assembly) or not _plain(plan):
+        return None
+    code = impact_code(plan, t, y, _gaps(plan))
+    return None if code is None else Jumps(code, events)
+
+
+def fill_bounces(
+    jumps: Jumps, plan: SceneProblem, probe: EventProbe, relative: float, impacts: Sequence[tuple[float, str]]
+) -> None:
+    """Give the impacts of a session other parameters, and the times and parts of the impacts before.
+
+    Events of gaps that are not plain have no row.
+    """
+    gaps, plain, scales = _gaps(plan), _plain(plan), plan.scales
+    near = NEAR * max(relative, 1e-13)
+    small = [near * scales.of(ALONG[one.law.options.unit]) for one in gaps]
+    size = {one.row.key[:2]: each for one, each in zip(gaps, small, strict=True)}
+    watched = [(one.part, one.law) for one in probe.event_functions]
+    rows, sizes = [plain.get(one, -1) for one in watched], np.array([size[one] for one in watched])
+    parts = {part: i for i, part in enumerate(dict.fromkeys(one.row.key[0] for one in gaps))}
+    past = [(time, parts[part]) for time, part in impacts if part in parts]
+    table = np.array([rows, sizes, sizes / scales.time])
+    left = LEFT * relative**0.5 * scales.time
+    jumps.fill(values_on_constraints(plan), table, [parts[one.row.key[0]] for one in gaps], left, past)
+
+
+def told_bounces(jumps: Sequence[Jump], plan: SceneProblem, probe: EventProbe) -> list[EventRecord]:
+    """Return what is told of impacts."""
+    units = {one.row.key[:2]: one.law.options.unit for one in _gaps(plan)}
+    watched = [(one.part, one.law) for one in probe.event_functions]
+    return [
+        told_impact(one.time, watched[one.event], units[watched[one.event]], (one.impulse,), (one.before, one.after))
+        for one in jumps
+    ]

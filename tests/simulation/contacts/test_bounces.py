@@ -1,0 +1,98 @@
+"""Impacts that are made without Python, against the same impacts made in Python."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import atwood as aw
+from atwood import Scene, simulate
+from atwood.simulation.contacts import changes
+from atwood.simulation.run import session
+from atwood_library import Ground, Inertia, PointContact, PointMass, RotationalStop, SurfaceContact
+
+
+def in_a_box() -> tuple[Scene, float]:
+    scene = Scene(gravity=2.0)
+    m = scene.add("m", PointMass(mass=1.5))
+    for name, place, normal in (
+        ("a", (0, 0, 0), (1, 0, 0)),
+        ("b", (1, 0, 0), (-1, 0, 0)),
+        ("c", (0, 0, 0), (0.1, 0, 1)),
+        ("d", (0, 0, 0.7), (0, 0, -1)),
+    ):
+        ground = scene.add(f"ground_{name}", Ground(position=place))
+        wall = scene.add(name, PointContact(normal=normal, radius=0.05, restitution=0.95))
+        scene.connect(ground.frame, wall.plane)
+        scene.connect(m.point, wall.point)
+    scene.start.update({"m.position.x": 0.3, "m.position.z": 0.2, "m.velocity.x": 1.1, "m.velocity.z": 0.7})
+    return scene, 6.0
+
+
+def in_a_circle() -> tuple[Scene, float]:
+    scene = Scene()
+    ground, m = scene.add("ground", Ground()), scene.add("m", PointMass(mass=1.0))
+    contact = scene.add("c", SurfaceContact(function="0.25 - x**2 - z**2", restitution=0.99))
+    scene.connect(ground.frame, contact.a)
+    scene.connect(m.point, contact.b)
+    scene.start.update({"m.position.x": 0.1, "m.position.z": 0.0, "m.velocity.x": 0.3, "m.velocity.z": 0.0})
+    return scene, 4.0
+
+
+def with_play() -> tuple[Scene, float]:
+    scene = Scene()
+    a, b = scene.add("a", Inertia(moment=1.0)), scene.add("b", Inertia(moment=2.0))
+    play = scene.add("play", RotationalStop(lower=-0.1, upper=0.1, restitution=0.9))
+    scene.connect(a.flange, play.a)
+    scene.connect(b.flange, play.b)
+    scene.start.update({"a.angle": 0.0, "b.angle": 0.0, "a.angular_velocity": 5.0, "b.angular_velocity": 0.0})
+    return scene, 1.0
+
+
+def on_a_floor() -> tuple[Scene, float]:
+    """It comes to rest after 1.1 s, by the series of its impacts."""
+    scene = Scene()
+    ground, m = scene.add("ground", Ground()), scene.add("m", PointMass(mass=2.0))
+    floor = scene.add("floor", PointContact(restitution=0.5))
+    scene.connect(ground.frame, floor.plane)
+    scene.connect(m.point, floor.point)
+    scene.start.update({"m.position.x": 0.0, "m.position.z": 0.6, "m.velocity.x": 0.0, "m.velocity.z": 0.0})
+    return scene, 2.0
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+@pytest.mark.parametrize("make", [in_a_box, in_a_circle, with_play, on_a_floor])
+def test_impacts_without_python_are_those_with_it(
+    make: Callable[[], tuple[Scene, float]], form: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, end = make()
+    calls = list[float]()
+    resolve = changes.resolve
+    monkeypatch.setattr(changes, "resolve", lambda *given: (calls.append(given[1][0]), resolve(*given))[1])
+
+    def run() -> tuple[aw.Result, int]:
+        calls.clear()
+        result = simulate(scene, form=form, t_end=end, rtol=1e-10, outputs=np.linspace(0.0, end, 7))
+        return result, len(calls)
+
+    quick, few = run()
+    monkeypatch.setattr(session, "_MANY_IMPACTS", math.inf)
+    slow, many = run()
+    assert [(one.part, one.kind) for one in quick.events] == [(one.part, one.kind) for one in slow.events]
+    assert [one.time for one in quick.events] == pytest.approx([one.time for one in slow.events], abs=1e-11)
+    assert len(quick.impacts) == len(slow.impacts) > 6
+    for one, other in zip(quick.impacts, slow.impacts, strict=True):
+        assert (one.impulse, one.before, one.after, one.loss) == pytest.approx(
+            (other.impulse, other.before, other.after, other.loss), abs=1e-9
+        )
+    assert few < 0.7 * many or (
+        make is with_play and form == "dae"
+    )  # bodies that are held are looked at at each impact
+    assert len(quick.run.segments) == len(slow.run.segments)
+    for one, other in zip(quick.run.segments, slow.run.segments, strict=True):
+        assert (one.impact, len(one.time)) == (other.impact, len(other.time))
+        assert one.coordinates == pytest.approx(other.coordinates, abs=1e-10)
+        assert one.speeds == pytest.approx(other.speeds, abs=1e-10)
