@@ -268,9 +268,11 @@ if TYPE_CHECKING:
     from atwood.theory.symmetry import (
         Conserved as Conserved,
         ConservedQuantity as ConservedQuantity,
+        MovedScene as MovedScene,
         Symmetry as Symmetry,
         conserved as conserved,
         galilean as galilean,
+        moved as moved,
     )
 
     __version__: str
@@ -324,7 +326,9 @@ _ROOMS = {
         "FreeRotation", "SymmetricTop", "foucault_formulas", "free_body", "free_rotation", "inertia_tensor",
         "rigid_body", "rotation_kinematics", "symmetric_top", "top_formulas",
     ),
-    "atwood.theory.symmetry": ("Conserved", "ConservedQuantity", "Symmetry", "conserved", "galilean"),
+    "atwood.theory.symmetry": (
+        *("Conserved", "ConservedQuantity", "MovedScene", "Symmetry", "conserved", "galilean", "moved"),
+    ),
 }  # fmt: skip
 _LATER = {name: room for room, names in _ROOMS.items() for name in names}
 """Names whose modules are imported when they are first used; type checkers read them above."""

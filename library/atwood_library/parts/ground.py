@@ -2,7 +2,19 @@
 
 from __future__ import annotations
 
-from atwood import Component, Frame, Number, Placement, Triple, as_vector, connector, joint, parameter
+from atwood import (
+    Component,
+    Frame,
+    Number,
+    Placement,
+    Triple,
+    as_vector,
+    connector,
+    is_zero,
+    joint,
+    parameter,
+    turn,
+)
 
 
 class Ground(Component):
@@ -21,9 +33,14 @@ class Ground(Component):
         doc="Position in world axes (x right, y into the page, z up).",
     )
     angle: Number = parameter(0.0, unit="rad", doc="Rotation in the plane x-z, counter-clockwise; in space, about -y.")
+    axis: Triple = parameter(
+        (0.0, -1.0, 0.0), turning=True, doc="Another axis of the rotation, which is right-handed about it."
+    )
     frame: Frame = connector(Frame, "The fixed frame.")
 
     @joint("world", "frame", rigid=True, spaces=("line", "plane", "space"), reaction="exerted by the ground")
     def fixation(self) -> Placement:
         """Place the frame in the world."""
-        return Placement(as_vector(self.position), self.angle)
+        axis = as_vector(self.axis)
+        along_y = not self.in_space or (is_zero(axis.x) and is_zero(axis.z))
+        return Placement(as_vector(self.position), -axis.y * self.angle if along_y else turn(axis, self.angle))

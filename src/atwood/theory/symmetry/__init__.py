@@ -2,6 +2,7 @@
 
 from atwood.theory.symmetry.conserved import Conserved, ConservedQuantity, conserved
 from atwood.theory.symmetry.galilean import galilean
+from atwood.theory.symmetry.moved import MovedScene, moved
 from atwood.theory.symmetry.stated import Symmetry
 
-__all__ = ["Conserved", "ConservedQuantity", "Symmetry", "conserved", "galilean"]
+__all__ = ["Conserved", "ConservedQuantity", "MovedScene", "Symmetry", "conserved", "galilean", "moved"]
