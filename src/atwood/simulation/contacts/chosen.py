@@ -12,6 +12,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from atwood.arguments import BY_PATH, optional
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError, suggestion
@@ -29,6 +31,7 @@ from atwood.numerics.contact_sets import GOES_ON, OPEN, STICKS, State
 from atwood.simulation.contacts.changes import forces_in, resolve, states_of
 from atwood.simulation.contacts.values import ContactValues, layout_of
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
+from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.scales import Scales, find_scales
 from atwood.simulation.events.mode_change import generalized_state
 from atwood.simulation.initialization.start import find_start
@@ -155,15 +158,15 @@ def set_at(
             )
         held = changed.held
     states = states_of(values.layout, held)
-    return ContactSet(*_said(assembly.flat, values.layout.first, states), _margins(values, states, scales))
+    return set_of(assembly.flat, values.layout.first, states, margins_in(values, states, scales))
 
 
 def state_in_set(
     before: Assembly, after: Assembly, t: float, q: FloatArray, u: FloatArray, length: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return a state of a scene in the generalized coordinates and speeds of one of its sets."""
-    values = ContactValues(before, t, q, u, length)
-    place, speeds, _ = generalized_state(before, after, t, (q, u), (values.q, values.u), length)
+    """Return a state of a scene in the generalized coordinates and speeds of one of its sets, or the other way."""
+    big_q, big_u = maximal_state(before, np.array([t]), q[:, None], u[:, None])
+    place, speeds, _ = generalized_state(before, after, t, (q, u), (big_q[:, 0], big_u[:, 0]), length)
     return place, speeds
 
 
@@ -198,7 +201,7 @@ def named_set(assembly: Assembly, given: Mapping[str, Any]) -> ContactSet:
         number = {"open": OPEN, "loose": OPEN, "closed": STICKS, "sticks": STICKS}.get(word, GOES_ON)
         way = (-1.0 if word == "slips backwards" else 1.0, 0.0)[:count] if number == GOES_ON else (0.0,) * count
         states.append((number, way))
-    return ContactSet(*_said(assembly.flat, first, states))
+    return set_of(assembly.flat, first, states)
 
 
 def words_of(flat: FlatScene) -> dict[str, str]:
@@ -225,18 +228,24 @@ def _law(one: ContactRow) -> str:
     return ".".join(one.row.key[:2])
 
 
-def _said(
-    flat: FlatScene, first: Sequence[ContactRow], states: Sequence[State]
-) -> tuple[dict[str, str], dict[str, float]]:
-    """Return states in words, and as values of the discrete states."""
+def states_by_path(first: Sequence[ContactRow], states: Sequence[State]) -> dict[str, float]:
+    """Return states of gaps and slips as values of discrete states by path."""
     values: dict[str, float] = {}
     for one, (state, way) in zip(first, states, strict=True):
         told = (float(state), *way) if one.is_slip else (float(state == STICKS),)
         values |= dict(zip(state_paths(one), told, strict=True))
-    return words_of(replace(flat, contact_states=values)), values
+    return values
 
 
-def _margins(values: ContactValues, states: Sequence[State], scales: Scales) -> tuple[Margin, ...]:
+def set_of(
+    flat: FlatScene, first: Sequence[ContactRow], states: Sequence[State], margins: tuple[Margin, ...] = ()
+) -> ContactSet:
+    """Return the set of contacts that states are."""
+    values = states_by_path(first, states)
+    return ContactSet(words_of(replace(flat, contact_states=values)), values, margins)
+
+
+def margins_in(values: ContactValues, states: Sequence[State], scales: Scales) -> tuple[Margin, ...]:
     """Return how far each gap and slip is from the border of its state."""
     forces = forces_in(values, states)
     limits, found = values.limits_at(forces), []

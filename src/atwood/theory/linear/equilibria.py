@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field
-from typing import Any, Literal, overload
+from typing import Any, Literal, NamedTuple, overload
 
 import numpy as np
 
@@ -20,12 +20,20 @@ from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.pipeline import SCENE, smooth_assembly_of
 from atwood.ranges import range_of
+from atwood.simulation.contacts.chosen import has_contacts
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.table import Shown, Table, table
 from atwood.theory.formulas.notation import SYMBOLS
 from atwood.theory.linear.normal_modes import NormalModes, modes_of, values_text
-from atwood.theory.linear.operating_point import OperatingPoint, find_operating_point, moved_to, values_at
+from atwood.theory.linear.operating_point import (
+    OperatingPoint,
+    find_operating_point,
+    moved_to,
+    plain_assembly,
+    values_at,
+)
 from atwood.theory.linear.rest import Degenerate, Rest, RestSearch, difference, falling, follow_null_space, wrapped
+from atwood.theory.linear.resting_contacts import RestingContacts, RestInSet
 from atwood.theory.oscillations.equilibria import SymbolicEquilibria, symbolic_equilibria
 
 _STARTS = 32
@@ -37,6 +45,9 @@ _LEAST = 48
 
 _IDLE = 24
 """For each independent coordinate, so many starts one after another that lead to nothing new end the search."""
+
+_OF_SETS = 0.25
+"""Each of many sets of contacts, in which coordinates are fewer, is sought in with so much of this patience."""
 
 _ALONE = 5.0
 
@@ -72,8 +83,13 @@ class Equilibrium:
     stability
         ``"stable"``, ``"unstable"``, or ``"undecided"`` where no derivative that is looked at decides.
     family
-        Along so many directions rest goes on: 0 of one that stands alone; 1 of a cart that may stand anywhere, or of a
-        ball in a circular groove. One state stands for all of a family.
+        Along so many directions rest goes on: 0 of one that stands alone; 1 of a cart that may stand anywhere, of a
+        ball in a circular groove, or of a block that friction holds. One state stands for all of a family.
+    reserves
+        What friction could hold besides, N or N m, of each slip that sticks, by path.
+    ends
+        Where rest goes on along one direction since something sticks: what changes, at both ends of the interval, by
+        path.
     """
 
     values: Mapping[str, float]
@@ -81,6 +97,13 @@ class Equilibrium:
     modes: NormalModes = field(repr=False)
     stability: str = ""
     family: int = 0
+    reserves: Mapping[str, float] = field(default_factory=dict)
+    ends: tuple[Mapping[str, float], ...] = ()
+
+    @property
+    def contacts(self) -> Mapping[str, str]:
+        """What each gap and slip does, by path."""
+        return self.modes.contacts
 
     @property
     def growth_rate(self) -> float:
@@ -89,11 +112,18 @@ class Equilibrium:
 
     def __str__(self) -> str:
         named = ", ".join(f"{path} = {value:.6g}" for path, value in list(self.values.items())[:6])
-        return f"{self.stability:<9} {named}{_family(self.family)}"
+        return f"{self.stability:<9} {named}{self._besides}"
 
-
-def _family(directions: int) -> str:
-    return f", one of a family in {count_of(directions, 'direction')}" if directions else ""
+    @property
+    def _besides(self) -> str:
+        """What it is one of, what holds it, and how far."""
+        said = f", one of a family in {count_of(self.family, 'direction')}" if self.family else ""
+        if self.ends:
+            first, last = self.ends
+            said += ": " + ", ".join(f"{path} from {first[path]:.6g} to {last[path]:.6g}" for path in first)
+        held = "".join(f"; {path} sticks, with {value:.6g} in reserve" for path, value in self.reserves.items())
+        closed = [path for path, word in self.contacts.items() if word == "closed"]
+        return said + held + (f"; closed: {', '.join(closed)}" if closed else "")
 
 
 class Equilibria(Shown, list[Equilibrium]):
@@ -105,13 +135,14 @@ class Equilibria(Shown, list[Equilibrium]):
 
     def to_data(self) -> list[dict[str, Any]]:
         """Return them as plain data, for JSON."""
-        return [data_of(one, "values", "stable", "stability", "family", "modes") for one in self]
+        return [
+            data_of(one, "values", "stable", "stability", "family", "contacts", "reserves", "ends", "modes")
+            for one in self
+        ]
 
     def tables(self) -> tuple[Table, ...]:
         """Return how stable each is, and where."""
-        rows = [
-            (one.stability + _family(one.family), f"{one.growth_rate:.6g}", values_text(one.values)) for one in self
-        ]
+        rows = [(one.stability + one._besides, f"{one.growth_rate:.6g}", values_text(one.values)) for one in self]
         title = f"{self.scene}: {len(self)} equilibri{'um' if len(self) == 1 else 'a'}"
         return (table(("", "growth, 1/s>", "where"), rows, title),)
 
@@ -147,6 +178,11 @@ def equilibria(
     lie very close to each other one can be missed. States that differ along a direction in which nothing changes (a
     cart that may stand anywhere) count as one.
 
+    With gaps and slips all sets of closed gaps are looked at, and a state counts if all forces push, all friction is
+    within its limit and nothing is inside of anything. What sticks lets rest go on: `Equilibrium.family` says along how
+    many directions, `ends` how far along one. Such states are sought where friction has nothing to hold, and where
+    there are none of these, at what sticks where the scene starts.
+
     Parameters
     ----------
     scene
@@ -171,7 +207,7 @@ def equilibria(
     UsageError
         If there is none in the region, or the scene stays nowhere at rest since it depends on time.
     UnsupportedError
-        If ``symbolic``, and there is no closed form that one would find by hand.
+        If ``symbolic``, and there is no closed form that one would find by hand; or if more than six gaps may close.
     ParameterError
         If the region names no coordinate.
     """
@@ -186,21 +222,53 @@ def equilibria(
 
 def numeric_equilibria(scene: Model | Assembly, region: Mapping[str, Any] | None = None) -> Equilibria:
     """Return the states of rest of a scene in a region, found by Newton's method."""
-    point = find_operating_point(smooth_assembly_of(scene), {}, ())
+    base = plain_assembly(scene)
+    if has_contacts(base):
+        return _with_contacts(RestingContacts(base), region or {})
+    point = find_operating_point(base, {}, ())
+    sought = _sought(point, region or {})
+    if not sought.inside:
+        raise _none_found(point, sought.every, bool(region), sought.seen_moving)
+    return _in_order([_equilibrium(sought.point, sought.search, one, q) for one, q in sought.inside], point)
+
+
+def _in_order(made: list[Equilibrium], point: OperatingPoint) -> Equilibria:
+    made.sort(key=lambda one: tuple(round(value, 9) for value in one.values.values()))
+    return Equilibria(made, point.assembly.flat.name)
+
+
+class _Sought(NamedTuple):
+    """What is found in a region.
+
+    Attributes
+    ----------
+    point, search
+        The scene in the sizes of the region, and what seeks there.
+    inside, every
+        The states of rest in the region, as they are told, and how many there are in all.
+    seen_moving
+        Whether something rests at one time and not at others.
+    """
+
+    point: OperatingPoint
+    search: RestSearch
+    inside: list[tuple[Degenerate, FloatArray]]
+    every: int
+    seen_moving: bool
+
+
+def _sought(point: OperatingPoint, region: Mapping[str, Any], push: float = 0.0, patience: float = 1.0) -> _Sought:
+    """Seek states of rest in a region, where accelerations are large from a size on, with more or less patience."""
     point = replace(point, scene=point.scene.sized(_length(point)))
-    bounds = _bounds(point, region or {})
-    lengths = [k for _, k in point.scene.tangents.plain if point.scene.tangents.names[k] in (region or {})]
+    bounds = _bounds(point, region)
+    lengths = [k for _, k in point.scene.tangents.plain if point.scene.tangents.names[k] in region]
     widths = [float(np.ptp(bounds[k])) / 4.0 for k in lengths if point.scene.tangents.units[k] == "m"]
     point = replace(point, scene=point.scene.sized(max(widths, default=point.scene.length)))
     search = RestSearch(point.scene, balance_of(point.assembly, "reduced"), point.t, point.kept)
-    found, seen_moving = _found(point, search, bounds)
+    found, seen_moving = _found(point, search, bounds, push, patience)
     settled = [(one, _settled(point, search, one, bounds)) for one in found]
     inside = [(one, q) for one, q in settled if _is_inside(point, q, bounds)]
-    if not inside:
-        raise _none_found(point, len(found), bool(region), seen_moving)
-    made = [_equilibrium(point, search, one, q) for one, q in inside]
-    made.sort(key=lambda one: tuple(round(value, 9) for value in one.values.values()))
-    return Equilibria(made, point.assembly.flat.name)
+    return _Sought(point, search, inside, len(found), seen_moving)
 
 
 def _length(point: OperatingPoint) -> float:
@@ -264,16 +332,19 @@ def _in_si(value: Any, unit: str, path: str) -> float:
     return float(parse_quantity(value, parse_unit(unit), path)) if isinstance(value, str) else float(value)
 
 
-def _found(point: OperatingPoint, search: RestSearch, bounds: FloatArray) -> tuple[list[Degenerate], bool]:
+def _found(
+    point: OperatingPoint, search: RestSearch, bounds: FloatArray, push: float, patience: float
+) -> tuple[list[Degenerate], bool]:
     """Return the states of rest that Newton's method finds from places all over the region, and their images."""
     free = max(1, len(point.scene.tangents) - len(point.kept))
     places = [point.q, *_places(point, bounds, min(_MOST_STARTS, _STARTS * free))]
     search.measure(places[:_MEASURED])
+    search.push = max(search.push, push)
     found: list[Degenerate] = []
     images: list[FloatArray] = []
     seen_moving, idle, taken = False, 0, 0
     chance = np.random.default_rng(7)
-    while (taken < len(places) and idle <= max(_LEAST, _IDLE * free)) or images:
+    while (taken < len(places) and idle <= patience * max(_LEAST, _IDLE * free)) or images:
         is_image = bool(images)
         q = images.pop() if is_image else places[taken]
         taken += not is_image
@@ -359,8 +430,9 @@ def _settled(point: OperatingPoint, search: RestSearch, one: Degenerate, bounds:
     q = one.rest.q
 
     def is_one(there: FloatArray) -> bool:
-        rest = search.at(there)
-        return rest is not None and rest.push <= max(one.rest.push, 1e-12 * search.push)
+        rest = search.at(there)  # where constraints put it elsewhere, that is another state
+        met = rest is not None and rest.push <= max(one.rest.push, 1e-12 * search.push)
+        return met and rest is not None and search.alike(rest.q, there)
 
     wrapped_values = _wrapped(point, one.rest, bounds)
     for i, k in point.scene.tangents.plain:
@@ -406,6 +478,49 @@ def _equilibrium(point: OperatingPoint, search: RestSearch, one: Degenerate, q: 
     else:
         stability = "stable" if modes.is_stable else "unstable"
     return Equilibrium(values, stability == "stable", modes, stability, one.family)
+
+
+def _with_contacts(contacts: RestingContacts, region: Mapping[str, Any]) -> Equilibria:
+    """Return the states of rest in all sets of contacts."""
+    made: list[Equilibrium] = []
+    rests: list[RestInSet] = []
+    push = 0.0
+    for closed in contacts.sets():
+        for sticks in (False, True):
+            known = sticks and any(one.closed == closed for one in rests)
+            point = None if known else contacts.point(closed, sticks)
+            if point is None:
+                break
+            sought = _sought(point, region, push, _OF_SETS)
+            push = max(push, sought.search.push)
+            for one, q in sought.inside:
+                rest = contacts.rest(sought.point, q, closed)
+                if rest is not None and not any(rest.is_at(other) for other in rests):
+                    rests.append(rest)
+                    made.append(_resting(contacts, rest, one, sought.search))
+                    if sticks:
+                        break
+    if not made:
+        raise UsageError(
+            "there is no equilibrium in the region, whatever touches and sticks",
+            where=contacts.assembly.flat.name,
+            advice="What sticks is looked at where the scene starts: start it elsewhere, or give a larger region.",
+        )
+    return _in_order(made, rests[0].point)
+
+
+def _resting(contacts: RestingContacts, rest: RestInSet, one: Degenerate, search: RestSearch) -> Equilibrium:
+    """Return a state of rest with contacts as it is told."""
+    found = _equilibrium(rest.point, search, one, rest.point.q)
+    stability = found.stability if rest.is_strict else "undecided"
+    return replace(
+        found,
+        stability=stability,
+        stable=stability == "stable",
+        family=rest.stuck or one.family,
+        reserves=rest.found.reserves,
+        ends=contacts.ends(rest),
+    )
 
 
 _CREEPS = 2e-3

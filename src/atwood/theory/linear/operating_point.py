@@ -106,10 +106,7 @@ class OperatingPoint:
 
 def find_operating_point(scene: Model | Assembly, at: At, inputs: Sequence[str]) -> OperatingPoint:
     """Find the state about which to look at a scene."""
-    if isinstance(scene, Assembly) and scene.orientation.kind == "quaternion":
-        base = scene if scene.form == "reduced" else assemble(_scene_of(scene), name=scene.flat.name)
-    else:
-        base = assemble(_scene_of(scene) if isinstance(scene, Assembly) else scene)
+    base = plain_assembly(scene)
     found = input_paths(base.flat, inputs)
     if isinstance(at, tuple):
         return _at_time(base, *at, found)
@@ -118,7 +115,16 @@ def find_operating_point(scene: Model | Assembly, at: At, inputs: Sequence[str])
         assembly = start_at(assembly, at)
     start = find_start(assembly)
     state = start.time, start.coordinates, start.speeds
-    return _in_set(assembly, *state, start.length, found) if has_contacts(assembly) else _point(assembly, *state, found)
+    return (
+        _in_set(assembly, *state, start.length, found) if has_contacts(assembly) else point_at(assembly, *state, found)
+    )
+
+
+def plain_assembly(scene: Model | Assembly) -> Assembly:
+    """Return a scene in generalized coordinates with quaternions."""
+    if isinstance(scene, Assembly) and scene.orientation.kind == "quaternion":
+        return scene if scene.form == "reduced" else assemble(_scene_of(scene), name=scene.flat.name)
+    return assemble(_scene_of(scene) if isinstance(scene, Assembly) else scene)
 
 
 def _in_set(
@@ -135,21 +141,23 @@ def _in_set(
     refuse_border(found)
     made = in_set(assembly, found.states)
     place, speeds = state_in_set(assembly, made, t, q, u, length)
-    return replace(_point(made, t, place, speeds, inputs, is_from_result), contacts=found.words)
+    return point_at(made, t, place, speeds, inputs, is_from_result, found.words)
 
 
-def _point(
+def point_at(
     assembly: Assembly,
     t: float,
     q: FloatArray,
     u: FloatArray,
-    inputs: tuple[InputPath, ...],
+    inputs: tuple[InputPath, ...] = (),
     is_from_result: bool = False,
+    contacts: Mapping[str, str] | None = None,
 ) -> OperatingPoint:
+    """Return a state of a scene as an operating point, in the set of contacts that the scene is of."""
     linear = _linear_scene(assembly, inputs)
     finding = linear.rank(t, q)
     _refuse_singular(linear, finding, t, q)
-    return OperatingPoint(assembly, linear, t, q, u, finding, inputs, is_from_result)
+    return OperatingPoint(assembly, linear, t, q, u, finding, inputs, is_from_result, contacts or {})
 
 
 def _at_time(base: Assembly, result: Result, time: float, inputs: tuple[InputPath, ...]) -> OperatingPoint:
@@ -186,7 +194,7 @@ def _at_time(base: Assembly, result: Result, time: float, inputs: tuple[InputPat
     if has_contacts(assembly):
         now = replace(assembly, held=own.held, given_relations=own.given_relations) if keys else own
         return _in_set(now, t, q, u, result.start.length, inputs, is_from_result=True)
-    return _point(assembly, t, q, u, inputs, is_from_result=True)
+    return point_at(assembly, t, q, u, inputs, is_from_result=True)
 
 
 def moved_to(point: OperatingPoint, q: FloatArray, u: FloatArray) -> OperatingPoint:

@@ -1,0 +1,134 @@
+"""Rest with contacts against statics: gaps push, friction is within its limit, what sticks may stand elsewhere."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from atwood import Scene, UsageError, equilibria
+from atwood_library import (
+    Box,
+    BoxContact,
+    Ground,
+    Link,
+    Pivot,
+    PointContact,
+    PointMass,
+    RotationalFriction,
+    Spring,
+    SurfaceContact,
+    VertexContact,
+)
+
+G = 9.81
+
+
+def block(
+    slope: float = 0.0, friction: float = 0.3, stiffness: float = 50.0, size: float = 1.0, **contact: float
+) -> Scene:
+    up = (-math.sin(slope), 0.0, math.cos(slope))
+    scene = Scene()
+    ground, m = scene.add("ground", Ground(position=(3.0 * size, 0.0, -size))), scene.add("m", PointMass(mass=2.0))
+    c = scene.add("c", PointContact(normal=up, friction=friction, **contact))
+    scene.connect(ground.frame, c.plane)
+    scene.connect(m.point, c.point)
+    if stiffness:
+        spring = scene.add("spring", Spring(stiffness=stiffness / size))
+        scene.connect(ground.frame, spring.a)
+        scene.connect(m.point, spring.b)
+    x = 3.3 * size
+    scene.start.update({"m.position.x": x, "m.position.z": (x - 3.0 * size) * math.tan(slope) - size})
+    return scene
+
+
+@pytest.mark.parametrize("size", [1.0, 1e3, 1e-3])
+def test_a_block_on_a_spring_rests_in_an_interval(size: float) -> None:
+    """It stays within mu m g/k of where spring and weight balance."""
+    for slope in (0.0, 0.2):
+        [rest] = equilibria(block(slope, size=size))
+        middle = 3.0 * size - 2.0 * G * size * math.sin(slope) / 50.0 * math.cos(slope)
+        wide = 0.3 * 2.0 * G * size * math.cos(slope) / 50.0 * math.cos(slope)
+        assert rest.values["m.position.x"] == pytest.approx(middle, abs=1e-8 * size)
+        assert (rest.stability, rest.family) == ("stable", 1)
+        assert rest.contacts == {"c.gap": "closed", "c.slip": "sticks"}
+        assert rest.reserves["c.slip"] == pytest.approx(0.6 * G * math.cos(slope), rel=1e-8)
+        ends = sorted(side["m.position.x"] for side in rest.ends)
+        assert ends == pytest.approx([middle - wide, middle + wide], abs=1e-8 * size)
+
+
+def test_without_friction_it_stands_alone_and_on_a_belt_friction_pulls_it_aside() -> None:
+    [smooth] = equilibria(block(friction=0.0))
+    assert (smooth.family, smooth.ends, dict(smooth.reserves)) == (0, (), {})
+    [pulled] = equilibria(block(surface_velocity=-1.0))
+    assert pulled.contacts["c.slip"] == "slips forwards"
+    assert pulled.values["m.position.x"] == pytest.approx(3.0 - 0.6 * G / 50.0, abs=1e-9)
+
+
+def test_a_slope_holds_what_is_rough_enough() -> None:
+    [rest] = equilibria(block(0.3, 0.4, stiffness=0.0))
+    assert rest.reserves["c.slip"] == pytest.approx(2.0 * G * (0.4 * math.cos(0.3) - math.sin(0.3)))
+    assert "c.slip sticks, with 1.69937 in reserve; closed: c.gap" in str(rest)
+    with pytest.raises(UsageError, match="no equilibrium in the region, whatever touches and sticks"):
+        equilibria(block(0.3, 0.3, stiffness=0.0))
+
+
+def test_a_box_stands_on_its_sides_and_balances_on_its_corners() -> None:
+    scene = Scene()
+    ground, m = scene.add("ground", Ground()), scene.add("m", Box(length_x=1.0, length_z=0.4, mass=3.0))
+    c = scene.add("c", BoxContact(length=1.0, height=0.4, friction=0.3))
+    scene.connect(ground.frame, c.plane)
+    scene.connect(m.frame, c.box)
+    scene.start.update({"m.position.x": 0.0, "m.position.z": 0.2, "m.angle": 0.0})
+    found = sorted((one.values["m.angle"], one.values["m.position.z"], one.stability) for one in equilibria(scene))
+    lean, high = math.atan2(1.0, 0.4), math.hypot(0.5, 0.2)
+    known = [(0.0, 0.2), (math.pi, 0.2), (math.pi / 2.0, 0.5), (-math.pi / 2.0, 0.5)]
+    sides = [(angle, z, "stable") for angle, z in known]
+    corners = [(a, high, "unstable") for a in (lean, -lean, math.pi - lean, lean - math.pi)]
+    for one, other in zip(found, sorted([*sides, *corners]), strict=True):
+        assert one == (pytest.approx(other[0], abs=1e-8), pytest.approx(other[1], abs=1e-8), other[2])
+
+
+def test_a_ladder_leans_up_to_the_angle_of_friction() -> None:
+    """At a smooth wall: tan(lean) = 2 mu. Upright the wall feels nothing, which is the border of this set."""
+    scene = Scene()
+    ground, m = scene.add("ground", Ground()), scene.add("m", Link(length=2.0, mass=1.0))
+    for name, normal, end, rough in (("floor", (0, 0, 1), m.a, 0.4), ("wall", (1, 0, 0), m.b, 0.0)):
+        contact = scene.add(name, VertexContact(normal=normal, friction=rough))
+        scene.connect(ground.frame, contact.plane)
+        scene.connect(end, contact.body)
+    scene.start.update({"m.angle": 0.5 * math.pi + 0.3, "floor.gap": 0.0, "wall.gap": 0.0})
+    [rest] = [
+        one for one in equilibria(scene) if one.values["m.position.z"] > 0.0 and one.contacts["wall.gap"] == "closed"
+    ]
+    leans = sorted(side["m.angle"] - 0.5 * math.pi for side in rest.ends)
+    assert leans == pytest.approx([0.0, math.atan(0.8)], abs=1e-8)
+    assert rest.stability == "undecided"
+
+
+def test_friction_in_a_hinge_and_in_a_bowl() -> None:
+    scene = Scene()
+    ground, pivot, link = (
+        scene.add("ground", Ground()),
+        scene.add("pivot", Pivot()),
+        scene.add("link", Link(length=1.0, mass=0.0)),
+    )
+    bob, rub = (
+        scene.add("bob", PointMass(mass=1.0)),
+        scene.add("rub", RotationalFriction(sliding="0.5", against="ground")),
+    )
+    for ends in ((ground.frame, pivot.a), (pivot.b, link.a), (link.b, bob.point), (pivot.shaft, rub.b)):
+        scene.connect(*ends)
+    found = equilibria(scene)
+    wide = math.asin(0.5 / G)
+    assert [round(one.values["link.angle"], 6) for one in found] == [-1.570796, 1.570796]
+    for one in found:
+        assert abs(one.ends[1]["link.angle"] - one.ends[0]["link.angle"]) == pytest.approx(2.0 * wide, abs=1e-8)
+    scene = Scene()
+    ground, m = scene.add("ground", Ground()), scene.add("m", PointMass(mass=1.0))
+    bowl = scene.add("c", SurfaceContact(function="1 - x**2 - z**2", friction=0.3))
+    scene.connect(ground.frame, bowl.a)
+    scene.connect(m.point, bowl.b)
+    scene.start.update({"m.position.x": 0.1, "m.position.z": -0.5})
+    [rest] = equilibria(scene)
+    assert abs(rest.ends[0]["m.position.x"]) == pytest.approx(math.sin(math.atan(0.3)), abs=1e-8)
