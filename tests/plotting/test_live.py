@@ -16,6 +16,7 @@ from atwood_library import Ground, PointMass, Rope, Spring
 from atwood_library.scenes import SCENES
 
 from ..helpers.node import run_node
+from ..library.test_tables import hoisted
 
 SAMPLE = (
     ("double-pendulum", "reduced"),
@@ -140,6 +141,7 @@ def slack_string() -> Scene:
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 def test_modes_are_entered_at_their_times(form: str) -> None:
     scenes = {"string": (slack_string, 2), "trebuchet": (SCENES["trebuchet"], 1), "wire": (SCENES["bead-on-wire"], 0)}
+    scenes |= {"cart": (SCENES["cart-pole"], 0), "winch": (lambda: hoisted("plane"), 2)}
     made = {name: live_program(scene(), form) for name, (scene, _) in scenes.items()}
     script = """
     print(Object.keys(models).map(name => {

@@ -389,9 +389,22 @@ function struck(mode, t, q, u) {
   const right = masses.map(row => row.reduce((sum, x, j) => sum + x * before[j], 0) / unit);
   const found = leastNorm([...top, ...bottom], [...right, ...units.map((one, k) => -still[k] / one)]);
   const impulses = found.slice(m), most = largest(impulses);
-  const k = refused.findIndex((signs, i) => Math.abs(impulses[i] * unit) > 1e-9 * most * unit && signs.includes(Math.sign(impulses[i])));
-  if (k >= 0) return {failed: `an impact, in which ${labels[k]} would have to act against its one side`};
+  for (const [i, ways] of refused.entries()) {
+    const way = Math.abs(impulses[i]) > 1e-9 * most && ways.find(([sign]) => sign === Math.sign(impulses[i]));
+    if (way) return {failed: `an impact, in which ${labels[i]} would have to act against its one side`, by: way[1]};
+  }
   return {speeds: Float64Array.from(found.slice(0, m), (x, i) => x * sizes[i])};
+}
+
+// What constraints miss in a state, in the scene's sizes, and how fast; and the fastest of all that moves.
+function misses(mode, t, q, u) {
+  const {sizes, slopes_of_constraints: place, labels} = mode.data.passage, n = q.length;
+  mode.M.set(q, mode.y);
+  mode.M.set(u, mode.y + n);
+  if (!mode.call("impact", t, mode.y, mode.y + n)) return null;
+  const slopes = mode.matrix(mode.output("impact", 5), place, labels.length, sizes), units = slopes.map(row => largest(row) || 1);
+  const [values, rates, still] = [2, 3, 6].map(k => Array.from(mode.output("impact", k), (x, i) => x / units[i]));
+  return {values, rates, fastest: Math.max(largest(Array.from(u, (x, i) => x / sizes[i])), largest(still))};
 }
 
 // The state of a mode that gives coordinates and speeds of bodies, from a first guess of its coordinates.
@@ -463,11 +476,37 @@ function createEngine(model, options = {}) {
     mode.fill();
   }
 
-  const nextPiece = t => mode.data.schedule.times.find(one => one > t) ?? mode.data.schedule.end ?? Infinity;
+  function nextPiece(t) {
+    const {schedule, updates} = mode.data, next = list => list?.find(one => one > t) ?? Infinity;
+    return Math.min(next(schedule.times), next(updates?.times), schedule.end ?? Infinity);
+  }
 
-  function begin(t, from, fired = null) {
+  // What updates make of the state, one after the other; false where one has no value.
+  function update(list, moment = -1) {
+    const from = Float64Array.from(state);
+    return list.every(k => {
+      const law = mode.data.updates.laws[k];
+      mode.M.set(from, mode.y);
+      const given = law.given?.[moment], is = given !== undefined || mode.call(`update_${k}`, time);
+      const found = given ?? mode.output(`update_${k}`, 0);
+      law.sets.forEach(([kind, i], j) => { (kind === "held" ? mode.values : from)[i] = found[j]; });
+      mode.fill();
+      take(time, from);
+      return is && law.sets.every((_, j) => Number.isFinite(found[j]));
+    });
+  }
+
+  // The updates that are due at a time.
+  function sample(t) {
+    const moment = mode.data.updates?.times.indexOf(t) ?? -1;
+    return moment < 0 || update(mode.data.updates.due[moment], moment);
+  }
+
+  function begin(t, from, fired = null, samples = false) {
     inPiece(t);
-    const wrong = mode.begin(t, from, fired);
+    take(t, Float64Array.from(from));
+    if (samples && !sample(t)) return say("failed", "an update has no value", t);
+    const wrong = mode.begin(t, state, fired);
     if (wrong) return say("failed", wrong, t);
     take(t, mode.at(t));
     [coming, searched, began] = [null, t, t];
@@ -478,10 +517,11 @@ function createEngine(model, options = {}) {
   }
 
   // What an event leads to.
-  function happen(i) {
-    const {part, law, message, target} = mode.data.events[i];
+  function happen(i, fired = null) {
+    const {part, law, message, target, updates} = mode.data.events[i];
     events.push({time, part, law, message, target});
     if (target === "stop") return say("stopped", `${part}: ${message}`);
+    if (updates.length) return alter(time, state, () => update(updates), fired);
     return target ? enter(mode.data.events[i]) : say("ready", "");
   }
 
@@ -497,6 +537,7 @@ function createEngine(model, options = {}) {
     const own = numbers[modes.indexOf(mode)];
     const guess = after.data.coordinates.map(({name}, i) => named.get(name) ?? (own.has(name) ? value(name) : after.data.passage.reference[i]));
     let [q, u] = whole;
+    for (const [path, k] of Object.entries(mode.data.held)) after.values[after.data.held[path]] = mode.values[k];
     mode = after;
     inPiece(t);
     if (impact) {
@@ -519,8 +560,9 @@ function createEngine(model, options = {}) {
     return mode.data.passage.signs.every(([a, b, sign]) => (place(b) - place(a)) * sign >= -1e-9 * mode.data.sizes[0]);
   }
 
-  function apply() {
+  function apply(anew = false) {
     for (const one of modes) {
+      if (anew) one.values.set(one.data.values);
       for (const each of parameters) {
         const number = one.data.numbers[each.path];
         if (number !== undefined) one.values[number] = each.value;
@@ -532,7 +574,7 @@ function createEngine(model, options = {}) {
   function restart() {
     const same = (list, known) => list.every((one, i) => one.value === known[i]);
     [mode, events, started] = [modes[0], [], false];
-    apply();
+    apply(true);
     if (mode.held) mode.held.most.fill(mode.held.largest = 0);
     let from = mode.data.state;
     if (!same(parameters, first.parameters) || !same(starts, first.starts)) {
@@ -545,7 +587,7 @@ function createEngine(model, options = {}) {
       if (found.failed) return say("failed", `the start cannot be met: ${found.failed}`, data.start_time);
       from = found.state;
     }
-    return begin(data.start_time, from);
+    return begin(data.start_time, from, null, true);
   }
 
   // Look for what happens up to the end of a step: an event, or a singular position.
@@ -571,21 +613,46 @@ function createEngine(model, options = {}) {
     const which = one.fired.flatMap((is, i) => (is ? [i] : [])), changing = which.find(i => mode.data.events[i].target);
     for (const i of which) if (!mode.data.events[i].target) happen(i);
     if (changing !== undefined) {
-      happen(changing);
-      return now;
+      return happen(changing, one.fired);
     }
     watch();
     return null;
   }
 
-  function passPiece(t) {
-    if (t === mode.data.schedule.end) return say("stopped", "it is not known when its functions of time switch after this", t);
-    const from = mode.at(t);
-    if (!from) return say("failed", "the equations have no value within a step", t);
+  // Go on from a state where values change that functions of time, or updates, give: a motion that these prescribe may
+  // jump in speed, which is an impact.
+  function alter(t, from, change, fired = null) {
+    const jumps = mode.data.passage?.switches, whole = jumps ? bodiesOf(mode, t, from) : null;
+    const was = whole && misses(mode, t, ...whole);
+    take(t, from);
     inPiece(t);
-    mode.M.set(from, mode.y);
-    const jumps = mode.missed(t);
-    return jumps ? say("failed", `the motion that ${jumps} prescribes jumps, which a page does not follow`, t) : begin(t, from);
+    if (!change()) return say("failed", "an update has no value", t);
+    if (!jumps) return begin(t, state, fired);
+    const now = was && misses(mode, t, ...whole);
+    if (!now) return say("failed", "a constraint has no value", t);
+    const {labels, laws} = mode.data.passage, moved = labels.find((_, i) => !(Math.abs(now.values[i] - was.values[i]) <= HELD));
+    if (moved) return say("failed", `the motion that ${moved} prescribes jumps, and no position can`, t);
+    const fast = 1e-9 * Math.max(was.fastest, now.fastest);
+    const faster = laws.filter((_, i) => Math.abs(now.rates[i] - was.rates[i]) > fast);
+    if (!faster.length) return begin(t, state, fired);
+    const hit = struck(mode, t, ...whole);
+    if (hit.by?.target) {
+      events.push({time: t, ...hit.by});
+      return hit.by.target === "stop" ? say("stopped", hit.by.message, t) : enter({...hit.by, impact: true});
+    }
+    if (hit.failed) return say("failed", hit.failed, t);
+    const found = stateOf(mode, t, Float64Array.from(state.slice(0, mode.n)), whole[0], hit.speeds);
+    if (found.failed) return say("failed", found.failed, t);
+    for (const [part, law] of new Map(faster)) {
+      events.push({time: t, part, law, message: "the speed of the prescribed motion jumps: an impact", target: ""});
+    }
+    return begin(t, found.state, fired);
+  }
+
+  function passPiece(t) {
+    if (t === mode.data.schedule.end) return say("stopped", "it is not known how its functions of time go on", t);
+    const from = mode.at(t);
+    return from ? alter(t, from, () => sample(t)) : say("failed", "the equations have no value within a step", t);
   }
 
   function advance(target, limits = {}) {

@@ -72,7 +72,7 @@ class ModeText:
         self._add_quantities(quantities)
         self._add_pictures()
         self._add_sizes()
-        self._add_schedule()
+        self.end = self._add_schedule()
         self._add_events(y)
 
     def text(self) -> str:
@@ -161,14 +161,15 @@ class ModeText:
             "turns": [list(one.coordinates) for one in homogeneous],
         }
 
-    def _add_schedule(self) -> None:
-        """Add when relations of functions of time change, and their values."""
+    def _add_schedule(self) -> float:
+        """Add when relations of functions of time change, and their values; return until when these are known."""
         flat, assembly = self.flat, self.assembly
         end = flat.t_end + _BEYOND * (flat.t_end - flat.t_start)
         schedule = find_schedule(assembly, flat.t_start, end)
         first = len(assembly.parameters) - len(assembly.relations)
         self.data["schedule"] = {"times": schedule.times.tolist(), "values": schedule.values.T.tolist(), "first": first}
-        self.data["schedule"]["end"] = end if assembly.relations else None
+        self.data["schedule"]["end"] = end if assembly.relations or assembly.discrete_states else None
+        return end
 
     def _add_events(self, y: FloatArray) -> None:
         """Add the values of events."""
@@ -194,6 +195,7 @@ class ModeText:
                 "impact": one.impact,
                 "noted": one.is_noted,
                 "small": MARGIN * self.plan.scales.of(one.unit),
+                "updates": [],
             }
             for one in probe.event_functions
         ]

@@ -10,12 +10,15 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
+from atwood.mechanics.constraints.knots import BALANCES
+from atwood.mechanics.outputs.event_functions import UPDATE
 from atwood.pipeline import simulate
 from atwood.plotting.live.mode import ModeText, NotLiveError, bodies_of, nodes_of
 from atwood.plotting.live.start import add_tangent
 from atwood.simulation.dynamics.kinematic_map import reference_coordinates
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.scales import motion_scales
+from atwood.simulation.events.impacts_in_time import switching
 from atwood.simulation.events.mode_change import maximal_places, refusing
 from atwood.simulation.initialization.start import Start, actual_line_signs, find_start, settle
 from atwood.simulation.problem.preparation import problem_of_run
@@ -45,10 +48,17 @@ def add_modes(first: ModeText, start: Start, quantities: Sequence[str] | None) -
                 raise NotLiveError("its parts make other bodies in other modes, which pages do not draw")
             waiting.append(made)
     every = list(found.values())
-    for one in every if len(every) > 1 else ():
+    for one in every:
+        switches = switching(one.assembly)
+        if any(
+            constraint.key[0] in switches and constraint.key[1] in BALANCES for constraint in one.equations.constraints
+        ):
+            raise NotLiveError(f"{switches[0]} jumps where forces on it balance, which pages do not follow")
         if one is not first:
             add_tangent(one)
-        _add_passage(one, start.length)
+        if switches or len(every) > 1:
+            _add_passage(one, start.length)
+            one.data["passage"]["switches"] = bool(switches)
     return every
 
 
@@ -59,7 +69,7 @@ def _key(modes: Mapping[str, str]) -> Modes:
 def _ahead(mode: ModeText) -> Iterator[dict[str, str]]:
     """Yield the modes that events of a mode lead to."""
     for one in mode.data["events"]:
-        if one["target"] not in ("", "stop"):
+        if one["target"] not in ("", "stop", UPDATE):
             yield {**mode.assembly.modes, one["part"]: one["target"]}
 
 
@@ -112,11 +122,16 @@ def _add_passage(mode: ModeText, length: float) -> None:
     data["slopes_of_constraints"] = [balance.jacobian_rows.tolist(), balance.jacobian_columns.tolist()]
     q, u = mode.plan.program.split(np.array(mode.data["state"]))
     big_q, big_u = (one[:, 0] for one in maximal_state(assembly, np.array([t]), q[:, None], u[:, None]))
+    state = t, big_q, big_u
+    refused = [
+        [(one.sign * sign, refusing(assembly, one, state, sign)) for sign in (1.0, -1.0)] for one in maximal.constraints
+    ]
+    names = ("part", "law", "message", "target")
     data["refused"] = [
-        [one.sign * sign for sign in (1.0, -1.0) if refusing(assembly, one, (t, big_q, big_u), sign) is not None]
-        for one in maximal.constraints
+        [(sign, {name: getattr(by, name) for name in names}) for sign, by in each if by is not None] for each in refused
     ]
     data["labels"] = [one.label for one in maximal.constraints]
+    data["laws"] = [one.key[:2] for one in maximal.constraints]
     data["signs"] = list(_signs(mode))
     mode.data["passage"] = data
 

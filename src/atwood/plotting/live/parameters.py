@@ -81,10 +81,16 @@ def find_parameters(assembly: Assembly) -> dict[str, tuple[int, Slot]]:
         return {}
     slots = dict(find_slots(assembly.flat))
     fixed = [one.difference for one in assembly.relations]
+    sampled = {
+        f"{path}.{name}"
+        for path, part in assembly.flat.parts.items()
+        for law in part.component.laws("update")
+        for name in (law.options.every, law.options.offset)
+    }
     return {
         slots[symbol.name].path: (number, slots[symbol.name])
         for number, symbol in enumerate(assembly.mechanism.table.values)
-        if symbol.name in slots and not (fixed and depends_on(fixed, [symbol]))
+        if symbol.name in slots and symbol.name not in sampled and not (fixed and depends_on(fixed, [symbol]))
     }
 
 

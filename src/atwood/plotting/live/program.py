@@ -16,6 +16,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.codegen.javascript.printer import print_routines
+from atwood.errors import UnsupportedError
 from atwood.forms.assembly import Assembly
 from atwood.forms.sides import has_sides
 from atwood.integrators.compiled_location import FIELDS as SEARCH_FIELDS, ROWS as SEARCH_ROWS, STACK
@@ -31,6 +32,7 @@ from atwood.plotting.live.mode import ModeText, NotLiveError, bodies_of
 from atwood.plotting.live.modes import add_modes
 from atwood.plotting.live.parameters import live_parameters, with_sliders
 from atwood.plotting.live.start import add_start, add_tangent
+from atwood.plotting.live.updates import add_updates
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.initialization.start import Start, settle, start_with_line_signs
 from atwood.simulation.problem.preparation import problem_of_run
@@ -118,11 +120,14 @@ def live_program(
         plan, y = _prepared(assembly, start)
         mode = ModeText(plan, y, quantities)
         data = _data(mode, start)
-        modes = [(one.text(), one.data) for one in add_modes(mode, start, quantities)]
+        every = add_modes(mode, start, quantities)
+        for one in every:
+            add_updates(one)
+        modes = [(one.text(), one.data) for one in every]
         texts = ", ".join(f"{{data: {_json(own)},\nopen: {text}}}" for text, own in modes)
         text = f"{{data: {_json(data)},\nmodes: [{texts}]}}"
         return LiveProgram(assembly.flat.name, assembly.form, "", text, data)
-    except NotLiveError as error:
+    except (NotLiveError, UnsupportedError) as error:
         return LiveProgram(assembly.flat.name, assembly.form, error.message)
 
 
@@ -131,8 +136,6 @@ def _refuse(assembly: Assembly) -> None:
     for path, local in assembly.mechanism.locals_.items():
         for contact in local.contacts:
             raise NotLiveError(f"{path}.{contact.law.name} is a gap or dry friction, which pages do not resolve yet")
-        for law in local.part.component.laws("update"):
-            raise NotLiveError(f"{path}.{law.name} is an update in Python, and a page has no Python")
     if kinematic_map_of(assembly, assembly.form).has_singular_coordinates:
         raise NotLiveError("its orientations have three coordinates, which are switched; quaternions are live")
 

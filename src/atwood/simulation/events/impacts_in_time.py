@@ -78,7 +78,7 @@ def pass_time_event(
     before: Assembly, after: Assembly, t: float, q: FloatArray, u: FloatArray, length: float
 ) -> tuple[FloatArray, FloatArray, tuple[EventRecord, ...]]:
     """Return the state just after a time event, and the impacts, one for each part whose motion jumps in speed."""
-    if not after.shared.get(_MOTION_SWITCHES, lambda: bool(_switching(after))):
+    if not after.shared.get(_MOTION_SWITCHES, lambda: bool(switching(after))):
         return q, u, ()
     big_q, big_u = (x[:, 0] for x in maximal_state(before, np.array([t]), q[:, None], u[:, None]))
     sizes = motion_scales(after.maximal, length)
@@ -132,7 +132,7 @@ def _values_after(after: Assembly, balance: Balance, t: float, q: FloatArray, u:
     except KernelEvaluationError as error:
         raise SolveError(
             f"at t = {t:.9g} its prescribed motion switches to one without a finite value, speed or acceleration",
-            where=_switching(after)[0],
+            where=switching(after)[0],
             advice="Look at the function just after that time: the square root of the time since then has an "
             "infinite derivative.",
         ) from error
@@ -184,7 +184,7 @@ def _check_places(
     )
 
 
-def _switching(assembly: Assembly) -> list[str]:
+def switching(assembly: Assembly) -> list[str]:
     """Return the parts with a constraint that reads a relation of functions of time, or may do so through a link."""
     found = []
     for path, local in assembly.mechanism.locals_.items():

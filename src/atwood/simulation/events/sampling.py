@@ -49,7 +49,7 @@ class Updated:
 
 
 @dataclass(frozen=True)
-class _Update:
+class Update:
     """One update law of a part.
 
     Attributes
@@ -91,7 +91,7 @@ class Sampler:
         For each of these, which updates.
     """
 
-    updates: tuple[_Update, ...]
+    updates: tuple[Update, ...]
     times: FloatArray
     due: Sequence[tuple[int, ...]]
 
@@ -114,11 +114,11 @@ class Sampler:
         reading = update_inputs_of(assembly)
         held = list(assembly.held_now)
         q, values = q.copy(), None
-        order = _ordered([self.updates[i] for i in chosen], reading)
+        order = in_order([self.updates[i] for i in chosen], reading)
         for one in order:
             if values is None:
                 values = reading.values(assembly, t, q, u, held)
-            given = _evaluated(one, assembly, t, values, reading)
+            given = evaluated(one, assembly, t, values, reading)
             for path, value in zip(one.sets, given, strict=True):
                 if path in reading.held:
                     held[reading.held[path]] = value
@@ -128,7 +128,7 @@ class Sampler:
         return Updated(tuple(held), q)
 
 
-def _ordered(updates: Sequence[_Update], reading: UpdateInputs) -> list[_Update]:
+def in_order(updates: Sequence[Update], reading: UpdateInputs) -> list[Update]:
     """Return updates of one moment, each after those that set what its inputs are made of."""
     if len(updates) < 2:
         return list(updates)
@@ -155,7 +155,7 @@ def _ordered(updates: Sequence[_Update], reading: UpdateInputs) -> list[_Update]
     return found
 
 
-def _circle(waiting: Mapping[str, _Update], before: Mapping[str, set[str]]) -> list[str]:
+def _circle(waiting: Mapping[str, Update], before: Mapping[str, set[str]]) -> list[str]:
     """Return a circle among updates that wait for each other, from one that feeds to the one that is fed."""
     way = [next(iter(waiting))]
     while way.count(way[-1]) < 2:
@@ -163,8 +163,8 @@ def _circle(waiting: Mapping[str, _Update], before: Mapping[str, set[str]]) -> l
     return way[way.index(way[-1]) :][::-1]
 
 
-def _evaluated(
-    one: _Update, assembly: Assembly, t: float, values: Mapping[str, Mapping[str, Any]], reading: UpdateInputs
+def evaluated(
+    one: Update, assembly: Assembly, t: float, values: Mapping[str, Mapping[str, Any]], reading: UpdateInputs
 ) -> list[float]:
     """Return the numbers that one update returns."""
     part, space = assembly.flat.parts[one.path], assembly.mechanism.space
@@ -239,11 +239,11 @@ def find_sampler(assembly: Assembly, start: float, end: float, moments: FloatArr
     if updates:
         reading = update_inputs_of(assembly)
         for chosen in set(due):
-            _ordered([updates[i] for i in chosen], reading)
+            in_order([updates[i] for i in chosen], reading)
     return Sampler(updates, _snapped(np.array(merged), moments), due)
 
 
-def _updates(assembly: Assembly) -> Iterable[_Update]:
+def _updates(assembly: Assembly) -> Iterable[Update]:
     for path, part in assembly.flat.parts.items():
         laws = part.component.laws("update")
         specs = part.component.state_specs() if laws else {}
@@ -257,7 +257,7 @@ def _updates(assembly: Assembly) -> Iterable[_Update]:
                 raise ParameterError(
                     f"its sample time is {every:g} s", where=where, advice="Give a sample time above zero."
                 )
-            yield _Update(path, law, every, _seconds(part, law, "offset"), sets, reads)
+            yield Update(path, law, every, _seconds(part, law, "offset"), sets, reads)
 
 
 def _seconds(part: Any, law: Law, option: str) -> float:
@@ -271,7 +271,7 @@ def _bound(assembly: Assembly, path: str, t: float) -> Any:
     return bind(component, Binding(values=assembly.flat.parts[path].values, time=t))
 
 
-def _times(one: _Update, assembly: Assembly, start: float, end: float) -> list[float]:
+def _times(one: Update, assembly: Assembly, start: float, end: float) -> list[float]:
     """Return when an update is due; pieces of functions of time do not begin at the very end of a run."""
     if one.law.options.when:
         given = np.array([start, *getattr(_bound(assembly, one.path, start), one.law.options.when)()], dtype=float)
