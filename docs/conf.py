@@ -1,17 +1,23 @@
 """Settings of Sphinx for the documentation: `python -m sphinx -W docs build/docs`, with the extra `docs`."""
 
 import sys
+from importlib.resources import files
 from pathlib import Path
 
+from sphinx.util.fileutil import copy_asset
+
 ROOT = Path(__file__).parents[1]
-sys.path[:0] = [str(ROOT / "src"), str(ROOT / "library")]
+sys.path[:0] = [str(ROOT / "src"), str(ROOT / "library"), str(ROOT / "docs")]
 
 project = "Atwood"
 copyright = "The Atwood authors"
 extensions = ["sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.napoleon", "sphinx.ext.mathjax", "myst_nb"]
 html_theme = "furo"
 html_title = "Atwood"
-exclude_patterns = ["build", "jupyter_execute"]
+exclude_patterns = ["build", "jupyter_execute", "gallery-files"]
+html_extra_path = ["gallery-files"]  # pages that move, each a file of its own
+html_static_path = ["static"]
+html_css_files = ["site.css"]
 nb_execution_mode = "force"  # of pages that are notebooks: those of the course
 nb_execution_raise_on_error = True
 nb_execution_timeout = 120
@@ -30,3 +36,23 @@ autodoc_typehints_description_target = "documented"
 autodoc_member_order = "groupwise"
 autodoc_default_options = {"members": True, "show-inheritance": True}
 default_role = "code"  # names in single backticks are code
+
+
+mathjax_path = "mathjax/tex-chtml.js"  # within the site, which asks for nothing outside
+
+
+def copy_mathjax(app, error):
+    """Copy what formulas need: one script and its letters."""
+    source = files("sphinx-mathjax-offline").joinpath("static", "mathjax")
+    target = Path(app.outdir) / "_static" / "mathjax"
+    if error is None:
+        for name in ("tex-chtml.js", "output/chtml/fonts"):
+            copy_asset(source / name, (target / name).parent if name.endswith(".js") else target / name)
+
+
+def setup(app):
+    """Write the gallery before pages are read, and copy what formulas need."""
+    from gallery import write_gallery
+
+    app.connect("builder-inited", write_gallery)
+    app.connect("build-finished", copy_mathjax)

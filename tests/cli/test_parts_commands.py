@@ -125,3 +125,17 @@ def test_a_run_stops_at_a_condition_and_notes_others() -> None:
     wrong = CliRunner().invoke(main, ["run", "simple-pendulum", "--until", "rod.angle croses 0"])
     assert wrong.exit_code == 1
     assert "Did you mean 'crosses'?" in wrong.output
+
+
+def test_a_word_that_is_no_name_finds_what_mentions_it() -> None:
+    found = json.loads(run("info", "motor", "--json").output)["mentioned"]
+    assert {"what": "part", "name": "Rotor"}.items() <= next(one for one in found if one["name"] == "Rotor").items()
+    assert "clutches" in [one["name"] for one in found], "scenes are found too"
+    assert "Rotor" in run("info", "motor").output
+
+
+@pytest.mark.parametrize("word", ["fluid", "flexible", "zzz"])
+def test_a_word_that_nothing_mentions_says_where_to_look(word: str) -> None:
+    refused = CliRunner().invoke(main, ["info", word])
+    assert refused.exit_code == 1
+    assert "atwood list --parts" in refused.stderr

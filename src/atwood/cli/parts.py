@@ -82,6 +82,18 @@ def _plain(name: str) -> str:
     return re.sub(r"[\W_]", "", name).casefold()
 
 
+def mentioning(word: str) -> list[tuple[str, str, str]]:
+    """Return parts and scenes in whose names, synonyms or first lines a word occurs: what it is, its name, the line."""
+    asked = _plain(word)
+    parts = [("part", name, _said(kind)[0], _synonyms(kind)) for name, kind in library_parts().items()]
+    scenes = [("scene", name, _said(kind)[0], ()) for name, kind in bundled_scenes().items()]
+    return [
+        (what, name, line)
+        for what, name, line, more in (*parts, *scenes)
+        if asked in _plain("".join((name, line, *more)))
+    ]
+
+
 def list_parts(as_json: bool) -> None:
     """Show the parts of the installed libraries, with one line each."""
     parts = library_parts()

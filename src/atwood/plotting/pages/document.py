@@ -70,7 +70,12 @@ def _library() -> str:
     return _packed(json.dumps({"three": (_HERE / "vendor" / "three.js").read_text(encoding="utf-8")}).encode())
 
 
-def write_document(payload: Mapping[str, Any], still: str, modules: Mapping[str, str]) -> str:
+def library_script() -> str:
+    """Return a script with the library that draws, for pages of one site that share it."""
+    return f'window.atwoodLibrary = "{_library()}";\n'
+
+
+def write_document(payload: Mapping[str, Any], still: str, modules: Mapping[str, str], library: str = "") -> str:
     """Return the page.
 
     Parameters
@@ -81,6 +86,8 @@ def write_document(payload: Mapping[str, Any], still: str, modules: Mapping[str,
         The still picture, as SVG.
     modules
         Further modules of this page alone.
+    library
+        Where `library_script` is, for a page that does not hold it itself.
     """
     numbers = Numbers()
     told = json.dumps(_plain(payload, numbers), allow_nan=False)
@@ -89,14 +96,18 @@ def write_document(payload: Mapping[str, Any], still: str, modules: Mapping[str,
     style = (_HERE / "page.css").read_text(encoding="utf-8")
     # Only the loader's own text may run, and what it unpacks from the page; nothing may be fetched.
     digest = base64.b64encode(hashlib.sha256(loader.encode()).digest()).decode()
-    policy = f"default-src 'none'; script-src 'sha256-{digest}' blob:; style-src 'unsafe-inline'; img-src data: blob:"
+    shared = "'self' file: " if library else ""
+    scripts = f"script-src {shared}'sha256-{digest}' blob:"
+    policy = f"default-src 'none'; {scripts}; style-src 'unsafe-inline'; img-src data: blob:"
     packed = {
-        "library": _library(),
+        **({} if library else {"library": _library()}),
         "modules": _packed(json.dumps({**modules, **texts}).encode()),
         "numbers": _packed(numbers.all()),
         "payload": _packed(told.encode()),
     }
     holders = "".join(f'<script type="text/plain" id="{name}">{text}</script>\n' for name, text in packed.items())
+    if library:
+        holders += f'<script src="{escape(library)}"></script>\n'
     title = escape(str(payload["title"]))
     return (
         '<!doctype html>\n<html lang="en" data-mode="loading">\n<head>\n<meta charset="utf-8">\n'

@@ -146,7 +146,7 @@ def page(
     known = list(dict.fromkeys(path for one in results.values() for path in one.paths))
     shown = [_known(path, known, "show") for path in ([show] if isinstance(show, str) else show)]
     bounds = dict(_bounds(text) for text in ([sliders] if isinstance(sliders, str) else sliders))
-    made = _write(results, shown, bounds, live)
+    made = make_page(results, shown, bounds, live)
     if len(made.html) > _LARGEST:
         raise UsageError(
             f"the page would have {len(made.html) / 1e6:.0f} MB, and at most {_LARGEST / 1e6:.0f} are written",
@@ -205,9 +205,15 @@ def _bounds(text: str) -> tuple[str, tuple[float, float] | None]:
 # -- what it holds --------------------------------------------------------------------------------------------------
 
 
-def _write(
-    results: Mapping[str, Result], shown: Sequence[str], bounds: Mapping[str, tuple[float, float] | None], live: str
+def make_page(
+    results: Mapping[str, Result],
+    shown: Sequence[str] = (),
+    bounds: Mapping[str, tuple[float, float] | None] | None = None,
+    live: str = "auto",
+    library: str = "",
 ) -> Page:
+    """Return the page of results; `library` says where pages of one site find what draws."""
+    bounds = bounds or {}
     first = next(iter(results.values()))
     stages = [set_stage(one) for one in results.values()]
     program = _live(results, bounds, live)
@@ -238,7 +244,7 @@ def _write(
         "about": _about(first),
         "report": repr(first),
     }
-    html = write_document(payload, still, modules)
+    html = write_document(payload, still, modules, library)
     return Page(html, "live" if modules else "recorded", program.reason)
 
 

@@ -7,7 +7,8 @@
     document.body.prepend(notice);
   };
   const unpack = async (id) => {
-    const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (c) => c.charCodeAt(0));
+    const packed = document.getElementById(id)?.textContent ?? window.atwoodLibrary; // pages of a site share the library
+    const bytes = Uint8Array.from(atob(packed), (c) => c.charCodeAt(0));
     return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
   };
   const text = async (id) => new TextDecoder().decode(await unpack(id));
