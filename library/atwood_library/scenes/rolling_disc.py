@@ -20,7 +20,7 @@ class RollingDisc(Scene):
     turns if it is slow.
     """
 
-    radius: Number = parameter(0.1, unit="m", above=0.0, doc="Radius.")
+    radius: Number = parameter(0.1, unit="m", above=0.0, doc="Radius.", symbol="r")
     hole: Number = parameter(0.0, unit="m", minimum=0.0, doc="Radius of its hole: a hoop, if it is the radius.")
     mass: Number = parameter(0.5, unit="kg", above=0.0, doc="Mass.")
     inclination: Number = parameter(math.radians(60.0), unit="rad", doc="Angle of its axis from the vertical at first.")

@@ -14,7 +14,7 @@ from itertools import combinations
 from typing import Literal
 
 from atwood.errors import UnsupportedError
-from atwood.expr import Expression, SparseMatrix, count_operations, depends_on, substitute, vjp
+from atwood.expr import Expression, SparseMatrix, count_operations, depends_on, live, substitute, vjp
 from atwood.expr.core import algebra
 from atwood.expr.core.relations import Relation
 from atwood.expr.simplify.polynomial import TooLargeError
@@ -22,6 +22,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import Contribution, Lagrangian, rows_by_part
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
+from atwood.theory.equations.euler_angles import middle_angles, with_one_sign
 from atwood.theory.equations.pages import Structure, structure_of
 from atwood.theory.equations.solved import quantity_of, solved_for
 from atwood.theory.formulas.book import Book
@@ -127,7 +128,23 @@ class EquationFormulas:
         return known
 
     def _plain(self, values: Sequence[Expression]) -> list[Expression]:
-        return substitute(list(values), self._meanings) if values and self._meanings else list(values)
+        found = substitute(list(values), self._meanings) if values and self._meanings else list(values)
+        for angle, is_sine in self._middle_angles if found else ():
+            found = with_one_sign(found, angle, is_sine, self.book.angles, self.book.parameters)
+        return found
+
+    @cached_property
+    def sign_said(self) -> str:
+        """Where the formulas hold, in words, where roots of squares of sines are written as these."""
+        roots = [one for one in live([self.expressions.potential, *self._balance]) if one.operation == "sqrt"]
+        waves = [(self.notation.symbols[q].name, "sin" if s else "cos") for q, s in self._middle_angles if roots]
+        return "; ".join(
+            f"{wave} {name} is positive: where it is zero, Euler angles are singular" for name, wave in waves
+        )
+
+    @cached_property
+    def _middle_angles(self) -> list[tuple[Expression, bool]]:
+        return middle_angles(self.expressions)
 
     def formula(self, value: Expression, shares: Mapping[str, Expression] | None = None, energy: bool = False) -> Sum:
         """Return an expression as a formula: the shortest, or as it is computed where that is too long.
@@ -261,11 +278,15 @@ class EquationFormulas:
         total, shares = quantity_of(self, path)
         return self._parted(total, shares)
 
-    @property
+    @cached_property
     def residuals(self) -> tuple[Expression, ...]:
         """The equations of motion as expressions, forces of constraints included."""
+        return tuple(self._plain(self._balance))
+
+    @cached_property
+    def _balance(self) -> list[Expression]:
         found = self.expressions
-        return tuple(row - held for row, held in zip(found.rows, found.constraint_rows, strict=True))
+        return [row - held for row, held in zip(found.rows, found.constraint_rows, strict=True)]
 
     def _matrix(self, matrix: SparseMatrix, shape: tuple[int, int]) -> tuple[tuple[Sum, ...], ...]:
         entries = [[Sum(())] * shape[1] for _ in range(shape[0])]

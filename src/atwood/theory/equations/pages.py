@@ -58,7 +58,7 @@ def _sections(eq: EquationsOfMotion, written: Written) -> list[Section]:
         if lines:
             sections.append(Section(title, tuple(lines)))
     lines = equation_lines(written)
-    sections.append(Section("Equations of motion", tuple(lines[: len(written.rows)])))
+    sections.append(Section("Equations of motion", tuple(lines[: len(written.rows)]), eq.sign_said))
     if written.constraints:
         sections.append(Section("Constraints", tuple(lines[len(written.rows) :]), _multipliers(eq)))
     if found.has_angular_velocities or found.is_restricted:
@@ -287,7 +287,8 @@ def module_of(eq: EquationsOfMotion) -> str:
         ]
     body = "\n\n\n".join(functions)
     used = [name for name in code.MATH if re.search(rf"\b{name}\b", body)]
-    head = [f'"""Equations of motion of {eq.name}, {eq.form} form: {_statement(eq)}', "", *_listing(eq), '"""', ""]
+    head = [f'"""Equations of motion of {eq.name}, {eq.form} form: {_statement(eq)}', "", *_listing(eq)]
+    head += [*filter(None, [eq.sign_said]), '"""', ""]
     head += [f"from math import {', '.join(used)}", ""] if used else []
     head += ["import numpy as np", "from numpy.linalg import solve", ""]
     if found.constraints:

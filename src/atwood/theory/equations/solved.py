@@ -16,6 +16,7 @@ from atwood.expr import Expression, collect, cos, depends_on, jacobian, jvp, liv
 from atwood.forms.lagrangian import lagrangian_of, rows_by_part
 from atwood.forms.quantities import find_observables, internal_reactions_of, places
 from atwood.mechanics.outputs.reactions import Reaction
+from atwood.theory.equations.euler_angles import in_whole_angles, middle_angles
 
 if TYPE_CHECKING:
     from atwood.theory.equations.formulas import EquationFormulas
@@ -109,7 +110,7 @@ def quantity_of(formulas: EquationFormulas, path: str) -> tuple[Expression, dict
         where = {**dict(moving), **dict(zip(maximal.accelerations, jvp(speeds, along), strict=True))}
     known, balance = _balanced(formulas, where) if where else ({}, {})
     by = {other.symbol: _reaction(formulas, other, where, known) for other in reactions}
-    value = substitute([one.value], {**own, **by})[0]
+    value = in_whole_angles(substitute([one.value], {**own, **by}), formulas.book.angles, formulas.book.parameters)[0]
     shares: dict[str, Expression] = {}
     if formulas.by_part and balance and substitute([value], dict.fromkeys(balance, 0.0))[0].is_zero:
         open_ = dict.fromkeys((held.multiplier for held in maximal.constraints if held.multiplier in known), 0.0)
@@ -196,6 +197,8 @@ def _balanced(
 
 def _in_whole_angles(formulas: EquationFormulas, rows: Sequence[Expression]) -> list[Expression]:
     """Return rows with products of sines and cosines of half an angle as those of the angle."""
+    if middle_angles(formulas.expressions):
+        return in_whole_angles(rows, formulas.book.angles, formulas.book.parameters)
     nodes, parameters = live(rows), formulas.book.parameters
     waves = dict.fromkeys(one.arguments[0] for one in nodes if one.operation in ("sin", "cos"))
     halves = [one for one in waves if 2.0 * one in waves and not one.is_parametric]
