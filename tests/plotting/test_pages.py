@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 
 from atwood import AtwoodError, UsageError, diagram, load_result, page, simulate
+from atwood.cli import main
 from atwood_library.scenes import SCENES
 
 
@@ -73,3 +76,24 @@ def test_a_diagram_marks_the_joint_that_closes_a_loop(tmp_path: Path) -> None:
     assert closing[0].startswith("pivot")
     with pytest.raises(UsageError, match="svg"):
         diagram(SCENES["four-bar"](), tmp_path / "a.png")
+
+
+def test_the_command_writes_a_page_and_says_what_it_is(tmp_path: Path) -> None:
+    target = str(tmp_path / "a.html")
+    told = json.loads(_run("page", "double-pendulum", "-o", target, "--t-end", "0.5", "--json").output)
+    assert told == {"file": target, "mode": "live", "reason": "", "bytes": Path(target).stat().st_size}
+    assert (
+        json.loads(_run("page", "double-pendulum", "-o", target, "--mode", "1", "--json").output)["mode"] == "recorded"
+    )
+    for wrong, said in (
+        (("--show", "rod1.angel"), "rod1.angle"),
+        (("--slider", "rod1.length=3:1"), "wrong way"),
+        (("--mode", "7"), "0 to 1"),
+    ):
+        refused = _run("page", "double-pendulum", "-o", target, *wrong)
+        assert refused.exit_code == 1
+        assert said in refused.stderr
+
+
+def _run(*arguments: str) -> Any:
+    return CliRunner().invoke(main, arguments)

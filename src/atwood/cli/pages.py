@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from atwood.arguments import FILE, FLAG, TEXT, each
+from atwood.arguments import FILE, FLAG, TEXT, each, optional, whole
 from atwood.cli.command import Request, command
 from atwood.cli.output import print_json
 from atwood.cli.running import run_of
@@ -17,6 +17,7 @@ from atwood.lazy_dataclasses import replace
 from atwood.pipeline import assemble, simulate
 from atwood.plotting.diagram import diagram
 from atwood.plotting.pages.page import check_target, page
+from atwood.result.result import Result
 
 
 def write_page(request: Request) -> None:
@@ -24,6 +25,8 @@ def write_page(request: Request) -> None:
 
     Parameters
     ----------
+    mode
+        Show this small oscillation, by its number in `atwood modes`, instead of the motion from the start.
     recorded
         Only play what was simulated, even where the page could be live.
     open
@@ -31,13 +34,13 @@ def write_page(request: Request) -> None:
     """
     target = Path(f"{Path(request.scene).stem}.html") if request.file is None else request.file
     check_target(target)
-    result = run_of(request)
+    result = run_of(request) if request.mode is None else _mode(request)
     made = page(
         result,
         target,
         show=request.show or (),
         sliders=request.sliders or (),
-        live="never" if request.recorded else "auto",
+        live="never" if request.recorded or request.mode is not None else "auto",
     )
     if request.as_json:
         print_json({"file": str(target), "mode": made.mode, "reason": made.reason, "bytes": target.stat().st_size})
@@ -46,6 +49,15 @@ def write_page(request: Request) -> None:
         click.echo(f"{target} ({target.stat().st_size / 1000:.0f} kB){why}")
     if request.open:
         webbrowser.open(target.absolute().as_uri())
+
+
+def _mode(request: Request) -> Result:
+    """Return a small oscillation about the start, or about the first stable equilibrium."""
+    from atwood.cli.theory import modes_of_scene
+
+    scene, name = prepare(request.scene, request.settings, request.start_values)
+    found = modes_of_scene(assemble(scene, name=name, **request.of(assemble)))
+    return found[0].motion(request.mode, frames=121)
 
 
 def draw(request: Request) -> None:
@@ -70,6 +82,7 @@ _PAGE = {
     "file": (FILE, None),
     "show": (each(replace(TEXT, word="PATH"), "paths of quantities"), None),
     "sliders": (each(replace(TEXT, word="PATH"), "paths"), None),
+    "mode": (optional(whole("the number of a mode", 0)), None),
     "recorded": (FLAG, False),
     "open": (FLAG, False),
     "progress": (FLAG, True),

@@ -30,7 +30,7 @@ from atwood.theory.formulas.named import NAMED
 from atwood.theory.formulas.notation import notation_of
 from atwood.theory.formulas.tree import Symbol
 from atwood.theory.hamiltonian.hamiltonian import read_hamiltonian
-from atwood.theory.linear import equilibria, equilibrium_branches
+from atwood.theory.linear import NormalModes, equilibria, equilibrium_branches, normal_modes
 
 _WRITTEN = ("latex", "markdown", "html", "python")
 """Languages in which results are written down, each an option; Python where they can be."""
@@ -155,10 +155,17 @@ def _modes(function: Callable[..., Any], scene: Assembly, asked: dict[str, Any],
     """Show the normal modes of SCENE: about its start if it is at rest there, else about its stable equilibria."""
     if asked.get("symbolic"):
         return _called(function, scene, asked)
+    return modes_of_scene(scene, "at" in asked, lambda: _called(function, scene, asked))
+
+
+def modes_of_scene(
+    scene: Assembly, is_said: bool = False, about: Callable[[], NormalModes] | None = None
+) -> list[NormalModes]:
+    """Return the modes about what is said, or about the start if it is at rest, else about all stable equilibria."""
     try:
-        return [_called(function, scene, asked)]
+        return [normal_modes(scene) if about is None else about()]
     except UsageError as error:
-        found = [one.modes for one in equilibria(scene) if one.stable] if "at" not in asked else []
+        found = [] if is_said else [one.modes for one in equilibria(scene) if one.stable]
         if not found:
             raise error
         return found

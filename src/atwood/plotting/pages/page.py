@@ -253,7 +253,7 @@ def _live(results: Mapping[str, Result], bounds: Mapping[str, object], live: str
     first = next(iter(results.values()))
     found = live_program(first.assembly, sliders=list(bounds))
     if live == "never":
-        return replace(found, reason="this was asked for", model="")
+        return replace(found, reason="a record was asked for", model="")
     if len(results) > 1:
         return replace(found, reason="several results are compared", model="")
     return found
