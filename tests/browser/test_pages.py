@@ -132,3 +132,18 @@ def test_every_control_has_a_name_and_nothing_is_wider_than_the_window(
     tab.get_by_role("tab", name="Parts").click()
     tab.get_by_label("Part", exact=True).select_option("crank")
     assert "crank.angle" in tab.locator(".part").inner_text()
+
+
+def test_the_picture_is_turned_by_keys_and_a_click_tells_a_part(show: Callable[..., Any], tmp_path: Path) -> None:
+    page(SCENES["double-pendulum"](), tmp_path / "a.html")
+    tab = show(tmp_path / "a.html")
+    before = _pixels(tab)
+    tab.locator(".view").focus()
+    tab.keyboard.press("ArrowRight")
+    assert np.any(before != _pixels(tab))
+    tab.get_by_label("Look from the front").click(force=True)
+    tab.evaluate("atwood.advance(0.7)")
+    dark = np.argwhere(np.all(np.abs(_pixels(tab) - [0.82, 0.286, 0.357]) < 0.05, axis=2))
+    y, x = dark.mean(axis=0)  # the second bob, which is red
+    tab.mouse.click(float(x), float(y))
+    assert "bob2" in tab.locator(".part h2").inner_text()

@@ -55,7 +55,8 @@ class Page {
     const still = document.getElementById("still");
     still.remove();
     const { payload } = this;
-    this.host = element("div", { class: "view", role: "img", "aria-label": `Moving picture of ${payload.title}` });
+    const label = `Moving picture of ${payload.title}; arrow keys turn it, plus and minus come nearer and go away`;
+    this.host = element("div", { class: "view", role: "application", tabindex: 0, "aria-label": label });
     this.tip = element("div", { class: "tip", role: "status", hidden: true });
     this.notice = element("p", { class: "notice", role: "alert", hidden: true });
     const badge = element("span", { class: `badge ${this.mode}`, title: this.reason || "" }, this.mode);
@@ -526,8 +527,21 @@ class Page {
       this.tip.style.top = `${event.clientY - box.top + 12}px`;
     });
     this.host.addEventListener("pointerleave", () => { this.tip.hidden = true; });
+    const keys = {
+      ArrowLeft: () => this.view.turn(-0.12, 0), ArrowRight: () => this.view.turn(0.12, 0),
+      ArrowUp: () => this.view.turn(0, 0.12), ArrowDown: () => this.view.turn(0, -0.12),
+      "+": () => this.view.zoom(1.15), "-": () => this.view.zoom(1 / 1.15),
+    };
+    this.host.addEventListener("keydown", (event) => {
+      if (!this.view || !(event.key in keys)) return;
+      event.preventDefault();
+      keys[event.key]();
+    });
+    let pressed = null;
+    this.host.addEventListener("pointerdown", (event) => { pressed = [event.clientX, event.clientY]; });
     this.host.addEventListener("click", (event) => {
-      const found = this.view?.pick(event);
+      const moved = pressed && Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) > 4;
+      const found = moved ? null : this.view?.pick(event); // a drag turns the picture
       if (!found) return;
       this.tellPart(found.part);
       this.choose("Parts");

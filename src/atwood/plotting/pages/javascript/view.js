@@ -96,6 +96,26 @@ export class View {
     this.resize();
   }
 
+  /** Turn the eye about what is seen, by angles to the right and up. */
+  turn(right, up) {
+    const away = this.camera.position.clone().sub(this.controls.target);
+    const radius = away.length();
+    const elevation = Math.min(1.55, Math.max(-1.55, Math.asin(away.z / radius) + up));
+    const azimuth = Math.atan2(away.y, away.x) + right;
+    const level = radius * Math.cos(elevation);
+    away.set(level * Math.cos(azimuth), level * Math.sin(azimuth), radius * Math.sin(elevation));
+    this.camera.position.copy(this.controls.target).add(away);
+    this.controls.update();
+    this.render();
+  }
+
+  /** Come nearer, or go away. */
+  zoom(factor) {
+    this.camera.zoom *= factor;
+    this.camera.updateProjectionMatrix();
+    this.render();
+  }
+
   /** Fit what was seen from the front into the window. */
   resize() {
     const { clientWidth: width, clientHeight: height } = this.host;
