@@ -53,7 +53,7 @@ function openMode(mode, options) {
   }
   const scratch = room(Math.max(...Object.values(words).map(one => one.scratch)));
   const [own, block, clock, y, yp, nearer] = [data.values.length, 8, 1, size, size, size + m].map(room);
-  const session = room(Object.keys(FIELD).length), arrays = room(ROW.all * padded), shifts = room(count);
+  const judged = room(4), session = room(Object.keys(FIELD).length), arrays = room(ROW.all * padded), shifts = room(count);
   const sought = room(Object.keys(SOUGHT).length), [sy, syp, shifted, turns] = [size, size, size, 2 * size].map(room);
   const rows = room(Object.keys(SEARCHED).length * count + POINTS * (1 + 2 * count));
   const M = new Float64Array(end), F = [null], values = Float64Array.from(data.values);
@@ -265,6 +265,10 @@ function openMode(mode, options) {
   [places.kernel.derived, scratch, places.nearer?.derived, scratch, nearer].forEach((one, i) => { M[block + i] = one ?? 0; });
   put({arrays, size, padded, function: address(functions.rates), data: block});
   if (functions.project) put({project: address(functions.project), project_data: block + 2});
+  if (functions.guard) {
+    [places.judge.derived, scratch, ...data.judged].forEach((one, i) => { M[judged + i] = one; });
+    put({guard: address(functions.guard), guard_data: judged});
+  }
   put({relative: Math.max(options.rtol * data.relative, 1e-15), longest: options.longest ?? Infinity, horizon: options.horizon});
   M.fill(1, row("absolute"), row("absolute") + padded);
   M.set(data.tolerances.map(one => (options.atol ?? options.rtol) * one), row("absolute"));

@@ -17,6 +17,8 @@ from atwood.forms.accelerations import accelerations_of
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import find_observables
 from atwood.integrators.embedded.rates import write_routines as write_rates
+from atwood.integrators.methods.dormand_prince import EXPLICIT
+from atwood.integrators.step_guard import write_routines as write_guard
 from atwood.mechanics.kinematics.mechanism import Mechanism, world_position
 from atwood.mechanics.outputs.observables import Observable
 from atwood.mechanics.outputs.totals import energies
@@ -25,8 +27,10 @@ from atwood.plotting.live.parameters import find_parameters
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.events.modes import MARGIN, EventProbe
 from atwood.simulation.events.time_events import find_schedule
+from atwood.simulation.problem.curved_laws import find_curved
 from atwood.simulation.problem.explicit_scene import program_on_constraints
 from atwood.simulation.problem.problem import SceneProblem
+from atwood.simulation.problem.step_guard import guard_program, shortest_judged
 
 _BEYOND = 4.0
 """So many times as long as the scene's run switches of functions of time are known beforehand."""
@@ -69,6 +73,7 @@ class ModeText:
             "state": y.tolist(),
         }
         self._add_motion(y)
+        self._add_guard()
         self._add_quantities(quantities)
         self._add_pictures()
         self._add_sizes()
@@ -79,7 +84,9 @@ class ModeText:
         """Return the JavaScript function that makes the functions of the mode, from memory and addresses."""
         n, m = len(self.equations.coordinates), len(self.equations.speeds)
         given, projects = len(self.programs["kernel"].outputs) == 2, "nearer" in self.programs
-        texts = [FUNCTIONS, BITS, print_routines([*write_elimination(), *write_rates(n, m, given, projects)])]
+        judges = write_guard("judge") if "judge" in self.programs else []
+        routines = [*write_elimination(), *write_rates(n, m, given, projects), *judges]
+        texts = [FUNCTIONS, BITS, print_routines(routines)]
         words = self.data["words"] = {}
         for name, program in self.programs.items():
             text, scratch = print_program(name, program)
@@ -87,7 +94,7 @@ class ModeText:
             sizes = [len(one.expressions) for one in program.outputs]
             words[name] = {"derived": len(program.prologue), "scratch": scratch, "outputs": sizes}
         names = [*self.programs, *(f"{name}_prologue" for name in self.programs), "rates"]
-        names += ["project"] if projects else []
+        names += [*(["project"] if projects else []), *(["guard"] if judges else [])]
         body = "\n".join(texts)
         return f"(M, F) => {{\n{body}\nreturn {{{', '.join(names)}}};\n}}"
 
@@ -109,6 +116,13 @@ class ModeText:
             balance = assembly.balance(assembly.form)
             self.programs |= {"nearer": made.projection, "held": balance.constraints_alone}
             self.data["slopes"] = [balance.jacobian_rows.tolist(), balance.jacobian_columns.tolist()]
+
+    def _add_guard(self) -> None:
+        """Add what judges steps that laws could slip through, whichever values parameters get."""
+        curved, span = find_curved(self.assembly), (self.flat.t_start, self.flat.t_end)
+        if curved:
+            self.programs["judge"] = guard_program(self.assembly, curved)
+            self.data["judged"] = [EXPLICIT.reach, shortest_judged(span)]
 
     def of_state(self, name: str, groups: Mapping[str, Sequence[Scalar]], more: Sequence[Expression] = ()) -> None:
         """Add a program of (t, q, u), and of the accelerations where these are given."""

@@ -16,7 +16,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.program import state_groups
 from atwood.integrators.protocol import StepGuard
-from atwood.simulation.problem.curved_laws import find_curved, find_external, is_needed, watched_program
+from atwood.simulation.problem.curved_laws import Curved, find_curved, find_external, is_needed, watched_program
 
 if TYPE_CHECKING:
     from atwood.forms.loops.closed_form import ClosedForm
@@ -95,6 +95,24 @@ def _by_bounds(
         return None
     form, values = closed or (None, assembly.parameter_values)
 
+    from atwood.integrators.step_guard import GuardCode, compile_guard
+
+    program = guard_program(assembly, curved, form, is_estimated)
+    code = assembly.shared.get(_CODE, lambda: compile_guard(program), program)
+    assert isinstance(code, GuardCode)
+    return code.bind(values, reach, shortest_judged(span))
+
+
+def shortest_judged(span: tuple[float, float]) -> float:
+    """Return the longest step of a run that is taken as it is, s."""
+    return _SHORTEST * abs(span[1] - span[0])
+
+
+def guard_program(
+    assembly: Assembly, curved: Sequence[Curved], form: ClosedForm | None = None, is_estimated: bool = True
+) -> Program:
+    """Return the program that judges steps; see `watched_program`."""
+
     def make() -> Program:
         equations, parameters = assembly.own_equations, assembly.parameters
         angles = [s for s, one in zip(equations.coordinates, equations.names, strict=True) if one.unit == "rad"]
@@ -105,11 +123,6 @@ def _by_bounds(
         reactions = equations.read.values()
         return watched_program(assembly.flat.name, curved, groups, parameters, angles, known, reactions)
 
-    from atwood.integrators.step_guard import GuardCode, compile_guard
-
     shared = assembly.shared
     with shared.lock:
-        program = shared.get(_PROGRAM, make, assembly.form, form, is_estimated)
-    code = shared.get(_CODE, lambda: compile_guard(program), program)
-    assert isinstance(code, GuardCode)
-    return code.bind(values, reach, _SHORTEST * abs(span[1] - span[0]))
+        return shared.get(_PROGRAM, make, assembly.form, form, is_estimated)
