@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from atwood import Scene, assemble, simulate
+from atwood import Scene, assemble, floor, sign, simulate
 from atwood.errors import ParameterError
 from atwood.plotting.live import LiveProgram, engine_script, live_program
 from atwood_library import Ground, PointMass, Rope, Spring
@@ -17,6 +17,8 @@ from atwood_library.scenes import SCENES
 
 from ..helpers.node import run_node
 from ..library.test_tables import hoisted
+from ..simulation.test_brief_laws import on_a_line
+from ..simulation.test_sides import band, moving
 
 SAMPLE = (
     ("double-pendulum", "reduced"),
@@ -219,3 +221,27 @@ def test_scenes_that_are_not_live_say_why() -> None:
     assert hostile.data["name"] == "</script><!-- "
     assert "</script" not in hostile.model
     assert "<!--" not in hostile.model
+
+
+def test_laws_that_switch_or_act_briefly_are_not_stepped_over() -> None:
+    scenes = {
+        "band": lambda: moving(band(1e-3)),
+        "sign": lambda: moving(lambda x, v: -3.0 * sign(x - 0.5)),
+        "floor": lambda: moving(lambda x, v: 0.1 * floor(3.0 * x)),
+        "bell": lambda: on_a_line("0.4*exp(-((x-3)/0.001)^2)"),
+        "friction": lambda: moving(lambda x, v: -0.3 * sign(v)),
+    }
+    made = {name: live_program(scene()) for name, scene in scenes.items()}
+    script = """
+    print(Object.keys(models).map(name => {
+      const engine = start(name), said = engine.advance(5.0);
+      return [said, Array.from(engine.state)];
+    }));
+    """
+    found = dict(zip(scenes, played(made, script), strict=True))
+    said, _ = found.pop("friction")
+    assert (said["code"], "stays where a law switches" in said["text"]) == ("failed", True)
+    for name, (said, state) in found.items():
+        assert said["code"] == "reached", name
+        expected = state_at(scenes[name](), 5.0, rtol=1e-12)
+        np.testing.assert_allclose(state, expected, rtol=0.0, atol=1e-9, err_msg=name)

@@ -16,7 +16,7 @@ from atwood.errors import UnsupportedError
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.program import Program
 
-_LONGEST = 1500
+_LONGEST = 500
 """Operations in one function."""
 
 _LARGEST_INLINE = 24

@@ -5,8 +5,9 @@ const STACK = 4096;                             // words for arrays of calls
 const TOO_SMALL = 2, FOUND = 1, HAPPENED = 2;   // how steps and searches end, and what a search is told of the start
 const HELD = 1e-6;                              // what constraints may miss, in the scene's sizes
 const MET = 1e-7;                               // the same of what a start is to fulfil
-const LOW = 0.6, NEARBY = 0.3, SINGULAR = 1e-3; // shares of the most that was left of constraints
+const LOW = 0.3, NEARBY = 0.1, SINGULAR = 1e-3; // shares of the most that was left of constraints
 const ROUNDING = 2 ** -52;
+const RELATED = {less: x => +(x < 0), less_equal: x => +(x <= 0), nonzero: x => +(x !== 0), sign: Math.sign, floor: Math.floor};
 
 const status = (code, text = "") => ({code, text});
 const shown = t => Number(t.toPrecision(9)).toString();
@@ -59,14 +60,14 @@ function openMode(mode, options) {
   const M = new Float64Array(end), F = [null], values = Float64Array.from(data.values);
   M[0] = 16;
   const functions = mode.open(M, F), method = steps(M, F), search = searches(M, F);
-  const held = words.held ? {most: new Float64Array(data.constraints.length), largest: 0} : null;
+  const held = words.held ? {most: new Float64Array(data.kept.length), largest: 0, size: 0} : null;
 
   const field = name => M[session + FIELD[name]];
   const put = fields => { for (const [name, one] of Object.entries(fields)) M[session + FIELD[name]] = one; };
   const row = name => arrays + padded * ROW[name];
   const seen = name => rows + count * SEARCHED[name];
   const address = f => F.push(f) - 1;
-  const read = (from, length = size) => M.slice(from, from + length);
+  const read_ = (from, length = size) => M.slice(from, from + length);
 
   // Call a program of (t, q, u, more); false where a result is not finite.
   function call(name, t, from = y, speeds = from + n, more = 0, target = null) {
@@ -109,32 +110,52 @@ function openMode(mode, options) {
     if (!held) return null;
     const found = constraints(t, from);
     if (!found) return "a constraint, which has no finite value";
+    held.size = Math.max(held.size, ...found.slopes.map(largest));
     const off = found.slopes.findIndex((one, i) => {
-      const unit = Math.max(largest(one), NEARBY * held.most[i], 1e-12);
+      const unit = Math.max(largest(one), 1e-4 * held.size, 1e-300);
       return !(Math.abs(found.gaps[i]) <= HELD * unit && Math.abs(found.rates[i]) * data.time <= HELD * unit);
     });
     return off < 0 ? null : data.constraints[off];
   }
 
   // What is left of each kept constraint by the others: the least share of the most that each has been, and whose.
+  const kept = data.kept.length, slopes = new Float64Array(kept * m), squares = new Float64Array(kept), order = new Int32Array(kept);
+  const [among, under] = data.slopes ?? [[], []], rank = new Map(data.kept.map((i, k) => [i, k]));
+  const entries = among.flatMap((i, k) => (rank.has(i) ? [[k, rank.get(i) * m + under[k], data.sizes[under[k]]]] : []));
+  const [from_, to_, by_] = [0, 1, 2].map(part => Float64Array.from(entries, one => one[part]));
+
   function independence(t, from) {
-    const found = constraints(t, from);
-    if (!found) return [0, 0];
-    const left = data.kept.map(i => {
-      held.most[i] = Math.max(held.most[i], Math.hypot(...found.slopes[i]));
-      return [i, found.slopes[i].map(x => x / (held.most[i] || 1))];
-    });
+    if (!call("held", t, from)) return [0, 0];
+    const found = output("held", 1);
+    slopes.fill(0);
+    for (let e = 0; e < from_.length; e++) slopes[to_[e]] = found[from_[e]] * by_[e];
+    for (let k = 0; k < kept; k++) {
+      let sum = 0;
+      for (let j = k * m; j < (k + 1) * m; j++) sum += slopes[j] * slopes[j];
+      const size = held.most[k] = Math.max(held.most[k], Math.sqrt(sum));
+      for (let j = k * m; j < (k + 1) * m; j++) slopes[j] /= size || 1;
+      [squares[k], order[k]] = [sum / (size * size || 1), k];
+    }
     let least = Infinity, which = 0;
-    while (left.length) {
-      const squares = left.map(([, one]) => one.reduce((sum, x) => sum + x * x, 0)), most = Math.max(...squares);
-      const [[i, pivot]] = left.splice(squares.indexOf(most), 1);
-      if (most < least) [least, which] = [most, i];
-      for (const one of left) {
-        const share = one[1].reduce((sum, x, j) => sum + x * pivot[j], 0) / (most || 1);
-        one[1] = one[1].map((x, j) => x - share * pivot[j]);
+    for (let turn = 0; turn < kept; turn++) {
+      let best = turn;
+      for (let k = turn + 1; k < kept; k++) if (squares[order[k]] > squares[order[best]]) best = k;
+      [order[turn], order[best]] = [order[best], order[turn]];
+      const p = order[turn], pivot = squares[p];
+      if (!(pivot >= least)) [least, which] = [pivot, data.kept[p]];
+      for (let k = turn + 1; k < kept; k++) {
+        const i = order[k];
+        let share = 0, left = 0;
+        for (let j = 0; j < m; j++) share += slopes[i * m + j] * slopes[p * m + j];
+        share /= pivot || 1;
+        for (let j = 0; j < m; j++) {
+          const x = slopes[i * m + j] -= share * slopes[p * m + j];
+          left += x * x;
+        }
+        squares[i] = left;
       }
     }
-    return [Math.sqrt(least), which];
+    return [Math.sqrt(Math.max(least, 0)), which];
   }
 
   // The singular position within the last step: its time and a constraint; null where there is none.
@@ -144,15 +165,25 @@ function openMode(mode, options) {
     held.largest = Math.max(held.largest, held.last);
     if (Math.min(before, held.last) >= LOW * held.largest) return null;
     const at = t => (method.interpolate(session, t, y, yp) === 0 ? independence(t, y)[0] : Infinity);
-    const times = Array.from({length: 13}, (_, k) => t0 + (t1 - t0) * k / 12), found = times.map(at);
-    const k = found.indexOf(Math.min(...found));
-    let [a, b] = [times[Math.max(k - 1, 0)], times[Math.min(k + 1, 12)]];
-    for (let i = 0; i < 40 && found[k] < NEARBY * held.largest; i++) {
-      const [left, right] = [a + 0.382 * (b - a), a + 0.618 * (b - a)];
-      if (at(left) < at(right)) b = right; else a = left;
+    const times = [0, 0.25, 0.5, 0.75, 1].map(share => t0 + share * (t1 - t0));
+    const found = [before, ...times.slice(1, 4).map(at), held.last], k = found.indexOf(Math.min(...found));
+    if (found[k] >= NEARBY * held.largest) return null;
+    let [a, b] = [times[Math.max(k - 1, 0)], times[Math.min(k + 1, 4)]], [left, right] = [a + 0.382 * (b - a), a + 0.618 * (b - a)];
+    let [low, high] = [at(left), at(right)];
+    while (b - a > 1e-6 * (t1 - t0) && Math.min(low, high) >= SINGULAR * held.largest) {
+      if (Math.abs(high - low) <= 1e-9 * held.largest) break;
+      if (low < high) {
+        [b, right, high] = [right, left, low];
+        low = at(left = a + 0.382 * (b - a));
+      } else {
+        [a, left, low] = [left, right, high];
+        high = at(right = a + 0.618 * (b - a));
+      }
     }
-    const middle = 0.5 * (a + b), low = at(middle) < SINGULAR * held.largest;
-    return low ? {time: middle, constraint: data.constraints[independence(middle, y)[1]]} : null;
+    const [time, least] = low < high ? [left, low] : [right, high];
+    if (least >= SINGULAR * held.largest) return null;
+    method.interpolate(session, time, y, yp);
+    return {time, constraint: data.constraints[independence(time, y)[1]]};
   }
 
   function normalize(state) {
@@ -181,7 +212,7 @@ function openMode(mode, options) {
     M.set(normalize(Float64Array.from(state)), y);
     if (!project(t)) return "the constraints cannot be met near this state";
     if (method.begin(session, t, y) !== 0) return "the equations have no finite value";
-    if (held) {
+    if (data.watched) {
       held.last = independence(t, y)[0];
       held.largest = Math.max(held.largest, held.last);
     }
@@ -195,12 +226,61 @@ function openMode(mode, options) {
     data.events.forEach((one, i) => {
       const small = one.small * options.rtol, at = M[sy + i];
       M[shifts + i] = !one.noted && Math.abs(at) <= small ? -one.direction * small : 0;
+      if (one.target === "side" && at <= 0) M[shifts + i] = 2 * Math.abs(at) + 1e-300;
       M[seen("given") + i] = fired?.[i] ? HAPPENED : 0;
       M[seen("direction") + i] = one.direction;
     });
     M.fill(0, seen("sign"), seen("sign") + count);
     M[sought + SOUGHT.is_first] = 0;
     return search.restart(sought, t) === 0 ? null : "an event has no value";
+  }
+
+  const differences = (t, state, sides) => {
+    values.set(sides, data.sides.first);
+    fill();
+    M.set(state, y);
+    return call("sides", t) ? [0, 1].map(k => Float64Array.from(output("sides", k))) : null;
+  };
+
+  // The values that relations of what moves have from a state on; null where it stays where one of them changes.
+  function settle(t, state, changed) {
+    const {first, kinds} = data.sides, before = Array.from(values.slice(first, first + kinds.length));
+    const same = (a, b) => a.every((x, i) => x === b[i]);
+    let now = before, read = differences(t, state, now);
+    for (let turn = 0; read && turn <= kinds.length; turn++) {
+      const found = kinds.map((kind, i) => RELATED[kind](read[0][i]));
+      if (same(found, now)) break;
+      [now, read] = [found, differences(t, state, found)];
+    }
+    if (!read) return null;
+    const zero = ([off, sizes]) => kinds.map((_, i) => Math.abs(off[i]) <= 64 * ROUNDING * sizes[i]), at = zero(read);
+    const near = kinds.map((_, i) => i).filter(i => at[i] || changed.includes(i));
+    if (!near.length) return now;
+    const other = (kind, x, off) => (kind === "floor" ? x + (off > x + 0.5 ? 1 : -1) : kind === "sign" ? -x : 1 - x);
+    const passed = now.map((x, i) => (changed.includes(i) ? other(kinds[i], before[i], read[0][i]) : x));
+    const ahead = (sides, step) => {
+      values.set(sides, first);
+      fill();
+      const rates = from => { M.set(from, y); functions.rates(t, y, yp, block); return read_(yp); };
+      const a = rates(state), half = rates(state.map((x, i) => (i < n ? x : x + 0.5 * step * a[i])));
+      const there = differences(t + step, state.map((x, i) => x + step * (i < n ? half : a)[i]), sides);
+      if (!there) return [sides, near];
+      const found = sides.map((x, i) => (near.includes(i) ? RELATED[kinds[i]](there[0][i]) : x)), still = zero(there);
+      return [found, near.filter(i => still[i] && kinds[i] !== "floor")];
+    };
+    for (const share of [1e-8, 1e-5]) {
+      const tried = [passed];
+      for (;;) {
+        const last = tried.at(-1), [found, open] = ahead(last, share * data.time);
+        if (!open.length && near.every(i => found[i] === last[i])) return found;
+        if (open.length || tried.some(one => same(one, found))) {
+          if (!open.length) return null;
+          break;
+        }
+        tried.push(found);
+      }
+    }
+    return null;
   }
 
   // The event that has happened where a mode begins; -1 where none has.
@@ -222,9 +302,9 @@ function openMode(mode, options) {
 
   // The same at the time at which its value was zero, where it came from the other side and the margin made it late.
   function withoutMargin(t, fired, began) {
-    const plain = {time: t, state: read(sy)}, since = t - began, some = fired.flatMap((one, i) => (one ? [i] : []));
+    const plain = {time: t, state: read_(sy)}, since = t - began, some = fired.flatMap((one, i) => (one ? [i] : []));
     if (!some.every(i => M[shifts + i]) || !(since > 0)) return plain;
-    const [state, rates] = [read(sy), read(syp)], short = 1e-6 * since;
+    const [state, rates] = [read_(sy), read_(syp)], short = 1e-6 * since;
     const back = by => {
       M.set(state.map((x, i) => x - by * rates[i]), y);
       eventsAt(t - by, y, yp);
@@ -243,7 +323,7 @@ function openMode(mode, options) {
       const square = turn.reduce((sum, i) => sum + M[row("y") + i] ** 2, 0);
       return !(square > 0.25 && square < 4);
     };
-    if (data.turns.some(strays)) begin(field("t"), read(row("y")));
+    if (data.turns.some(strays)) begin(field("t"), read_(row("y")));
     put({limit: field("steps") + 1, stop: Infinity});
     return method.run(session) === TOO_SMALL ? "no step is short enough: something has no value, or changes too fast" : null;
   }
@@ -252,7 +332,7 @@ function openMode(mode, options) {
   function at(t) {
     if (method.interpolate(session, t, y, yp) !== 0) return null;
     if (t !== field("t")) project(t);
-    return read(y);
+    return read_(y);
   }
 
   function evaluate(t, state) {
@@ -281,7 +361,7 @@ function openMode(mode, options) {
     for (let i = 0; i < size; i++) [M[turns + i], M[turns + size + i]] = [Math.cos(1 + 2.4 * i), Math.sin(1 + 2.4 * i)];
   }
   return {
-    data, M, n, m, y, values, fill, begin, broken, step, at, event, missed, singular, evaluate, call, output, matrix,
+    data, M, n, m, y, values, fill, begin, broken, step, at, event, missed, singular, evaluate, settle, call, output, matrix,
     normalize, held, moved, get time() { return field("t"); }, get begun() { return field("t_old"); },
     get statistics() { return ["steps", "failures", "evaluations"].map(field); },
   };
@@ -465,7 +545,7 @@ function createEngine(model, options = {}) {
   const numbers = modes.map(one => new Map(one.data.paths.map((path, i) => [path, i])));
   const first = {parameters: parameters.map(one => one.value), starts: starts.map(one => one.value)};
   let mode = modes[0], time = data.start_time, state = Float64Array.from(mode.data.state), now = status("ready");
-  let events = [], started = false, evaluated = false, coming = null, searched = time, began = time, changes = 0, changed = -Infinity;
+  let events = [], started = false, evaluated = false, coming = null, searched = time, began = time, changes = 0, changedAt = -Infinity;
 
   const say = (code, text, t = time) => (now = status(code, text && `at t = ${shown(t)} s ${text}`));
 
@@ -506,10 +586,16 @@ function createEngine(model, options = {}) {
     return moment < 0 || update(mode.data.updates.due[moment], moment);
   }
 
-  function begin(t, from, fired = null, samples = false) {
+  function begin(t, from, fired = null, samples = false, changed = []) {
     inPiece(t);
     take(t, Float64Array.from(from));
     if (samples && !sample(t)) return say("failed", "an update has no value", t);
+    if (mode.data.sides) {
+      const sides = mode.settle(t, state, changed);
+      if (!sides) return say("failed", "the motion stays where a law switches, which a page does not follow", t);
+      mode.values.set(sides, mode.data.sides.first);
+      mode.fill();
+    }
     const wrong = mode.begin(t, state, fired);
     if (wrong) return say("failed", wrong, t);
     take(t, mode.at(t));
@@ -534,7 +620,7 @@ function createEngine(model, options = {}) {
     const modesThen = {...mode.data.modes, [part]: target}, t = time;
     const after = modes.find(one => Object.entries(modesThen).every(([key, is]) => one.data.modes[key] === is));
     if (!after) return say("stopped", `${part}: ${message}; the motion after that is not in this page`);
-    [changes, changed] = [t - changed <= 1e-9 * settings.horizon ? changes + 1 : 0, t];
+    [changes, changedAt] = [t - changedAt <= 1e-9 * settings.horizon ? changes + 1 : 0, t];
     if (changes > 50) return say("failed", `${part} changes its mode endlessly`);
     const whole = bodiesOf(mode, t, state), named = new Map(mode.data.coordinates.map((one, i) => [one.name, state[i]]));
     if (!whole) return say("failed", "the bodies have no place");
@@ -598,7 +684,7 @@ function createEngine(model, options = {}) {
   function watch() {
     const until = Math.min(mode.time, nextPiece(began));
     coming = mode.event(searched, until, began);
-    if (mode.held) {
+    if (mode.data.watched) {
       const low = mode.singular();
       if (low && low.time <= (coming?.time ?? until)) coming = {time: low.time, singular: low.constraint};
     }
@@ -614,10 +700,16 @@ function createEngine(model, options = {}) {
       return say("singular", `the position is singular: ${one.singular} follows from the other constraints`);
     }
     take(one.time, one.state);
-    const which = one.fired.flatMap((is, i) => (is ? [i] : [])), changing = which.find(i => mode.data.events[i].target);
-    for (const i of which) if (!mode.data.events[i].target) happen(i);
+    const list = mode.data.events, which = one.fired.flatMap((is, i) => (is ? [i] : []));
+    const sides = which.filter(i => list[i].target === "side").map(i => Number(list[i].law));
+    const changing = which.find(i => list[i].target && list[i].target !== "side");
+    for (const i of which) if (!list[i].target) happen(i);
     if (changing !== undefined) {
       return happen(changing, one.fired);
+    }
+    if (sides.length) {
+      [changes, changedAt] = [time - changedAt <= 1e-9 * settings.horizon ? changes + 1 : 0, time];
+      return changes > 50 ? say("failed", "a law switches endlessly") : begin(time, state, null, false, sides);
     }
     watch();
     return null;

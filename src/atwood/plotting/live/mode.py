@@ -14,11 +14,14 @@ from atwood.codegen.llvm.linear_systems import write_elimination
 from atwood.errors import AtwoodError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, Scalar, depends_on
 from atwood.forms.accelerations import accelerations_of
+from atwood.forms.assembly import Assembly
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import find_observables
+from atwood.forms.sides import in_pieces
 from atwood.integrators.embedded.rates import write_routines as write_rates
 from atwood.integrators.methods.dormand_prince import EXPLICIT
 from atwood.integrators.step_guard import write_routines as write_guard
+from atwood.lazy_dataclasses import replace
 from atwood.mechanics.kinematics.mechanism import Mechanism, world_position
 from atwood.mechanics.outputs.observables import Observable
 from atwood.mechanics.outputs.totals import energies
@@ -26,9 +29,11 @@ from atwood.model.values.space import planar_axes
 from atwood.plotting.live.parameters import find_parameters
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.events.modes import MARGIN, EventProbe
+from atwood.simulation.events.sides import plain_sides
 from atwood.simulation.events.time_events import find_schedule
 from atwood.simulation.problem.curved_laws import find_curved
 from atwood.simulation.problem.explicit_scene import program_on_constraints
+from atwood.simulation.problem.preparation import problem_of_run
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.step_guard import guard_program, shortest_judged
 
@@ -38,6 +43,18 @@ _BEYOND = 4.0
 
 class NotLiveError(AtwoodError):
     """What a page cannot compute."""
+
+
+def plan_of(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length: float) -> SceneProblem:
+    """Return the plan of a run from a state, with relations of what moves as parameters."""
+    sided = in_pieces(assembly)
+    if sided.sides is not None:
+        sided = replace(sided, side_values=plain_sides(sided, t, q, u))
+    plan = problem_of_run(sided, t, q, u, length, assembly.flat.t_end - assembly.flat.t_start)
+    plan.keep_better(t, q)
+    if plan.not_compilable:
+        raise NotLiveError(f"{plan.not_compilable}, and a page has no Python")
+    return plan
 
 
 class ModeText:
@@ -79,6 +96,7 @@ class ModeText:
         self._add_sizes()
         self.end = self._add_schedule()
         self._add_events(y)
+        self._add_sides()
 
     def text(self) -> str:
         """Return the JavaScript function that makes the functions of the mode, from memory and addresses."""
@@ -115,6 +133,7 @@ class ModeText:
         if plan.holds:
             balance = assembly.balance(assembly.form)
             self.programs |= {"nearer": made.projection, "held": balance.constraints_alone}
+            self.data["watched"] = bool(assembly.reduced.constraints)
             self.data["slopes"] = [balance.jacobian_rows.tolist(), balance.jacobian_columns.tolist()]
 
     def _add_guard(self) -> None:
@@ -213,6 +232,17 @@ class ModeText:
             }
             for one in probe.event_functions
         ]
+
+    def _add_sides(self) -> None:
+        """Add the relations of what moves: their kinds, what each compares with zero, and how large its terms are."""
+        sides = self.assembly.sides
+        if sides is None:
+            return
+        known = sides.program(self.assembly)
+        groups = state_groups(self.equations)
+        self.programs["sides"] = Program(known.name, groups, self.assembly.parameters, known.outputs)
+        first = self.assembly.parameters.index(sides.symbols[0])
+        self.data["sides"] = {"first": first, "kinds": [one.kind for one in sides.relations]}
 
 
 def nodes_of(mode: ModeText) -> list[int]:

@@ -13,15 +13,15 @@ from atwood.forms.assembly import Assembly
 from atwood.mechanics.constraints.knots import BALANCES
 from atwood.mechanics.outputs.event_functions import UPDATE
 from atwood.pipeline import simulate
-from atwood.plotting.live.mode import ModeText, NotLiveError, bodies_of, nodes_of
+from atwood.plotting.live.mode import ModeText, NotLiveError, bodies_of, nodes_of, plan_of
 from atwood.plotting.live.start import add_tangent
 from atwood.simulation.dynamics.kinematic_map import reference_coordinates
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.events.impacts_in_time import switching
 from atwood.simulation.events.mode_change import maximal_places, refusing
+from atwood.simulation.events.sides import SIDE
 from atwood.simulation.initialization.start import Start, actual_line_signs, find_start, settle
-from atwood.simulation.problem.preparation import problem_of_run
 from atwood.simulation.problem.problem import SceneProblem
 
 _MOST = 16
@@ -30,7 +30,7 @@ _MOST = 16
 Modes = tuple[tuple[str, str], ...]
 
 
-def add_modes(first: ModeText, start: Start, quantities: Sequence[str] | None) -> list[ModeText]:
+def add_modes(first: ModeText, given: Assembly, start: Start, quantities: Sequence[str] | None) -> list[ModeText]:
     """Return the modes that events lead to, the first among them, with what passes a state between them."""
     found = {_key(first.assembly.modes): first}
     waiting = [first]
@@ -39,8 +39,8 @@ def add_modes(first: ModeText, start: Start, quantities: Sequence[str] | None) -
         for modes in _ahead(waiting.pop(0)):
             if _key(modes) in found or len(found) >= _MOST:
                 continue
-            met = _met(first.assembly) if met is None else met
-            state = met.get(_key(modes)) or _started(first, start, modes)
+            met = _met(given, start.length) if met is None else met
+            state = met.get(_key(modes)) or _started(first, given, start, modes)
             if state is None or not len(state[1]):  # nothing is free to move there
                 continue
             made = found[_key(modes)] = ModeText(*state, quantities)
@@ -69,30 +69,34 @@ def _key(modes: Mapping[str, str]) -> Modes:
 def _ahead(mode: ModeText) -> Iterator[dict[str, str]]:
     """Yield the modes that events of a mode lead to."""
     for one in mode.data["events"]:
-        if one["target"] not in ("", "stop", UPDATE):
+        if one["target"] not in ("", "stop", UPDATE, SIDE):
             yield {**mode.assembly.modes, one["part"]: one["target"]}
 
 
-def _met(assembly: Assembly) -> dict[Modes, tuple[SceneProblem, FloatArray]]:
+def _met(assembly: Assembly, length: float) -> dict[Modes, tuple[SceneProblem, FloatArray]]:
     """Return the modes that a run of the scene gets into, each with a state there."""
     try:
         segments = simulate(assembly).run.segments
     except AtwoodError as error:
         segments = getattr(getattr(error, "run", None), "segments", ())
-    states = ((one.plan, np.concatenate([one.coordinates[:, 0], one.speeds[:, 0]])) for one in segments)
-    return {_key(plan.assembly.modes): (plan, y) for plan, y in reversed(list(states))}
+    found: dict[Modes, tuple[SceneProblem, FloatArray]] = {}
+    for one in segments:
+        key, (t, q, u) = _key(one.assembly.modes), (float(one.time[0]), one.coordinates[:, 0], one.speeds[:, 0])
+        if key not in found and len(q):
+            found[key] = plan_of(one.assembly, t, q, u, length), np.concatenate([q, u])
+    return found
 
 
-def _started(first: ModeText, start: Start, modes: Mapping[str, str]) -> tuple[SceneProblem, FloatArray] | None:
+def _started(
+    first: ModeText, assembly: Assembly, start: Start, modes: Mapping[str, str]
+) -> tuple[SceneProblem, FloatArray] | None:
     """Return a state of a mode in which no run has been: the start that the scene would have in it."""
-    assembly = first.assembly
     q, u = first.plan.program.split(np.array(first.data["state"]))
     signs = actual_line_signs(assembly, start.time, q, u, assembly.form)
     try:
         after = assembly.other_mode(modes, signs)
         after, q, u = settle(after, find_start(after), after.other_mode)
-        plan = problem_of_run(after, start.time, q, u, start.length, after.flat.t_end - start.time)
-        plan.keep_better(start.time, q)
+        plan = plan_of(after, start.time, q, u, start.length)
     except AtwoodError:
         return None
     return plan, np.concatenate([q, u])

@@ -18,7 +18,6 @@ from atwood.arrays import FloatArray
 from atwood.codegen.javascript.printer import print_routines
 from atwood.errors import UnsupportedError
 from atwood.forms.assembly import Assembly
-from atwood.forms.sides import has_sides
 from atwood.integrators.compiled_location import FIELDS as SEARCH_FIELDS, ROWS as SEARCH_ROWS, STACK
 from atwood.integrators.embedded.stepper import FIELDS
 from atwood.integrators.embedded.steps import write_routines as write_steps
@@ -28,14 +27,13 @@ from atwood.integrators.methods.dormand_prince import TABLEAU
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import assembly_of
-from atwood.plotting.live.mode import ModeText, NotLiveError, bodies_of
+from atwood.plotting.live.mode import ModeText, NotLiveError, bodies_of, plan_of
 from atwood.plotting.live.modes import add_modes
 from atwood.plotting.live.parameters import live_parameters, with_sliders
 from atwood.plotting.live.start import add_start, add_tangent
 from atwood.plotting.live.updates import add_updates
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.initialization.start import Start, settle, start_with_line_signs
-from atwood.simulation.problem.preparation import problem_of_run
 from atwood.simulation.problem.problem import SceneProblem
 
 _OF_QUANTITIES = "path", "unit", "doc", "periodic", "sharing"
@@ -120,7 +118,7 @@ def live_program(
         plan, y = _prepared(assembly, start)
         mode = ModeText(plan, y, quantities)
         data = _data(mode, start)
-        every = add_modes(mode, start, quantities)
+        every = add_modes(mode, assembly, start, quantities)
         for one in every:
             add_updates(one)
         modes = [(one.text(), one.data) for one in every]
@@ -145,13 +143,7 @@ def _prepared(assembly: Assembly, start: Start) -> tuple[SceneProblem, FloatArra
     assembly, q, u = settle(assembly, start, assembly.other_mode)
     if not len(q):
         raise NotLiveError("nothing in it is free to move: its motion is prescribed")
-    plan = problem_of_run(assembly, start.time, q, u, start.length, assembly.flat.t_end - start.time)
-    plan.keep_better(start.time, q)
-    if plan.not_compilable:
-        raise NotLiveError(f"{plan.not_compilable}, and a page has no Python")
-    if has_sides(assembly):
-        raise NotLiveError("a law compares what moves, at whose switches pages do not stop yet")
-    return plan, np.concatenate([q, u])
+    return plan_of(assembly, start.time, q, u, start.length), np.concatenate([q, u])
 
 
 def _data(mode: ModeText, start: Start) -> dict[str, Any]:
