@@ -43,7 +43,8 @@ def test_a_hinge_has_its_quantities_with_units_and_spaces() -> None:
     units = {one["name"]: one["unit"] for one in data["quantities"]}
     assert units == {
         "angle": "rad", "angular_velocity": "rad/s", "torque": "N*m", "force": "N", "bearing_1": "N*m",
-        "bearing_2": "N*m",
+        "bearing_2": "N*m", "above_lower_stop": "rad", "above_lower_stop_state": "", "lower_stop_torque": "N*m",
+        "below_upper_stop": "rad", "below_upper_stop_state": "", "upper_stop_torque": "N*m",
     }  # fmt: skip
     meanings = {one["name"]: one["meaning"] for one in data["quantities"]}
     assert meanings["angle"].endswith("(plane and space only)")

@@ -246,7 +246,7 @@ def law_values(cls: type[aw.Component], space: str, kind: str) -> Mapping[str, l
             coordinates = [numbers.draw(name) for name in getattr(law.options, "coordinates", ())]
             made = getattr(bound, law.name)
             made = flat_values(made(*coordinates) if callable(made) else made)
-            found[f"{law.kind} {law.name} {len(found)}"] = [numbers.read(one) for one in made]
+            found[f"{law.kind} {law.name} {len(found)}"] = [numbers.read(one) for one in made if one is not None]
     return found
 
 

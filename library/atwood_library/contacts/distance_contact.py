@@ -31,12 +31,16 @@ class DistanceContact(Bounded):
         """Return the distance."""
         return self.distance(self.a, self.b)
 
-    @unilateral(reaction="pressure", restitution="restitution", doc="Force that pushes the points apart.")
+    @unilateral(
+        reaction="pressure", restitution="restitution", given=["lower"], doc="Force that pushes the points apart."
+    )
     def above_lower(self) -> Scalar:
-        """Distance above the lower bound; it never changes where there is none."""
-        return self.above(self.distance(self.a, self.b))
+        """Distance above the lower bound."""
+        return self.distance(self.a, self.b) - self.lower
 
-    @unilateral(reaction="tension", restitution="restitution", doc="Force that pulls the points together.")
+    @unilateral(
+        reaction="tension", restitution="restitution", given=["upper"], doc="Force that pulls the points together."
+    )
     def below_upper(self) -> Scalar:
-        """Distance below the upper bound; it never changes where there is none."""
-        return self.below(self.distance(self.a, self.b))
+        """Distance below the upper bound."""
+        return self.upper - self.distance(self.a, self.b)

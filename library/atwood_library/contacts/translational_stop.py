@@ -34,14 +34,24 @@ class TranslationalStop(Bounded):
         """Return the extension."""
         return between(self)[0]
 
-    @unilateral(reaction="lower_force", unit="N", restitution="restitution", doc="What the lower end exerts on b.")
+    @unilateral(
+        reaction="lower_force",
+        unit="N",
+        restitution="restitution",
+        given=["lower"],
+        doc="What the lower end exerts on b.",
+    )
     def above_lower(self) -> Scalar:
-        """Play above the lower end; it never changes where there is none."""
-        return self.above(between(self)[0])
+        """Play above the lower end."""
+        return between(self)[0] - self.lower
 
     @unilateral(
-        reaction="upper_force", unit="N", restitution="restitution", doc="What the upper end exerts, against b."
+        reaction="upper_force",
+        unit="N",
+        restitution="restitution",
+        given=["upper"],
+        doc="What the upper end exerts, against b.",
     )
     def below_upper(self) -> Scalar:
-        """Play below the upper end; it never changes where there is none."""
-        return self.below(between(self)[0])
+        """Play below the upper end."""
+        return self.upper - between(self)[0]

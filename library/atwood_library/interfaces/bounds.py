@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from atwood import Component, ParameterError, Scalar
+from atwood import Component, ParameterError
 
 __all__ = ["Bounded"]
 
@@ -24,11 +24,3 @@ class Bounded(Component):
             raise ParameterError(
                 f"the upper bound {upper:g} is not above the lower one, {lower:g}", where=f"{self.path}.upper"
             )
-
-    def above(self, value: Scalar) -> Scalar:
-        """Return how far a value is above the lower bound; what never changes where there is none."""
-        return abs(self.upper) if self.lower is None else value - self.lower
-
-    def below(self, value: Scalar) -> Scalar:
-        """Return how far a value is below the upper bound; what never changes where there is none."""
-        return abs(self.lower) if self.upper is None else self.upper - value

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from atwood import Number, Scalar, dissipation, parameter, potential
+from atwood import Number, Scalar, dissipation, parameter, potential, unilateral
 from atwood_library.interfaces.axis_motor import AxisMotor
-from atwood_library.interfaces.loads import damper_function, elastic_energy
+from atwood_library.interfaces.loads import check_stops, damper_function, elastic_energy, stops_of
 
 
 class LoadedHinge(AxisMotor):
@@ -31,13 +31,53 @@ class LoadedHinge(AxisMotor):
     upper_stop: Number | None = parameter(
         None, unit="rad", doc="Angle above which a stop acts; none if not given.", symbol="theta_max"
     )
+    stop_restitution: Number | None = parameter(
+        None,
+        minimum=0.0,
+        maximum=1.0,
+        doc="Share of the speed that a stop leaves, which is rigid then; stops are elastic if not given.",
+        symbol="e_s",
+    )
+
+    def check_values(self) -> None:
+        """Refuse stops that are rigid and elastic, and those that are nowhere."""
+        super().check_values()
+        check_stops(self, self.stop_stiffness, self.stop_restitution, self.lower_stop, self.upper_stop)
 
     @potential
     def spring_energy(self) -> Scalar:
         """Return the energy in the spring and in the stops."""
         joint: Any = self
-        stops = self.stop_stiffness, self.lower_stop, self.upper_stop
+        stops = stops_of(self.stop_stiffness, self.stop_restitution, self.lower_stop, self.upper_stop)
         return elastic_energy(joint.angle, (self.stiffness, self.natural_angle), stops)
+
+    @unilateral(
+        reaction="lower_stop_torque",
+        unit="N*m",
+        restitution="stop_restitution",
+        given=("lower_stop", "stop_restitution"),
+        doc="Torque of the lower stop, where it is rigid.",
+        spaces=("plane", "space"),
+    )
+    def above_lower_stop(self) -> Scalar:
+        """Angle above the lower stop."""
+        joint: Any = self
+        gap: Scalar = joint.angle() - self.lower_stop
+        return gap
+
+    @unilateral(
+        reaction="upper_stop_torque",
+        unit="N*m",
+        restitution="stop_restitution",
+        given=("upper_stop", "stop_restitution"),
+        doc="Torque of the upper stop, where it is rigid.",
+        spaces=("plane", "space"),
+    )
+    def below_upper_stop(self) -> Scalar:
+        """Angle below the upper stop."""
+        joint: Any = self
+        gap: Scalar = self.upper_stop - joint.angle()
+        return gap
 
     @dissipation
     def damper_function(self) -> Scalar:

@@ -8,8 +8,20 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from atwood import Component, Load, Number, Scalar, dissipation, force, is_zero, parameter, potential, signal
-from atwood_library.interfaces.loads import damper_function, elastic_energy, push_apart
+from atwood import (
+    Component,
+    Load,
+    Number,
+    Scalar,
+    dissipation,
+    force,
+    is_zero,
+    parameter,
+    potential,
+    signal,
+    unilateral,
+)
+from atwood_library.interfaces.loads import check_stops, damper_function, elastic_energy, push_apart, stops_of
 
 
 class LoadedSlide(Component):
@@ -33,14 +45,52 @@ class LoadedSlide(Component):
         doc="Displacement above which a stop acts; none if not given.",
         symbol="x_max",
     )
+    stop_restitution: Number | None = parameter(
+        None,
+        minimum=0.0,
+        maximum=1.0,
+        doc="Share of the speed that a stop leaves, which is rigid then; stops are elastic if not given.",
+        symbol="e_s",
+    )
     actuator: Number = signal(0.0, unit="N", doc="Force of the actuator on frame b, and against frame a.")
+
+    def check_values(self) -> None:
+        """Refuse stops that are rigid and elastic, and those that are nowhere."""
+        super().check_values()
+        check_stops(self, self.stop_stiffness, self.stop_restitution, self.lower_stop, self.upper_stop)
 
     @potential
     def spring_energy(self) -> Scalar:
         """Return the energy in the spring and in the stops."""
         joint: Any = self
-        stops = self.stop_stiffness, self.lower_stop, self.upper_stop
+        stops = stops_of(self.stop_stiffness, self.stop_restitution, self.lower_stop, self.upper_stop)
         return elastic_energy(joint.displacement, (self.stiffness, self.natural_length), stops)
+
+    @unilateral(
+        reaction="lower_stop_force",
+        unit="N",
+        restitution="stop_restitution",
+        given=("lower_stop", "stop_restitution"),
+        doc="Force of the lower stop, where it is rigid.",
+    )
+    def above_lower_stop(self) -> Scalar:
+        """Displacement above the lower stop."""
+        joint: Any = self
+        gap: Scalar = joint.displacement() - self.lower_stop
+        return gap
+
+    @unilateral(
+        reaction="upper_stop_force",
+        unit="N",
+        restitution="stop_restitution",
+        given=("upper_stop", "stop_restitution"),
+        doc="Force of the upper stop, where it is rigid.",
+    )
+    def below_upper_stop(self) -> Scalar:
+        """Displacement below the upper stop."""
+        joint: Any = self
+        gap: Scalar = self.upper_stop - joint.displacement()
+        return gap
 
     @dissipation
     def damper_function(self) -> Scalar:

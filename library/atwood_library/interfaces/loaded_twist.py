@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from atwood import Number, Scalar, dissipation, parameter, potential
+from atwood import Number, Scalar, dissipation, parameter, potential, unilateral
 from atwood_library.interfaces.axis_motor import AxisMotor
-from atwood_library.interfaces.loads import damper_function, elastic_energy
+from atwood_library.interfaces.loads import check_stops, damper_function, elastic_energy, stops_of
 
 
 class LoadedTwist(AxisMotor):
@@ -48,13 +48,57 @@ class LoadedTwist(AxisMotor):
         doc="Angle above which a stop acts; none if not given.",
         symbol="theta_max",
     )
+    angle_stop_restitution: Number | None = parameter(
+        None,
+        minimum=0.0,
+        maximum=1.0,
+        doc="Share of the speed that a stop leaves, which is rigid then; stops are elastic if not given.",
+        symbol="e_s",
+    )
+
+    def check_values(self) -> None:
+        """Refuse stops that are rigid and elastic, and those that are nowhere."""
+        super().check_values()
+        check_stops(
+            self, self.angle_stop_stiffness, self.angle_stop_restitution, self.lower_angle_stop, self.upper_angle_stop
+        )
 
     @potential
     def torsion_energy(self) -> Scalar:
         """Return the energy in the torsion spring and in the stops of the angle."""
         joint: Any = self
-        stops = self.angle_stop_stiffness, self.lower_angle_stop, self.upper_angle_stop
+        stops = stops_of(
+            self.angle_stop_stiffness, self.angle_stop_restitution, self.lower_angle_stop, self.upper_angle_stop
+        )
         return elastic_energy(joint.angle, (self.torsional_stiffness, self.natural_angle), stops)
+
+    @unilateral(
+        reaction="lower_angle_stop_torque",
+        unit="N*m",
+        restitution="angle_stop_restitution",
+        given=("lower_angle_stop", "angle_stop_restitution"),
+        doc="Torque of the lower stop of the angle, where it is rigid.",
+        spaces=("plane", "space"),
+    )
+    def above_lower_angle_stop(self) -> Scalar:
+        """Angle above the lower stop."""
+        joint: Any = self
+        gap: Scalar = joint.angle() - self.lower_angle_stop
+        return gap
+
+    @unilateral(
+        reaction="upper_angle_stop_torque",
+        unit="N*m",
+        restitution="angle_stop_restitution",
+        given=("upper_angle_stop", "angle_stop_restitution"),
+        doc="Torque of the upper stop of the angle, where it is rigid.",
+        spaces=("plane", "space"),
+    )
+    def below_upper_angle_stop(self) -> Scalar:
+        """Angle below the upper stop."""
+        joint: Any = self
+        gap: Scalar = self.upper_angle_stop - joint.angle()
+        return gap
 
     @dissipation
     def torsion_damper_function(self) -> Scalar:

@@ -3,16 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from typing import TypeAlias
 
-from atwood import Frame, Load, Point, Scalar, Vector, cos, cross, dot, is_zero, maximum, minimum, sin
+from atwood import (
+    Component,
+    Frame,
+    Load,
+    ParameterError,
+    Point,
+    Scalar,
+    Vector,
+    cos,
+    cross,
+    dot,
+    is_zero,
+    maximum,
+    minimum,
+    sin,
+)
 
-__all__ = ["beyond_bend", "beyond_rim", "damper_function", "elastic_energy", "push_apart", "turn_apart"]
+__all__ = [
+    "beyond_bend",
+    "beyond_rim",
+    "check_stops",
+    "damper_function",
+    "elastic_energy",
+    "push_apart",
+    "stops_of",
+    "turn_apart",
+]
+
+Stops: TypeAlias = tuple[float, float | None, float | None]
+"""Force or torque of a stop for one unit beyond it, and where the lower and the upper stop are."""
 
 
 def elastic_energy(
     coordinate: Callable[[], Scalar],
     spring: tuple[float, float],
-    stops: tuple[float, float | None, float | None],
+    stops: Stops,
 ) -> Scalar:
     """Return the energy in a linear spring and in two elastic stops, J, each of which may be missing.
 
@@ -38,6 +66,28 @@ def elastic_energy(
         above = maximum(coordinate() - upper, 0.0)
         energy = energy + 0.5 * stop_stiffness * above * above
     return energy
+
+
+def stops_of(stiffness: float, restitution: float | None, *bounds: float | None) -> Stops:
+    """Return the elastic stops of a joint: none where these are rigid."""
+    lower, upper = bounds if restitution is None else (None, None)
+    return stiffness, lower, upper
+
+
+def check_stops(part: Component, stiffness: float, restitution: float | None, *bounds: float | None) -> None:
+    """Refuse stops that are rigid and elastic, and those that are nowhere."""
+    if restitution is None:
+        return
+    if stiffness:
+        raise ParameterError(
+            "its stops cannot be elastic and rigid",
+            where=part.path,
+            advice="Give a stiffness of them or a restitution.",
+        )
+    if all(one is None for one in bounds):
+        raise ParameterError(
+            "its rigid stops are nowhere", where=part.path, advice="Give where the lower or the upper is."
+        )
 
 
 def damper_function(rates: Callable[[], Sequence[Scalar]], damping: float) -> Scalar:

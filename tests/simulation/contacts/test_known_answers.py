@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+import scipy.special
 
 import atwood as aw
 from atwood import Scene, simulate
@@ -25,6 +26,7 @@ from atwood_library import (
     RotationalFriction,
     RotationalSource,
     RotationalStop,
+    Slider,
     Sphere,
     Spring,
     SurfaceContact,
@@ -410,3 +412,62 @@ def test_without_friction_nothing_slips() -> None:
     result = run(scene, "reduced", 1.0)
     assert [one.kind for one in result.events] == ["impact", "closes"]
     assert [result[f"c.{name}"][-1] for name in ("slip", "slip_state", "friction_force")] == [0.3, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("space", ["plane", "space"])
+@FORMS
+def test_a_pendulum_hits_a_rigid_stop_of_its_hinge(form: str, space: str) -> None:
+    """From 0.5 rad it hangs straight after a quarter of its period, K(sin(1/4)) sqrt(l/g), and bounces back."""
+    scene = Scene(space=space)
+    ground, bob = scene.add("ground", Ground()), scene.add("bob", PointMass(mass=2.0))
+    pivot = scene.add("pivot", Pivot(lower_stop=-0.5 * math.pi, stop_restitution=0.6))
+    link = scene.add("link", Link(length=1.0, mass=0.0))
+    for ends in ((ground.frame, pivot.a), (pivot.b, link.a), (link.b, bob.point)):
+        scene.connect(*ends)
+    scene.start.update({"pivot.angle": 0.5 - 0.5 * math.pi, "pivot.angular_velocity": 0.0})
+    result = run(scene, form, 3.0)
+
+    def quarter(swing: float) -> float:
+        return float(scipy.special.ellipk(math.sin(0.5 * swing) ** 2)) / math.sqrt(G)
+
+    first, second = (2.0 * math.asin(0.6**n * math.sin(0.25)) for n in (0, 1))
+    third = 2.0 * math.asin(0.36 * math.sin(0.25))
+    known = np.cumsum([quarter(first), 2.0 * quarter(second), 2.0 * quarter(third)])
+    assert times(result, "impact")[:3] == pytest.approx(known.tolist(), abs=1e-9)
+    speed = 2.0 * math.sqrt(G) * math.sin(0.25)
+    assert result.impacts[0].impulse == pytest.approx(2.0 * 1.6 * speed, rel=1e-9)
+    assert "pivot.below_upper_stop" not in result
+
+
+@FORMS
+def test_stops_count_turns_and_hold_slides(form: str) -> None:
+    scene = Scene(space="space", gravity=0.0)
+    ground, body = scene.add("ground", Ground()), scene.add("body", Sphere(mass=1.0, radius=0.1))
+    pivot = scene.add("pivot", Pivot(axis=(0.6, 0.0, 0.8), upper_stop=10.0, stop_restitution=0.5))
+    scene.connect(ground.frame, pivot.a)
+    scene.connect(pivot.b, body.frame)
+    scene.start.update({"pivot.angle": 0.0, "pivot.angular_velocity": 2.0})
+    result = run(scene, form, 8.0)
+    assert times(result, "impact") == [pytest.approx(5.0, abs=1e-9)]
+    assert result["pivot.angle"][-1] == pytest.approx(7.0, abs=1e-9)
+    slide = Scene(space="line")
+    ground, m = slide.add("ground", Ground()), slide.add("m", PointMass(mass=1.0))
+    rail = slide.add("rail", Slider(lower_stop=-1.0, stop_restitution=0.5))
+    slide.connect(ground.frame, rail.a)
+    slide.connect(rail.b, m.point)
+    slide.start.update({"rail.displacement": 0.0, "rail.speed": -2.0})
+    assert run(slide, form, 2.0)["rail.displacement"][-1] == pytest.approx(0.5, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("settings", "what"),
+    [
+        ({"stop_restitution": 0.5}, "its rigid stops are nowhere"),
+        ({"stop_restitution": 0.5, "lower_stop": 0.0, "stop_stiffness": 1.0}, "cannot be elastic and rigid"),
+    ],
+)
+def test_stops_that_mean_nothing_are_refused(settings: dict[str, float], what: str) -> None:
+    scene = Scene()
+    scene.add("pivot", Pivot(**settings))
+    with pytest.raises(aw.ParameterError, match=what):
+        aw.assemble(scene)

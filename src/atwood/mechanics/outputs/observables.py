@@ -285,7 +285,10 @@ def _observe_part(mechanism: Mechanism, reader: Reader, path: str) -> dict[str, 
             continue  # it asks for an orientation that nothing determines, or for what never leaves a pole
         except Exception as error:  # whatever a law of somebody's own can raise
             raise not_evaluated(path, law, error) from error
-        if isinstance(value, tuple) and law.name in local.part.component.state_specs():
+        component = local.part.component
+        if value is None and (law.name in component.contact_laws() or law.name in component.state_specs()):
+            continue  # of a gap that the component does not have
+        if isinstance(value, tuple) and law.name in component.state_specs():
             for i, one in enumerate(value):
                 take(mechanism, found, f"{path}.{law.name}[{i}]", one, law.options.unit, law.options.doc, False)
             continue

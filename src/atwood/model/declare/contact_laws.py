@@ -8,6 +8,7 @@ law); see F. Pfeiffer and C. Glocker, *Multibody Dynamics with Unilateral Contac
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import wraps
 from typing import TYPE_CHECKING, Any, Literal
 
 from atwood.arguments import DOC, NAME, TEXT, each, either, number, one_of, takes
@@ -31,6 +32,7 @@ class UnilateralOptions:
     impact_law: str
     level: str
     adhesion: str
+    given: tuple[str, ...]
     doc: str
     modes: tuple[str, ...]
     spaces: tuple[str, ...]
@@ -67,7 +69,8 @@ class ContactLaw(ObservableLaw[Any]):
 
     def __init__(self, function: Callable[[Any], Any], contact: Law, unit: str) -> None:
         self.unit, self.says = unit, (function.__doc__ or contact.options.doc).strip().partition("\n")[0]
-        super().__init__(function, Law("observable", contact.name, self._seen(unit, self.says, contact)))
+        law = Law("observable", contact.name, self._seen(unit, self.says, contact))
+        super().__init__(_where_given(function, contact), law)
         self.contact = contact
 
     @staticmethod
@@ -95,6 +98,16 @@ class ContactLaw(ObservableLaw[Any]):
         found[f"{name}_state"] = discrete_state(doc=f"0 where nothing rubs, 1 where {name} goes on, 2 where it sticks.")
         says = f"Direction in which {name} goes on; 0 where it does not."
         return {**found, **{f"{one}_direction": discrete_state(doc=says) for one in self.names}}
+
+
+def _where_given(function: Callable[[Any], Any], contact: Law) -> Callable[[Any], Any]:
+    names = getattr(contact.options, "given", ())
+
+    @wraps(function)
+    def value(component: Component) -> Any:
+        return None if any(getattr(component, name) is None for name in names) else function(component)
+
+    return value if names else function
 
 
 def _says(read: Callable[[Component], Any], doc: str) -> Callable[[Component], Any]:
@@ -128,6 +141,7 @@ def _along(unit: str, rate: str) -> str:
     impact_law=one_of(("newton", "poisson")),
     level=one_of(("position", "velocity")),
     adhesion=TEXT,
+    given=NAMES,
     modes=NAMES,
     spaces=SPACES,
 )
@@ -140,6 +154,7 @@ def unilateral(
     impact_law: Literal["newton", "poisson"] = "newton",
     level: Literal["position", "velocity"] = "position",
     adhesion: str = "",
+    given: Sequence[str] = (),
     modes: Sequence[str] = (),
     spaces: Sequence[str] = ("line", "plane", "space"),
 ) -> Callable[[Callable[[Any], Any]], ContactLaw]:
@@ -165,12 +180,14 @@ def unilateral(
         What the method reads: positions, angles and time, or also velocities, in which it is affine then.
     adhesion
         Name of a method, or a parameter, that gives how much a gap bears that is pulled open; it then lets go.
+    given
+        Parameters without which there is no gap: it is not there where one of them is None.
     modes, spaces
         The modes of the component and the spaces in which it holds; all modes when empty.
     """
-    given = str(restitution) if isinstance(restitution, str) else float(restitution)
+    share = str(restitution) if isinstance(restitution, str) else float(restitution)
     many = tuple(modes), tuple(spaces)
-    options = UnilateralOptions((reaction,), unit, given, impact_law, level, adhesion, doc, *many)
+    options = UnilateralOptions((reaction,), unit, share, impact_law, level, adhesion, tuple(given), doc, *many)
     along = _along(unit, "/s" if level == "velocity" else "")
     return lambda function: ContactLaw(function, Law("unilateral", function.__name__, options), along)
 

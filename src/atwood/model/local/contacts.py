@@ -14,7 +14,7 @@ from atwood.errors import DeclarationError, UnsupportedError, suggestion
 from atwood.expr import Expression, Graph, Scalar, depends_on, jvp, sqrt
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.declare.component import Binding, bind
-from atwood.model.declare.contact_laws import FrictionOptions, value_names
+from atwood.model.declare.contact_laws import FrictionOptions, state_names, value_names
 from atwood.model.declare.law_results import call_law, finite_scalar, one_scalar
 from atwood.model.declare.laws import Law, scalars
 from atwood.model.local.flatten import Part
@@ -83,8 +83,9 @@ def local_contacts(
     holds: Callable[[Law], bool],
 ) -> tuple[tuple[LocalContact, ...], Binding]:
     """Return the gaps and slips of a part, and a binding with their reactions as other laws of the part read them."""
-    laws = [law for law in part.component.contact_laws().values() if holds(law)]
-    found = [_gap(part, law, binding, connectors, graph) for law in laws if law.kind == "unilateral"]
+    laws = sorted(filter(holds, part.component.contact_laws().values()), key=lambda law: law.kind != "unilateral")
+    every = [_gap(part, law, binding, connectors, graph) for law in laws if law.kind == "unilateral"]
+    found = [one for one in every if one is not None]
     gaps = [one for one in found if not one.row.value.is_parametric]  # what never changes never closes
     never: dict[str, Scalar] = {one.row.reaction: 0.0 for one in found if one not in gaps}
     pressing = {one.row.reaction: one.read for one in gaps}  # zero where the gap is open
@@ -93,7 +94,16 @@ def local_contacts(
     never |= {one.row.reaction: 0.0 for one in slips if one.is_free}
     slips = [one for one in slips if not one.is_free]
     forces = {one.row.reaction: one.force for one in (*gaps, *slips)}
-    return (*gaps, *slips), replace(binding, reactions={**binding.reactions, **never, **forces})
+    acting = {one.law.name for one in (*gaps, *slips)}
+    absent = {law.name for law, one in zip(laws, every, strict=False) if one is None}
+    idle = {
+        name: None if law.name in absent else 0.0
+        for law in part.component.contact_laws().values()
+        if law.name not in acting
+        for name in state_names(law)
+    }
+    values = {**binding.values, **idle}
+    return (*gaps, *slips), replace(binding, values=values, reactions={**binding.reactions, **never, **forces})
 
 
 def in_chosen_set(
@@ -117,8 +127,13 @@ def _value(part: Part, law: Law, bound: Any, name: str, graph: Graph) -> Express
 
 def _gap(
     part: Part, law: Law, binding: Binding, connectors: Mapping[str, LocalConnector], graph: Graph
-) -> LocalContact:
+) -> LocalContact | None:
     bound = bind(part.component, binding)
+    for name in law.options.given:
+        if name not in part.values:
+            raise _no_name(part, law, name)
+    if any(part.values[name] is None for name in law.options.given):
+        return None
     value = _value(part, law, bound, law.name, graph)
     velocities = [symbol for one in connectors.values() for symbol in (*one.velocity, *one.spin)]
     is_speed = law.options.level == "velocity"
@@ -187,13 +202,17 @@ def _ways(values: Sequence[Expression], held: Sequence[Expression]) -> list[Expr
 def _named(part: Part, law: Law, bound: Any, name: str, graph: Graph) -> Expression:
     """Return what a method, or a parameter, of the component gives that a law names."""
     if not hasattr(type(part.component), name):
-        known = [*part.component.parameter_specs(), *(x for x in vars(type(part.component)) if not x.startswith("_"))]
-        raise DeclarationError(
-            f"it names {name!r}, which the component does not have",
-            where=f"{part.path}.{law.name}",
-            advice=suggestion(name, known),
-        )
+        raise _no_name(part, law, name)
     return _value(part, law, bound, name, graph)
+
+
+def _no_name(part: Part, law: Law, name: str) -> DeclarationError:
+    known = [*part.component.parameter_specs(), *(x for x in vars(type(part.component)) if not x.startswith("_"))]
+    return DeclarationError(
+        f"it names {name!r}, which the component does not have",
+        where=f"{part.path}.{law.name}",
+        advice=suggestion(name, known),
+    )
 
 
 def _symbols(part: Part, law: Law, graph: Graph, number: int = 0) -> tuple[Expression, Expression, Expression]:

@@ -171,7 +171,7 @@ def _localize_part(
         reads=_multipliers_read(part, constraints, contacts, given.values, graph),
         stand_ins=given.stand_ins,
         states=given.states,
-        discrete_states=discrete_states(part, graph, flat.contact_states),
+        discrete_states=discrete_states(part, graph, binding.values),
         contacts=contacts,
         rubs={one.row.reaction: one.force for one in rubbing},
     )
@@ -214,6 +214,7 @@ def _forces_of(laws: _Laws, acting: Any, contacts: Sequence[LocalContact]) -> _F
     stand_ins |= {one.stand_in: one.force for one in contacts}
     states = local_states(part, laws.of("derivative"), acting, graph)
     values: list[Scalar] = [*dissipations, *(c for one in loads for c in one.components), *(x.rate for x in states)]
+    values += [one.row.value for one in contacts if not one.is_slip]  # whose turns count
     return _Forces(dissipations, loads, stand_ins, states, [*values, *stand_ins.values()])
 
 

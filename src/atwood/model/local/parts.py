@@ -244,9 +244,9 @@ def contact_states(part: Part) -> list[str]:
     return [name for law in part.component.contact_laws().values() for name in state_names(law)]
 
 
-def discrete_states(part: Part, graph: Graph, is_set_known: object = False) -> tuple[DiscreteState, ...]:
-    """Return the states of a part that change at moments only; not those of gaps and slips where a set is chosen."""
-    known = contact_states(part) if is_set_known else []
+def discrete_states(part: Part, graph: Graph, values: Mapping[str, Any]) -> tuple[DiscreteState, ...]:
+    """Return the states of a part that change at moments only; of gaps and slips those that are no numbers already."""
+    known = [name for name in contact_states(part) if not isinstance(values[name], Expression)]
     return tuple(
         DiscreteState(f"{part.path}.{name}", symbol)
         for spec in part.component.state_specs().values()

@@ -170,7 +170,7 @@ def evaluated(
     part, space = assembly.flat.parts[one.path], assembly.mechanism.space
     known: dict[str, Any] = {**part.values, **values.get(one.path, {})}
     for name, spec in part.component.state_specs().items():
-        numbers = [values[""][f"{one.path}.{own}"] for own in spec.names(part.values)]
+        numbers = [values[""].get(f"{one.path}.{own}", 0.0) for own in spec.names(part.values)]
         known[name] = numbers[0] if spec.count is None else tuple(numbers)
     bound = bind(part.component, Binding(values=known, time=t, space=space.name, line=space.line))
     try:
