@@ -13,11 +13,13 @@ import dataclasses
 from operator import attrgetter
 from reprlib import recursive_repr
 from threading import RLock
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from atwood.display import brief
 
-__all__ = ["dataclass", "names_of", "replace"]
+__all__ = ["dataclass", "made_of", "names_of", "replace"]
+
+_T = TypeVar("_T")
 
 if TYPE_CHECKING:
     from dataclasses import dataclass as dataclass, replace as replace
@@ -28,7 +30,8 @@ else:
         completion = getattr(type(one), "_completion", None)
         if completion is None or type(one) is not completion.cls:
             return dataclasses.replace(one, **changes)
-        completion.complete()
+        if not completion.done:
+            completion.complete()
         for name in completion.given_names:
             if name not in changes:
                 changes[name] = getattr(one, name)
@@ -37,6 +40,13 @@ else:
     def dataclass(cls=None, /, *, frozen=False, eq=True):
         """Make a class a dataclass, as `dataclasses.dataclass` does with the same options."""
         return _declare(cls, frozen, eq) if cls is not None else lambda cls: _declare(cls, frozen, eq)
+
+
+def made_of(cls: type[_T], **fields: Any) -> _T:
+    """Return an instance with all its fields given, unchecked: a fifth of the time, for what is made by thousands."""
+    one = object.__new__(cls)
+    one.__dict__.update(fields)
+    return one
 
 
 def names_of(cls: Any) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError, StartError
 from atwood.forms.assembly import Assembly
-from atwood.lazy_dataclasses import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, made_of, replace
 from atwood.mechanics.outputs.event_functions import CLOSES, OPENS, RESTS, STOPS, YIELDS
 from atwood.model.values.units import ALONG
 from atwood.numerics.contact_sets import (
@@ -418,11 +418,13 @@ def told_impact(
 
     Without friction the loss follows from these.
     """
+    part, law = key
     before, after = speeds
     loss = -0.5 * impulses[0] * (before + after) if loss is None else loss
-    struck = Impact(t, *key, impulses[0], impulses[1:], before, after, loss)
+    own = {"time": t, "part": part, "law": law}
+    struck = made_of(Impact, **own, impulse=impulses[0], friction=impulses[1:], before=before, after=after, loss=loss)
     said = f"an impact at {-before:.6g} {ALONG[unit]}/s"
-    return EventRecord(t, *key, said, "", True, "impact", struck)
+    return made_of(EventRecord, **own, message=said, target="", impact=True, kind="impact", struck=struck)
 
 
 def _of_impulses(limits: tuple[Limits, Limits]) -> tuple[Limits, Limits]:

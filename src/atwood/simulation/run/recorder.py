@@ -13,7 +13,7 @@ from atwood.arrays import FloatArray
 from atwood.clock import TimeIsUp, more_time
 from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly
-from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_dataclasses import dataclass, made_of
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.projection import misses_of, project_safely, project_states
 
@@ -137,7 +137,14 @@ class Recorder:
         if len(pending) >= _PENDING:
             self.settle()
 
-    def take_many(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_], jumps: Sequence[Jump] = ()) -> None:
+    def take_many(
+        self,
+        t: FloatArray,
+        y: FloatArray,
+        shown: NDArray[np.bool_],
+        jumps: Sequence[Jump] = (),
+        shows_jumps: bool = True,
+    ) -> None:
         """Record states of the solver after the last sample, one row each, with those at jumps among them."""
         pending = self._samples[1]
         if jumps:
@@ -146,7 +153,7 @@ class Recorder:
             t, y, shown = (
                 np.insert(t, places, times),
                 np.insert(y, places, states, axis=0),
-                np.insert(shown, places, True),
+                np.insert(shown, places, shows_jumps),
             )
             once = np.append(
                 [True, True], (t[2:] != t[1:-1]) | (t[2:] != t[:-2])
@@ -235,16 +242,17 @@ class Recorder:
         cuts = np.searchsorted(time, self._jumps) + 1 if self._jumps else ()
         ends = [0, *(int(one) for one in cuts if one < len(time)), len(time)]
         return [
-            SegmentRecord(
-                self.plan,
-                impact or first > 0,
-                time[first:last],
-                q[:, first:last],
-                u[:, first:last],
-                shown[first:last],
-                held[:, first:last],
-                crossings,
-                after_time_event and first == 0,
+            made_of(
+                SegmentRecord,
+                plan=self.plan,
+                impact=impact or first > 0,
+                time=time[first:last],
+                coordinates=q[:, first:last],
+                speeds=u[:, first:last],
+                shown=shown[first:last],
+                held=held[:, first:last],
+                singular_crossings=crossings,
+                after_time_event=after_time_event and first == 0,
             )
             for first, last in pairwise(ends)
         ]

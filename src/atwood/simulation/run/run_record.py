@@ -107,18 +107,22 @@ def as_asked(segments: Sequence[SegmentRecord], outputs: int | FloatArray) -> tu
 
     At an event the state after it is shown. Where no time that was asked for is reached, the last state is.
     """
-    if isinstance(outputs, (int, np.integer)):
+    if isinstance(outputs, (int, np.integer)) or not segments:
         return tuple(segments)
-    made: list[SegmentRecord] = []
-    later = np.inf
-    for one in reversed(segments):
-        place = np.minimum(np.searchsorted(outputs, one.time), len(outputs) - 1)
-        shown = (outputs[place] == one.time) & (one.time < later)
-        later = min(later, float(one.time[0])) if len(one.time) else later
-        made.append(replace(one, shown=shown))
-    if made and not any(one.shown.any() for one in made):
-        made[0].shown[-1] = True
-    return tuple(reversed(made))
+    counts = [len(one.time) for one in segments]
+    time, before = (np.concatenate([getattr(one, name) for one in segments]) for name in ("time", "shown"))
+    starts = np.array([one.time[0] if len(one.time) else np.inf for one in segments])
+    later = np.append(np.minimum.accumulate(starts[::-1])[::-1][1:], np.inf)
+    place = np.minimum(np.searchsorted(outputs, time), len(outputs) - 1)
+    shown = (outputs[place] == time) & (time < np.repeat(later, counts))
+    if not shown.any():
+        shown[-1] = True
+    ends = np.cumsum(counts)
+    changed = set(np.searchsorted(ends, np.flatnonzero(shown != before), side="right").tolist())
+    return tuple(
+        replace(one, shown=shown[ends[i] - counts[i] : ends[i]]) if i in changed else one
+        for i, one in enumerate(segments)
+    )
 
 
 def run_out_of_time(assembly: Assembly, start: Start | None, options: RunOptions) -> Run:

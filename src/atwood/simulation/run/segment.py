@@ -348,7 +348,8 @@ class _Runner:
                 from atwood.simulation.contacts.bounces import told_bounces
 
                 self.noted += told_bounces(jumps, segment.plan, segment.probe)
-            self.recorder.take_many(times[:count], y, segment.samples.shown[done : done + count], jumps)
+            shows = isinstance(segment.options.outputs, (int, np.integer))  # or just the times that were asked for
+            self.recorder.take_many(times[:count], y, segment.samples.shown[done : done + count], jumps, shows)
             done += count
             if step_result.status is not Status.REACHED:
                 return done, step_result
