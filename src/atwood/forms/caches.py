@@ -223,8 +223,11 @@ _MOST_COORDINATES = 12
 
 
 def as_by_hand(equations: Equations, parameters: Sequence[Expression], rows: Sequence[Expression]) -> list[Expression]:
-    """Return rows rewritten with fewer operations, for scenes of the size that one would do by hand."""
-    if len(equations.coordinates) > _MOST_COORDINATES or equations.solved_speeds:
+    """Return rows rewritten with fewer operations, for scenes of the size that one would do by hand.
+
+    Rows with forces of gaps and slips stay as they are: they are solved for in the graph, which is no work by hand.
+    """
+    if len(equations.coordinates) > _MOST_COORDINATES or equations.solved_speeds or equations.contacts:
         return list(rows)
     angles = [q for q, c in zip(equations.coordinates, equations.names, strict=True) if c.unit == "rad"]
     read = tuple(rows), tuple(angles), parameters

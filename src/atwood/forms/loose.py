@@ -44,6 +44,11 @@ def is_loose(assembly: Assembly) -> bool:
     return assembly.kept.get(_LOOSE, find)
 
 
+def has_touched(assembly: Assembly) -> bool:
+    """Return whether a scene has gaps or slips, and one of them touches, slips or sticks."""
+    return bool(assembly.own_equations.contacts) and not is_loose(assembly)
+
+
 def loosened(assembly: Assembly, values: Sequence[Expression]) -> list[Expression]:
     """Return expressions as they are in the present states, if these are all zero; else as they stand."""
     if not is_loose(assembly):

@@ -60,6 +60,10 @@ _SMALL = 20_000
 """Beyond so many nodes LLVM's quickest level is used: it takes a sixth of the time, for code that is a tenth slower."""
 
 
+_BRIEF = 500
+"""The same for programs that are run for short stretches, between which far more is done."""
+
+
 class Failures(threading.local):
     """The exception that a function in Python raised inside compiled code, in each thread.
 
@@ -128,10 +132,10 @@ class Built:
         return derived, scratch
 
 
-def default_options(parts: Sequence[Part]) -> CodeOptions:
-    """Return how to compile programs of this size on this machine."""
+def default_options(parts: Sequence[Part], is_brief: bool = False) -> CodeOptions:
+    """Return how to compile programs of this size on this machine; brief ones are run for short stretches at a time."""
     size = sum(part.program.size for part in parts)
-    return CodeOptions(level=1 if size <= _SMALL else 0, sincos=sincos_name())
+    return CodeOptions(level=1 if size <= (_BRIEF if is_brief else _SMALL) else 0, sincos=sincos_name())
 
 
 def build_code(

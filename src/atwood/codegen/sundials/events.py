@@ -138,8 +138,8 @@ class EventCode:
         derived[:], _ = self._built.derive("kernel", self.program, parameter_values)
 
 
-def compile_events(program: Program, for_ida: bool) -> EventCode:
-    """Compile the values of events."""
+def compile_events(program: Program, for_ida: bool, is_brief: bool = False) -> EventCode:
+    """Compile the values of events; brief ones are used for short stretches at a time."""
     groups = [len(group.symbols) for group in program.inputs]
     if len(groups) != 4 or groups[0] != 1 or [groups[3]] != [len(program.results)]:
         raise UsageError(f"needs the input groups t, q, u and shift, not groups of {groups}", where=program.name)
@@ -148,7 +148,8 @@ def compile_events(program: Program, for_ida: bool) -> EventCode:
     exports = ["events", "look", *(["ida_events"] if for_ida else [])]
     files = ("codegen/sundials/residuals.py", "codegen/tangents.py")
     routines = RoutineSource("codegen.sundials.events", files, (groups[1], groups[2], groups[3], layout))
-    return EventCode(program, build_code([part], default_options([part]), exports=exports, routines=routines), for_ida)
+    options = default_options([part], is_brief)
+    return EventCode(program, build_code([part], options, exports=exports, routines=routines), for_ida)
 
 
 def write_routines(coordinates: int, speeds: int, count: int, layout: SundialsLayout | None) -> list[Routine]:

@@ -78,6 +78,8 @@ class CompiledAccelerations:
         the speeds.
     projection
         A step onto the constraints; see `atwood.forms.constrained.ConstrainedProgram`.
+    is_brief
+        Whether it is run for short stretches at a time.
 
     Raises
     ------
@@ -85,7 +87,7 @@ class CompiledAccelerations:
         If a program calls functions in Python.
     """
 
-    def __init__(self, program: Program, projection: Program | None = None) -> None:
+    def __init__(self, program: Program, projection: Program | None = None, is_brief: bool = False) -> None:
         self._programs = {"kernel": program} | ({} if projection is None else {"nearer": projection})
         for one in self._programs.values():
             if any(node.operation == "external" for node in one.nodes):
@@ -96,7 +98,7 @@ class CompiledAccelerations:
         self._room = q + 2 * u if projects else 0
         routines = rates_source(q, u, given, projects)
         exports = ["rates", "project"] if projects else ["rates"]
-        self._built = build_code(parts, default_options(parts), exports=exports, routines=routines)
+        self._built = build_code(parts, default_options(parts, is_brief), exports=exports, routines=routines)
         self._prologues = [
             ctypes.CFUNCTYPE(None, *[c_void_p] * 3)(self._built.code.addresses[f"{name}_prologue"])
             for name in self._programs

@@ -14,7 +14,7 @@ from atwood.arrays import BoolArray, FloatArray
 from atwood.expr import Program, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
-from atwood.forms.loose import is_loose, loosened
+from atwood.forms.loose import has_touched, is_loose, loosened
 from atwood.forms.quantities import known_program
 from atwood.integrators.protocol import StepResult
 from atwood.lazy_dataclasses import dataclass, replace
@@ -329,7 +329,7 @@ class EventProbe:
                 return None
             from atwood.codegen.sundials.events import compile_events
 
-            return compile_events(program, for_ida)
+            return compile_events(program, for_ida, has_touched(self.assembly))
 
         return self.assembly.shared.get(_EVENT_CODE, make, for_ida, *self.key)
 

@@ -20,7 +20,7 @@ from atwood.forms.accelerations import AccelerationProgram, accelerations_of
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.constrained import ConstrainedProgram, constrained_program, impact_program
-from atwood.forms.loose import is_loose, loose_equations
+from atwood.forms.loose import has_touched, is_loose, loose_equations
 from atwood.forms.quantities import to_maximal
 from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
 from atwood.integrators.protocol import MET, STEPS, CompiledRates, ExplicitProblem, Values
@@ -112,7 +112,9 @@ def own_rates_on_constraints(
 ) -> tuple[CompiledAccelerations, OwnRates] | None:
     """Return the same of a scene whose constraints stay; its parameters are those of `values_on_constraints`."""
     program = program_on_constraints(plan, t, y)
-    code = plan.assembly.shared.get(_COMPILED_ON_CONSTRAINTS, lambda: _code(program), program)
+    code = plan.assembly.shared.get(
+        _COMPILED_ON_CONSTRAINTS, lambda: _code(program, has_touched(plan.assembly)), program
+    )
     return None if code is None or plan.not_compilable else (code, code.open(plan.holds))
 
 
@@ -251,12 +253,14 @@ def _compiled_on_constraints(
     """Return a factory of compiled rates and projections for sessions; None if not compilable."""
     if plan.not_compilable:
         return None
-    code = plan.assembly.shared.get(_COMPILED_ON_CONSTRAINTS, lambda: _code(program), program)
+    code = plan.assembly.shared.get(
+        _COMPILED_ON_CONSTRAINTS, lambda: _code(program, has_touched(plan.assembly)), program
+    )
     return None if code is None else _once(lambda: code.bind(values, projects=plan.holds))
 
 
-def _code(program: ConstrainedProgram) -> CompiledAccelerations | None:
+def _code(program: ConstrainedProgram, is_brief: bool) -> CompiledAccelerations | None:
     """Return the machine code; None where there is none."""
     if any(node.operation == "external" for node in (*program.accelerations.nodes, *program.projection.nodes)):
         return None
-    return CompiledAccelerations(program.accelerations, program.projection)
+    return CompiledAccelerations(program.accelerations, program.projection, is_brief)

@@ -12,6 +12,7 @@ from atwood.clock import GRACE, Clock, TimeIsUp
 from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Shared
+from atwood.forms.loose import has_touched
 from atwood.integrators.protocol import Statistics
 from atwood.mechanics.outputs.event_functions import CONTACT, UPDATE
 from atwood.simulation.dynamics.numerical_failure import is_numerical, named, numerical_failure
@@ -214,6 +215,7 @@ class _Walk:
         assert self.plan is not None
         assert self.probe is not None
         self._kept.impacts = None if self.sampler.updates else self._impacts
+        self._kept.has_touched |= bool(self._impacts) or has_touched(self.plan.assembly)
         limit = min(schedule.next(t, options.t_end), self.sampler.next(t, options.t_end))
         ahead = self.samples.until(t, limit)
         if limit < options.t_end or (t < limit and self.sampler.due_at(limit)):  # the state just after it is shown
