@@ -7,12 +7,14 @@ import functools
 import gzip
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from html import escape
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from atwood.codegen.cache import default_cache, make_key
 
 _HERE = Path(__file__).parent
 
@@ -64,10 +66,23 @@ def _packed(content: bytes) -> str:
     return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
 
 
+def kept_text(name: str, parts: Iterable[object], make: Callable[[], str]) -> str:
+    """Return a text that is the same for all pages, from the cache where it was made before."""
+    cache, key = default_cache(), make_key(["page", name, *parts])
+    found = None if cache is None else cache.read(key)
+    if found is not None:
+        return found.decode()
+    made = make()
+    if cache is not None:
+        cache.write(key, made.encode())
+    return made
+
+
 @functools.cache
 def _library() -> str:
     """Return the library that draws, packed."""
-    return _packed(json.dumps({"three": (_HERE / "vendor" / "three.js").read_text(encoding="utf-8")}).encode())
+    text = (_HERE / "vendor" / "three.js").read_text(encoding="utf-8")
+    return kept_text("library", [text], lambda: _packed(json.dumps({"three": text}).encode()))
 
 
 def library_script() -> str:

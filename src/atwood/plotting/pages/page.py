@@ -6,7 +6,7 @@ import base64
 import inspect
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any, Literal
@@ -23,10 +23,9 @@ from atwood.model.declare.component import Component
 from atwood.pipeline import simulate
 from atwood.plotting.diagram import draw_diagram
 from atwood.plotting.live import LiveProgram, engine_script, live_program
-from atwood.plotting.pages.document import write_document
+from atwood.plotting.pages.document import kept_text, write_document
 from atwood.plotting.pages.stage import Stage, set_stage
 from atwood.plotting.pages.still import still_picture
-from atwood.reporting.parts import list_parameters
 from atwood.result.result import Result
 
 _LARGEST = 20e6
@@ -220,7 +219,7 @@ def make_page(
     modules = {}
     if program.model:
         modules = {
-            "engine": f"{engine_script()}\nexport {{ createEngine }};",
+            "engine": kept_text("engine", _engine_sources(), engine_script) + "\nexport { createEngine };",
             "model": f"export const model = {program.model};",
         }
     equations, latex = _equations(first)
@@ -259,6 +258,13 @@ def _live(results: Mapping[str, Result], bounds: Mapping[str, object], live: str
     return found
 
 
+def _engine_sources() -> Iterator[bytes]:
+    """Yield what the engine's text is made by."""
+    root = Path(__file__).parents[2]
+    for room in ("codegen", "integrators", "numerics", "plotting/live"):
+        yield from (file.read_bytes() for file in sorted((root / room).rglob("*")) if file.suffix in (".py", ".js"))
+
+
 def _facts(result: Result) -> str:
     ledger = result.energy
     return f"{result.method}; energy drifts by {ledger.max_drift:.1e} of what is exchanged"
@@ -294,24 +300,25 @@ def _run(label: str, result: Result, stage: Stage, is_whole: bool) -> dict[str, 
 
 def _parts(assembly: Assembly) -> list[dict[str, Any]]:
     """Return what the parts are, with their parameters and connectors."""
-    found: dict[str, dict[str, Any]] = {}
+    found = []
     for path, part in assembly.flat.parts.items():
         component: Component = part.component
         doc = (inspect.getdoc(type(component)) or "").partition("\n")[0]
+        given = [(name, spec, part.values[name]) for name, spec in component.parameter_specs().items()]
+        parameters = [
+            {"name": name, "value": _shown(value), "unit": spec.unit.text.removeprefix("1"), "doc": spec.doc}
+            for name, spec, value in given
+            if value is not None
+        ]
         names = list(component.connectors())
-        found[path] = {
-            "path": path,
-            "kind": type(component).__name__,
-            "doc": doc,
-            "connectors": names,
-            "parameters": [],
-        }
-    for one in list_parameters(assembly):
-        path, _, name = one.path.rpartition(".")
-        value = f"{one.value:.6g}" if isinstance(one.value, float) else str(one.value)
-        unit = "" if one.unit == "1" else one.unit
-        found[path]["parameters"].append({"name": name, "value": value, "unit": unit, "doc": one.meaning})
-    return list(found.values())
+        kind = type(component).__name__
+        found.append({"path": path, "kind": kind, "doc": doc, "connectors": names, "parameters": parameters})
+    return found
+
+
+def _shown(value: Any) -> str:
+    """Return a parameter's value as text: of a function the text that it was given as."""
+    return f"{value:.6g}" if isinstance(value, float) else str(getattr(value, "text", value))
 
 
 def _equations(result: Result) -> tuple[str, str]:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from atwood.arguments import Kind, Refused, number, optional, takes
 from atwood.arrays import FloatArray
@@ -21,6 +20,9 @@ from atwood.pipeline import SCENE, assemble_flat, assembly_of, simulate
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.arguments import FORM, RTOL, T_END
 from atwood.theory.formulas.described import Described
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 _VECTORS = ("position", "velocity", "x_axis", "y_axis", "z_axis", "angular_velocity")
 """Quantities of parts in world axes."""
@@ -126,6 +128,8 @@ def moved(
     UnsupportedError
         If a part stands still in the world, and there is a velocity; or the scene does not move alike.
     """
+    from scipy.spatial.transform import Rotation  # half a second of imports
+
     assembly = assembly_of(scene, form=form)
     flat, space = assembly.flat, assembly.mechanism.space
     n = np.array(axis, dtype=float)
@@ -167,7 +171,7 @@ def _moved_part(part: Part, turn: Rotation, d: FloatArray) -> Part:
         elif spec.direction and not spec.turning:
             values[name] = tuple(map(float, turn.apply(values[name])))
         elif spec.turning and "angle" in values:
-            vector = (turn * Rotation.from_rotvec(values["angle"] * np.array(values[name]))).as_rotvec()
+            vector = (turn * turn.from_rotvec(values["angle"] * np.array(values[name]))).as_rotvec()
             size = float(np.linalg.norm(vector))
             if size > 0.0:
                 sign = 1.0 if vector @ values[name] >= 0.0 else -1.0
