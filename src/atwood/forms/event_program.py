@@ -26,7 +26,7 @@ def event_program(
     known: dict[Expression, Expression] = {}
     symbols = read_by(values, [one.symbol for one in assembly.reactions])
     if symbols:
-        found = _reactions(assembly, set(symbols), kept_maximal)
+        found = solved_reactions(assembly, set(symbols), kept_maximal)
         if found is None:
             return None
         known.update(found)
@@ -64,8 +64,10 @@ def _solve(equations: Equations, kept: Sequence[int]) -> list[Expression] | None
     return [graph.convert(one) for one in solve(matrix, right)]
 
 
-def _reactions(assembly: Assembly, wanted: set[Expression], kept: Sequence[int]) -> dict[Expression, Expression] | None:
-    """Return reactions in terms of the form's coordinates and speeds."""
+def solved_reactions(
+    assembly: Assembly, wanted: set[Expression], kept: Sequence[int]
+) -> dict[Expression, Expression] | None:
+    """Return reactions in terms of the form's coordinates and speeds; None where these do not give them."""
     maximal = assembly.maximal
     if len(kept) != len(maximal.constraints):
         return None

@@ -342,6 +342,14 @@ function openMode(mode, options) {
     return is;
   }
 
+  // What reads reactions, which takes longer.
+  function load(t, state) {
+    M.set(state, y);
+    functions.rates(t, y, yp, block);
+    call("loads", t, y, y + n, yp + n);
+    return true;
+  }
+
   [places.kernel.derived, scratch, places.nearer?.derived, scratch, nearer].forEach((one, i) => { M[block + i] = one ?? 0; });
   put({arrays, size, padded, function: address(functions.rates), data: block});
   if (functions.project) put({project: address(functions.project), project_data: block + 2});
@@ -361,7 +369,7 @@ function openMode(mode, options) {
     for (let i = 0; i < size; i++) [M[turns + i], M[turns + size + i]] = [Math.cos(1 + 2.4 * i), Math.sin(1 + 2.4 * i)];
   }
   return {
-    data, M, n, m, y, values, fill, begin, broken, step, at, event, missed, singular, evaluate, settle, call, output, matrix,
+    data, M, n, m, y, values, fill, begin, broken, step, at, event, missed, singular, evaluate, load, settle, call, output, matrix,
     normalize, held, moved, get time() { return field("t"); }, get begun() { return field("t_old"); },
     get statistics() { return ["steps", "failures", "evaluations"].map(field); },
   };
@@ -542,15 +550,15 @@ function createEngine(model, options = {}) {
   const settings = {...options, rtol: options.rtol ?? 1e-8, horizon: span > 0 ? span : 1};
   const modes = model.modes.map(one => openMode(one, settings));
   const parameters = data.parameters.map(one => ({...one})), starts = data.starts.map(one => ({...one}));
-  const numbers = modes.map(one => new Map(one.data.paths.map((path, i) => [path, i])));
+  const numbers = modes.map(one => new Map(Object.entries(one.data.paths).flatMap(([name, list]) => list.map((path, i) => [path, [name, i]]))));
   const first = {parameters: parameters.map(one => one.value), starts: starts.map(one => one.value)};
   let mode = modes[0], time = data.start_time, state = Float64Array.from(mode.data.state), now = status("ready");
-  let events = [], started = false, evaluated = false, coming = null, searched = time, began = time, changes = 0, changedAt = -Infinity;
+  let events = [], started = false, evaluated = false, loaded = false, coming = null, searched = time, began = time, changes = 0, changedAt = -Infinity;
 
   const say = (code, text, t = time) => (now = status(code, text && `at t = ${shown(t)} s ${text}`));
 
   function take(t, from) {
-    [time, state, evaluated] = [t, from, false];
+    [time, state, evaluated, loaded] = [t, from, false, false];
   }
 
   // Relations of functions of time have the values that hold at a time and just after it.
@@ -788,10 +796,11 @@ function createEngine(model, options = {}) {
   }
 
   function value(path) {
-    const known = numbers[modes.indexOf(mode)], i = known.get(path);
-    if (i === undefined) throw new Error(`${path}: ${data.unknown[path] ?? `there is no such quantity${near(path, [...known.keys()])}`}`);
+    const known = numbers[modes.indexOf(mode)], place = known.get(path);
+    if (!place) throw new Error(`${path}: ${data.unknown[path] ?? `there is no such quantity${near(path, [...known.keys()])}`}`);
     evaluate();
-    return mode.output("quantities", 0)[i];
+    if (place[0] === "loads" && !loaded) loaded = mode.load(time, state);
+    return mode.output(place[0], 0)[place[1]];
   }
 
   function set(path, number) {

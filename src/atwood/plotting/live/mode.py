@@ -12,9 +12,19 @@ from atwood.codegen.javascript.printer import BITS, print_routines
 from atwood.codegen.javascript.program import FUNCTIONS, print_program
 from atwood.codegen.llvm.linear_systems import write_elimination
 from atwood.errors import AtwoodError
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, Scalar, depends_on
+from atwood.expr import (
+    Expression,
+    InputGroup,
+    OutputGroup,
+    Program,
+    Scalar,
+    depends_on,
+    read_by,
+    substitute,
+)
 from atwood.forms.accelerations import accelerations_of
 from atwood.forms.assembly import Assembly
+from atwood.forms.event_program import solved_reactions
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import find_observables
 from atwood.forms.sides import in_pieces
@@ -28,6 +38,7 @@ from atwood.mechanics.outputs.totals import energies
 from atwood.model.values.space import planar_axes
 from atwood.plotting.live.parameters import find_parameters
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
+from atwood.simulation.dynamics.reactions import ReactionSolver
 from atwood.simulation.events.modes import MARGIN, EventProbe
 from atwood.simulation.events.sides import plain_sides
 from atwood.simulation.events.time_events import find_schedule
@@ -91,7 +102,7 @@ class ModeText:
         }
         self._add_motion(y)
         self._add_guard()
-        self._add_quantities(quantities)
+        self._add_quantities(quantities, y)
         self._add_pictures()
         self._add_sizes()
         self.end = self._add_schedule()
@@ -150,18 +161,33 @@ class ModeText:
         inputs = (*state_groups(self.equations), *([InputGroup("a", tuple(more))] if more else []))
         self.programs[name] = Program(f"{self.flat.name} ({name})", inputs, parameters, outputs)
 
-    def _add_quantities(self, paths: Sequence[str] | None) -> None:
+    def _add_quantities(self, paths: Sequence[str] | None, y: FloatArray) -> None:
         """Add the program of quantities and energies."""
         symbols = [one.symbol for one in self.assembly.reactions]
         every = self.assembly.observables
         found = find_observables(self.assembly, list(every) if paths is None else paths)
         reading = {one.path for one in found if symbols and depends_on([one.value], symbols)}
-        self.unknown = dict.fromkeys(sorted(reading), "it reads reactions, which pages do not solve for")
-        self.known = [one for one in found if one.path not in reading]
-        of = {"quantities": [one.value for one in self.known]}
+        plain = [one for one in found if one.path not in reading]
+        of = {"quantities": [one.value for one in plain]}
         of["energies"] = list(energies(self.assembly.mechanism, self.equations))
         self.of_state("quantities", of, self.equations.accelerations)
-        self.data["paths"] = [one.path for one in self.known]
+        self.data["paths"] = {"quantities": [one.path for one in plain]}
+        self.known = plain + self._add_loads([one for one in found if one.path in reading], y)
+
+    def _add_loads(self, reading: list[Observable], y: FloatArray) -> list[Observable]:
+        """Add the program of what reads reactions, which is asked for now and then; return what it gives."""
+        if not reading:
+            return []
+        symbols = read_by([one.value for one in reading], [one.symbol for one in self.assembly.reactions])
+        kept = ReactionSolver(self.assembly, self.flat.t_start, *self.plan.program.split(y)).finding.kept
+        solved = solved_reactions(self.assembly, set(symbols), kept)
+        if solved is None:
+            self.unknown = dict.fromkeys((one.path for one in reading), "it reads reactions that have no formulas here")
+            return []
+        values = substitute([one.value for one in reading], solved)
+        self.of_state("loads", {"loads": values}, self.equations.accelerations)
+        self.data["paths"]["loads"] = [one.path for one in reading]
+        return reading
 
     def _add_pictures(self) -> None:
         """Add the program of where bodies and nodes are."""
