@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import unicodedata
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from fractions import Fraction
 from html import escape
 from typing import Any
 
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.theory.formulas.printers import latex, text
-from atwood.theory.formulas.quantities import distances_in, moments_in, with_quantities
+from atwood.theory.formulas.quantities import distances_in, moments_in
+from atwood.theory.formulas.search import Search
 from atwood.theory.formulas.tree import Call, Name, Node, Sum, Symbol, Term, alone, names_in, replaced
 
 _WIDTH = 88
@@ -88,18 +90,11 @@ def with_names(sections: Sequence[Section], legend: Sequence[Symbol]) -> list[Se
     }
     where |= {name: line_for(name, one) for one, name in moments.items()}
     if where:
-        named = [replace(one, lines=tuple(_with(line, distances, moments) for line in one.lines)) for one in sections]
-        sections = [*named, Section("Distances and moments of inertia", tuple(where.values()))]
+        searches = [Search(one, name, Fraction(2)) for one, (name, _) in distances.items()]
+        for search in (*searches, *(Search(one, name) for one, name in moments.items())):
+            sections = [replace(s, lines=tuple(line_with(one, search.put) for one in s.lines)) for s in sections]
+        sections = [*sections, Section("Distances and moments of inertia", tuple(where.values()))]
     return _with_short_names(sections, taken)
-
-
-def _with(line: Line | Matrix, distances: Mapping[Sum, tuple[Name, Sum]], moments: Mapping[Sum, Name]) -> Line | Matrix:
-    def made(one: Sum) -> Sum:
-        return alone(with_quantities(one, distances, moments))
-
-    if isinstance(line, Line):
-        return Line(line.left, made(line.formula), line.right)
-    return Matrix(line.left, tuple(tuple(map(made, row)) for row in line.entries))
 
 
 def _with_short_names(sections: Sequence[Section], taken: Iterable[str]) -> list[Section]:
@@ -115,7 +110,11 @@ def _with_short_names(sections: Sequence[Section], taken: Iterable[str]) -> list
     names: dict[Node, Node] = {
         bracket: Name(Symbol(letter, (str(i + 1),), kind="shared", order=i)) for i, bracket in enumerate(chosen)
     }
-    shorter = [Section(one.title, tuple(_renamed(line, names) for line in one.lines), one.note) for one in sections]
+
+    def short(one: Sum) -> Sum:
+        return alone(replaced(one, names))
+
+    shorter = [replace(one, lines=tuple(line_with(line, short) for line in one.lines)) for one in sections]
     where = []
     for bracket, name in names.items():
         assert isinstance(bracket, Sum)
@@ -144,10 +143,11 @@ def _brackets(node: Node) -> Iterable[Sum]:
                 yield from _brackets(inner)
 
 
-def _renamed(line: Line | Matrix, names: Mapping[Node, Node]) -> Line | Matrix:
+def line_with(line: Line | Matrix, change: Callable[[Sum], Sum]) -> Line | Matrix:
+    """Return a line with each of its formulas changed."""
     if isinstance(line, Line):
-        return Line(line.left, alone(replaced(line.formula, names)), line.right)
-    return Matrix(line.left, tuple(tuple(alone(replaced(one, names)) for one in row) for row in line.entries))
+        return replace(line, formula=change(line.formula))
+    return replace(line, entries=tuple(tuple(map(change, row)) for row in line.entries))
 
 
 def shared_in(formulas: Iterable[Node], shared: Sequence[tuple[Name, Sum]]) -> list[tuple[Name, Sum]]:

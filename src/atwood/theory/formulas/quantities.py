@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from itertools import combinations
 from typing import TypeAlias
 
-from atwood.lazy_dataclasses import replace
-from atwood.theory.formulas.tree import ONE, Call, Factor, Name, Node, Number, Sum, Symbol, Term, names_in
+from atwood.theory.formulas.tree import ONE, Call, Name, Node, Number, Sum, Symbol, Term, names_in
 
 _TIMES = 3
 """A moment of inertia has a name where it stands so often."""
@@ -57,31 +56,6 @@ def moments_in(formulas: Sequence[Node]) -> dict[Sum, Name]:
         if times >= _TIMES and name not in found.values():
             found[one] = name
     return found
-
-
-def with_quantities(node: Node, distances: Mapping[Sum, tuple[Name, Sum]], moments: Mapping[Sum, Name]) -> Node:
-    """Return a formula with these names in it."""
-    if isinstance(node, Name):
-        return node
-    if isinstance(node, Call):
-        return Call(node.function, tuple(with_quantities(one, distances, moments) for one in node.arguments))
-    for sums, name in moments.items():
-        if set(sums.terms) <= set(node.terms):
-            rest = tuple(term for term in node.terms if term not in sums.terms)
-            owners = dict.fromkeys(owner for term in node.terms if term in sums.terms for owner in term.owners)
-            node = Sum((Term(ONE, ((name, ONE),), tuple(owners)), *rest))
-
-    def factor(one: Factor) -> Factor:
-        base, power = one
-        if isinstance(base, Sum) and base in distances:
-            return distances[base][0], 2 * power
-        made = with_quantities(base, distances, moments)
-        if isinstance(made, Sum) and len(made.terms) == 1 == len(made.terms[0].factors) and made.terms[0].number == 1:
-            ((inner, own),) = made.terms[0].factors
-            return inner, own * power
-        return made, power
-
-    return Sum(tuple(replace(term, factors=tuple(map(factor, term.factors))) for term in node.terms))
 
 
 def _brackets(formulas: Iterable[Node]) -> Iterator[Sum]:
