@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
-from atwood import AtwoodError, UsageError, diagram, load_result, page, simulate
+from atwood import AtwoodError, SavedResult, UsageError, diagram, load_result, page, simulate
 from atwood.cli import main
 from atwood_library.scenes import SCENES
 
@@ -36,10 +36,14 @@ def test_what_cannot_be_shown_is_refused(result: Any, options: dict[str, Any], s
         page(result, **options)
 
 
-def test_results_that_hold_no_scene_are_refused(result: Any, tmp_path: Path) -> None:
+def test_a_file_of_results_is_run_again_where_it_holds_the_scene(result: Any, tmp_path: Path) -> None:
     saved = load_result(result.save(tmp_path / "a.npz"))
-    with pytest.raises(UsageError, match="holds no scene"):
-        page(saved)  # type: ignore[arg-type]
+    assert page(saved).mode == "live"
+    bare = SavedResult(saved.time, saved.quantities, saved.units)
+    with pytest.raises(UsageError, match="does not"):
+        page(bare)
+    with pytest.raises(UsageError, match="a scene, a Result"):
+        page([])
 
 
 def test_a_plane_and_space_have_no_common_picture(result: Any) -> None:

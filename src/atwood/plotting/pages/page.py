@@ -26,6 +26,7 @@ from atwood.plotting.live import LiveProgram, engine_script, live_program
 from atwood.plotting.pages.document import kept_text, write_document
 from atwood.plotting.pages.stage import Stage, set_stage
 from atwood.plotting.pages.still import still_picture
+from atwood.result.files import SavedResult
 from atwood.result.result import Result
 
 _LARGEST = 20e6
@@ -36,12 +37,11 @@ _LONG = 600
 
 
 def _scene_or_results(value: Any) -> Any:
-    if isinstance(value, (Model, Assembly, Result)):
+    if isinstance(value, (Model, Assembly, Result, SavedResult)):
         return value
-    values = list(value.items()) if isinstance(value, Mapping) else list(value) if isinstance(value, Sequence) else []
-    results = [one[1] if isinstance(one, tuple) else one for one in values]
-    if not results or not all(isinstance(one, Result) for one in results):
-        raise Refused("A result that was read from a file holds no scene.")
+    values = list(value.values()) if isinstance(value, Mapping) else list(value) if isinstance(value, Sequence) else []
+    if not values or not all(isinstance(one, (Result, SavedResult)) for one in values):
+        raise Refused
     return value
 
 
@@ -99,7 +99,7 @@ class Page:
     live=one_of(("auto", "never")),
 )
 def page(
-    scene: Model | Assembly | Result | Sequence[Result] | Mapping[str, Result],
+    scene: Model | Assembly | Result | SavedResult | Sequence[Result] | Mapping[str, Result],
     file: str | os.PathLike[str] | None = None,
     *,
     show: str | Sequence[str] = (),
@@ -113,7 +113,8 @@ def page(
     Parameters
     ----------
     scene
-        A scene, which is simulated; its assembly; a result; or several results, which may have names.
+        A scene, which is simulated; its assembly; a result, also one that was read from a file, which is simulated
+        again; or several results, which may have names.
     file
         Where to save it (``.html``).
     show
@@ -163,15 +164,23 @@ def check_target(file: Path) -> None:
 
 
 def _results(scene: Any) -> dict[str, Result]:
-    if isinstance(scene, (Model, Assembly, Result)):
-        result = scene if isinstance(scene, Result) else simulate(scene)
+    if isinstance(scene, Mapping) and not isinstance(scene, (Result, SavedResult)):
+        return {str(name): _result(one) for name, one in scene.items()}
+    if not isinstance(scene, Sequence):
+        result = _result(scene)
         return {result.method: result}
-    if isinstance(scene, Mapping):
-        return {str(name): one for name, one in scene.items()}
+    scene = [_result(one) for one in scene]
     names = [f"{one.assembly.flat.name}, {one.method}" for one in scene]
     again = len(set(names)) < len(names)
     labels = [f"{k}: {name}" if again else name for k, name in enumerate(names, 1)]
     return dict(zip(labels, scene, strict=True))
+
+
+def _result(one: Model | Assembly | Result | SavedResult) -> Result:
+    """Return a run: of a scene, or again of a file that holds one."""
+    if isinstance(one, Result):
+        return one
+    return simulate(one.scene(), **one.settings()) if isinstance(one, SavedResult) else simulate(one)
 
 
 def _known(path: str, known: Sequence[str], where: str) -> str:
