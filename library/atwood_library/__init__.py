@@ -28,10 +28,13 @@ if TYPE_CHECKING:
     from atwood_library.contacts.ball_contact import BallContact as BallContact
     from atwood_library.contacts.ball_pair_contact import BallPairContact as BallPairContact
     from atwood_library.contacts.box_contact import BoxContact as BoxContact
+    from atwood_library.contacts.compliant_contact import CompliantContact as CompliantContact
     from atwood_library.contacts.distance_contact import DistanceContact as DistanceContact
+    from atwood_library.contacts.ellipsoid_contact import EllipsoidContact as EllipsoidContact
     from atwood_library.contacts.lossy_gear import LossyGear as LossyGear
     from atwood_library.contacts.one_way_clutch import OneWayClutch as OneWayClutch
     from atwood_library.contacts.point_contact import PointContact as PointContact
+    from atwood_library.contacts.polygon_contact import PolygonContact as PolygonContact
     from atwood_library.contacts.ratchet import Ratchet as Ratchet
     from atwood_library.contacts.rotational_friction import RotationalFriction as RotationalFriction
     from atwood_library.contacts.rotational_stop import RotationalStop as RotationalStop
@@ -153,6 +156,7 @@ _MODULES = {
     "Bushing": "forces.bushing",
     "CentralGravity": "forces.central_gravity",
     "Charge": "fields.charge",
+    "CompliantContact": "contacts.compliant_contact",
     "Cone": "parts.cone",
     "ConstantVelocity": "joints.constant_velocity",
     "CoordinateLagrangian": "fields.coordinate_lagrangian",
@@ -165,6 +169,7 @@ _MODULES = {
     "Drag": "forces.drag",
     "Drive": "joints.drive",
     "ElasticRope": "ropes.elastic_rope",
+    "EllipsoidContact": "contacts.ellipsoid_contact",
     "EnergySensor": "sensors.energy_sensor",
     "FirstOrder": "blocks.first_order",
     "Force": "forces.force",
@@ -203,6 +208,7 @@ _MODULES = {
     "PointOnPlane": "joints.point_on_plane",
     "PointOnSurface": "joints.point_on_surface",
     "PointToPoint": "sources.point_to_point",
+    "PolygonContact": "contacts.polygon_contact",
     "PositionSensor": "sensors.position_sensor",
     "Potential": "fields.potential",
     "Pulley": "ropes.pulley",
