@@ -18,7 +18,7 @@ exclude_patterns = ["build", "jupyter_execute", "gallery-files"]
 html_extra_path = ["gallery-files"]  # pages that move, each a file of its own
 html_static_path = ["static"]
 html_css_files = ["site.css"]
-nb_execution_mode = "force"  # of pages that are notebooks: those of the course
+nb_execution_mode = "force"  # of pages that are notebooks: those of the course, and tutorials
 nb_execution_raise_on_error = True
 nb_execution_timeout = 120
 myst_heading_anchors = 3
@@ -51,8 +51,10 @@ def copy_mathjax(app, error):
 
 
 def setup(app):
-    """Write the gallery before pages are read, and copy what formulas need."""
+    """Write the gallery and the pages of parts before pages are read, and copy what formulas need."""
     from gallery import write_gallery
+    from parts_pages import write_parts
 
     app.connect("builder-inited", write_gallery)
+    app.connect("builder-inited", write_parts)
     app.connect("build-finished", copy_mathjax)

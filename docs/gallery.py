@@ -34,14 +34,14 @@ def write_gallery(*_: Any) -> None:
     parts += [f"## {title}\n\n{_grid(kinds[kind])}" for kind, title in _KINDS.items()]
     parts.append("## By chapter of the course\n\n" + "\n".join(_by_chapter()))
     hidden = "\n".join(["```{toctree}", ":hidden:", "", *SCENES, "```"])
-    _write(PAGES / "index.md", "\n\n".join((*parts, hidden)) + "\n")
+    write(PAGES / "index.md", "\n\n".join((*parts, hidden)) + "\n")
 
 
 _INTRODUCTION = """Every scene of the library. Each page has the scene in motion: turn it, and where it is live, change
 its lengths, masses and starts while it moves. `atwood page NAME` writes the same as a file."""
 
 
-def _write(file: Path, text: str) -> None:
+def write(file: Path, text: str) -> None:
     """Write a file where it is not there already, so that Sphinx reads again only what is new."""
     if not file.exists() or file.read_text(encoding="utf-8") != text:
         file.write_text(text, encoding="utf-8")
@@ -51,7 +51,7 @@ def _write_scene(name: str, scene: Scene) -> str:
     """Write the page of a scene, and return its card."""
     result = simulate(scene)
     made = make_page({result.method: result}, library="library.js")
-    _write(FILES / "live" / f"{name}.html", made.html)
+    write(FILES / "live" / f"{name}.html", made.html)
     still = still_picture(set_stage(result), name)
     told = inspect.cleandoc(type(scene).__doc__ or "").partition("\n\nParameters\n")[0]
     summary, _, more = told.partition("\n\n")
@@ -68,7 +68,7 @@ def _write_scene(name: str, scene: Scene) -> str:
         f"What is known of it, and shown by tests: [{name}](../scenes/{name}.md)." if also.exists() else "",
         f"## The scene\n\n```python\n{source.read_text(encoding='utf-8')}\n```",
     ]
-    _write(PAGES / f"{name}.md", "\n\n".join(one for one in sections if one) + "\n")
+    write(PAGES / f"{name}.md", "\n\n".join(one for one in sections if one) + "\n")
     return f'<a class="card" href="{name}.html">{still}<span>{name}</span></a>'
 
 
