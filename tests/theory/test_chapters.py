@@ -38,7 +38,7 @@ COMMANDS: dict[str, list[list[str]]] = {
     ],
     "2-lagrange": [
         ["equations", "double-pendulum"],
-        ["equations", "spherical-pendulum"],
+        ["equations", "spherical-pendulum", "--set", "coordinates=angles"],
         ["equations", "double-atwood"],
         ["equations", "rotating-hoop-driven"],
         ["equations", "simple-pendulum", "--form", "dae"],

@@ -39,6 +39,7 @@ class SphericalPendulum(Scene):
         if self.coordinates == "angles":
             sphere = ("sin(p)*cos(q)", "sin(p)*sin(q)", "-cos(p)")
             self.replace("rod", PointOnSurface(surface=sphere, scale=self.length))
+            self.symbols.update({"rod.parameter_1": "theta", "rod.parameter_2": "phi"})
             self.start.update({"rod.parameter_1": self.inclination, "rod.parameter_2": 0.0})
             self.start.update({"rod.rate_1": 0.0, "rod.rate_2": self.azimuth_rate})
             return

@@ -13,6 +13,7 @@ from atwood import Scene, SolveError, UsageError, action_angle, exp, hamiltonian
 from atwood.theory.action import Separation
 from atwood_library import PointMass, Potential
 from atwood_library.scenes import (
+    ChargedParticle,
     DoublePendulum,
     DrivenPendulum,
     Kepler,
@@ -276,3 +277,10 @@ def test_beside_the_separatrix_there_is_one_and_in_x_to_the_fourth() -> None:
     below = action_angle(well(lambda x: (x**2 - 1.0) ** 2, np.sqrt(2.0) * (1.0 - 1e-9), 0.0))
     assert below.kind == "libration"
     assert np.isfinite(below.period)
+
+
+def test_a_charge_separates_in_the_gauge_in_which_a_coordinate_is_ignorable() -> None:
+    assert not separation(ChargedParticle()).separates
+    found = separation(ChargedParticle(), gauge="q*B*x*z/2")
+    assert found.separates
+    assert "p_x" in map(str, found.constants)

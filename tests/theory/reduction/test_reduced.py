@@ -314,3 +314,15 @@ def test_on_top_of_the_potential_a_separatrix_is_named_and_no_period_is_infinite
     [told] = [line for line in top.text().splitlines() if line.startswith("period ")]
     assert "none" in told
     assert not reduced(SCENES["simple-pendulum"]()).is_separatrix
+
+
+def test_two_bodies_start_at_any_angle_of_their_distance() -> None:
+    """Body 1 is to the left of body 2 at the start: there the angle is pi, and the distance not negative."""
+    places = {
+        f"body{one}.position.{axis}": f"{whole} {sign} m_{3 - one}/(m_1 + m_2)*r*{wave}(phi)"
+        for one, sign in ((1, "+"), (2, "-"))
+        for axis, whole, wave in (("x", "X", "cos"), ("z", "Z", "sin"))
+    }
+    found = reduced(point_transformation(SCENES["two-body"](space="plane"), places, ["X", "Z", "r", "phi"]), "r")
+    assert found.period == pytest.approx(2.0 * math.pi / math.sqrt(3.0), rel=1e-12)
+    assert found.turning_points == pytest.approx((0.5, 1.5), rel=1e-9)

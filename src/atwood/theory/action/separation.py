@@ -20,6 +20,7 @@ from atwood.lazy_modules import mpmath, sympy
 from atwood.model.compose.composite import Model
 from atwood.theory.action.action_angle import Level, level_through
 from atwood.theory.action.complete_integral import CompleteIntegral, complete_integral
+from atwood.theory.equations.stated import GAUGE
 from atwood.theory.formulas.described import Described
 from atwood.theory.formulas.notation import SYMBOLS
 from atwood.theory.formulas.printers import Sympy
@@ -303,12 +304,14 @@ class Separation(Described):
     ),
     coordinates=optional(BY_PATH),
     symbols=SYMBOLS,
+    gauge=GAUGE,
 )
 def separation(
     scene: Model | Assembly | Hamiltonian | PointTransformation,
     coordinates: Mapping[str, Any] | None = None,
     *,
     symbols: Mapping[str, str] | None = None,
+    gauge: Any = None,
 ) -> Separation:
     """Return whether the equation of Hamilton and Jacobi of a scene separates in given coordinates.
 
@@ -319,8 +322,8 @@ def separation(
     coordinates
         The scene's coordinates, by their paths, as text or sympy expressions of others, which are those that are asked
         about: ``{"body.position.x": "r*cos(phi)", "body.position.z": "r*sin(phi)"}``. If not given, the scene's own.
-    symbols
-        See `atwood.equations`.
+    symbols, gauge
+        See `atwood.equations`: a charge in a magnetic field separates in one gauge and not in another.
 
     Returns
     -------
@@ -337,7 +340,7 @@ def separation(
     if isinstance(scene, PointTransformation):
         coordinates = dict(zip(scene.source.paths, scene.old.values(), strict=True))
         scene = scene.source
-    h = scene if isinstance(scene, Hamiltonian) else hamiltonian(scene, symbols=symbols)
+    h = scene if isinstance(scene, Hamiltonian) else hamiltonian(scene, symbols=symbols, gauge=gauge)
     if h.depends_on_time:
         raise UnsupportedError("H depends on time", where=h.name)
     plain = [sympy.Symbol(f"{by}{one.func.__name__}") for by in ("", "p_") for one in h.coordinates]

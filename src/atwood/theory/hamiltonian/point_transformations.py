@@ -352,9 +352,14 @@ def start_in(given: PointTransformation) -> tuple[float, FloatArray, FloatArray]
     def missing(x: Any) -> FloatArray:
         return np.asarray(place(*x, start.time), dtype=float) - q
 
+    sizes = [
+        one.is_positive or any(one in factor.free_symbols for factor in given.positive) for one in given.coordinates
+    ]
     random = np.random.default_rng(11)
     for trial in range(_TRIALS):
         guess = start.length * random.uniform(0.1, 2.0, len(q)) if trial else np.abs(q) + 0.1 * start.length
+        if trial % 2:  # angles may be anywhere
+            guess = np.where(sizes, guess, random.uniform(-np.pi, np.pi, len(q)))
         with np.errstate(all="ignore"):
             found = scipy.optimize.least_squares(missing, guess, xtol=3e-16, ftol=3e-16, gtol=3e-16)
         is_met = np.max(np.abs(found.fun)) <= 1e-13 * (np.max(np.abs(q)) + start.length)
