@@ -57,7 +57,7 @@ def write_routines(coordinates: int, speeds: int) -> list[Routine]:
 
 
 def _alone(r: Routine, m: Record, search: Search) -> Value:
-    """Return the number of the event; what happens beside it, or nearly so, is left to Python."""
+    """Return the number of the event; what happens beside it, or nearly so, or had a margin, is left to Python."""
     found, known, shift = search.row("found"), search.row("known"), m.shift
     one, many = r.variable(0, INTEGER), r.variable(0, INTEGER)
     with r.count(search.count) as i, r.when(found[i] != 0.0):
@@ -65,6 +65,8 @@ def _alone(r: Routine, m: Record, search: Search) -> Value:
     with r.when((many.now != 1) | (m.logged >= m.capacity)):
         r.give(1)
     which, small = one.now, m.table.at(search.count * TABLE.index("small"))
+    with r.when(shift[which] * 2.0 > small[which]):
+        r.give(1)
     with r.count(search.count) as i, r.when((i != which) & ~(known[i] - shift[i] > small[i])):
         r.give(1)
     return which

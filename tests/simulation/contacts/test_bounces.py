@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import atwood as aw
-from atwood import Scene, simulate
+from atwood import Component, Point, Scalar, Scene, connector, cos, parameter, simulate, unilateral
 from atwood.simulation.contacts import changes
 from atwood.simulation.run import session
 from atwood_library import Ground, Inertia, PointContact, PointMass, RotationalStop, SurfaceContact
@@ -61,6 +61,34 @@ def on_a_floor() -> tuple[Scene, float]:
     scene.connect(m.point, floor.point)
     scene.start.update({"m.position.x": 0.0, "m.position.z": 0.6, "m.velocity.x": 0.0, "m.velocity.z": 0.0})
     return scene, 2.0
+
+
+class Falling(Component):
+    """A floor that falls away at first, and comes back."""
+
+    p: Point = connector(Point, "What touches it.")
+    restitution: float = parameter(0.5, doc="Share of the speed that is left.")
+
+    @unilateral(reaction="force", unit="N", restitution="restitution", doc="Force of the floor.")
+    def gap(self) -> Scalar:
+        """Height above the floor."""
+        return self.p.position.z - 0.3 * (cos(6.0 * self.time) - 1.0)
+
+
+def test_an_impact_of_what_began_at_zero_has_no_margin(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It rests on the floor, is left behind once a turn, and falls: a margin would make that impact late by 1e-5 s."""
+    scene = Scene()
+    scene.connect(scene.add("m", PointMass(mass=1.0)).point, scene.add("falling", Falling()).p)
+    scene.start.update({"m.position.x": 0.0, "m.position.z": 0.0, "m.velocity.x": 0.0, "m.velocity.z": 0.0})
+
+    def impacts() -> list[float]:
+        events = simulate(scene, t_end=1.5, rtol=1e-6).events
+        assert [one.kind for one in events].count("opens") == 1
+        return [one.time for one in events if one.kind == "impact"]
+
+    quick = impacts()
+    monkeypatch.setattr(session, "_MANY_IMPACTS", math.inf)
+    assert quick == pytest.approx(impacts(), abs=1e-9)
 
 
 @pytest.mark.parametrize("form", ["reduced", "dae"])

@@ -23,6 +23,7 @@ from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import dataclass
 
 _RELATION: Key[Program] = Key("relation of functions of time")
+_SCHEDULE: Key[Schedule] = Key("schedule")
 _RATE_OF_RELATION: Key[list[Expression]] = Key("its derivative")
 
 
@@ -105,10 +106,14 @@ def find_schedule(assembly: Assembly, start: float, end: float) -> Schedule:
     relations = assembly.relations
     if not relations or not end > start:
         return Schedule(np.zeros(0), np.array([assembly.relation_values]).reshape(len(relations), 1))
-    pieces = _Pieces(np.array([start, end]), np.zeros((0, 1)))
-    for number in range(len(relations)):
-        pieces = pieces.with_relation(assembly, number)
-    return pieces.schedule()
+
+    def find() -> Schedule:
+        pieces = _Pieces(np.array([start, end]), np.zeros((0, 1)))
+        for number in range(len(relations)):
+            pieces = pieces.with_relation(assembly, number)
+        return pieces.schedule()
+
+    return assembly.kept.get(_SCHEDULE, find, start, end)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Shared
 from atwood.forms.loose import has_touched
 from atwood.integrators.protocol import Statistics
+from atwood.lazy_dataclasses import replace
 from atwood.mechanics.outputs.event_functions import CONTACT, UPDATE
 from atwood.simulation.dynamics.numerical_failure import is_numerical, named, numerical_failure
 from atwood.simulation.dynamics.orientation_coordinates import (
@@ -35,7 +36,15 @@ from atwood.simulation.problem.preparation import problem_of_run
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.run.choice import Choice, check_solver, choose
 from atwood.simulation.run.recorder import Recorder, SegmentRecord
-from atwood.simulation.run.run_record import Outcome, Run, Segment, as_asked, run_out_of_time, shortest_mode
+from atwood.simulation.run.run_record import (
+    Outcome,
+    Run,
+    Segment,
+    as_asked,
+    goes_on,
+    run_out_of_time,
+    shortest_mode,
+)
 from atwood.simulation.run.segment import run_segment
 from atwood.simulation.run.session import KeptSession
 from atwood.simulation.run.sides_of_run import SidesOfRun
@@ -215,7 +224,8 @@ class _Walk:
         assert self.plan is not None
         assert self.probe is not None
         self._kept.impacts = None if self.sampler.updates else self._impacts
-        self._kept.has_touched |= bool(self._impacts) or has_touched(self.plan.assembly)
+        contacts = bool(self.plan.assembly.own_equations.contacts)
+        self._kept.is_undisturbed = not contacts or not (self.segments or has_touched(self.plan.assembly))
         limit = min(schedule.next(t, options.t_end), self.sampler.next(t, options.t_end))
         ahead = self.samples.until(t, limit)
         if limit < options.t_end or (t < limit and self.sampler.due_at(limit)):  # the state just after it is shown
@@ -223,6 +233,12 @@ class _Walk:
         segment = Segment(self.plan, self.probe, options, self.choice, ahead, self.show, self.statistics, self._kept)
         recorder = Recorder(self.plan)
         outcome = run_segment(segment, recorder, t, q, u)
+        if (
+            contacts and self._kept.is_undisturbed and goes_on(outcome, options.t_end)
+        ):  # it was tried as without contacts
+            self._kept.is_undisturbed, recorder = False, Recorder(self.plan)
+            self.statistics = self.statistics + outcome.statistics
+            outcome = run_segment(replace(segment, spent=self.statistics), recorder, t, q, u)
         if recorder.is_empty and outcome.error is not None:  # not even the start could be projected
             raise outcome.error
         if recorder.is_empty:  # nor was there time to

@@ -209,6 +209,13 @@ class Outcome:
     sides: tuple[int, ...] = ()
 
 
+def goes_on(outcome: Outcome, end: float) -> bool:
+    """Return whether a run goes on behind a stretch."""
+    if outcome.event is not None:
+        return outcome.event.target != "stop"
+    return outcome.status == "finished" and outcome.t < end
+
+
 def shortest_mode(plan: SceneProblem, options: RunOptions, began: float) -> float:
     """Return a time within which only errors, and margins of events, change a mode and change it back, s."""
     margin = min(20.0 * options.relative_tolerance, 1e-5) * plan.scales.time

@@ -51,8 +51,8 @@ if TYPE_CHECKING:
 _MANY_IMPACTS = 3
 """From so many on it pays to compile what an impact does."""
 
-_OF_CONTACTS, _BEFORE_CONTACTS = 0.01, 0.1
-"""Of the tolerance, where gaps and slips decide how the motion goes on, and as long as nothing has touched."""
+_OF_CONTACTS = 0.01
+"""Of the tolerance, where gaps and slips decide how the motion goes on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,9 +96,8 @@ class SolverRequest:
         """Return the options of a solver that starts at a time, with no looser tolerance than it can hold."""
         options = self.options
         relative = min(options.relative_tolerance, loosest)
-        if self.plan.assembly.own_equations.contacts:  # errors add up over impacts, and decide when the next one is
-            share = _OF_CONTACTS if self.kept.has_touched else _BEFORE_CONTACTS
-            relative, loosest = share * relative, share * loosest
+        if not self.kept.is_undisturbed:  # errors add up over impacts, and decide when the next one is
+            relative, loosest = _OF_CONTACTS * relative, _OF_CONTACTS * loosest
         return SolverOptions(
             relative_tolerance=max(relative * self.plan.relative_share, LEAST),
             absolute_tolerances=self.plan.tolerances(
@@ -231,15 +230,15 @@ class KeptSession:
         What sessions were opened with, the sessions, and what gives their functions the parameters of a request.
     impacts
         Times and parts of the impacts so far, to which steps may add; None where each is looked at.
-    has_touched
-        Whether a gap has been closed, or something has slipped or stuck, so far.
+    is_undisturbed
+        Whether there are no gaps and slips, or nothing is to happen at them.
     """
 
     kept: list[tuple[tuple[object, ...], ExplicitSession, Callable[[SolverRequest], object]]] = field(
         default_factory=list
     )
     impacts: list[tuple[float, str]] | None = None
-    has_touched: bool = False
+    is_undisturbed: bool = True
 
     @property
     def has_impacts(self) -> bool:
@@ -269,7 +268,7 @@ def _opened_with(request: SolverRequest, method: Method, on_stiff: OnStiff | Non
     plan = request.plan
     scene = plan.assembly.shared, is_loose(plan.assembly), request.probe.code(for_ida=False)
     made = plan.program, request.options, plan.scales, plan.sizes, plan.finding
-    return method, *scene, *made, on_stiff is None, request.kept.has_impacts, request.kept.has_touched
+    return method, *scene, *made, on_stiff is None, request.kept.has_impacts, request.kept.is_undisturbed
 
 
 def _can_be_kept(problem: ExplicitProblem, method: Method) -> bool:
