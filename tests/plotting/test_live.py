@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,6 +13,7 @@ import pytest
 from atwood import Scene, assemble, floor, sign, simulate
 from atwood.errors import ParameterError
 from atwood.plotting.live import LiveProgram, engine_script, live_program
+from atwood.plotting.live.pulls import Pull
 from atwood_library import Ground, PointMass, Rope, Spring
 from atwood_library.scenes import SCENES
 
@@ -245,3 +247,31 @@ def test_laws_that_switch_or_act_briefly_are_not_stepped_over() -> None:
         assert said["code"] == "reached", name
         expected = state_at(scenes[name](), 5.0, rtol=1e-12)
         np.testing.assert_allclose(state, expected, rtol=0.0, atol=1e-9, err_msg=name)
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+def test_a_body_that_is_pulled_moves_as_on_a_damped_spring(form: str) -> None:
+    live = live_program(SCENES["double-pendulum"](), form, drag=True)
+    node = next(one["node"] for one in live.data["nodes"] if "bob2.point" in one["connectors"])
+    assert not any("page pull" in path for one in live.data["nodes"] for path in one["connectors"])
+    assert not any("page pull" in one["path"] for one in (*live.data["parameters"], *live.data["quantities"]))
+    script = f"""
+    const engine = start("x"), own = engine.model.modes[0].data;
+    const first = [engine.advance(0.2).code, Array.from(engine.state)];
+    const said = [engine.drag(99, [0, 0, 0]).code, engine.drag({node}, [0, 0]).code];
+    engine.reset();
+    said.push(engine.drag({node}, [0.5, 0.0, -1.0]).code, engine.advance(0.7).code);
+    const pulled = Array.from(engine.state);
+    said.push(engine.drag(null).code, engine.advance(1.0).code);
+    print([first, said, pulled, own.stiffness, own.time]);
+    """
+    (code, free), said, pulled, stiffness, time = played({"x": live}, script)
+    assert (code, said) == ("reached", ["refused", "refused", "ready", "reached", "ready", "reached"])
+    expected = state_at(SCENES["double-pendulum"](), 0.2, form=form, rtol=1e-12, solver="explicit")
+    np.testing.assert_allclose(free, expected, rtol=0.0, atol=1e-9)
+    scene = SCENES["double-pendulum"]()
+    values = {"stiffness": 10.0 * stiffness, "damping": math.sqrt(10.0) * stiffness * time, "target": (0.5, 0.0, -1.0)}
+    hand = scene.add("hand", Pull(**values))
+    scene.connect(scene.bob2.point, hand.point)
+    expected = state_at(scene, 0.7, form=form, rtol=1e-12, solver="explicit")
+    np.testing.assert_allclose(pulled, expected, rtol=0.0, atol=1e-8)

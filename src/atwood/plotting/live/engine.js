@@ -825,6 +825,24 @@ function createEngine(model, options = {}) {
     return status("refused", said.text);
   }
 
+  // Pull a node to a place by a damped spring, or let go of all (null).
+  function drag(node, target = null, strength = 1) {
+    const known = mode.data.pulls.find(([one]) => one === node);
+    if (node !== null && !known) return status("refused", `the node ${node} cannot be pulled`);
+    if (known && !(target?.length === 3 && [...target, strength].every(Number.isFinite) && strength > 0)) {
+      return status("refused", "a node is pulled to a place, x y z, by a strength above zero");
+    }
+    for (const one of modes) {
+      for (const [at, [k, c, ...place]] of one.data.pulls) {
+        const stiffness = at === node ? 10 * strength * one.data.stiffness : 0;
+        [one.values[k], one.values[c]] = [stiffness, stiffness && Math.sqrt(10 * strength) * one.data.stiffness * one.data.time];
+        if (at === node) place.forEach((i, axis) => { one.values[i] = target[axis]; });
+      }
+      one.fill();
+    }
+    return ["failed", "singular", "stopped"].includes(now.code) ? now : begin(time, state);
+  }
+
   function setState(t, from) {
     if (from.length !== mode.n + mode.m || ![t, ...from].every(Number.isFinite)) {
       return status("refused", `a state is ${mode.n + mode.m} numbers`);
@@ -835,7 +853,7 @@ function createEngine(model, options = {}) {
 
   restart();
   return {
-    model, parameters, starts, advance, value, set, setState,
+    model, parameters, starts, advance, value, set, setState, drag,
     get time() { return time; },
     get state() { return Float64Array.from(state); },
     get status() { return now; },

@@ -37,6 +37,7 @@ from atwood.mechanics.outputs.observables import Observable
 from atwood.mechanics.outputs.totals import energies
 from atwood.model.values.space import planar_axes
 from atwood.plotting.live.parameters import find_parameters
+from atwood.plotting.live.pulls import PULL, pulls_of
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.reactions import ReactionSolver
 from atwood.simulation.events.modes import MARGIN, EventProbe
@@ -165,7 +166,8 @@ class ModeText:
         """Add the program of quantities and energies."""
         symbols = [one.symbol for one in self.assembly.reactions]
         every = self.assembly.observables
-        found = find_observables(self.assembly, list(every) if paths is None else paths)
+        own = (path for path in every if not path.startswith(PULL))
+        found = find_observables(self.assembly, list(own) if paths is None else paths)
         reading = {one.path for one in found if symbols and depends_on([one.value], symbols)}
         plain = [one for one in found if one.path not in reading]
         of = {"quantities": [one.value for one in plain]}
@@ -217,6 +219,8 @@ class ModeText:
             "relative": plan.relative_share,
             "sizes": plan.sizes.tolist(),
             "time": plan.scales.time,
+            "stiffness": plan.scales.force / plan.scales.length,
+            "pulls": pulls_of(self.assembly),
             "turns": [list(one.coordinates) for one in homogeneous],
         }
 
@@ -281,7 +285,8 @@ def bodies_of(mode: ModeText) -> dict[str, Any]:
     mechanism: Mechanism = mode.assembly.mechanism
     at: dict[int, list[str]] = {}
     for (part, name), node in mechanism.graph.node_of.items():
-        at.setdefault(node, []).append(f"{part}.{name}")
+        if not part.startswith(PULL):
+            at.setdefault(node, []).append(f"{part}.{name}")
     body_of = mechanism.bodies.body_of
     return {
         "bodies": [{"index": one.index, "name": one.name, "root": one.root} for one in mechanism.bodies.bodies],

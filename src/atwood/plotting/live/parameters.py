@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
-
-import numpy as np
 
 from atwood.errors import ParameterError, suggestion_in_parts
 from atwood.expr import depends_on
@@ -13,12 +11,15 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.other_values import Slot, find_slots
 from atwood.lazy_dataclasses import replace
 from atwood.model.values.units import parse_unit
+from atwood.plotting.live.pulls import PULL
 
 _TRIALS = 1.0, 0.5, 0.1, -1.0
 
 
-def with_sliders(assembly: Assembly, sliders: Sequence[str]) -> Assembly:
-    """Return a scene in whose equations some parameters stay that are zero, with the values that it has.
+def with_sliders(assembly: Assembly, sliders: Sequence[str]) -> tuple[Assembly, set[str]]:
+    """Return a scene in whose equations some parameters stay that are zero, and the names of their symbols.
+
+    They have other values there; see `with_zeros`.
 
     Raises
     ------
@@ -42,11 +43,19 @@ def with_sliders(assembly: Assembly, sliders: Sequence[str]) -> Assembly:
         if value == 0.0:
             zeros[path] = slots[path]
     if not zeros:
-        return assembly
+        return assembly, set()
     made = assembly.with_values({path: _trial(assembly, slot) for path, slot in zeros.items()})
-    names = {name: slot.path for name, slot in find_slots(assembly.flat)}
-    known = [0.0 if names.get(symbol.name) in zeros else value for symbol, value in made.known_values.items()]
-    return replace(made, given_values=np.array(known))
+    places = {(slot.part, slot.name, slot.axis) for slot in zeros.values()}
+    return made, {name for name, slot in find_slots(made.flat) if (slot.part, slot.name, slot.axis) in places}
+
+
+def with_zeros(assembly: Assembly, names: Collection[str]) -> Assembly:
+    """Return a scene with the same equations, in which the parameters of some symbols are zero."""
+    if not names:
+        return assembly
+    table = assembly.mechanism.table
+    values = {symbol: 0.0 if symbol.name in names else value for symbol, value in table.values.items()}
+    return replace(assembly, mechanism=replace(assembly.mechanism, table=replace(table, values=values)))
 
 
 def _is_structural(assembly: Assembly, slot: Slot) -> bool:
@@ -90,7 +99,10 @@ def find_parameters(assembly: Assembly) -> dict[str, tuple[int, Slot]]:
     return {
         slots[symbol.name].path: (number, slots[symbol.name])
         for number, symbol in enumerate(assembly.mechanism.table.values)
-        if symbol.name in slots and symbol.name not in sampled and not (fixed and depends_on(fixed, [symbol]))
+        if symbol.name in slots
+        and symbol.name not in sampled
+        and not symbol.name.startswith(PULL)
+        and not (fixed and depends_on(fixed, [symbol]))
     }
 
 

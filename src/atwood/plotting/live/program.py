@@ -29,7 +29,8 @@ from atwood.model.compose.composite import Model
 from atwood.pipeline import assembly_of
 from atwood.plotting.live.mode import ModeText, NotLiveError, bodies_of, plan_of
 from atwood.plotting.live.modes import add_modes
-from atwood.plotting.live.parameters import live_parameters, with_sliders
+from atwood.plotting.live.parameters import live_parameters, with_sliders, with_zeros
+from atwood.plotting.live.pulls import with_pulls
 from atwood.plotting.live.start import add_start, add_tangent
 from atwood.plotting.live.updates import add_updates
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
@@ -96,6 +97,7 @@ def live_program(
     form: str | None = None,
     sliders: Sequence[str] = (),
     quantities: Sequence[str] | None = None,
+    drag: bool = False,
 ) -> LiveProgram:
     """Return a scene as JavaScript, or why it is not live.
 
@@ -108,12 +110,18 @@ def live_program(
     sliders
         Parameters that are to be changed: they stay in the equations where they are zero.
     quantities
-        Paths of the quantities that can be asked for; all that the state and its accelerations give if not given.
+        Paths of the quantities that can be asked for; all if not given.
+    drag
+        Whether bodies can be pulled by a damped spring, which its equations then have.
     """
     assembly = assembly_of(scene, form=form)
     try:
-        assembly = with_sliders(assembly, sliders)
+        assembly, zeros = with_sliders(assembly, sliders)
         _refuse(assembly)
+        if drag:
+            assembly, idle = with_pulls(assembly)
+            zeros |= idle
+        assembly = with_zeros(assembly, zeros)
         assembly, start = start_with_line_signs(assembly)
         plan, y = _prepared(assembly, start)
         mode = ModeText(plan, y, quantities)
@@ -121,6 +129,9 @@ def live_program(
         every = add_modes(mode, assembly, start, quantities)
         for one in every:
             add_updates(one)
+            for number, symbol in enumerate(one.assembly.parameters):
+                if symbol.name in zeros:
+                    one.data["values"][number] = 0.0
         modes = [(one.text(), one.data) for one in every]
         texts = ", ".join(f"{{data: {_json(own)},\nopen: {text}}}" for text, own in modes)
         text = f"{{data: {_json(data)},\nmodes: [{texts}]}}"
