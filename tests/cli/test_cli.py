@@ -140,7 +140,7 @@ def test_a_run_is_drawn(tmp_path: Path) -> None:
         (["free-body", "--view", "1", "--draw", "a.png"], "azimuth and elevation in degrees"),
         (["free-body", "--view", "0,95", "--draw", "a.png"], "elevation of 95 degrees"),
         (["simple-pendulum", "--view", "1,2", "--draw", "a.png"], "always seen from the front"),
-        (["free-body", "--draw", "a.mp4"], ".gif"),
+        (["free-body", "--draw", "a.avi"], ".gif"),
     ],
 )
 def test_what_cannot_be_drawn(arguments: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

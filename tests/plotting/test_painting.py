@@ -10,6 +10,7 @@ from atwood.plotting.scene3d.painter import Stage, lighter
 from atwood.plotting.scene3d.picture import hull
 from atwood.plotting.scene3d.reading import Lump
 from atwood.plotting.shapes.meshes import Mesh, box, cylinder, frame_along, revolved, ring
+from atwood.plotting.sheet import Sheet
 
 pytest.importorskip("matplotlib")
 
@@ -131,7 +132,7 @@ def painted(stage: Stage) -> tuple[list[np.ndarray], list[np.ndarray]]:
     from matplotlib.figure import Figure
 
     axes = Figure().subplots()
-    stage.paint(axes, 3.0)
+    stage.paint(Sheet(axes), 3.0)
     faces, lines = axes.collections if len(axes.collections) == 2 else (axes.collections[0], None)
     ends = [] if lines is None else [path.vertices for path in lines.get_paths()]
     return [path.vertices for path in faces.get_paths()], ends

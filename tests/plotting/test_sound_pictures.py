@@ -16,6 +16,7 @@ from atwood.plotting.plots.linear import plot_bode
 from atwood.plotting.scene3d.painter import Stage
 from atwood.plotting.scene3d.picture import make_space_picture
 from atwood.plotting.shapes.meshes import box
+from atwood.plotting.sheet import Sheet
 from atwood.result.result import Result
 from atwood_library import Box, Disc, Force, Ground, Link, Pivot, PointMass, RigidBody, Rope, Spring
 from atwood_library.scenes import SCENES
@@ -110,7 +111,7 @@ def test_what_lies_below_is_painted_first() -> None:
     stage.mesh(box((10.0, 10.0, 0.01)), "#eef1f4", below=True)
     stage.mesh(box((0.5, 0.5, 0.5)).placed((-4.0, 4.0, 0.25), np.eye(3)), "#2a6fbb")
     axes = new_figure(3.0, 3.0).subplots()
-    stage.paint(axes, 3.0)
+    stage.paint(Sheet(axes), 3.0)
     colours = axes.collections[0].get_facecolor()
     is_plane = colours[:, 2] - colours[:, 0] < 0.1
     assert np.all(np.diff(is_plane.astype(int)) <= 0)

@@ -133,12 +133,12 @@ def test_animation(results: dict[str, Result], tmp_path: Path) -> None:
 
 def test_a_notebook_plays_an_animation(results: dict[str, Result], tmp_path: Path) -> None:
     played = animate(results["simple-pendulum"], seconds=0.2, frames_per_second=10)
-    assert played.gif.startswith(b"GIF8")
+    assert played.content.startswith(b"GIF8")
     assert 'src="data:image/gif;base64,R0lGOD' in played._repr_html_()
     with pytest.raises(TypeError, match="was not saved"):
         os.fspath(played)
     saved = animate(results["simple-pendulum"], tmp_path / "run.gif", seconds=0.2, frames_per_second=10)
-    assert Path(saved).read_bytes() == saved.gif
+    assert Path(saved).read_bytes() == saved.content
     assert len(repr(saved)) < 300
 
 

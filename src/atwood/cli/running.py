@@ -127,8 +127,10 @@ def _check_files(request: Request) -> None:
     if request.draw is not None:
         from atwood.plotting.camera import as_camera
         from atwood.plotting.canvas import ANIMATED, SUFFIXES, check_picture
+        from atwood.plotting.moving import check_moving
 
-        check_picture(request.draw, (*SUFFIXES, *ANIMATED))
+        moves = request.draw.suffix.lower() in ANIMATED
+        check_moving(request.draw) if moves else check_picture(request.draw, (*SUFFIXES, *ANIMATED))
         as_camera(request.view)
 
 

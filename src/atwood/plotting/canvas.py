@@ -13,6 +13,7 @@ from atwood.files import check_directory, write_atomically
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.text import Text
 
 
 COLOURS = ("#2a6fbb", "#d1495b", "#2e9e6b", "#c98a1b", "#7b5ea7", "#3aa6b9", "#8a6d5a", "#d46ba3")
@@ -22,7 +23,7 @@ INK, GREY = "#22303c", "#8d99a6"
 
 SUFFIXES = (".png", ".svg", ".pdf")
 
-ANIMATED = (".gif",)
+ANIMATED = (".gif", ".webp", ".mp4")
 
 
 def check_picture(file: str | os.PathLike[str], suffixes: tuple[str, ...] = SUFFIXES) -> None:
@@ -83,12 +84,13 @@ def with_unit(label: str, unit: str) -> str:
     return label if unit in ("", "1", "any") else f"{label}, {unit}"
 
 
-def titled(figure: Figure, text: str, **style: Any) -> None:
-    """Put a title over a figure, which is made as wide as the title is."""
+def titled(figure: Figure, text: str, **style: Any) -> Text:
+    """Put a title over a figure, which is made as wide as the title is, and return it."""
     made = figure.suptitle(text, x=0.01, ha="left", fontsize=11, color=INK, **style)
     needed = made.get_window_extent().width / figure.dpi + 0.02 * figure.get_figwidth() + 0.1
     if needed > figure.get_figwidth():
         figure.set_figwidth(needed)
+    return made
 
 
 def save_figure(figure: Figure, file: str | os.PathLike[str]) -> Path:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,11 +14,13 @@ from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.files import write_atomically
 from atwood.plotting.camera import View, as_camera, check_view
-from atwood.plotting.canvas import ANIMATED, COLOURS, INK, check_picture, finished, need_matplotlib, new_figure, titled
+from atwood.plotting.canvas import COLOURS, INK, finished, need_matplotlib, new_figure, titled
+from atwood.plotting.moving import check_moving, film
 from atwood.plotting.planar.geometry import Picture, find_connectors, make_picture
 from atwood.plotting.planar.strokes import Pen, draw_trace
 from atwood.plotting.scene3d.drawing import draw_space, frame_space, space_panels
 from atwood.plotting.scene3d.picture import SpacePicture, make_space_picture
+from atwood.plotting.sheet import Sheet
 from atwood.result.result import Result
 from atwood.theory.linear import NormalModes
 
@@ -109,7 +110,7 @@ def _draw_space(result: Result, picture: SpacePicture, moments: Sequence[int]) -
     figure, panels = space_panels(picture, [f"{name}, {titles[0]}"] if alone else titles, "" if alone else name)
     for axes, moment in zip(panels, moments, strict=True):
         frame_space(axes, picture, moment)
-        draw_space(axes, picture, moment)
+        draw_space(Sheet(axes), picture, moment)
     return figure
 
 
@@ -117,24 +118,25 @@ def _draw_together(result: Result, picture: Picture, moments: Sequence[int], tra
     """Draw all times in one picture, with traces."""
     shown = slice(0, moments[-1] + 1)
     figure, axes, pen = _page(picture, shown)
-    _draw_traces(axes, picture, pen, shown, traced)
+    sheet = Sheet(axes)
+    _draw_traces(sheet, picture, pen, shown, traced)
     for rank, moment in enumerate(moments):
         share = 1.0 if len(moments) == 1 else rank / (len(moments) - 1)
-        pen.draw(axes, moment, alpha=0.16 + 0.84 * share**1.5, depth=3 + rank)
+        pen.draw(sheet, moment, alpha=0.16 + 0.84 * share**1.5, depth=3 + rank)
     times = ", ".join(f"{result.time[i]:.3g}" for i in moments)
     titled(figure, f"{_name(result)}, t = {times} s")
     return figure
 
 
-def _draw_traces(axes: Axes, picture: Picture, pen: Pen, shown: slice, traced: Sequence[int]) -> None:
+def _draw_traces(sheet: Sheet, picture: Picture, pen: Pen, shown: slice, traced: Sequence[int]) -> None:
     """Draw the paths of all masses and of chosen nodes, older parts fainter."""
     free = [s for s in pen.heavy if s.nodes[0] not in pen.sliding]
     moving = [s for s in free if np.max(np.ptp(picture.points[s.nodes[0]], axis=0)) > 1e-3 * picture.extent]
     chosen = moving if len(moving) <= _TRACES else moving[-1:]
     for shape in chosen:
-        draw_trace(axes, picture.points[shape.nodes[0]][shown], pen.colour(shape))
+        draw_trace(sheet, picture.points[shape.nodes[0]][shown], pen.colour(shape))
     for rank, node in enumerate(traced):
-        draw_trace(axes, picture.points[node][shown], COLOURS[(4 + rank) % len(COLOURS)])
+        draw_trace(sheet, picture.points[node][shown], COLOURS[(4 + rank) % len(COLOURS)])
 
 
 _TRACES = 4
@@ -157,7 +159,7 @@ def _draw_apart(result: Result, picture: Picture, moments: Sequence[int], traced
     pen = Pen(picture)
     for axes, moment in zip(panels, moments, strict=True):
         _frame(axes, lows, highs)
-        pen.draw(axes, moment, alpha=1.0, depth=3)
+        pen.draw(Sheet(axes), moment, alpha=1.0, depth=3)
         axes.set_title(f"t = {result.time[moment]:.3g} s", fontsize=10, color=INK)
     titled(figure, _name(result))
     return figure
@@ -191,7 +193,7 @@ def animate(
     result
         The run.
     file
-        Where to save it (``.gif``).
+        Where to save it (``.gif``, ``.webp`` or, with ``pip install 'atwood[video]'``, ``.mp4``).
     seconds
         How long it plays; as long as the run took in its own time when not given, but two to twenty seconds.
     frames_per_second
@@ -209,11 +211,8 @@ def animate(
     UsageError
         If matplotlib is missing, there is no such view or connector, or the file cannot be saved.
     """
+    kind = "gif" if file is None else check_moving(file)
     need_matplotlib()
-    if file is not None:
-        check_picture(file, ANIMATED)
-    from matplotlib.animation import FuncAnimation, PillowWriter
-
     from atwood.plotting.figure import Animation
 
     span = float(result.time[-1] - result.time[0])
@@ -223,41 +222,41 @@ def animate(
     count = max(2, min(round(lasting * frames_per_second), len(result.time)))
     wanted = np.linspace(result.time[0], result.time[-1], count)
     moments = [int(np.argmin(np.abs(result.time - time))) for time in wanted]
-    traced = find_connectors(result, trace)
+    figure, draw = _stage(result, view, find_connectors(result, trace))
+    titles = [f"{_name(result)}, t = {time:.{digits}f} s" for time in wanted]
+    content = film(figure, draw, moments, titles, min(frames_per_second, count / lasting), kind)
+    if file is None:
+        return Animation(content, kind)
+    target = Path(file)
+    write_atomically(target, lambda part: part.write_bytes(content))
+    return Animation(content, kind, target)
+
+
+def _stage(result: Result, view: View | None, traced: Mapping[str, int]) -> tuple[Figure, Callable[[int], None]]:
+    """Return a figure, and what draws an output time on it in the place of the one before."""
     if check_view(result.assembly.mechanism.space.name, view):
         seen = make_space_picture(result, as_camera(view), traced)
-        figure, (axes,) = space_panels(seen, [" "])
+        figure, (axes,) = space_panels(seen, [""])
         axes.set_position((0.02, 0.02, 0.96, 0.9))
-    else:
-        picture = make_picture(result, traced.values())
-        figure, axes, pen = _page(picture, None)
-        lows, highs = _bounds(picture)
+        sheet = Sheet(axes)
 
-    def show(number: int) -> list[object]:
-        axes.clear()
-        if result.assembly.mechanism.space.is_spatial:
-            frame_space(axes, seen, moments[number])
-            draw_space(axes, seen, moments[number])
-        else:
-            _frame(axes, lows, highs)
-            if not picture.direction:
-                _draw_traces(axes, picture, pen, slice(0, moments[number] + 1), list(traced.values()))
-            pen.draw(axes, moments[number], alpha=1.0, depth=3)
-        titled(figure, f"{_name(result)}, t = {wanted[number]:.{digits}f} s")
-        return []
+        def draw_seen(moment: int) -> None:
+            sheet.again()
+            frame_space(axes, seen, moment)
+            draw_space(sheet, seen, moment)
 
-    figure.set_layout_engine("none")
-    motion = FuncAnimation(figure, show, frames=count, blit=False)  # type: ignore[arg-type]
-    writer = PillowWriter(fps=min(frames_per_second, count / lasting))  # type: ignore[arg-type]  # any number will do
-    with TemporaryDirectory() as folder:
-        made = Path(folder, "motion.gif")
-        motion.save(str(made), writer=writer, dpi=80)
-        gif = made.read_bytes()
-    if file is None:
-        return Animation(gif)
-    target = Path(file)
-    write_atomically(target, lambda part: part.write_bytes(gif))
-    return Animation(gif, target)
+        return figure, draw_seen
+    picture = make_picture(result, traced.values())
+    figure, axes, pen = _page(picture, None)
+    sheet = Sheet(axes)
+
+    def draw(moment: int) -> None:
+        sheet.again()
+        if not picture.direction:
+            _draw_traces(sheet, picture, pen, slice(0, moment + 1), list(traced.values()))
+        pen.draw(sheet, moment, alpha=1.0, depth=3)
+
+    return figure, draw
 
 
 def _name(result: Result) -> str:

@@ -26,13 +26,16 @@ class Animation:
 
     Attributes
     ----------
-    gif
-        The picture, as the content of a ``.gif`` file.
+    content
+        What a file of it holds.
+    kind
+        ``"gif"``, ``"webp"`` or ``"mp4"``.
     file
         Where it was saved; None if it was not.
     """
 
-    gif: bytes
+    content: bytes
+    kind: str = "gif"
     file: Path | None = None
 
     def __fspath__(self) -> str:
@@ -41,7 +44,10 @@ class Animation:
         return str(self.file)
 
     def __repr__(self) -> str:
-        return f"<Animation of {len(self.gif) / 1000.0:.0f} kB{f', {self.file}' if self.file else ''}>"
+        return f"<Animation of {len(self.content) / 1000.0:.0f} kB{f', {self.file}' if self.file else ''}>"
 
     def _repr_html_(self) -> str:
-        return f'<img alt="animation" src="data:image/gif;base64,{base64.b64encode(self.gif).decode()}">'
+        data = base64.b64encode(self.content).decode()
+        if self.kind == "mp4":
+            return f'<video autoplay loop muted controls src="data:video/mp4;base64,{data}"></video>'
+        return f'<img alt="animation" src="data:image/{self.kind};base64,{data}">'

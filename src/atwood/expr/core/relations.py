@@ -242,8 +242,9 @@ def values_just_after(relations: Sequence[Relation], known: Mapping[Expression, 
 
 def _side_after(difference: Expression, values: Mapping[Expression, float], time: Expression) -> float:
     """Return a number with the sign that a function of time has just after a time; 0 where it stays zero."""
-    points = {symbol: (np.array([value]), np.array([value])) for symbol, value in values.items()}
-    if any(node.operation == "external" for node in live([difference])):  # it has no bounds, and maybe no derivatives
+    nodes = live([difference])
+    points = {one: (np.array([values[one]]), np.array([values[one]])) for one in nodes if one in values}
+    if any(node.operation == "external" for node in nodes):  # it has no bounds, and maybe no derivatives
         return evaluate([difference], values)[0]
     derivative = difference
     for _ in range(_ORDERS):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +12,7 @@ from atwood.numerics.rank import decompose
 from atwood.plotting.canvas import COLOURS, GREY, INK
 from atwood.plotting.planar.geometry import Picture, Shape, hanging
 from atwood.plotting.shapes.meshes import Mesh
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from atwood.plotting.sheet import Sheet
 
 
 class Pen:
@@ -42,13 +40,13 @@ class Pen:
             return COLOURS[0]
         return COLOURS[self.heavy.index(shape)] if shape in self.heavy else INK
 
-    def draw(self, axes: Axes, moment: int, alpha: float, depth: int) -> None:
+    def draw(self, sheet: Sheet, moment: int, alpha: float, depth: int) -> None:
         """Draw everything at one time."""
         for shape in self.picture.shapes:
             points = np.array([self.picture.points[node][moment] for node in shape.nodes])
             self.share = 1.0 if shape.kind == "ground" else alpha
             look = {"zorder": depth}
-            getattr(self, f"_{shape.kind}")(axes, shape, points, look, moment)
+            getattr(self, f"_{shape.kind}")(sheet, shape, points, look, moment)
 
     def _tone(self, colour: str) -> tuple[float, float, float]:
         """Return a colour as strongly as is being drawn."""
@@ -59,9 +57,9 @@ class Pen:
 
     # -- what is fixed ---------------------------------------------------------------------------------------------
 
-    def _ground(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+    def _ground(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
         for line, width in self.ground_lines(shape, points[0]):
-            axes.plot(line[:, 0], line[:, 1], color=INK, linewidth=width, **{**look, "zorder": 2})
+            sheet.line(line, color=INK, linewidth=width, **{**look, "zorder": 2})
 
     def ground_lines(self, shape: Shape, place: FloatArray) -> list[tuple[FloatArray, float]]:
         """Return the lines that stand for what is fixed at a place, m, and their widths, points."""
@@ -108,28 +106,26 @@ class Pen:
         ends: FloatArray = middle + reach[:, None] * axes[0]
         return ends
 
-    def _rail(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+    def _rail(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
         ends = self.rails[shape.part]
         if ends is None and not shape.size:  # a line that moves goes from the base to what slides on it
-            axes.plot(points[:, 0], points[:, 1], color=self._tone(GREY), linewidth=1.2, **look)
+            sheet.line(points, color=self._tone(GREY), linewidth=1.2, **look)
         elif ends is not None:
-            axes.plot(ends[:, 0], ends[:, 1], color=GREY, linewidth=1.2, zorder=1.5, solid_capstyle="round")
+            sheet.line(ends, color=GREY, linewidth=1.2, zorder=1.5, solid_capstyle="round")
 
     # -- what moves ------------------------------------------------------------------------------------------------
 
-    def _rod(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
-        axes.plot(points[:, 0], points[:, 1], color=self._tone(INK), linewidth=2.0, solid_capstyle="round", **look)
+    def _rod(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+        sheet.line(points, color=self._tone(INK), linewidth=2.0, solid_capstyle="round", **look)
 
-    def _link(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+    def _link(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
         front = look["zorder"]
         for colour, width in ((INK, 8.0), ("#c8d3de", 5.6)):
             tone = self._tone(colour)
-            axes.plot(points[:, 0], points[:, 1], color=tone, linewidth=width, solid_capstyle="round", zorder=front)
+            sheet.line(points, color=tone, linewidth=width, solid_capstyle="round", zorder=front)
 
-    def _solid(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+    def _solid(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
         """Draw what a surface shows from the front, and the lines where it ends."""
-        from matplotlib.collections import LineCollection, PolyCollection
-
         assert shape.surface is not None
         mesh, angle = shape.surface, float(self.picture.angles[shape.nodes[0]][moment])
         c, s = np.cos(angle), np.sin(angle)
@@ -137,41 +133,32 @@ class Pen:
         front, borders = seen_from_front(mesh)
         for tone, chosen in (("#c8d3de", front & ~mesh.marked), ("#b4c2cf", front & mesh.marked)):
             colour = self._tone(tone)
-            flat = PolyCollection(list(page[mesh.faces[chosen]]), facecolors=[colour], edgecolors=[colour], **look)
-            flat.set_linewidth(0.4)
-            axes.add_collection(flat)
-        lines = list(page[borders])
-        axes.add_collection(LineCollection(lines, colors=[self._tone(INK)], linewidths=1.3, capstyle="round", **look))
+            sheet.polygons(page[mesh.faces[chosen]], [colour], [colour], linewidth=0.4, **look)
+        sheet.lines(page[borders], [self._tone(INK)], 1.3, capstyle="round", **look)
 
-    def _curve(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+    def _curve(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
         assert shape.line is not None
         angle = float(self.picture.angles[shape.nodes[0]][moment])
         c, s = np.cos(angle), np.sin(angle)
         line = points[0] + shape.line @ np.array([[c, s], [-s, c]])
-        axes.plot(line[:, 0], line[:, 1], color=self._tone(GREY), linewidth=1.6, solid_joinstyle="round", **look)
+        sheet.line(line, color=self._tone(GREY), linewidth=1.6, solid_joinstyle="round", **look)
 
-    def _spiral(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+    def _spiral(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
         turn = np.linspace(0.0, 5.0 * np.pi, 80)
         out = self.unit * (0.6 + 2.2 * turn / turn[-1])
         line = points[0] + np.column_stack([out * np.cos(turn), out * np.sin(turn)])
-        axes.plot(line[:, 0], line[:, 1], color=self._tone(INK), linewidth=1.1, **look)
+        sheet.line(line, color=self._tone(INK), linewidth=1.1, **look)
 
-    def _pivot(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
-        x, z = points[0]
-        edge = self._tone(INK)
-        style: dict[str, Any] = {
-            "markerfacecolor": "white",
-            "markeredgecolor": edge,
-            "markeredgewidth": 1.4,
-            "markersize": 5.5,
-        }
-        axes.plot([x], [z], marker="o", linestyle="none", zorder=look["zorder"] + 0.3, **style)
+    def _pivot(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+        style: dict[str, Any] = {"markerfacecolor": "white", "markeredgecolor": self._tone(INK), "markeredgewidth": 1.4}
+        style |= {"marker": "o", "markersize": 5.5, "linestyle": "none", "zorder": look["zorder"] + 0.3}
+        sheet.line(points[:1], **style)
 
-    def _spring(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+    def _spring(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
         line = _zigzag(points[0], points[1], 1.6 * self.unit)
-        axes.plot(line[:, 0], line[:, 1], color=self._tone(INK), linewidth=1.3, solid_joinstyle="round", **look)
+        sheet.line(line, color=self._tone(INK), linewidth=1.3, solid_joinstyle="round", **look)
 
-    def _damper(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+    def _damper(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
         a, b = points
         along, across, length = _directions(a, b)
         half, middle = 1.5 * self.unit, 0.5 * (a + b)
@@ -181,43 +168,36 @@ class Pen:
         piston = [middle + across * half * 0.8, middle - across * half * 0.8]
         for line in ([a, middle - along * size], cup, piston, [middle, b]):
             path = np.array(line)
-            axes.plot(path[:, 0], path[:, 1], color=self._tone(INK), linewidth=1.3, **look)
+            sheet.line(path, color=self._tone(INK), linewidth=1.3, **look)
 
-    def _rope(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+    def _rope(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
         spare = self.picture.spare(shape, moment)
         if spare < -1e-6 * self.picture.extent:
             return  # it was let go, and its ends are farther apart than it is long
         if len(points) == 2 and spare > 0.0 and not self.picture.direction:
             points = hanging(points, spare)
-            axes.plot(points[:, 0], points[:, 1], color=self._tone("#a8642a"), linewidth=1.6, **look)
+            sheet.line(points, color=self._tone("#a8642a"), linewidth=1.6, **look)
             return
         line = _rope_line(points, [self.picture.radii.get(node, 0.0) for node in shape.nodes])
-        axes.plot(line[:, 0], line[:, 1], color=self._tone("#a8642a"), linewidth=1.6, solid_joinstyle="round", **look)
+        sheet.line(line, color=self._tone("#a8642a"), linewidth=1.6, solid_joinstyle="round", **look)
 
-    def _pulley(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
-        from matplotlib.patches import Circle
-
-        x, z = points[0]
+    def _pulley(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
         radius = self.picture.radii.get(shape.nodes[0], 2.2 * self.unit)
-        axes.add_patch(
-            Circle(
-                (x, z), 0.97 * radius, facecolor=self._tone("#e7ecf1"), edgecolor=self._tone(INK), linewidth=1.3, **look
-            )
-        )
-        axes.add_patch(
-            Circle((x, z), min(0.16 * radius, self.unit), facecolor=self._tone(INK), edgecolor="none", **look)
-        )
+        style = {"facecolor": self._tone("#e7ecf1"), "edgecolor": self._tone(INK), "linewidth": 1.3}
+        sheet.circle(points[0], 0.97 * radius, **style, **look)
+        style = {"facecolor": self._tone(INK), "edgecolor": "none"}
+        sheet.circle(points[0], min(0.16 * radius, self.unit), **style, **look)
 
-    def _mass(self, axes: Axes, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
-        from matplotlib.patches import Circle, Polygon
-
+    def _mass(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
         if shape.size <= 0.0:
             return
         style: dict[str, Any] = {"facecolor": self._tone(self.colour(shape)), "edgecolor": "white", "linewidth": 0.9}
         style.update({**look, "zorder": look["zorder"] + 0.5})
         half, corners = self.mass_outline(shape)
-        made = Circle(tuple(points[0]), half, **style) if corners is None else Polygon(points[0] + corners, **style)
-        axes.add_patch(made)
+        if corners is None:
+            sheet.circle(points[0], half, **style)
+        else:
+            sheet.polygon(points[0] + corners, **style)
 
     def mass_outline(self, shape: Shape) -> tuple[float, FloatArray | None]:
         """Return half the size of a mass as it is drawn, m, and its corners from its place where it is no disc, m."""
@@ -236,13 +216,11 @@ class Pen:
 def seen_from_front(mesh: Mesh) -> tuple[NDArray[np.bool_], IndexArray]:
     """Return which faces of a surface look towards the front, and the ends of the edges where these end."""
     front = mesh.normals[:, 1] < -1e-9  # the eye looks along y
-    ends, faces, _ = mesh.edges
-    return front, ends[front[faces[:, 0]] != front[faces[:, 1]]]
+    return front, mesh.border(front)
 
 
-def draw_trace(axes: Axes, points: FloatArray, colour: str) -> None:
+def draw_trace(sheet: Sheet, points: FloatArray, colour: str) -> None:
     """Draw the path of a point, older parts fainter."""
-    from matplotlib.collections import LineCollection
     from matplotlib.colors import to_rgb
 
     if len(points) < 2:
@@ -250,7 +228,7 @@ def draw_trace(axes: Axes, points: FloatArray, colour: str) -> None:
     pieces = np.stack([points[:-1], points[1:]], axis=1)
     shares = np.linspace(0.15, 0.8, len(pieces))[:, None]
     colours = shares * np.array(to_rgb(colour)) + 1.0 - shares
-    axes.add_collection(LineCollection(list(pieces), colors=colours, linewidths=1.3, zorder=1.8, capstyle="round"))
+    sheet.lines(pieces, colours, 1.3, zorder=1.8, capstyle="round")
 
 
 def _directions(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, float]:

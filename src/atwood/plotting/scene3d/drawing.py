@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,8 +13,10 @@ from atwood.plotting.canvas import GREY, INK, new_figure, titled
 from atwood.plotting.scene3d.model import AXIS_COLOURS, SpaceModel
 from atwood.plotting.scene3d.painter import Stage, to_rgb
 from atwood.plotting.scene3d.picture import SpacePicture, Trail
+from atwood.plotting.scene3d.pieces import Piece
 from atwood.plotting.scene3d.reading import Tie
-from atwood.plotting.shapes.meshes import cylinder, frame_along
+from atwood.plotting.shapes.meshes import Mesh, cylinder, frame_along
+from atwood.plotting.sheet import Sheet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,19 +26,19 @@ if TYPE_CHECKING:
 _ROPE, _ROD = "#a8642a", "#5d6b78"
 
 
-def draw_space(axes: Axes, picture: SpacePicture, moment: int) -> None:
+def draw_space(sheet: Sheet, picture: SpacePicture, moment: int) -> None:
     """Draw a scene at one time, with the paths until then."""
     model = picture.model
-    draw_floor(axes, picture, moment)
+    poses = [model.reading.poses[piece.body].at(moment) for piece in model.pieces]
+    meshes = [piece.mesh and piece.mesh.placed(*pose) for piece, pose in zip(model.pieces, poses, strict=True)]
+    _draw_floor(sheet, picture, (_from_above(*one) for one in zip(model.pieces, poses, meshes, strict=True)))
     for trail in picture.trails:
-        draw_sphere(axes, picture.camera, trail)
+        draw_sphere(sheet, picture.camera, trail)
     stage = Stage(picture.camera, model.unit)
-    for piece in model.pieces:
-        pose = model.reading.poses[piece.body]
-        origin, turn = pose.origin[moment], pose.axes[moment]
-        if piece.mesh is not None:
+    for piece, (origin, turn), mesh in zip(model.pieces, poses, meshes, strict=True):
+        if mesh is not None:
             below = piece.up is not None and float(picture.camera.depth(turn @ piece.up)) >= 0.0
-            stage.mesh(piece.mesh.placed(origin, turn), piece.colour, below=below)
+            stage.mesh(mesh, piece.colour, below=below)
             continue
         assert piece.points is not None
         points = origin + piece.points @ turn.T
@@ -47,8 +49,8 @@ def draw_space(axes: Axes, picture: SpacePicture, moment: int) -> None:
     _draw_ties(stage, model, moment)
     for trail in picture.trails:
         _draw_trail(stage, trail, moment)
-    stage.paint(axes, 3.0)
-    draw_corner_axes(axes, picture.camera, picture.bounds_at(moment))
+    stage.paint(sheet, 3.0)
+    draw_corner_axes(sheet, picture.camera, picture.bounds_at(moment))
 
 
 def _draw_trail(stage: Stage, trail: Trail, moment: int) -> None:
@@ -154,13 +156,11 @@ def space_panels(picture: SpacePicture, titles: Sequence[str], name: str = "") -
     return figure, panels[:count]
 
 
-_SHADOW, _GRID = "#e7ebef", "#d9dfe5"
+_SHADOW, _GRID, _AROUND = "#e7ebef", "#d9dfe5", 96
 
 
-def draw_floor(axes: Axes, picture: SpacePicture, moment: int) -> None:
+def _draw_floor(sheet: Sheet, picture: SpacePicture, above: Iterable[FloatArray]) -> None:
     """Draw a grid on the floor, and on it the shadows of what is above, straight down."""
-    from matplotlib.collections import LineCollection, PolyCollection
-
     if picture.floor is None:
         return
     low, high = picture.floor
@@ -170,41 +170,38 @@ def draw_floor(axes: Axes, picture: SpacePicture, moment: int) -> None:
         lines.append([[x, low[1], low[2]], [x, high[1], low[2]]])
     for y in np.arange(low[1], high[1] + 0.5 * step, step):
         lines.append([[low[0], y, low[2]], [high[0], y, low[2]]])
-    shadows = []
-    for shape in _from_above(picture, moment):
-        shape[..., 2] = low[2]
-        shadows += list(camera.project(shape))
-    axes.add_collection(PolyCollection(shadows, facecolors=_SHADOW, edgecolors=_SHADOW, linewidths=0.4, zorder=0.5))
-    page = camera.project(np.array(lines))
-    axes.add_collection(LineCollection(list(page), colors=_GRID, linewidths=0.7, zorder=0.6))
+    shadows = [one for shapes in above for one in camera.project([0.0, 0.0, low[2]] + shapes * [1.0, 1.0, 0.0])]
+    sheet.polygons(shadows, [_SHADOW], [_SHADOW], linewidths=0.4, zorder=0.5)
+    sheet.lines(camera.project(np.array(lines)), [_GRID], 0.7, zorder=0.6)
 
 
-def _from_above(picture: SpacePicture, moment: int) -> list[FloatArray]:
-    """Return the faces of everything that the sky sees, in world axes, m, each of shape (faces, corners, 3)."""
-    found = []
-    turn = np.linspace(0.0, 2.0 * np.pi, 25)
-    circle = np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=-1)
-    for piece in picture.model.pieces:
-        pose = picture.model.reading.poses[piece.body]
-        origin, axes = pose.origin[moment], pose.axes[moment]
-        if piece.mesh is not None:
-            placed = piece.mesh.placed(origin, axes)
-            found.append(placed.vertices[placed.faces[placed.normals[:, 2] > 1e-6]])
-        elif piece.points is not None and len(piece.points) == 1:
-            found.append((origin + piece.points[0] @ axes.T + piece.size * circle)[None])
-    return found
+def _from_above(piece: Piece, pose: tuple[FloatArray, FloatArray], mesh: Mesh | None) -> FloatArray:
+    """Return the faces of a piece that the sky sees, or its outline, in world axes, m, shape (faces, corners, 3)."""
+    origin, axes = pose
+    if mesh is not None:
+        up = mesh.normals[:, 2] > 1e-6
+        corners = mesh.vertices[np.unique(mesh.border(up))]
+        if mesh.planes is None or len(corners) < 3:
+            return mesh.vertices[mesh.faces[up]]
+        # Once around a convex one; the last corner again and again, so that all have as many.
+        x, y = (corners[:, :2] - corners[:, :2].mean(axis=0)).T
+        last = len(corners) - 1
+        return corners[None, np.argsort(np.arctan2(y, x))[np.minimum(np.arange(max(_AROUND, last + 1)), last)]]
+    if piece.points is not None and len(piece.points) == 1:
+        turn = np.linspace(0.0, 2.0 * np.pi, 25)
+        circle = np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=-1)
+        around: FloatArray = (origin + piece.points[0] @ axes.T + piece.size * circle)[None]
+        return around
+    return np.empty((0, 4, 3))
 
 
-def draw_sphere(axes: Axes, camera: Camera, trail: Trail) -> None:
+def draw_sphere(sheet: Sheet, camera: Camera, trail: Trail) -> None:
     """Draw the sphere on which the end of an axis moves, or half of it, with a net of meridians and parallels."""
-    from matplotlib.collections import LineCollection
-    from matplotlib.patches import Polygon
-
     if trail.center is None:
         return
     low, high = trail.heights
-    outline = Polygon(trail.outline(camera), facecolor="#f7f9fb", edgecolor="#ccd4dc", linewidth=0.9, zorder=1.0)
-    axes.add_patch(outline)
+    style = {"facecolor": "#f7f9fb", "edgecolor": "#ccd4dc", "linewidth": 0.9, "zorder": 1.0}
+    sheet.polygon(trail.outline(camera), **style)
     middle = camera.project(trail.center)
     turn = np.linspace(0.0, 2.0 * np.pi, 145)
     lines = []
@@ -220,10 +217,10 @@ def draw_sphere(axes: Axes, camera: Camera, trail: Trail) -> None:
         kept = (heights >= low - 1e-9) & (heights <= high + 1e-9)
         pieces = np.stack([page[:-1], page[1:]], axis=1)[kept]
         tones = np.where(0.5 * (near[:-1] + near[1:])[kept] > 0.0, "#d8dfe6", "#ebeff3")
-        axes.add_collection(LineCollection(list(pieces), colors=list(tones), linewidths=0.7, zorder=1.1))
+        sheet.lines(pieces, tones, 0.7, zorder=1.1)
 
 
-def draw_corner_axes(axes: Axes, camera: Camera, bounds: tuple[FloatArray, FloatArray]) -> None:
+def draw_corner_axes(sheet: Sheet, camera: Camera, bounds: tuple[FloatArray, FloatArray]) -> None:
     """Draw the directions of the world's axes in the lower left corner."""
     lows, highs = bounds
     size = 0.07 * float(np.max(highs - lows))
@@ -232,7 +229,7 @@ def draw_corner_axes(axes: Axes, camera: Camera, bounds: tuple[FloatArray, Float
     for number in np.argsort(camera.axes[2]):
         arm = arms[number]
         end = start + size * arm
-        axes.plot([start[0], end[0]], [start[1], end[1]], color=AXIS_COLOURS[number], linewidth=1.6, zorder=4)
+        sheet.line(np.array([start, end]), color=AXIS_COLOURS[number], linewidth=1.6, zorder=4)
         if np.linalg.norm(arm) > 0.15:
             label = start + (size + 0.22 * size / np.linalg.norm(arm)) * arm
-            axes.text(label[0], label[1], "xyz"[number], color=GREY, fontsize=8, ha="center", va="center", zorder=4)
+            sheet.text(label, "xyz"[number], color=GREY, fontsize=8, ha="center", va="center", zorder=4)

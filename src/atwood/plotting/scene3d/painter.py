@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,10 +12,7 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.plotting.camera import Camera
 from atwood.plotting.canvas import INK
 from atwood.plotting.shapes.meshes import Mesh
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
+from atwood.plotting.sheet import Sheet
 
 _LIGHT = np.array([-0.45, 0.75, 0.5]) / np.linalg.norm([-0.45, 0.75, 0.5])
 """Where the light comes from, on the page and towards the eye: from the left, from above."""
@@ -26,6 +22,9 @@ _CLEAR = 0.35
 
 _FAR = 1e4
 """In units: farther away than anything is from anything."""
+
+_SEEN, _BALL, _GONE = -1, -2, -3
+"""What hides a point, instead of the number of a surface: nothing, a ball; and of a face that is hidden as a whole."""
 
 _CIRCLE = np.stack([np.cos(np.linspace(0.0, 2.0 * np.pi, 37)), np.sin(np.linspace(0.0, 2.0 * np.pi, 37))], axis=-1)
 
@@ -46,12 +45,17 @@ def lighter(colour: ArrayLike | str, share: float) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class _Faces:
-    """Flat faces on the page: corners, depths of the corners, normals as the eye sees them, colours."""
+    """Flat faces on the page: corners, depths of the corners, normals as the eye sees them, colours.
+
+    Of a convex surface also its planes, as rows (a, b, c) with the depth a x + b y + c for those in front and those
+    behind, and with a x + b y + c >= 0 for those seen from the side.
+    """
 
     corners: FloatArray
     depths: FloatArray
     normals: FloatArray
     tones: FloatArray
+    planes: tuple[FloatArray, FloatArray, FloatArray] | None = None
 
     @cached_property
     def bounds(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -71,12 +75,13 @@ class _Ball:
 
 @dataclass(frozen=True, eq=False)
 class _Lines:
-    """Short straight pieces on the page: ends, depths of the middles, colours, width."""
+    """Straight lines: starts and ends, m, colours, width, and how much farther away than they are they count."""
 
+    starts: FloatArray
     ends: FloatArray
-    depths: FloatArray
     tones: FloatArray
     width: float
+    away: float = 0.0
 
 
 class Stage:
@@ -108,30 +113,36 @@ class Stage:
         brightness = np.where(mesh.marked, 0.8 * brightness, brightness)[visible]
         tones = np.minimum(brightness[:, None] * to_rgb(colour), 1.0)
         shown = mesh.faces[visible]
-        self._faces.append(_Faces(page[shown], depth[shown], seen[visible], tones))
+        planes = None if mesh.planes is None else _sorted_planes(*mesh.planes, self.camera, away)
+        self._faces.append(_Faces(page[shown], depth[shown], seen[visible], tones, planes))
         ends, sides, sharp = mesh.edges
         first, second = visible[sides[:, 0]], visible[sides[:, 1]]
         drawn = ends[np.where(sharp, first | second, first ^ second)]
-        self._cut(mesh.vertices[drawn[:, 0]], mesh.vertices[drawn[:, 1]], to_rgb(INK)[None], line, away)
+        starts, stops = mesh.vertices[drawn.T]
+        self._lines.append(_Lines(starts, stops, np.tile(to_rgb(INK), (len(drawn), 1)), line, away))
 
     def line(self, points: FloatArray, colour: ArrayLike | str, width: float) -> None:
         """Add a line."""
-        self._cut(points[:-1], points[1:], np.atleast_2d(to_rgb(colour)), width)
+        tones = np.broadcast_to(to_rgb(colour), (len(points) - 1, 3))
+        self._lines.append(_Lines(points[:-1], points[1:], tones, width))
 
-    def _cut(self, starts: FloatArray, ends: FloatArray, tones: FloatArray, width: float, away: float = 0.0) -> None:
-        """Cut straight lines into short pieces and add them."""
+    def _pieces(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return the short pieces of all lines: ends on the page, depths of the middles, colours, widths."""
+        starts, ends, tones = (
+            np.concatenate([getattr(one, name) for one in self._lines]) for name in ("starts", "ends", "tones")
+        )
+        sizes = [len(one.ends) for one in self._lines]
+        widths = np.repeat([one.width for one in self._lines], sizes)
+        away = np.repeat([one.away for one in self._lines], sizes)
         lengths = np.linalg.norm(ends - starts, axis=1)
         counts = np.clip(np.ceil(lengths / (1.5 * self.unit)), 1, 200).astype(int)
-        if not counts.size:
-            return
         whose = np.repeat(np.arange(len(counts)), counts)
         number = np.arange(len(whose)) - np.repeat(np.cumsum(counts) - counts, counts)
         low, high = number / counts[whose], (number + 1) / counts[whose]
         way = (ends - starts)[whose]
         a, b = starts[whose] + low[:, None] * way, starts[whose] + high[:, None] * way
         page = np.stack([self.camera.project(a), self.camera.project(b)], axis=1)
-        depths = self.camera.depth(0.5 * (a + b)) - away
-        self._lines.append(_Lines(page, depths, np.broadcast_to(tones, (len(counts), 3))[whose], width))
+        return page, self.camera.depth(0.5 * (a + b)) - away[whose], tones[whose], widths[whose]
 
     def ball(self, center: FloatArray, radius: float, colour: ArrayLike | str) -> None:
         """Add a ball."""
@@ -140,29 +151,45 @@ class Stage:
 
     # -- what is seen ----------------------------------------------------------------------------------------------
 
-    def _seen(self, points: FloatArray, depths: FloatArray) -> NDArray[np.bool_]:
-        """Return which points on the page, at some depths, are hidden by no face and no ball."""
+    def _hidden_by(
+        self, points: FloatArray, depths: FloatArray, owners: NDArray[np.intp] | None = None
+    ) -> NDArray[np.intp]:
+        """Return which surfaces hide points on the page at some depths, or a ball, or nothing.
+
+        Points within faces have owners, the numbers of their surfaces, since a convex surface hides none of its own.
+        """
         clear = _CLEAR * self.unit
-        seen = np.ones(len(points), dtype=bool)
+        found = np.full(len(points), _SEEN)
         for ball in self._balls:
             inside = ball.radius**2 - np.sum((points - ball.middle) ** 2, axis=1)
             over = ball.depth + np.sqrt(np.maximum(inside, 0.0)) > depths + 1e-3 * self.unit
-            seen &= ~((inside > 0.0) & over)
-        for faces in self._faces:
+            found[(inside > 0.0) & over] = _BALL
+        still = np.flatnonzero(found == _SEEN)  # those that nothing has hidden yet
+        x, y, z = points[still, 0], points[still, 1], depths[still] + clear
+        for number, faces in enumerate(self._faces):
             low, high, top = faces.bounds
             if not top.size:
                 continue
-            about = np.all((points >= low.min(axis=0)) & (points <= high.max(axis=0)), axis=1)
-            near = np.flatnonzero(seen & about & (depths + clear < top.max()))
+            (left, down), (right, up) = low.min(axis=0), high.max(axis=0)
+            about = (x >= left) & (x <= right) & (y >= down) & (y <= up) & (z < top.max())
+            if owners is not None and faces.planes is not None:
+                about &= owners[still] != number
+            near = np.flatnonzero(about)
             if not near.size:
                 continue
-            x, y, z = points[near, 0, None], points[near, 1, None], depths[near, None] + clear
-            boxed = (x >= low[:, 0]) & (x <= high[:, 0]) & (y >= low[:, 1]) & (y <= high[:, 1]) & (z < top)
-            which, face = np.nonzero(boxed)
-            which = near[which]
-            hidden = _covers(faces, face, points[which], depths[which] + clear)
-            seen[which[hidden]] = False
-        return seen
+            if faces.planes is not None:
+                hidden = near[_lies_behind(faces.planes, points[still[near]], z[near])]
+            else:
+                u, v, w = x[near, None], y[near, None], z[near, None]
+                boxed = (u >= low[:, 0]) & (u <= high[:, 0]) & (v >= low[:, 1]) & (v <= high[:, 1]) & (w < top)
+                which, face = np.nonzero(boxed)
+                which = near[which]
+                hidden = which[_covers(faces, face, points[still[which]], z[which])]
+            if hidden.size:
+                found[still[hidden]] = number
+                kept = np.flatnonzero(found[still] == _SEEN)
+                still, x, y, z = still[kept], x[kept], y[kept], z[kept]
+        return found
 
     def _shown_faces(self) -> list[_Faces]:
         """Return the faces that are not hidden altogether, since the order of the hidden ones may be wrong."""
@@ -170,21 +197,28 @@ class Stage:
             return []
         corners = np.concatenate([one.corners for one in self._faces])
         depths = np.concatenate([one.depths for one in self._faces])
-        # In the middle of each face, and near each of its corners.
-        at = np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1)
-        near = np.concatenate([depths, depths.mean(axis=1, keepdims=True)], axis=1)
-        at, near = 0.85 * at + 0.15 * at[:, 4:], 0.85 * near + 0.15 * near[:, 4:]
-        shown = np.any(self._seen(at.reshape(-1, 2), near.reshape(-1)).reshape(-1, 5), axis=1)
+        counts = [len(one.tones) for one in self._faces]
+        owners = np.repeat(np.arange(len(counts)), counts)
+        # In the middle of each face, and of those where it is hidden near each corner.
+        at, near = corners.mean(axis=1, keepdims=True), depths.mean(axis=1, keepdims=True)
+        by = self._hidden_by(at[:, 0], near[:, 0], owners)
+        at, near, clear = 0.85 * corners + 0.15 * at, 0.85 * depths + 0.15 * near, _CLEAR * self.unit
+        shown = by == _SEEN
+        for number, faces in enumerate(self._faces):  # what hides the middle most often hides all of it
+            if faces.planes is not None:
+                mine = np.flatnonzero(by == number)
+                hidden = _lies_behind(faces.planes, at[mine].reshape(-1, 2), near[mine].reshape(-1) + clear)
+                by[mine[np.all(hidden.reshape(-1, 4), axis=1)]] = _GONE
+        rest = np.flatnonzero((by != _SEEN) & (by != _GONE))
+        seen = self._hidden_by(at[rest].reshape(-1, 2), near[rest].reshape(-1), np.repeat(owners[rest], 4)) == _SEEN
+        shown[rest] = np.any(seen.reshape(-1, 4), axis=1)
         found = []
-        counts = np.cumsum([len(one.tones) for one in self._faces])
-        for one, mine in zip(self._faces, np.split(shown, counts[:-1]), strict=True):
+        for one, mine in zip(self._faces, np.split(shown, np.cumsum(counts)[:-1]), strict=True):
             found.append(_Faces(one.corners[mine], one.depths[mine], one.normals[mine], one.tones[mine]))
         return found
 
-    def paint(self, axes: Axes, layer: float) -> None:
+    def paint(self, sheet: Sheet, layer: float) -> None:
         """Paint everything that was added."""
-        from matplotlib.collections import LineCollection, PolyCollection
-
         shown = self._shown_faces()
         shapes: list[FloatArray] = [shape for one in shown for shape in one.corners]
         depths = [one.depths.mean(axis=1) for one in shown]
@@ -201,24 +235,33 @@ class Stage:
         if shapes:
             order = np.argsort(np.concatenate(depths), kind="stable")
             face, edge = np.concatenate(tones)[order], np.concatenate(edges)[order]
-            painted = [shapes[i] for i in order]
-            axes.add_collection(PolyCollection(painted, facecolors=face, edgecolors=edge, linewidths=0.8, zorder=layer))
+            sheet.polygons([shapes[i] for i in order], face, edge, linewidths=0.8, zorder=layer)
         if self._lines:
-            ends = np.concatenate([one.ends for one in self._lines])
-            away = np.concatenate([one.depths for one in self._lines])
-            colours = np.concatenate([one.tones for one in self._lines])
-            widths = np.concatenate([np.full(len(one.depths), one.width) for one in self._lines])
-            seen = np.flatnonzero(self._seen(ends.mean(axis=1), away))
+            ends, away, colours, widths = self._pieces()
+            seen = np.flatnonzero(self._hidden_by(ends.mean(axis=1), away) == _SEEN)
             order = seen[np.argsort(away[seen], kind="stable")]
-            axes.add_collection(
-                LineCollection(
-                    list(ends[order]),
-                    colors=colours[order],
-                    linewidths=widths[order],
-                    capstyle="round",
-                    zorder=layer + 0.1,
-                )
-            )
+            sheet.lines(ends[order], colours[order], widths[order], capstyle="round", zorder=layer + 0.1)
+
+
+def _sorted_planes(
+    normals: FloatArray, distances: FloatArray, camera: Camera, away: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the planes of a convex surface as the eye sees them: of its front, of its back, and from the side."""
+    seen = normals @ camera.axes.T
+    front, back = seen[:, 2] > 1e-9, seen[:, 2] < -1e-9
+    rows = np.column_stack([-seen[:, :2], distances])
+    over = [rows[one] / seen[one, 2, None] - np.array([0.0, 0.0, away]) for one in (front, back)]
+    return over[0], over[1], rows[~(front | back)]
+
+
+def _lies_behind(
+    planes: tuple[FloatArray, FloatArray, FloatArray], points: FloatArray, depths: FloatArray
+) -> NDArray[np.bool_]:
+    """Return which points on the page, at some depths, have a convex surface between them and the eye."""
+    front, back, side = (one[:, :2] @ points.T + one[:, 2:] for one in planes)
+    top, bottom = front.min(axis=0), back.max(axis=0)
+    found: NDArray[np.bool_] = (top > depths) & (bottom <= top) & np.all(side >= 0.0, axis=0)
+    return found
 
 
 def _covers(faces: _Faces, face: NDArray[np.intp], points: FloatArray, depths: FloatArray) -> NDArray[np.bool_]:

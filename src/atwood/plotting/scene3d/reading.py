@@ -54,6 +54,10 @@ class Pose:
     origin: FloatArray
     axes: FloatArray
 
+    def at(self, moment: int) -> tuple[FloatArray, FloatArray]:
+        """Return place and axes at one output time."""
+        return self.origin[moment], self.axes[moment]
+
     def place(self, point: FloatArray) -> FloatArray:
         """Return where a point of the body is along the run, m, shape (times, 3)."""
         found: FloatArray = self.origin + self.axes @ point

@@ -14,6 +14,7 @@ from atwood.plotting.canvas import COLOURS, INK, finished, new_figure
 from atwood.plotting.scene3d.drawing import draw_corner_axes, draw_sphere
 from atwood.plotting.scene3d.painter import lighter
 from atwood.plotting.scene3d.picture import Trail
+from atwood.plotting.sheet import Sheet
 from atwood.result.result import Result
 
 if TYPE_CHECKING:
@@ -72,14 +73,14 @@ def plot_on_sphere(
     width, height = bounds[1] - bounds[0]
     figure, panels = _panels(len(trails), width / height, 1 + max(name.count("\n") for name in named))
     for axes, name, trail in zip(panels, named, trails, strict=False):
-        draw_sphere(axes, camera, globe)
+        draw_sphere(Sheet(axes), camera, globe)
         _draw_path(axes, camera, trail)
         axes.set_xlim(float(bounds[0][0]), float(bounds[1][0]))
         axes.set_ylim(float(bounds[0][1]), float(bounds[1][1]))
         axes.set_aspect("equal")
         axes.set_axis_off()
         axes.set_title(name, fontsize=10, color=INK)
-    draw_corner_axes(panels[0], camera, bounds)
+    draw_corner_axes(Sheet(panels[0]), camera, bounds)
     return finished(figure, file)
 
 

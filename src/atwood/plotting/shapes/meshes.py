@@ -51,24 +51,53 @@ class Mesh:
     @cached_property
     def edges(self) -> tuple[IndexArray, IndexArray, NDArray[np.bool_]]:
         """Ends of each edge, the two faces that meet there, and whether they meet at an angle."""
-        sides: dict[tuple[int, int], list[int]] = {}
-        for number, face in enumerate(self.faces.tolist()):
-            for one, other in zip(face, (*face[1:], face[0]), strict=True):
-                if one != other:
-                    sides.setdefault((min(one, other), max(one, other)), []).append(number)
-        pairs = [(ends, faces) for ends, faces in sides.items() if len(faces) == 2]
-        ends = np.array([one for one, _ in pairs], dtype=np.intp).reshape(-1, 2)
-        faces = np.array([one for _, one in pairs], dtype=np.intp).reshape(-1, 2)
+        sides = np.sort(np.stack([self.faces, np.roll(self.faces, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+        used = np.flatnonzero(sides[:, 0] != sides[:, 1])
+        _, first, which, counts = np.unique(
+            sides[used] @ (len(self.vertices), 1), return_index=True, return_inverse=True, return_counts=True
+        )
+        twice = np.flatnonzero(counts == 2)
+        twice = twice[np.argsort(first[twice])]
+        starts, members = np.cumsum(counts) - counts, np.argsort(which, kind="stable")
+        faces = used[members[starts[twice, None] + np.arange(2)]] // 4
+        ends = sides[used[first[twice]]]
         bends = np.einsum("ij,ij->i", self.normals[faces[:, 0]], self.normals[faces[:, 1]])
         has_length = np.any(self.vertices[ends[:, 0]] != self.vertices[ends[:, 1]], axis=1)
         return ends[has_length], faces[has_length], bends[has_length] < _SHARP
+
+    @cached_property
+    def planes(self) -> tuple[FloatArray, FloatArray] | None:
+        """The planes that a convex surface lies between: outward unit normals, and distances from the origin, m.
+
+        None for a surface that is not convex, or not closed: its directed areas do not add up to zero.
+        """
+        a, b, c, d = (self.vertices[self.faces[:, i]] for i in range(4))
+        areas, has_area = np.cross(c - a, d - b), np.any(self.normals, axis=1)
+        if np.linalg.norm(areas.sum(axis=0)) >= 1e-9 * np.abs(areas).sum():
+            return None
+        normals, first = self.normals[has_area], self.vertices[self.faces[has_area, 0]]
+        distances, size = np.sum(normals * first, axis=1), float(np.max(np.ptp(self.vertices, axis=0)))
+        alike = np.round(np.column_stack([normals, distances / size]), 9)
+        _, once = np.unique(alike, axis=0, return_index=True)
+        normals, distances = normals[once], distances[once]
+        return (normals, distances) if np.max(self.vertices @ normals.T - distances) < 1e-9 * size else None
+
+    def border(self, faces: NDArray[np.bool_]) -> IndexArray:
+        """Return the ends of the edges between some faces and the others."""
+        ends, sides, _ = self.edges
+        return ends[faces[sides[:, 0]] ^ faces[sides[:, 1]]]
 
     def placed(self, origin: ArrayLike, axes: ArrayLike) -> Mesh:
         """Return the same surface elsewhere."""
         turn = np.asarray(axes, dtype=float)
         moved = Mesh(np.asarray(origin, dtype=float) + self.vertices @ turn.T, self.faces, self.marked)
-        # Neither the edges nor how faces meet depend on where it is.
+        # Neither the edges nor how faces meet depend on where it is, nor whether it is convex.
         moved.__dict__.update(normals=self.normals @ turn.T, edges=self.edges)
+        planes = self.planes
+        if planes is not None:
+            normals = planes[0] @ turn.T
+            planes = normals, planes[1] + normals @ np.asarray(origin, dtype=float)
+        moved.__dict__["planes"] = planes
         return moved
 
 
