@@ -55,6 +55,37 @@ _GOLDSTEIN = "euler-zxz"
 """Orientation coordinates where a scene has quaternions, which have no momenta (Goldstein, section 4.4)."""
 
 
+def with_momenta_of_its_own(assembly: Assembly) -> Assembly:
+    """Return an assembly in coordinates that have momenta: Euler angles in place of quaternions; or refuse it."""
+    refuse_without_hamiltonian(assembly)
+    if any(one.kind == "quaternion" for one in assembly.reduced.orientation_coordinates):
+        return assembly.other_mode(assembly.modes, {}, Orientation(_GOLDSTEIN))
+    return assembly
+
+
+def start_of(assembly: Assembly) -> tuple[FloatArray, FloatArray]:
+    """Return coordinates and their derivatives where a scene starts; its speeds may be angular velocities.
+
+    Raises
+    ------
+    StartError
+        If the start is not consistent, or the coordinates are singular there.
+    """
+    begun, equations = find_start(assembly), assembly.reduced
+    q = from_regular(assembly, begun.coordinates)
+    program = known_program(assembly, _VELOCITIES, lambda: list(equations.rates))
+    idle = np.zeros(len(equations.speeds)), np.zeros(len(assembly.reactions))
+    try:
+        found = assembly.kernel(program)([begun.time], q, begun.speeds, *idle)[0]
+        return q, np.asarray(found[: len(equations.names)], dtype=float)
+    except KernelEvaluationError as error:
+        raise StartError(
+            f"it starts where its coordinates as {assembly.orientation.kind!r} are singular",
+            where=assembly.flat.name,
+            advice="Ask for the Hamiltonian in other Euler angles, such as orientation='euler-zyx'.",
+        ) from error
+
+
 def read_hamiltonian(
     assembly: Assembly,
     parameters: Parameters = "symbolic",
@@ -63,9 +94,7 @@ def read_hamiltonian(
     gauge: Any = None,
 ) -> Hamiltonian:
     """Return the Hamiltonian of an assembly, with the rate of a function added to L."""
-    refuse_without_hamiltonian(assembly)
-    if any(one.kind == "quaternion" for one in assembly.reduced.orientation_coordinates):
-        assembly = assembly.other_mode(assembly.modes, {}, Orientation(_GOLDSTEIN))
+    assembly = with_momenta_of_its_own(assembly)
     found = lagrangian_of(assembly)
     plain = notation_of(assembly, found, symbols)
     found = with_gauge(assembly, found, plain, gauge)
@@ -157,23 +186,8 @@ class Hamiltonian(Paged):
         StartError
             If the start is not consistent, or the coordinates are singular there.
         """
-        begun = find_start(self.assembly)
-        q = from_regular(self.assembly, begun.coordinates)
-        return q, self.momenta_at(q, self._velocities_of(q, begun.speeds, begun.time), begun.time)
-
-    def _velocities_of(self, q: FloatArray, u: FloatArray, t: float) -> FloatArray:
-        """Return the derivatives of the coordinates, from speeds that may be angular velocities."""
-        equations = self.assembly.reduced
-        program = known_program(self.assembly, _VELOCITIES, lambda: list(equations.rates))
-        idle = np.zeros(len(equations.speeds)), np.zeros(len(self.assembly.reactions))
-        try:
-            return np.asarray(self.assembly.kernel(program)([t], q, u, *idle)[0], dtype=float)
-        except KernelEvaluationError as error:
-            raise StartError(
-                f"it starts where its coordinates as {self.assembly.orientation.kind!r} are singular",
-                where=self.name,
-                advice="Ask for the Hamiltonian in other Euler angles, such as orientation='euler-zyx'.",
-            ) from error
+        q, v = start_of(self.assembly)
+        return q, self.momenta_at(q, v, find_start(self.assembly).time)
 
     def __call__(self, q: Numbers, p: Numbers, t: float | None = None) -> FloatArray:
         """Return H, J; a number, or one for each state."""

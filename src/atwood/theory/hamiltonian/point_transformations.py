@@ -22,14 +22,13 @@ from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import scipy, sympy
 from atwood.model.compose.composite import Model
-from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
 from atwood.theory.equations.equations import EquationsOfMotion
 from atwood.theory.formulas.described import Described
 from atwood.theory.formulas.notation import SYMBOLS as LETTERS
 from atwood.theory.formulas.printers import Sympy
 from atwood.theory.formulas.reading import text_of
-from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian
+from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian, start_of
 from atwood.theory.hamiltonian.phase_space import EXPRESSION, SYMBOLS
 from atwood.theory.hamiltonian.tidied import is_positive, length, tidied
 
@@ -336,8 +335,7 @@ def start_in(given: PointTransformation) -> tuple[float, FloatArray, FloatArray]
     h = given.source
     refuse_letters(given)
     start = find_start(h.assembly)
-    q = from_regular(h.assembly, start.coordinates)
-    v = h.velocities_at(q, h.start()[1], start.time)
+    q, v = start_of(h.assembly)
     t = sympy.Symbol("t")
     old = [one.xreplace(h.values) for one in given.old.values()]
     by_new = [[one.diff(x) for x in given.coordinates] for one in old]

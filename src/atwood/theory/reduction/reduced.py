@@ -10,20 +10,17 @@ import numpy as np
 
 from atwood.arguments import ARRAY, BY_PATH, TEXT, check, instance, optional, takes
 from atwood.arrays import FloatArray
-from atwood.errors import AtwoodError, UnsupportedError, UsageError, suggestion
-from atwood.expr import OutputGroup, Program, depends_on
+from atwood.errors import UnsupportedError, UsageError, suggestion
+from atwood.expr import depends_on
 from atwood.forms.assembly import Assembly
-from atwood.forms.lagrangian import Lagrangian
-from atwood.forms.program import state_groups
 from atwood.forms.quantities import observer
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
-from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
 from atwood.theory.formulas.described import Described
 from atwood.theory.formulas.notation import SYMBOLS
-from atwood.theory.hamiltonian.hamiltonian import hamiltonian
+from atwood.theory.hamiltonian.hamiltonian import hamiltonian, start_of
 from atwood.theory.hamiltonian.phase_space import EXPRESSION
 from atwood.theory.hamiltonian.point_transformations import PointTransformation, point_transformation, start_in
 from atwood.theory.hamiltonian.tidied import tidied
@@ -38,7 +35,6 @@ from atwood.theory.reduction.routhian import (
     routhian_of,
     transformed_parts,
 )
-from atwood.theory.symmetry.quantities import Quantities
 
 
 @dataclass(frozen=True, eq=False)
@@ -295,7 +291,7 @@ def reduced(
     ignorable = tuple(path for path in paths if path != left[0])
     parts = parts_of(assembly, number, find_start(assembly).time)
     symbolic = {"routhian": routhian_of(assembly, found, ignorable, symbols)}
-    return _motion(assembly, parts, paths, number, _start_of(assembly, found), unit, symbolic)
+    return _motion(assembly, parts, paths, number, start_of(assembly), unit, symbolic)
 
 
 def _motion(
@@ -362,18 +358,3 @@ def _transformed(given: PointTransformation) -> ReducedMotion:
     potential = given.hamiltonian.xreplace({given.momenta[number]: sympy.Integer(0)})
     names, symbolic = [str(one) for one in given.coordinates], {"potential": potential, "transformation": given}
     return _motion(h.assembly, parts, names, number, (q, v), unit, symbolic)
-
-
-def _start_of(assembly: Assembly, found: Lagrangian) -> tuple[FloatArray, FloatArray]:
-    """Return coordinates and their derivatives where a scene starts."""
-    start, e = find_start(assembly), assembly.reduced
-    q = from_regular(assembly, start.coordinates)
-    rates = Quantities(assembly, found).on_speeds(list(found.velocities))
-    outputs = (OutputGroup("rates", tuple(rates)),)
-    program = Program(f"{assembly.flat.name} rates", state_groups(e), assembly.parameters, outputs)
-    try:
-        return q, np.asarray(assembly.kernel(program)([start.time], q, start.speeds)[0], dtype=float)
-    except AtwoodError as error:
-        raise UnsupportedError(
-            "it starts where its coordinates are singular", where=assembly.flat.name, advice="Simulate it."
-        ) from error

@@ -33,15 +33,13 @@ from atwood.theory.formulas.described import Described
 from atwood.theory.formulas.notation import SYMBOLS, notation_of
 from atwood.theory.formulas.printers import Sympy, objects
 from atwood.theory.formulas.tree import Sum
+from atwood.theory.hamiltonian.hamiltonian import with_momenta_of_its_own
 from atwood.theory.hamiltonian.phase_space import collected, short
 from atwood.theory.hamiltonian.point_transformations import PointTransformation
 from atwood.theory.hamiltonian.tidied import length
 from atwood.theory.symmetry.find import find_conserved
 from atwood.theory.symmetry.proof import Prover
 from atwood.theory.symmetry.quantities import Quantities
-from atwood.topology.orientation_coordinates import Orientation
-
-_EULER = "euler-zxz"
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,12 +216,7 @@ def routhian_of(
 
 def ignorable_of(scene: Model | Assembly, orientation: str | None) -> tuple[Assembly, Lagrangian, tuple[str, ...]]:
     """Return a scene in coordinates with momenta, its Lagrangian, and the paths of its ignorable coordinates."""
-    from atwood.theory.hamiltonian.legendre import refuse_without_hamiltonian
-
-    assembly = smooth_assembly_of(scene, orientation=orientation)
-    refuse_without_hamiltonian(assembly)
-    if any(one.kind == "quaternion" for one in assembly.reduced.orientation_coordinates):
-        assembly = assembly.other_mode(assembly.modes, {}, Orientation(_EULER))
+    assembly = with_momenta_of_its_own(smooth_assembly_of(scene, orientation=orientation))
     found = lagrangian_of(assembly, "reduced")
     quantities = Quantities(assembly, found)
     kept = find_conserved(assembly, quantities, Prover(quantities, notation_of(assembly, found)))
