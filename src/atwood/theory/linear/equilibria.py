@@ -207,7 +207,7 @@ def equilibria(
     UsageError
         If there is none in the region, or the scene stays nowhere at rest since it depends on time.
     UnsupportedError
-        If ``symbolic``, and there is no closed form that one would find by hand; or if more than six gaps may close.
+        If ``symbolic``, and there is no closed form that one would find by hand; or if more than five gaps may close.
     ParameterError
         If the region names no coordinate.
     """
@@ -359,7 +359,7 @@ def _found(
         made = follow_null_space(search, rest)
         if made.rest is not rest and any(search.same(one.rest, made.rest) for one in found):
             continue
-        if len(found) < _IMAGED:
+        if len(found) < patience * _IMAGED:
             images += _images(point, made.rest, [one.rest for one in found])
         images += made.beside
         found.append(made)

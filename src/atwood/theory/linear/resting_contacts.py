@@ -23,13 +23,14 @@ from atwood.simulation.contacts.changes import forces_in
 from atwood.simulation.contacts.chosen import ContactSet, in_set, margins_in, set_of, state_in_set, states_by_path
 from atwood.simulation.contacts.values import ContactValues, layout_of
 from atwood.simulation.dynamics.balance import balance_of
-from atwood.simulation.dynamics.scales import Scales, coordinate_scales, find_scales
+from atwood.simulation.dynamics.scales import Scales, find_scales
 from atwood.simulation.initialization.start import Start, find_start
 from atwood.theory.linear.operating_point import OperatingPoint, moved_to, point_at, start_at, values_at
 from atwood.theory.linear.rest import RestSearch, slopes_at
+from atwood.theory.linear.variations import LinearScene
 from atwood.tolerances import tolerances
 
-_MOST_GAPS = 6
+_MOST_GAPS = 5
 """Sets of so many gaps are looked through; of more there are too many."""
 
 _SAME = 1e-6
@@ -51,7 +52,7 @@ class RestInSet:
     found
         The set, with forces and reserves.
     place
-        Where everything is, in maximal coordinates.
+        Where everything is and how it is turned, whole turns aside; see `RestSearch.configuration`.
     stuck
         Along so many directions what sticks lets rest go on, neutral ones included; 0 where nothing sticks.
     closed
@@ -66,8 +67,7 @@ class RestInSet:
 
     def is_at(self, other: RestInSet) -> bool:
         """Return whether everything is in the same places."""
-        sizes = coordinate_scales(self.point.assembly.maximal, self.point.scene.length)
-        return bool(np.all(np.abs(self.place - other.place) <= _SAME * sizes))
+        return bool(np.max(np.abs(self.place - other.place), initial=0.0) <= _SAME)
 
     @property
     def is_strict(self) -> bool:
@@ -99,6 +99,12 @@ class RestingContacts:
     def start(self) -> Start:
         """A place near the scene's start."""
         return find_start(self.assembly)
+
+    @cached_property
+    def _places(self) -> RestSearch:
+        """Tells places of the whole scene apart."""
+        scene = LinearScene(self.assembly, "reduced")
+        return RestSearch(scene, balance_of(self.assembly, "reduced"), self.start.time, ())
 
     def sets(self) -> Iterator[tuple[int, ...]]:
         """Yield which gaps may be closed: first as few as there can be."""
@@ -138,7 +144,7 @@ class RestingContacts:
         there = point_at(made, point.t, place, np.zeros(len(made.regular.speeds)), contacts=found.words)
         held = any(state == STICKS for k, (state, _) in enumerate(states) if self.layout.is_slip[k])
         stuck = self._free_directions(there).shape[1] if held else 0
-        return RestInSet(there, found, values.q, stuck, closed)
+        return RestInSet(there, found, self._places.configuration(now), stuck, closed)
 
     def ends(self, one: RestInSet) -> tuple[Mapping[str, float], ...]:
         """Return both ends of an interval of rest: what changes along it, by path; nothing where it has none."""
