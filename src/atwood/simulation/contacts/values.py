@@ -41,8 +41,9 @@ class Layout:
         The program of (t, q, u, multipliers that limits read).
     slopes
         The pattern of the slopes of their rates.
-    read, shares
-        The multipliers that limits read, and the patterns of the slopes of limits and static limits along these.
+    read, sources, shares
+        The multipliers that limits read, for each whether it is that of a row, and its number there or among those of
+        joints, and the patterns of the slopes of limits and static limits along these.
     is_curved, is_borne
         Whether limits are curved in these multipliers, and whether some are those of joints.
     contacts, units
@@ -60,7 +61,8 @@ class Layout:
     program: Program
     slopes: tuple[tuple[int, ...], tuple[int, ...]]
     read: tuple[Expression, ...]
-    shares: tuple[tuple[tuple[int, int], ...], ...]
+    sources: tuple[tuple[bool, int], ...]
+    shares: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]
     is_curved: bool
     is_borne: bool
     contacts: tuple[ContactRow, ...]
@@ -111,7 +113,8 @@ def _layout(assembly: Assembly) -> Layout:
         program,
         (slopes.rows, slopes.columns),
         read,
-        tuple(tuple(zip(one.rows, one.columns, strict=True)) for one in found),
+        tuple((x in own, own.index(x) if x in own else equations.multipliers.index(x)) for x in read),
+        tuple((one.rows, one.columns) for one in found),
         depends_on([entry for one in found for entry in one.entries], list(read)),
         any(x not in own for x in read),
         contacts,
@@ -240,14 +243,12 @@ class ContactValues:
     def limits_at(self, forces: FloatArray) -> tuple[Limits, Limits]:
         """Return the limits of all units near some forces of the rows, forwards and backwards: ``L(f) = L_0 + P f``."""
         layout, count, n = self.layout, len(self.contacts), len(self.u)
-        own = {one.read: i for i, one in enumerate(self.contacts)}
-        number = {symbol: n + i for i, symbol in enumerate(self.assembly.maximal.multipliers)}
         ways, rest = np.zeros((len(layout.read), count)), np.zeros(len(layout.read))
-        for k, symbol in enumerate(layout.read):
-            if symbol in own:
-                ways[k, own[symbol]] = 1.0
+        for k, (is_own, number) in enumerate(layout.sources):
+            if is_own:
+                ways[k, number] = 1.0
             else:
-                ways[k], rest[k] = self._by_each[number[symbol]], self._free[number[symbol]]
+                ways[k], rest[k] = self._by_each[n + number], self._free[n + number]
         read = rest + ways @ forces
         if not np.array_equal(read, self.read):
             self.read = read
@@ -256,8 +257,7 @@ class ContactValues:
         heads = [rows[0] for rows in self.units]
         for limits, entries, places in zip(self._limits, self._shares, layout.shares, strict=True):
             slopes = np.zeros((count, len(self.read)))
-            for (r, c), entry in zip(places, entries, strict=True):
-                slopes[r, c] = entry
+            slopes[places] = entries
             shares = slopes @ ways
             found += [(limits - shares @ forces)[heads], shares[heads]]
         return Limits(*found[:4]), Limits(*found[4:])
