@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from atwood import Scene, UsageError, equilibria
 from atwood_library import (
-    Box,
-    BoxContact,
     Ground,
     Link,
     Pivot,
     PointContact,
     PointMass,
+    PolygonContact,
+    RigidBody,
     RotationalFriction,
     Spring,
     SurfaceContact,
@@ -73,20 +74,27 @@ def test_a_slope_holds_what_is_rough_enough() -> None:
         equilibria(block(0.3, 0.3, stiffness=0.0))
 
 
-def test_a_box_stands_on_its_sides_and_balances_on_its_corners() -> None:
+def test_a_triangle_stands_on_its_sides_and_balances_on_its_corners() -> None:
+    """It turns until a corner, or the outward normal of a side, points down, as far from its centre as this is."""
+    corners = np.array([(-0.5, -0.3), (0.5, -0.3), (0.0, 0.6)])
     scene = Scene()
-    ground, m = scene.add("ground", Ground()), scene.add("m", Box(length_x=1.0, length_z=0.4, mass=3.0))
-    c = scene.add("c", BoxContact(length=1.0, height=0.4, friction=0.3))
+    ground = scene.add("ground", Ground())
+    m = scene.add("m", RigidBody(mass=3.0, moments=(0.3, 0.3, 0.3)))
+    c = scene.add("c", PolygonContact(vertices=corners, friction=0.3))
     scene.connect(ground.frame, c.plane)
-    scene.connect(m.frame, c.box)
-    scene.start.update({"m.position.x": 0.0, "m.position.z": 0.2, "m.angle": 0.0})
-    found = sorted((one.values["m.angle"], one.values["m.position.z"], one.stability) for one in equilibria(scene))
-    lean, high = math.atan2(1.0, 0.4), math.hypot(0.5, 0.2)
-    known = [(0.0, 0.2), (math.pi, 0.2), (math.pi / 2.0, 0.5), (-math.pi / 2.0, 0.5)]
-    sides = [(angle, z, "stable") for angle, z in known]
-    corners = [(a, high, "unstable") for a in (lean, -lean, math.pi - lean, lean - math.pi)]
-    for one, other in zip(found, sorted([*sides, *corners]), strict=True):
-        assert one == (pytest.approx(other[0], abs=1e-8), pytest.approx(other[1], abs=1e-8), other[2])
+    scene.connect(m.frame, c.body)
+    scene.start.update({"m.position.x": 0.0, "m.position.z": 0.3, "m.angle": 0.0})
+    sides = np.roll(corners, -1, axis=0) - corners
+    normals = np.column_stack([sides[:, 1], -sides[:, 0]]) / np.linalg.norm(sides, axis=1)[:, None]
+    down = [(*one, "unstable") for one in corners]
+    down += [(*(n * (n @ corner)), "stable") for n, corner in zip(normals, corners, strict=True)]
+    known = [(-0.5 * math.pi - math.atan2(z, x), math.hypot(x, z), said) for x, z, said in down]
+    found = [(one.values["m.angle"], one.values["m.position.z"], one.stability) for one in equilibria(scene)]
+
+    def told(states: list[tuple[float, float, str]]) -> list[tuple[float, float, float, str]]:
+        return sorted((round(z, 7), round(math.cos(t), 7) + 0.0, round(math.sin(t), 7) + 0.0, s) for t, z, s in states)
+
+    assert told(found) == told(known)
 
 
 def test_a_ladder_leans_up_to_the_angle_of_friction() -> None:

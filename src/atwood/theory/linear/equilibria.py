@@ -485,11 +485,13 @@ def _with_contacts(contacts: RestingContacts, region: Mapping[str, Any]) -> Equi
     made: list[Equilibrium] = []
     rests: list[RestInSet] = []
     push = 0.0
+    apart: list[set[int]] = []  # gaps that cannot be closed together
     for closed in contacts.sets():
         for sticks in (False, True):
-            known = sticks and any(one.closed == closed for one in rests)
+            known = any(one.closed == closed for one in rests) if sticks else any(one <= {*closed} for one in apart)
             point = None if known else contacts.point(closed, sticks)
             if point is None:
+                apart += [] if known or sticks else [{*closed}]
                 break
             sought = _sought(point, region, push, _OF_SETS)
             push = max(push, sought.search.push)

@@ -36,7 +36,7 @@ _MOST_GAPS = 5
 _SAME = 1e-6
 """Relative to sizes of the scene: places that differ by less are one."""
 
-_STEP, _FARTHEST, _HALVINGS = 1e-3, 1e3, 60
+_STEP, _FARTHEST, _HALVINGS = 1e-3, 1e3, 44
 """In sizes of the scene: the first step along a direction of rest, and how far it is followed; how exactly its end is
 found."""
 
