@@ -275,3 +275,12 @@ def test_a_body_that_is_pulled_moves_as_on_a_damped_spring(form: str) -> None:
     scene.connect(scene.bob2.point, hand.point)
     expected = state_at(scene, 0.7, form=form, rtol=1e-12, solver="explicit")
     np.testing.assert_allclose(pulled, expected, rtol=0.0, atol=1e-8)
+
+
+def test_a_chaotic_motion_agrees_with_taylor_series_to_the_end() -> None:
+    live = live_program(SCENES["double-pendulum"](), "reduced")
+    script = 'const engine = start("x", {rtol: 1e-15}); print([engine.advance(10.0).code, Array.from(engine.state)]);'
+    code, state = played({"x": live}, script)
+    expected = state_at(SCENES["double-pendulum"](), 10.0, form="reduced", rtol=1e-15, solver="taylor")
+    assert code == "reached"
+    np.testing.assert_allclose(state, expected, rtol=0.0, atol=1e-12)
