@@ -147,3 +147,36 @@ def test_the_picture_is_turned_by_keys_and_a_click_tells_a_part(show: Callable[.
     y, x = dark.mean(axis=0)  # the second bob, which is red
     tab.mouse.click(float(x), float(y))
     assert "bob2" in tab.locator(".part h2").inner_text()
+
+
+def test_a_body_is_pulled_by_the_pointer_and_let_go(show: Callable[..., Any], tmp_path: Path) -> None:
+    scene = SCENES["double-pendulum"]()
+    scene.start.update({"rod1.angle": 0.0, "rod2.angle": 0.0})
+    page(scene, tmp_path / "a.html")
+    tab = show(tmp_path / "a.html")
+    assert tab.evaluate("atwood.advance(0.2)")["code"] == "reached"
+    assert abs(tab.evaluate("atwood.value('bob2.position.x')")) < 1e-9, "it hangs at rest"
+    dark = np.argwhere(np.all(np.abs(_pixels(tab) - [0.82, 0.286, 0.357]) < 0.05, axis=2))
+    y, x = (float(one) for one in dark.mean(axis=0))
+    tab.mouse.move(x, y)
+    tab.mouse.down()
+    tab.mouse.move(x + 60.0, y, steps=4)
+    tab.wait_for_timeout(800)
+    assert tab.evaluate("atwood.value('bob2.position.x')") > 0.05
+    tab.mouse.up()
+    tab.evaluate("atwood.play(false)")
+    paths = [f"{bob}.{kind}_energy" for bob in ("bob1", "bob2") for kind in ("kinetic", "potential")]
+    energy = " + ".join(f"atwood.value('{path}')" for path in paths)
+    before = tab.evaluate(energy)
+    tab.evaluate("atwood.advance(atwood.time + 0.5)")
+    assert tab.evaluate(energy) == pytest.approx(before, abs=1e-4), "nothing pulls any more"
+
+
+def test_forces_of_a_live_page_are_those_of_simulate(show: Callable[..., Any], tmp_path: Path) -> None:
+    result = simulate(SCENES["double-pendulum"](), t_end=1.0, **_EXACT)
+    page(result, tmp_path / "a.html", show="rod1.tension")
+    tab = show(tmp_path / "a.html")
+    assert tab.evaluate("atwood.advance(1.0)")["code"] == "reached"
+    tab.get_by_role("tab", name="Curves").click()
+    shown = float(tab.locator("output[data-path='rod1.tension']").inner_text())
+    assert shown == pytest.approx(result["rod1.tension"][-1], abs=1e-8)

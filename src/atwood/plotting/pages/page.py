@@ -259,7 +259,7 @@ def make_page(
 def _live(results: Mapping[str, Result], bounds: Mapping[str, object], live: str) -> LiveProgram:
     """Return the scene as a program of the page, or why it is none."""
     first = next(iter(results.values()))
-    found = live_program(first.assembly, sliders=list(bounds))
+    found = live_program(first.assembly, sliders=list(bounds), drag=True)
     if live == "never":
         return replace(found, reason="a record was asked for", model="")
     if len(results) > 1:

@@ -27,7 +27,10 @@ export class LiveMotion {
       : keys.map((key, k) => ({
         place: 3 * nodeAt.get(key), body: 12 * bodyAt.get(bodyOf[k]), turn: turns[k], column: columns[key],
       }));
+    this.pulls = new Set(engine.model.modes.flatMap((mode) => mode.data.pulls.map(([node]) => node)));
+    this.loads = new Set(engine.model.modes.flatMap((mode) => mode.data.paths.loads ?? []));
     this.energies = [];
+    this.wanted = () => []; // of what reads reactions, which takes longer, the paths that are looked at
     this.begin();
   }
 
@@ -54,11 +57,35 @@ export class LiveMotion {
     if (track.times.length >= MOST) {
       for (const list of [track.times, track.poses, track.values, this.energies]) list.splice(0, MOST / 10);
     }
-    const values = Float64Array.from(this.engine.values(this.paths));
+    const asked = new Set(this.wanted());
+    const values = Float64Array.from(this.paths, (path) => (this.loads.has(path) && !asked.has(path) ? NaN : this.value(path)));
     const last = track.values[track.values.length - 1];
     if (last) for (const k of this.periodic) values[k] = goingOn(values[k], last[k]);
     track.add(this.engine.time, this.frames(), values);
     this.energies.push(this.engine.energy());
+  }
+
+  /** Return a quantity now; what the present mode has not is no number. */
+  value(path) {
+    try {
+      return this.engine.value(path);
+    } catch {
+      return NaN;
+    }
+  }
+
+  /** Return the node that is pulled where a part is taken hold of at a place: the nearest one, of that part if it can be. */
+  nodeAt(part, place) {
+    const places = this.engine.places();
+    const apart = (k) => Math.hypot(...[0, 1, 2].map((i) => places[3 * k + i] - place[i]));
+    const all = this.engine.model.data.nodes.map((one, k) => ({ ...one, apart: apart(k) })).filter((one) => this.pulls.has(one.node));
+    const own = all.filter((one) => one.connectors.some((path) => path.startsWith(`${part}.`)));
+    return (own.length ? own : all).sort((a, b) => a.apart - b.apart)[0] ?? null;
+  }
+
+  /** Pull a node to a place, or let go (null). */
+  pull(node, place) {
+    return node === null ? this.engine.drag(null) : this.engine.drag(node, place);
   }
 
   /** Return the frames of the stage, from where the engine says that bodies and nodes are. */

@@ -19,6 +19,7 @@ class Page {
     this.units = new Map(this.runs.flatMap((run) => run.quantities.paths.map((p, k) => [p, run.quantities.units[k]])));
     this.shown = payload.show.filter((path) => this.units.has(path));
     this.arrows = new Set();
+    this.vectors = [];
     this.mode = "recorded";
     this.reason = payload.reason;
     if (model && createEngine) this.goLive(createEngine, model);
@@ -44,6 +45,7 @@ class Page {
       return;
     }
     this.live = new LiveMotion(engine, this.runs[0]);
+    this.live.wanted = () => [...this.shown, ...this.vectors.filter((one) => this.arrows.has(one.kind)).flatMap((one) => one.paths)];
     this.mode = "live";
     for (const { path, unit } of engine.model.data.quantities) this.units.set(path, unit);
   }
@@ -185,6 +187,7 @@ class Page {
       return false;
     }
     if (!this.shown.includes(path)) this.shown.push(path);
+    if (this.live) this.live.sample();
     this.say("");
     this.listValues();
     this.show();
@@ -539,6 +542,7 @@ class Page {
     });
     let pressed = null;
     this.host.addEventListener("pointerdown", (event) => { pressed = [event.clientX, event.clientY]; });
+    if (this.live) this.watchPulls();
     this.host.addEventListener("click", (event) => {
       const moved = pressed && Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) > 4;
       const found = moved ? null : this.view?.pick(event); // a drag turns the picture
@@ -546,6 +550,32 @@ class Page {
       this.tellPart(found.part);
       this.choose("Parts");
     });
+  }
+
+  /** Let a part be pulled by the pointer: by a spring while the scene moves, or while it is held at the pointer. */
+  watchPulls() {
+    let held = null;
+    this.host.addEventListener("pointerdown", (event) => {
+      const found = event.button === 0 && this.view?.pick(event);
+      const node = found && this.time === this.live.time ? this.live.nodeAt(found.part, found.point.toArray()) : null;
+      if (!node) return;
+      held = { node: node.node, point: found.point };
+      this.view.controls.enabled = false;
+      this.host.setPointerCapture(event.pointerId);
+    }, true);
+    this.host.addEventListener("pointermove", (event) => {
+      if (!held) return;
+      const status = this.live.pull(held.node, this.view.under(event, held.point).toArray());
+      if (["refused", "failed"].includes(status.code)) this.say(status.text);
+      else this.play(true);
+    });
+    for (const name of ["pointerup", "pointercancel"]) {
+      this.host.addEventListener(name, () => {
+        if (held) this.live.pull(null);
+        held = null;
+        if (this.view) this.view.controls.enabled = true;
+      });
+    }
   }
 
   // -- out of the page --------------------------------------------------------------------------------------------
@@ -664,7 +694,8 @@ export function start(payload, createEngine, model) {
     get reason() { return page.reason; },
     get time() { return page.time; },
     get statistics() { return page.live ? page.live.engine.statistics : null; },
-    value: (path) => page.track.value(path, page.track.nearest(page.time)),
+    value: (path) => (page.live && page.time === page.live.time
+      ? page.live.engine.value(path) : page.track.value(path, page.track.nearest(page.time))),
     set: (path, value) => page.set(path, value),
     advance: (time) => page.advance(time),
     reset: () => page.reset(),

@@ -226,6 +226,20 @@ export class View {
     return { part: hits[0].object.userData.part, point: hits[0].point, object: hits[0].object };
   }
 
+  /** Return the place under the pointer in the plane of the screen through a point; of a flat scene in its own plane. */
+  under(event, point) {
+    const box = this.renderer.domElement.getBoundingClientRect();
+    const at = new Vector2(
+      (2 * (event.clientX - box.left)) / box.width - 1, 1 - (2 * (event.clientY - box.top)) / box.height,
+    );
+    const ray = new Raycaster();
+    ray.setFromCamera(at, this.camera);
+    const normal = this.flat ? new Vector3(0, 1, 0) : this.camera.getWorldDirection(new Vector3());
+    const { origin, direction } = ray.ray;
+    const along = normal.dot(new Vector3().subVectors(point, origin)) / normal.dot(direction);
+    return origin.clone().addScaledVector(direction, along);
+  }
+
   /** Return the picture as it is, as a PNG file. */
   png() {
     this.render();
