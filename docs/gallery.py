@@ -9,11 +9,9 @@ from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
-from atwood import Scene, simulate
+from atwood import Scene, animate, simulate
 from atwood.plotting.pages.document import library_script
 from atwood.plotting.pages.page import make_page
-from atwood.plotting.pages.stage import set_stage
-from atwood.plotting.pages.still import still_picture
 from atwood_library.scenes import SCENES
 
 HERE = Path(__file__).parent
@@ -52,7 +50,7 @@ def _write_scene(name: str, scene: Scene) -> str:
     result = simulate(scene)
     made = make_page({result.method: result}, library="library.js")
     write(FILES / "live" / f"{name}.html", made.html)
-    still = still_picture(set_stage(result), name)
+    animate(result, FILES / "live" / f"{name}.gif", seconds=2.5, frames_per_second=8)
     told = inspect.cleandoc(type(scene).__doc__ or "").partition("\n\nParameters\n")[0]
     summary, _, more = told.partition("\n\n")
     also = HERE / "scenes" / f"{name}.md"
@@ -69,7 +67,8 @@ def _write_scene(name: str, scene: Scene) -> str:
         f"## The scene\n\n```python\n{source.read_text(encoding='utf-8')}\n```",
     ]
     write(PAGES / f"{name}.md", "\n\n".join(one for one in sections if one) + "\n")
-    return f'<a class="card" href="{name}.html">{still}<span>{name}</span></a>'
+    picture = f'<img src="../live/{name}.gif" alt="{name} in motion" loading="lazy">'
+    return f'<a class="card" href="{name}.html">{picture}<span>{name}</span></a>'
 
 
 def _grid(cards: list[str]) -> str:
