@@ -65,7 +65,7 @@ def test_what_must_be_given_has_no_default() -> None:
 def test_who_has_an_init_of_its_own_says_how_it_is_called() -> None:
     assert list(inspect.signature(OfItsOwn).parameters) == ["hardness"]
     assert list(inspect.signature(Component).parameters) == ["unnamed", "values"]
-    assert list(inspect.signature(Ground).parameters) == ["position", "angle"]
+    assert list(inspect.signature(Ground).parameters) == ["position", "angle", "axis"]
     assert next(iter(inspect.signature(Scene).parameters)) == "space"
 
 
