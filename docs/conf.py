@@ -16,12 +16,16 @@ html_theme = "furo"
 html_title = "Atwood"
 exclude_patterns = ["build", "jupyter_execute", "gallery-files"]
 html_extra_path = ["gallery-files"]  # pages that move, each a file of its own
+(ROOT / "docs" / "gallery-files").mkdir(exist_ok=True)  # the gallery is written later, and Sphinx asks for it before
 html_static_path = ["static"]
 html_css_files = ["site.css"]
 nb_execution_mode = "force"  # of pages that are notebooks: those of the course, and tutorials
 nb_execution_raise_on_error = True
 nb_execution_timeout = 120
 myst_heading_anchors = 3
+myst_enable_extensions = ["dollarmath"]
+myst_mathjax_classes = "tex2jax_process|mathjax_process|math|output_area|text_html"  # also what cells show as HTML
+mathjax3_config = {"tex": {"inlineMath": [["\\(", "\\)"], ["$", "$"]]}}
 suppress_warnings = [
     "myst.xref_missing",  # pages link to files of the repository, which stand outside of the pages
     "ref.python",  # several classes have an attribute of the same name
