@@ -53,7 +53,8 @@ function openMode(mode, options) {
     places[name] = {derived: room(one.derived), outputs: one.outputs.map(room)};
   }
   const scratch = room(Math.max(...Object.values(words).map(one => one.scratch)));
-  const [own, block, clock, y, yp, nearer] = [data.values.length, 8, 1, size, size, size + m].map(room);
+  const wide = Math.max(size, data.passage?.counts.reduce((a, b) => a + b) ?? 0); // bodies have more coordinates
+  const [own, block, clock, y, yp, nearer] = [data.values.length, 8, 1, wide, wide, size + m].map(room);
   const judged = room(4), session = room(Object.keys(FIELD).length), arrays = room(ROW.all * padded), shifts = room(count);
   const sought = room(Object.keys(SOUGHT).length), [sy, syp, shifted, turns] = [size, size, size, 2 * size].map(room);
   const rows = room(Object.keys(SEARCHED).length * count + POINTS * (1 + 2 * count));

@@ -182,7 +182,8 @@ class ModeText:
             return []
         symbols = read_by([one.value for one in reading], [one.symbol for one in self.assembly.reactions])
         kept = ReactionSolver(self.assembly, self.flat.t_start, *self.plan.program.split(y)).finding.kept
-        solved = solved_reactions(self.assembly, set(symbols), kept)
+        # Where laws compare what moves, reactions inside bodies read these as they stand, and not on their sides.
+        solved = None if self.assembly.sides else solved_reactions(self.assembly, set(symbols), kept)
         if solved is None:
             self.unknown = dict.fromkeys((one.path for one in reading), "it reads reactions that have no formulas here")
             return []
