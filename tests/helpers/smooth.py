@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
-from atwood import Model
+from atwood import Component, Model
+from atwood.model.declare.laws import Law
 from atwood_library.scenes import SCENES
 
 
 def touches(model: Model) -> bool:
-    """Tell whether a part of a model has a gap or dry friction."""
-    return any(
-        touches(part) if isinstance(part, Model) else bool(type(part).contact_laws()) for part in model.parts.values()
-    )
+    """Tell whether a part of a model has a gap or dry friction; a stop that is not set is none."""
+    return any(touches(part) if isinstance(part, Model) else rubs(part) for part in model.parts.values())
+
+
+def rubs(part: Component) -> bool:
+    """Tell whether a part has a one-sided law that acts."""
+    return any(is_set(part, law) for law in type(part).contact_laws().values())
+
+
+def is_set(part: Component, law: Law) -> bool:
+    """Tell whether all parameters are given that a one-sided law needs."""
+    return all(getattr(part, name) is not None for name in getattr(law.options, "given", ()))
 
 
 SMOOTH = {name: make for name, make in SCENES.items() if not touches(make())}

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from atwood import Scene, conserved, exp, reduced, select, simulate
-from atwood.errors import UnsupportedError
+from atwood.errors import StartError, UnsupportedError
 from atwood_library import PointMass, Potential
 from atwood_library.scenes import LagrangeTop
 
@@ -64,7 +64,7 @@ def test_a_top_keeps_three_in_euler_angles_wherever_it_starts(inclination: float
     found = conserved(LagrangeTop(inclination=inclination), orientation="euler-zxz")
     assert found.names == ("h", "p:top.euler.phi", "p:top.euler.psi")
     if inclination in (0.0, math.pi):
-        with pytest.raises(UnsupportedError, match="coordinates are singular"):
+        with pytest.raises((StartError, UnsupportedError), match=r"it starts where its coordinates .*are singular"):
             reduced(LagrangeTop(inclination=inclination))
 
 

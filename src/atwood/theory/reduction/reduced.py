@@ -262,6 +262,8 @@ def reduced(
     UnsupportedError
         If more than one coordinate is left, the energy function is not conserved, or the motion passes a place where
         coordinates are singular.
+    StartError
+        If the start is not consistent, or the coordinates are singular there.
     SolveError
         If the motion is too near to a separatrix.
     """
