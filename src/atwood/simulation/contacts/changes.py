@@ -50,6 +50,9 @@ What still rises in one interval rises by some tolerances, and rounding does not
 _NEAR_REST = 1000.0
 """The same where impacts have accumulated: what still bounces is as near as that."""
 
+_ALIKE = 100.0
+"""Gaps that come to rest together part at speeds that differ by no larger factor."""
+
 _SEEN = 2.0
 """Times what is slow: what has come to rest may go by that still, or again, where its event is seen."""
 
@@ -197,10 +200,15 @@ class _Moment:
     def stop(self, left: float) -> None:
         """Stop whatever touches: impacts have accumulated, and nothing opens any more; what has stuck goes on to."""
         still = [k for k, one in enumerate(self.first) if one.is_slip and self.before[k][0] == STICKS]
-        held = [row for k in (*self.touching, *still) for row in self.units[k]]
+        rates = self.rates()
+        speeds = {k: self.rate(k, rates) for k in self.touching}
+        # What has just bounced much faster than the others only passes: its impacts have not come to an end.
+        coming = max(0.0, *(-speed for speed in speeds.values()))
+        resting = [k for k, speed in speeds.items() if speed <= max(_ALIKE * coming, self.slow[k])]
+        held = [row for k in (*resting, *still) for row in self.units[k]]
         self._hold(held)
         self.slow = NEAR / _NEAR_REST * self.slow
-        for k in self.touching[:1]:
+        for k in resting[:1]:
             self._tell(k, "impacts have accumulated: it rests", "rests")
             self.events[-1] = replace(self.events[-1], time=self.t + left)
 
