@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -40,6 +41,9 @@ NEAR = 10.0
 
 _SPANS = 3, 12
 """At least and at most so many intervals between impacts say how fast these follow each other."""
+
+_EVEN = 3.0
+"""By so many times as many powers as ever before may the last interval have shrunk."""
 
 LEFT = 100.0
 """Times the root of the tolerance, in units of the scene's time: so long may impacts still go on that are summed.
@@ -190,6 +194,9 @@ class _Moment:
             last = time
         if len(spans) < _SPANS[0] or spans[0] <= 0.0:
             return None
+        shrinks = [math.log(before / after) for after, before in pairwise(spans)]
+        if shrinks[0] > _EVEN * max(shrinks[1:]):
+            return None  # two impacts that only happen to be near each other are no series
         share = (spans[0] / spans[-1]) ** (1.0 / (len(spans) - 1))
         left: float = spans[0] * share / (1.0 - share)
         if not left < LEFT * unit:
