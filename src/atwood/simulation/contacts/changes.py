@@ -39,13 +39,13 @@ from atwood.simulation.events.modes import EventRecord, Impact
 NEAR = 10.0
 """Times the relative tolerance, in sizes of the scene: what is nearer to zero is there."""
 
-_SPANS = 3, 12
+_SPANS = 4, 12
 """At least and at most so many intervals between impacts say how fast these follow each other."""
 
-_EVEN = 3.0
-"""By so many times as many powers as ever before may the last interval have shrunk."""
+_EVEN = 4.0
+"""Intervals of a series shrink by factors that differ by no more than this from their mean."""
 
-LEFT = 100.0
+LEFT = 10.0
 """Times the root of the tolerance, in units of the scene's time: so long may impacts still go on that are summed.
 
 What still rises in one interval rises by some tolerances, and rounding does not tell in its intervals yet.
@@ -194,10 +194,14 @@ class _Moment:
             last = time
         if len(spans) < _SPANS[0] or spans[0] <= 0.0:
             return None
-        shrinks = [math.log(before / after) for after, before in pairwise(spans)]
-        if shrinks[0] > _EVEN * max(shrinks[1:]):
-            return None  # two impacts that only happen to be near each other are no series
-        share = (spans[0] / spans[-1]) ** (1.0 / (len(spans) - 1))
+        # Impacts that only happen to be near each other are no series: each interval shrinks about as the one before.
+        ratios = np.array([after / before for after, before in pairwise(spans)])
+        typical = float(np.exp(np.mean(np.log(ratios[: _SPANS[0] - 1]))))
+        uneven = np.flatnonzero(np.abs(np.log(ratios / typical)) > math.log(_EVEN))
+        count = int(uneven[0]) if len(uneven) else len(ratios)
+        if count < _SPANS[0] - 1:
+            return None
+        share = float(np.exp(np.mean(np.log(ratios[:count]))))
         left: float = spans[0] * share / (1.0 - share)
         if not left < LEFT * unit:
             return None
