@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ctypes
 import math
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
@@ -22,27 +23,13 @@ from atwood.integrators.methods.dormand_prince import TABLEAU
 from atwood_library import Ground, PointContact, PointMass
 from atwood_library.scenes import Clutches, DoublePendulum, StickSlip
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from tests.helpers.contact_scenes import box_of_walls
+
 RTOL = 1e-10
 OF_CONTACTS = 0.01
 """Scenes with contacts run at this share of the tolerance, and so does the C."""
-
-
-def box() -> Scene:
-    """Return a ball in a box without gravity."""
-    scene = Scene(gravity=0.0)
-    ball = scene.add("m", PointMass(mass=1.0))
-    for name, place, normal in (
-        ("a", (0, 0, 0), (1, 0, 0)),
-        ("b", (1, 0, 0), (-1, 0, 0)),
-        ("c", (0, 0, 0), (0, 0, 1)),
-        ("d", (0, 0, 0.7), (0, 0, -1)),
-    ):
-        ground = scene.add(f"ground_{name}", Ground(position=place))
-        wall = scene.add(name, PointContact(normal=normal, radius=0.05, restitution=1.0))
-        scene.connect(ground.frame, wall.plane)
-        scene.connect(ball.point, wall.point)
-    scene.start.update({"m.position.x": 0.3, "m.position.z": 0.2, "m.velocity.x": 1.1, "m.velocity.z": 0.7})
-    return scene
 
 
 def block() -> Scene:
@@ -58,7 +45,7 @@ def block() -> Scene:
 
 Case = tuple[str, Callable[[], Model], float, list[float], list[int], list[float]]
 CASES: tuple[Case, ...] = (
-    ("ball in a box", box, 432.1, [0.3, 0.2, 1.1, 0.7], [0, 0, 0], []),
+    ("ball in a box", box_of_walls, 432.1, [0.3, 0.2, 1.1, 0.7], [0, 0, 0], []),
     ("mass on a belt", StickSlip, 100.0, [0.0, 0.2], [2, 0, 0], []),
     ("coupled clutches", Clutches, 1.2, [0.0] * 4 + [10.0, 0.0, 0.0, 0.0], [1, 0, 0], [0.4, 0.9]),
     ("block on a slope", block, 1e4, [0.0, 1.0], [1, 0, 0], []),

@@ -148,28 +148,8 @@ static void change(int which, double t, double *y)
 
 #include METHOD
 
-static double first_step(double t, const double *y, const double *k, double rtol, double atol, double most)
-{
-    double d0 = 0.0, d1 = 0.0, d2 = 0.0, h, steepest, z[SIZE], kz[SIZE];
-    EACH
-    {
-        const double over = 1.0 / (atol + rtol * fabs(y[i]));
-        d0 += y[i] * y[i] * over * over;
-        d1 += k[i] * k[i] * over * over;
-    }
-    h = d0 < SIZE * 1e-10 || d1 < SIZE * 1e-10 ? 1e-6 : 0.01 * sqrt(d0 / d1);
-    h = fmin(h, most);
-    EACH z[i] = y[i] + h * k[i];
-    rates(t + h, z, kz);
-    EACH
-    {
-        const double d = (kz[i] - k[i]) / (atol + rtol * fabs(y[i]));
-        d2 += d * d;
-    }
-    steepest = fmax(sqrt(d1 / SIZE), sqrt(d2 / SIZE) / h);
-    steepest = steepest <= 1e-15 ? fmax(1e-6, 1e-3 * h) : sqrt(sqrt(sqrt(0.01 / steepest)));
-    return fmin(fmin(100.0 * h, steepest), most);
-}
+#define RATES(t, y, p, k) ((void)(p), rates(t, y, k))
+#include "first_step.h"
 
 /* The first event in a step: its number and its time, by regula falsi (Illinois) on the dense output; -1 for none. */
 static int locate(double t, double h, const double *y, double d[][SIZE], const double *old, const double *new_,
@@ -228,7 +208,7 @@ long integrate(double end, double rtol, double atol, const double *times, double
 #endif
         rates(t, y, k[0]);
         events(t, y, old);
-        h = first_step(t, y, k[0], rtol, atol, ends - t);
+        h = first_step(y, k[0], rtol, atol, ends - t, t, 0);
         while (t < ends) {
             const int last = t + 1.01 * h >= ends;
             double error, factor;
@@ -262,7 +242,7 @@ long integrate(double end, double rtol, double atol, const double *times, double
                     events(t, y, old);
                     for (int e = 0; e < EVENTS; e++)
                         fresh[e] = fabs(old[e]) < 1e-10;
-                    h = first_step(t, y, k[0], rtol, atol, ends - t);
+                    h = first_step(y, k[0], rtol, atol, ends - t, t, 0);
                     rejected = 0;
                     continue;
                 }

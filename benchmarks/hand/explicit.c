@@ -14,29 +14,8 @@ static inline void rates(const double *y, const double *p, double *k)
     accelerate(y, y + LINKS, p, k + LINKS);
 }
 
-/* Hairer's first step, from the sizes of the first two derivatives. */
-static double first_step(const double *y, const double *k, const double *p, double rtol, double atol, double most)
-{
-    double d0 = 0.0, d1 = 0.0, d2 = 0.0, h, steepest, z[SIZE], kz[SIZE];
-    EACH
-    {
-        const double over = 1.0 / (atol + rtol * fabs(y[i]));
-        d0 += y[i] * y[i] * over * over;
-        d1 += k[i] * k[i] * over * over;
-    }
-    h = d0 < SIZE * 1e-10 || d1 < SIZE * 1e-10 ? 1e-6 : 0.01 * sqrt(d0 / d1);
-    h = fmin(h, most);
-    EACH z[i] = y[i] + h * k[i];
-    rates(z, p, kz);
-    EACH
-    {
-        const double d = (kz[i] - k[i]) / (atol + rtol * fabs(y[i]));
-        d2 += d * d;
-    }
-    steepest = fmax(sqrt(d1 / SIZE), sqrt(d2 / SIZE) / h);
-    steepest = steepest <= 1e-15 ? fmax(1e-6, 1e-3 * h) : pow(0.01 / steepest, 0.125);
-    return fmin(fmin(100.0 * h, steepest), most);
-}
+#define RATES(t, y, p, k) ((void)(t), rates(y, p, k))
+#include "first_step.h"
 
 /* Integrate y = (q, u) from 0 to an end; return 0, or 1 if the steps become too small.
  * Counts: steps, rejected steps, evaluations. */
@@ -49,7 +28,7 @@ int integrate(double end, double rtol, double atol, const double *p, double *y_i
     long steps = 0, failures = 0;
     EACH y[i] = y_in_out[i];
     rates(y, p, k1);
-    h = first_step(y, k1, p, rtol, atol, end);
+    h = first_step(y, k1, rtol, atol, end, 0.0, p);
     while (t < end) {
         double e3 = 0.0, e5 = 0.0, error, factor;
         const int last = t + 1.01 * h >= end;

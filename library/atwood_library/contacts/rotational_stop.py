@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from atwood import Number, Scalar, Shaft, connector, observable, parameter, unilateral
+from atwood import Number, Scalar, Shaft, connector, observable, parameter
 from atwood_library.interfaces.along_coordinates import between
 from atwood_library.interfaces.bounds import Bounded
+from atwood_library.interfaces.loads import rigid_stops
 
 __all__ = ["RotationalStop"]
 
@@ -34,24 +35,11 @@ class RotationalStop(Bounded):
         """Return the extension."""
         return between(self)[0]
 
-    @unilateral(
-        reaction="lower_torque",
+    above_lower, below_upper = rigid_stops(
+        lambda part: between(part)[0],
+        ("lower", "upper"),
+        "restitution",
         unit="N*m",
-        restitution="restitution",
-        given=["lower"],
-        doc="What the lower end exerts on b.",
+        doc="Play {way} the {end} end.",
+        reaction_doc="What the {end} end exerts on b, away from it.",
     )
-    def above_lower(self) -> Scalar:
-        """Play above the lower end."""
-        return between(self)[0] - self.lower
-
-    @unilateral(
-        reaction="upper_torque",
-        unit="N*m",
-        restitution="restitution",
-        given=["upper"],
-        doc="What the upper end exerts, against b.",
-    )
-    def below_upper(self) -> Scalar:
-        """Play below the upper end."""
-        return self.upper - between(self)[0]

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from atwood import Number, Scalar, dissipation, parameter, potential, unilateral
+from atwood import Number, Scalar, dissipation, parameter, potential
 from atwood_library.interfaces.axis_motor import AxisMotor
-from atwood_library.interfaces.loads import check_stops, damper_function, elastic_energy, stops_of
+from atwood_library.interfaces.loads import check_stops, damper_function, elastic_energy, rigid_stops, stops_of
 
 
 class LoadedHinge(AxisMotor):
@@ -51,33 +51,14 @@ class LoadedHinge(AxisMotor):
         stops = stops_of(self.stop_stiffness, self.stop_restitution, self.lower_stop, self.upper_stop)
         return elastic_energy(joint.angle, (self.stiffness, self.natural_angle), stops)
 
-    @unilateral(
-        reaction="lower_stop_torque",
+    above_lower_stop, below_upper_stop = rigid_stops(
+        lambda joint: joint.angle(),
+        ("lower_stop", "upper_stop"),
+        "stop_restitution",
         unit="N*m",
-        restitution="stop_restitution",
-        given=("lower_stop", "stop_restitution"),
-        doc="Torque of the lower stop, where it is rigid.",
-        spaces=("plane", "space"),
+        doc="Angle {way} the {end} stop.",
+        reaction_doc="Torque of the {end} stop, where it is rigid.",
     )
-    def above_lower_stop(self) -> Scalar:
-        """Angle above the lower stop."""
-        joint: Any = self
-        gap: Scalar = joint.angle() - self.lower_stop
-        return gap
-
-    @unilateral(
-        reaction="upper_stop_torque",
-        unit="N*m",
-        restitution="stop_restitution",
-        given=("upper_stop", "stop_restitution"),
-        doc="Torque of the upper stop, where it is rigid.",
-        spaces=("plane", "space"),
-    )
-    def below_upper_stop(self) -> Scalar:
-        """Angle below the upper stop."""
-        joint: Any = self
-        gap: Scalar = self.upper_stop - joint.angle()
-        return gap
 
     @dissipation
     def damper_function(self) -> Scalar:

@@ -19,9 +19,15 @@ from atwood import (
     parameter,
     potential,
     signal,
-    unilateral,
 )
-from atwood_library.interfaces.loads import check_stops, damper_function, elastic_energy, push_apart, stops_of
+from atwood_library.interfaces.loads import (
+    check_stops,
+    damper_function,
+    elastic_energy,
+    push_apart,
+    rigid_stops,
+    stops_of,
+)
 
 
 class LoadedSlide(Component):
@@ -66,31 +72,15 @@ class LoadedSlide(Component):
         stops = stops_of(self.stop_stiffness, self.stop_restitution, self.lower_stop, self.upper_stop)
         return elastic_energy(joint.displacement, (self.stiffness, self.natural_length), stops)
 
-    @unilateral(
-        reaction="lower_stop_force",
+    above_lower_stop, below_upper_stop = rigid_stops(
+        lambda joint: joint.displacement(),
+        ("lower_stop", "upper_stop"),
+        "stop_restitution",
         unit="N",
-        restitution="stop_restitution",
-        given=("lower_stop", "stop_restitution"),
-        doc="Force of the lower stop, where it is rigid.",
+        doc="Displacement {way} the {end} stop.",
+        reaction_doc="Force of the {end} stop, where it is rigid.",
+        spaces=("line", "plane", "space"),
     )
-    def above_lower_stop(self) -> Scalar:
-        """Displacement above the lower stop."""
-        joint: Any = self
-        gap: Scalar = joint.displacement() - self.lower_stop
-        return gap
-
-    @unilateral(
-        reaction="upper_stop_force",
-        unit="N",
-        restitution="stop_restitution",
-        given=("upper_stop", "stop_restitution"),
-        doc="Force of the upper stop, where it is rigid.",
-    )
-    def below_upper_stop(self) -> Scalar:
-        """Displacement below the upper stop."""
-        joint: Any = self
-        gap: Scalar = self.upper_stop - joint.displacement()
-        return gap
 
     @dissipation
     def damper_function(self) -> Scalar:

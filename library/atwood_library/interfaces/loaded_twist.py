@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from atwood import Number, Scalar, dissipation, parameter, potential, unilateral
+from atwood import Number, Scalar, dissipation, parameter, potential
 from atwood_library.interfaces.axis_motor import AxisMotor
-from atwood_library.interfaces.loads import check_stops, damper_function, elastic_energy, stops_of
+from atwood_library.interfaces.loads import check_stops, damper_function, elastic_energy, rigid_stops, stops_of
 
 
 class LoadedTwist(AxisMotor):
@@ -72,33 +72,14 @@ class LoadedTwist(AxisMotor):
         )
         return elastic_energy(joint.angle, (self.torsional_stiffness, self.natural_angle), stops)
 
-    @unilateral(
-        reaction="lower_angle_stop_torque",
+    above_lower_angle_stop, below_upper_angle_stop = rigid_stops(
+        lambda joint: joint.angle(),
+        ("lower_angle_stop", "upper_angle_stop"),
+        "angle_stop_restitution",
         unit="N*m",
-        restitution="angle_stop_restitution",
-        given=("lower_angle_stop", "angle_stop_restitution"),
-        doc="Torque of the lower stop of the angle, where it is rigid.",
-        spaces=("plane", "space"),
+        doc="Angle {way} the {end} stop.",
+        reaction_doc="Torque of the {end} stop of the angle, where it is rigid.",
     )
-    def above_lower_angle_stop(self) -> Scalar:
-        """Angle above the lower stop."""
-        joint: Any = self
-        gap: Scalar = joint.angle() - self.lower_angle_stop
-        return gap
-
-    @unilateral(
-        reaction="upper_angle_stop_torque",
-        unit="N*m",
-        restitution="angle_stop_restitution",
-        given=("upper_angle_stop", "angle_stop_restitution"),
-        doc="Torque of the upper stop of the angle, where it is rigid.",
-        spaces=("plane", "space"),
-    )
-    def below_upper_angle_stop(self) -> Scalar:
-        """Angle below the upper stop."""
-        joint: Any = self
-        gap: Scalar = self.upper_angle_stop - joint.angle()
-        return gap
 
     @dissipation
     def torsion_damper_function(self) -> Scalar:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from atwood import (
     Component,
@@ -20,6 +20,7 @@ from atwood import (
     maximum,
     minimum,
     sin,
+    unilateral,
 )
 
 __all__ = [
@@ -29,6 +30,7 @@ __all__ = [
     "damper_function",
     "elastic_energy",
     "push_apart",
+    "rigid_stops",
     "stops_of",
     "turn_apart",
 ]
@@ -88,6 +90,51 @@ def check_stops(part: Component, stiffness: float, restitution: float | None, *b
         raise ParameterError(
             "its rigid stops are nowhere", where=part.path, advice="Give where the lower or the upper is."
         )
+
+
+def rigid_stops(
+    coordinate: Callable[[Any], Scalar],
+    bounds: tuple[str, str],
+    restitution: str,
+    *,
+    unit: str,
+    doc: str,
+    reaction_doc: str,
+    spaces: Sequence[str] = ("plane", "space"),
+) -> tuple[Any, Any]:
+    """Return two laws, `above_` and `below_` the bounds, which hold where a bound and the restitution are given.
+
+    Parameters
+    ----------
+    coordinate
+        Gives displacement, m, or angle, rad, of a part.
+    bounds, restitution
+        Names of the parameters of the part: the lower and the upper bound, and what is left of a speed.
+    unit
+        Of the reactions, which are named after the bounds.
+    doc, reaction_doc
+        What is said of each gap and of its reaction; ``{way}`` is above or below, and ``{end}`` lower or upper.
+    spaces
+        The spaces in which they hold.
+    """
+
+    def law(bound: str, end: str, way: str) -> Any:
+        def gap(part: Any) -> Scalar:
+            value, limit = coordinate(part), getattr(part, bound)
+            return value - limit if way == "above" else limit - value
+
+        gap.__name__, gap.__doc__ = f"{way}_{bound}", doc.format(way=way, end=end)
+        return unilateral(
+            reaction=f"{bound}_{'force' if unit == 'N' else 'torque'}",
+            unit=unit,
+            restitution=restitution,
+            given=(bound, restitution),
+            doc=reaction_doc.format(end=end),
+            spaces=spaces,
+        )(gap)
+
+    lower, upper = bounds
+    return law(lower, "lower", "above"), law(upper, "upper", "below")
 
 
 def damper_function(rates: Callable[[], Sequence[Scalar]], damping: float) -> Scalar:

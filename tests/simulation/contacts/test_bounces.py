@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from tests.helpers.contact_scenes import box_of_walls
 
 import atwood as aw
 from atwood import Component, Point, Scalar, Scene, connector, cos, parameter, simulate, unilateral
@@ -16,20 +17,7 @@ from atwood_library import Ground, Inertia, PointContact, PointMass, RotationalS
 
 
 def in_a_box() -> tuple[Scene, float]:
-    scene = Scene(gravity=2.0)
-    m = scene.add("m", PointMass(mass=1.5))
-    for name, place, normal in (
-        ("a", (0, 0, 0), (1, 0, 0)),
-        ("b", (1, 0, 0), (-1, 0, 0)),
-        ("c", (0, 0, 0), (0.1, 0, 1)),
-        ("d", (0, 0, 0.7), (0, 0, -1)),
-    ):
-        ground = scene.add(f"ground_{name}", Ground(position=place))
-        wall = scene.add(name, PointContact(normal=normal, radius=0.05, restitution=0.95))
-        scene.connect(ground.frame, wall.plane)
-        scene.connect(m.point, wall.point)
-    scene.start.update({"m.position.x": 0.3, "m.position.z": 0.2, "m.velocity.x": 1.1, "m.velocity.z": 0.7})
-    return scene, 6.0
+    return box_of_walls(0.95, 0.1, 2.0, 1.5), 6.0
 
 
 def in_a_circle() -> tuple[Scene, float]:

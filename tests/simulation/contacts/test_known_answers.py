@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 import scipy.special
+from tests.helpers.contact_scenes import box_of_walls, rough_pendulum
 
 import atwood as aw
 from atwood import Scene, simulate
@@ -79,19 +80,6 @@ def test_a_ball_bounces_and_comes_to_rest(form: str, size: float) -> None:
 @FORMS
 def test_a_ball_in_a_box_is_reflected_as_light_is(form: str) -> None:
     """Unfolded, its way is straight: after 432.1 s the place is that of a triangle wave of each coordinate."""
-    scene = Scene(gravity=0.0)
-    m = scene.add("m", PointMass(mass=1.0))
-    for name, place, normal in (
-        ("a", (0, 0, 0), (1, 0, 0)),
-        ("b", (1, 0, 0), (-1, 0, 0)),
-        ("c", (0, 0, 0), (0, 0, 1)),
-        ("d", (0, 0, 0.7), (0, 0, -1)),
-    ):
-        ground = scene.add(f"ground_{name}", Ground(position=place))
-        wall = scene.add(name, PointContact(normal=normal, radius=0.05, restitution=1.0))
-        scene.connect(ground.frame, wall.plane)
-        scene.connect(m.point, wall.point)
-    start_at(scene, 0.3, 0.2, 1.1, 0.7)
     end = 43.21
 
     def folded(start: float, speed: float, width: float) -> tuple[float, int]:
@@ -100,7 +88,7 @@ def test_a_ball_in_a_box_is_reflected_as_light_is(form: str) -> None:
         return 0.05 + (rest if rest < width else 2.0 * width - rest), int(way // width)
 
     (x, x_hits), (z, z_hits) = folded(0.3, 1.1, 0.9), folded(0.2, 0.7, 0.6)
-    result = run(scene, form, end)
+    result = run(box_of_walls(), form, end)
     assert len(times(result, "impact")) == x_hits + z_hits
     assert result["m.position.x"][-1] == pytest.approx(x, abs=1e-9)
     assert result["m.position.z"][-1] == pytest.approx(z, abs=1e-9)
@@ -293,22 +281,7 @@ def test_two_rotors_with_play(form: str) -> None:
 
 @FORMS
 def test_a_pendulum_with_friction_in_its_hinge_stays(form: str) -> None:
-    scene = Scene()
-    ground, pivot, link = (
-        scene.add("ground", Ground()),
-        scene.add("pivot", Pivot()),
-        scene.add("link", Link(length=1.0, mass=0.0)),
-    )
-    bob, rub = (
-        scene.add("bob", PointMass(mass=1.0)),
-        scene.add("rub", RotationalFriction(sliding="0.5", against="ground")),
-    )
-    scene.connect(ground.frame, pivot.a)
-    scene.connect(pivot.b, link.a)
-    scene.connect(link.b, bob.point)
-    scene.connect(pivot.shaft, rub.b)
-    scene.start.update({"pivot.angle": 1.5 - 0.5 * math.pi, "pivot.angular_velocity": 0.0})
-    result = run(scene, form, 15.0)
+    result = run(rough_pendulum(1.5), form, 15.0)
     assert (result.events[-1].kind, result.events[-1].time) == ("sticks", pytest.approx(13.6445534015, abs=1e-9))
 
 

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.helpers.contact_scenes import rough_pendulum
 
 import atwood as aw
 from atwood import Scene, UsageError, linearize, normal_modes, simulate
@@ -16,7 +17,6 @@ from atwood_library import (
     Ground,
     Inertia,
     Link,
-    Pivot,
     PointContact,
     PointMass,
     PointOnLine,
@@ -157,29 +157,12 @@ def test_a_ladder_leans_as_long_as_friction_holds_it(form: str) -> None:
         linearize(aw.assemble(scene).with_values({"floor.friction": 0.5 * math.tan(0.3)}))
 
 
-def pendulum(angle: float) -> Scene:
-    scene = Scene()
-    ground, pivot, link = (
-        scene.add("ground", Ground()),
-        scene.add("pivot", Pivot()),
-        scene.add("link", Link(length=1.0, mass=0.0)),
-    )
-    bob, rub = (
-        scene.add("bob", PointMass(mass=1.0)),
-        scene.add("rub", RotationalFriction(sliding="0.5", against="ground")),
-    )
-    for ends in ((ground.frame, pivot.a), (pivot.b, link.a), (link.b, bob.point), (pivot.shaft, rub.b)):
-        scene.connect(*ends)
-    scene.start.update({"pivot.angle": angle - 0.5 * math.pi, "pivot.angular_velocity": 0.0})
-    return scene
-
-
 @FORMS
 def test_a_pendulum_with_friction_in_its_hinge(form: str) -> None:
-    model = linearize(pendulum(0.02), form=form)
+    model = linearize(rough_pendulum(0.02), form=form)
     assert (model.contacts, model.eigenvalues.tolist()) == ({"rub.slip": "sticks"}, [0.0])
-    result = simulate(pendulum(1.5), t_end=0.1, rtol=1e-10)
-    slips = linearize(pendulum(1.5), at=(result, 0.1), form=form)
+    result = simulate(rough_pendulum(1.5), t_end=0.1, rtol=1e-10)
+    slips = linearize(rough_pendulum(1.5), at=(result, 0.1), form=form)
     pull = G * math.cos(float(result["pivot.angle"][-1]) + 0.5 * math.pi)
     assert slips.eigenvalues**2 == pytest.approx(np.full(2, -pull), rel=1e-9)
 

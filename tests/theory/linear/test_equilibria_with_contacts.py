@@ -6,17 +6,16 @@ import math
 
 import numpy as np
 import pytest
+from tests.helpers.contact_scenes import rough_pendulum
 
 from atwood import Scene, UsageError, equilibria
 from atwood_library import (
     Ground,
     Link,
-    Pivot,
     PointContact,
     PointMass,
     PolygonContact,
     RigidBody,
-    RotationalFriction,
     Spring,
     SurfaceContact,
     VertexContact,
@@ -115,18 +114,7 @@ def test_a_ladder_leans_up_to_the_angle_of_friction() -> None:
 
 
 def test_friction_in_a_hinge_and_in_a_bowl() -> None:
-    scene = Scene()
-    ground, pivot, link = (
-        scene.add("ground", Ground()),
-        scene.add("pivot", Pivot()),
-        scene.add("link", Link(length=1.0, mass=0.0)),
-    )
-    bob, rub = (
-        scene.add("bob", PointMass(mass=1.0)),
-        scene.add("rub", RotationalFriction(sliding="0.5", against="ground")),
-    )
-    for ends in ((ground.frame, pivot.a), (pivot.b, link.a), (link.b, bob.point), (pivot.shaft, rub.b)):
-        scene.connect(*ends)
+    scene = rough_pendulum()
     found = equilibria(scene)
     wide = math.asin(0.5 / G)
     assert [round(one.values["link.angle"], 6) for one in found] == [-1.570796, 1.570796]
