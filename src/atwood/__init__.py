@@ -112,6 +112,7 @@ if TYPE_CHECKING:
         Page as Page,
         page as page,
     )
+    from atwood.plotting.pages.viewer import Viewer as Viewer
     from atwood.plotting.plots.energies import plot_energies as plot_energies
     from atwood.plotting.plots.linear import (
         plot_bode as plot_bode,
@@ -286,6 +287,7 @@ _ROOMS = {
     "atwood.plotting.diagram": ("Diagram", "diagram"),
     "atwood.plotting.drawing": ("plot_mode",),
     "atwood.plotting.pages.page": ("Page", "page"),
+    "atwood.plotting.pages.viewer": ("Viewer",),
     "atwood.plotting.plots.energies": ("plot_energies",),
     "atwood.plotting.plots.linear": ("plot_bode", "plot_branches", "plot_nyquist", "plot_root_locus"),
     "atwood.plotting.plots.reduction": ("plot_effective_potential", "plot_top_path"),

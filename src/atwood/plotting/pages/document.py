@@ -90,6 +90,33 @@ def library_script() -> str:
     return f'window.atwoodLibrary = "{_library()}";\n'
 
 
+def page_style() -> str:
+    """Return the style of all pages."""
+    return (_HERE / "page.css").read_text(encoding="utf-8")
+
+
+def _script(*names: str) -> str:
+    return "".join((_HERE / "javascript" / f"{name}.js").read_text(encoding="utf-8") for name in names)
+
+
+def widget_script() -> str:
+    """Return the module that shows packets in a notebook."""
+    return _script("unpack", "widget")
+
+
+def pack(payload: Mapping[str, Any], modules: Mapping[str, str]) -> dict[str, str]:
+    """Return the packets of a page: the library that draws, the modules, arrays, and the other data."""
+    numbers = Numbers()
+    told = json.dumps(_plain(payload, numbers), allow_nan=False)
+    texts = {name: _script(name) for name in _MODULES}
+    return {
+        "library": _library(),
+        "modules": _packed(json.dumps({**modules, **texts}).encode()),
+        "numbers": _packed(numbers.all()),
+        "payload": _packed(told.encode()),
+    }
+
+
 def write_document(payload: Mapping[str, Any], still: str, modules: Mapping[str, str], library: str = "") -> str:
     """Return the page.
 
@@ -104,22 +131,15 @@ def write_document(payload: Mapping[str, Any], still: str, modules: Mapping[str,
     library
         Where `library_script` is, for a page that does not hold it itself.
     """
-    numbers = Numbers()
-    told = json.dumps(_plain(payload, numbers), allow_nan=False)
-    texts = {name: (_HERE / "javascript" / f"{name}.js").read_text(encoding="utf-8") for name in _MODULES}
-    loader = (_HERE / "javascript" / "load.js").read_text(encoding="utf-8")
-    style = (_HERE / "page.css").read_text(encoding="utf-8")
+    loader, style = _script("unpack", "load"), page_style()
     # Only the loader's own text may run, and what it unpacks from the page; nothing may be fetched.
     digest = base64.b64encode(hashlib.sha256(loader.encode()).digest()).decode()
     shared = "'self' file: " if library else ""
     scripts = f"script-src {shared}'sha256-{digest}' blob:"
     policy = f"default-src 'none'; {scripts}; style-src 'unsafe-inline'; img-src data: blob:"
-    packed = {
-        **({} if library else {"library": _library()}),
-        "modules": _packed(json.dumps({**modules, **texts}).encode()),
-        "numbers": _packed(numbers.all()),
-        "payload": _packed(told.encode()),
-    }
+    packed = pack(payload, modules)
+    if library:
+        del packed["library"]
     holders = "".join(f'<script type="text/plain" id="{name}">{text}</script>\n' for name, text in packed.items())
     if library:
         holders += f'<script src="{escape(library)}"></script>\n'

@@ -144,8 +144,8 @@ def page(
         if one.assembly.mechanism.space.name != next(iter(results.values())).assembly.mechanism.space.name:
             raise UsageError("results in a plane and in space have no common picture", advice="Make a page of each.")
     known = list(dict.fromkeys(path for one in results.values() for path in one.paths))
-    shown = [_known(path, known, "show") for path in ([show] if isinstance(show, str) else show)]
-    bounds = dict(_bounds(text) for text in ([sliders] if isinstance(sliders, str) else sliders))
+    shown = [known_path(path, known, "show") for path in ([show] if isinstance(show, str) else show)]
+    bounds = dict(read_slider(text) for text in ([sliders] if isinstance(sliders, str) else sliders))
     made = make_page(results, shown, bounds, live)
     if len(made.html) > _LARGEST:
         raise UsageError(
@@ -183,7 +183,8 @@ def _result(one: Model | Assembly | Result | SavedResult) -> Result:
     return simulate(one.scene(), **one.settings()) if isinstance(one, SavedResult) else simulate(one)
 
 
-def _known(path: str, known: Sequence[str], where: str) -> str:
+def known_path(path: str, known: Sequence[str], where: str) -> str:
+    """Return a path, or refuse one that is no quantity."""
     if path not in known:
         raise UsageError(f"there is no quantity {path!r}", where=where, advice=suggestion(path, known))
     return path
@@ -192,7 +193,7 @@ def _known(path: str, known: Sequence[str], where: str) -> str:
 _BOUNDS = re.compile(r"(?P<path>[^=]+)(=(?P<low>[^:=]+):(?P<high>[^:=]+))?")
 
 
-def _bounds(text: str) -> tuple[str, tuple[float, float] | None]:
+def read_slider(text: str) -> tuple[str, tuple[float, float] | None]:
     """Return the path of a slider and its bounds, if it says any."""
     found = _BOUNDS.fullmatch(text.strip())
     try:
@@ -221,7 +222,25 @@ def make_page(
     library: str = "",
 ) -> Page:
     """Return the page of results; `library` says where pages of one site find what draws."""
-    bounds = bounds or {}
+    made = page_content(results, shown, bounds or {}, live)
+    html = write_document(made.payload, still_picture(made.stage, made.payload["title"]), made.modules, library)
+    return Page(html, "live" if made.modules else "recorded", made.program.reason)
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """What a page of results shows as data, its own modules, the stage of the first one, and its live program."""
+
+    payload: Mapping[str, Any]
+    modules: Mapping[str, str]
+    stage: Stage
+    program: LiveProgram
+
+
+def page_content(
+    results: Mapping[str, Result], shown: Sequence[str], bounds: Mapping[str, tuple[float, float] | None], live: str
+) -> Content:
+    """Return what a page of results holds."""
     first = next(iter(results.values()))
     stages = [set_stage(one) for one in results.values()]
     program = _live(results, bounds, live)
@@ -233,7 +252,6 @@ def make_page(
         }
     equations, latex = _equations(first)
     name = first.assembly.flat.name
-    still = still_picture(stages[0], name)
     payload = {
         "title": name,
         "name": re.sub(r"[^\w.-]+", "-", name),
@@ -252,8 +270,7 @@ def make_page(
         "about": _about(first),
         "report": repr(first),
     }
-    html = write_document(payload, still, modules, library)
-    return Page(html, "live" if modules else "recorded", program.reason)
+    return Content(payload, modules, stages[0], program)
 
 
 def _live(results: Mapping[str, Result], bounds: Mapping[str, object], live: str) -> LiveProgram:

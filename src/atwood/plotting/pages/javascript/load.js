@@ -1,41 +1,14 @@
-// Unpacks what is in the page and starts it.  Nothing is asked of any network.
+// Starts a page from what is packed in it.  Nothing is asked of any network.
 (async () => {
-  const failed = (text) => {
+  try {
+    // Pages of a site share the library.
+    const packed = await unpackPage((id) => document.getElementById(id)?.textContent ?? window.atwoodLibrary);
+    packed.start(packed.payload, packed.createEngine, packed.model);
+  } catch (error) {
     const notice = document.createElement("p");
     notice.className = "notice";
-    notice.textContent = `The page could not start: ${text}`;
+    notice.textContent = `The page could not start: ${error.message}`;
     document.body.prepend(notice);
-  };
-  const unpack = async (id) => {
-    const packed = document.getElementById(id)?.textContent ?? window.atwoodLibrary; // pages of a site share the library
-    const bytes = Uint8Array.from(atob(packed), (c) => c.charCodeAt(0));
-    return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
-  };
-  const text = async (id) => new TextDecoder().decode(await unpack(id));
-  try {
-    const modules = { ...JSON.parse(await text("library")), ...JSON.parse(await text("modules")) };
-    const urls = {};
-    for (const [name, source] of Object.entries(modules)) { // each after those that it imports
-      const resolved = source.replace(/from\s*"\.\/([\w.-]+)\.js"/g, (_, other) => `from "${urls[other]}"`);
-      urls[name] = URL.createObjectURL(new Blob([resolved], { type: "text/javascript" }));
-    }
-    const numbers = await unpack("numbers");
-    const types = { f4: Float32Array, f8: Float64Array, i4: Int32Array };
-    const array = ({ $: type, at, count, row }) => { // of each row the first bytes of its numbers come first
-      const made = new types[type](count);
-      const [from, to, width] = [new Uint8Array(numbers, at), new Uint8Array(made.buffer), made.BYTES_PER_ELEMENT];
-      for (let o = 0; o < count * width; o += row * width) {
-        for (let b = 0; b < width; b += 1) for (let k = 0; k < row; k += 1) to[o + k * width + b] = from[o + b * row + k];
-      }
-      return made;
-    };
-    const payload = JSON.parse(await text("payload"), (key, value) => (value && value.$ ? array(value) : value));
-    const { start } = await import(urls.page);
-    const engine = urls.engine ? await import(urls.engine) : {};
-    const model = urls.model ? (await import(urls.model)).model : null;
-    start(payload, engine.createEngine, model);
-  } catch (error) {
-    failed(error.message);
     throw error;
   }
 })();

@@ -11,8 +11,8 @@ const FIRST_SLIDERS = 8; // where none are asked for
 const FRAME_MS = 12; // what a frame may take for the motion
 
 class Page {
-  constructor(payload, createEngine, model) {
-    Object.assign(this, { payload, speed: 1, playing: false, loops: true, time: 0 });
+  constructor(payload, createEngine, model, host) {
+    Object.assign(this, { payload, embedded: host, speed: 1, playing: false, loops: true, time: 0 });
     this.runs = payload.runs.map((run, k) => ({
       ...run, track: Track.recorded(run), tint: payload.runs.length > 1 ? COLOURS[k % COLOURS.length] : null,
     }));
@@ -53,9 +53,9 @@ class Page {
   // -- the document ---------------------------------------------------------------------------------------------
 
   build() {
-    const root = document.getElementById("page");
-    const still = document.getElementById("still");
-    still.remove();
+    const root = this.embedded?.root ?? document.getElementById("page");
+    const still = this.embedded ? "" : document.getElementById("still");
+    if (still) still.remove();
     const { payload } = this;
     const label = `Moving picture of ${payload.title}; arrow keys turn it, plus and minus come nearer and go away`;
     this.host = element("div", { class: "view", role: "application", tabindex: 0, "aria-label": label });
@@ -110,7 +110,7 @@ class Page {
       this.button("Save the picture", "PNG", () => this.view?.png().then((blob) => download(`${this.payload.name}.png`, blob))),
       this.button("Save all values", "CSV", () => this.saveTable()),
       this.button("Save a video", "WebM", (event) => this.video(event.currentTarget)),
-      this.button("Copy a link with what is set", "Link", (event) => this.copyLink(event.currentTarget)));
+      this.embedded ? null : this.button("Copy a link with what is set", "Link", (event) => this.copyLink(event.currentTarget)));
   }
 
   /** Return a switch and a scale for each kind of vectors that parts have. */
@@ -294,6 +294,7 @@ class Page {
     const apply = (value, source) => {
       const status = this.set(one.path, value);
       if (status.code === "refused") return;
+      this.embedded?.told({ [one.path]: value });
       for (const other of [number, range]) if (other !== source) other.value = value;
     };
     range.addEventListener("input", () => apply(Number(range.value), range));
@@ -311,7 +312,15 @@ class Page {
     return status;
   }
 
+  /** Set what another one than the slider asks for. */
+  put(path, value) {
+    const status = this.set(path, value);
+    if (status.code !== "refused") for (const input of [this.inputs.get(path).number, this.inputs.get(path).range]) input.value = value;
+    return status;
+  }
+
   asScene() {
+    this.embedded?.told(null);
     this.live.set(Object.fromEntries([...this.inputs].map(([path, one]) => [path, one.value])));
     for (const one of this.inputs.values()) one.number.value = one.range.value = one.value;
     this.reset();
@@ -450,6 +459,7 @@ class Page {
   // -- what is shown -----------------------------------------------------------------------------------------------
 
   show() {
+    this.embedded?.moved();
     const { first, last } = this.track;
     this.slider.value = last > first ? (1000 * (this.time - first)) / (last - first) : 0;
     this.clock.textContent = `${this.time.toFixed(3)} s`;
@@ -620,7 +630,7 @@ class Page {
 
   /** Set what a link asks for; what it names wrongly is said. */
   readLink() {
-    const asked = [...new URLSearchParams(window.location.hash.slice(1))];
+    const asked = this.embedded ? [] : [...new URLSearchParams(window.location.hash.slice(1))];
     this.linked = asked.length > 0;
     const settable = this.live ? [...this.inputs.keys()] : [];
     const problems = [];
@@ -634,9 +644,8 @@ class Page {
         for (const path of paths) if (!this.units.has(path)) problems.push(this.unknown(path, [...this.units.keys()]));
       } else if (!settable.includes(key)) problems.push(this.unknown(key, settable));
       else {
-        const status = this.set(key, Number(text));
+        const status = this.put(key, Number(text));
         if (status.code === "refused") problems.push(status.text);
-        else for (const input of [this.inputs.get(key).number, this.inputs.get(key).range]) input.value = text;
       }
     }
     if (time !== null && Number.isFinite(time)) {
@@ -685,9 +694,13 @@ function copy(text, button) {
   navigator.clipboard.writeText(text).then(() => told("Copied"), () => window.prompt("Copy this:", text));
 }
 
-/** Build the page, and give those who embed it a way to it. */
-export function start(payload, createEngine, model) {
-  const page = new Page(payload, createEngine, model);
+/** Build the page, and give those who embed it a way to it; a `host` has a root, and is told what is set and that time moves. */
+export function start(payload, createEngine, model, host = null) {
+  const page = new Page(payload, createEngine, model, host);
+  const { dataset } = host ? host.root : document.documentElement;
+  if (page.reason) dataset.reason = page.reason;
+  dataset.mode = page.mode;
+  if (host) return page;
   window.atwood = {
     ready: true,
     get mode() { return page.mode; },
@@ -701,7 +714,5 @@ export function start(payload, createEngine, model) {
     reset: () => page.reset(),
     play: (on) => page.play(on),
   };
-  if (page.reason) document.documentElement.dataset.reason = page.reason;
-  document.documentElement.dataset.mode = page.mode;
   return page;
 }

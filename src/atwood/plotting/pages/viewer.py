@@ -1,0 +1,169 @@
+"""A scene in a notebook, moved by sliders there and by Python, each of which hears of the other."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from atwood.arguments import TEXT, instance, number, takes
+from atwood.errors import UsageError, suggestion
+from atwood.forms.assembly import Assembly
+from atwood.model.compose.composite import Model
+from atwood.pipeline import simulate
+from atwood.plotting.pages.document import pack, page_style, widget_script
+from atwood.plotting.pages.page import PATH_LIST, SLIDERS, known_path, page_content, read_slider
+from atwood.result.result import Result
+
+
+class Viewer:
+    """A page of a scene as a widget: what its sliders set is here, and what is set here is shown by them.
+
+    It needs ``pip install 'atwood[notebook]'``. A cell that returns it shows it; its `widget` stands in layouts of
+    ipywidgets.
+
+    Parameters
+    ----------
+    scene
+        A scene, which is simulated; its assembly; or a result.
+    show, sliders
+        See `page`.
+
+    Attributes
+    ----------
+    widget
+        The widget, by anywidget.
+    result
+        The run that is shown, or that the live page begins with.
+
+    Raises
+    ------
+    UsageError
+        If anywidget is missing, or a path is not known.
+    """
+
+    @takes(
+        scene=instance("a scene, its assembly, or a Result", Model, Assembly, Result), show=PATH_LIST, sliders=SLIDERS
+    )
+    def __init__(
+        self, scene: Model | Assembly | Result, *, show: str | Sequence[str] = (), sliders: str | Sequence[str] = ()
+    ) -> None:
+        if importlib.util.find_spec("anywidget") is None:
+            raise UsageError(
+                "a viewer needs anywidget, which is not installed", advice="pip install 'atwood[notebook]'"
+            )
+        self._shown = [show] if isinstance(show, str) else list(show)
+        self._bounds = dict(read_slider(text) for text in ([sliders] if isinstance(sliders, str) else sliders))
+        self.result = scene if isinstance(scene, Result) else simulate(scene)
+        self._first: dict[str, dict[str, float]] = {}
+        self._reason = ""
+        for path in self._shown:
+            known_path(path, list(self.result.paths), "show")
+        self.widget = _make_widget(self._packets())
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Parameters that can be set, with what they are now, in SI units."""
+        return self._now("parameters")
+
+    @property
+    def start(self) -> dict[str, float]:
+        """Start values that can be set, with what they are now, in SI units."""
+        return self._now("starts")
+
+    @property
+    def time(self) -> float:
+        """The time that is shown, s."""
+        return float(self.widget.time)
+
+    @takes(path=TEXT, value=number())
+    def set(self, path: str, value: float) -> None:
+        """Set a parameter or a start value, in SI units, as its slider does.
+
+        Raises
+        ------
+        UsageError
+            If there is none that can be set.
+        AtwoodError
+            If the value is not admissible.
+        """
+        self._check(path)
+        settings = {**self.widget.settings, path: float(value)}
+        self._assembly(settings)
+        self.widget.settings = settings
+
+    @takes(result=instance("a Result, as simulate returns it", Result))
+    def show(self, result: Result) -> None:
+        """Show a result in the place of what is shown; its parameters and its start are those that are set then."""
+        for path in self._shown:
+            known_path(path, list(result.paths), "show")
+        self.result = result
+        packets = self._packets()
+        with self.widget.hold_sync():
+            self.widget.settings = {}
+            self.widget.packets = packets
+
+    def run(self, **options: Any) -> Result:
+        """Simulate the scene with what is set, and show it.
+
+        Parameters
+        ----------
+        options
+            See `simulate`.
+        """
+        self.show(simulate(self._assembly(self.widget.settings), **options))
+        return self.result
+
+    def __repr__(self) -> str:
+        return f"<Viewer of {self.result.assembly.flat.name}, t = {self.time:g} s>"
+
+    def _repr_mimebundle_(self, **options: Any) -> Any:
+        return self.widget._repr_mimebundle_(**options)
+
+    def _packets(self) -> dict[str, str]:
+        content = page_content({self.result.method: self.result}, self._shown, self._bounds, "auto")
+        self._reason, data = content.program.reason, content.program.data if content.modules else {}
+        self._first = {
+            kind: {one["path"]: float(one["value"]) for one in data.get(kind, ())} for kind in ("parameters", "starts")
+        }
+        return pack(content.payload, content.modules)
+
+    def _check(self, path: str) -> None:
+        known = [*self._first["parameters"], *self._first["starts"]]
+        if path in known:
+            return
+        advice = suggestion(path, known) if known else f"The page is not live: {self._reason}"
+        raise UsageError("nothing of that name can be set here", where=path, advice=advice)
+
+    def _now(self, kind: str) -> dict[str, float]:
+        settings = self.widget.settings
+        return {path: settings.get(path, value) for path, value in self._first[kind].items()}
+
+    def _assembly(self, settings: Mapping[str, float]) -> Assembly:
+        """Return the scene with what is set."""
+        starts = {path: value for path, value in settings.items() if path in self._first["starts"]}
+        assembly, values = self.result.assembly, dict[str, Any]()
+        for path, value in settings.items():
+            whole, bracket, number_of = path.partition("[")
+            if bracket:  # one component of a vector
+                part, _, name = whole.rpartition(".")
+                vector = values.setdefault(whole, list(assembly.flat.parts[part].values[name]))
+                vector[int(number_of[:-1])] = value
+            elif path not in starts:
+                values[path] = value
+        return assembly.with_values(values, start=starts)
+
+
+def _make_widget(packets: Mapping[str, str]) -> Any:
+    """Return the widget; its class is made when it is asked for, since anywidget need not be there."""
+    import anywidget
+    import traitlets
+
+    class ViewerWidget(anywidget.AnyWidget):
+        _esm = widget_script()
+        look = traitlets.Unicode(page_style()).tag(sync=True)
+        packets = traitlets.Dict().tag(sync=True)
+        settings = traitlets.Dict().tag(sync=True)
+        time = traitlets.Float(0.0).tag(sync=True)
+
+    return ViewerWidget(packets=dict(packets))
