@@ -39,6 +39,13 @@ def test_pages_are_shown_in_frames(show: Callable[..., Any], tmp_path: Path) -> 
         frame.wait_for_selector(f"html[data-mode={mode}]")
         assert frame.evaluate("atwood.advance(0.5).code") == "reached"
         assert frame.evaluate("atwood.value('rod1.angle')") == pytest.approx(result["rod1.angle"][-1], abs=1e-6)
+        frame.get_by_role("button", name="Copy a link").click()
+        frame.get_by_text("Copied").wait_for()
+    # The link of a page in a frame is the whole page.
+    tab.goto(tab.frames[1].evaluate("location.href.split('#')[0]") + "#t=0.25&rod1.length=1.2")
+    tab.wait_for_selector("html[data-mode=live]")
+    assert tab.evaluate("atwood.time") == 0.25
+    assert tab.get_by_label("rod1.length, number").input_value() == "1.2"
 
 
 def test_a_widget_tells_what_is_set_and_hears_it(show: Callable[..., Any], tmp_path: Path) -> None:

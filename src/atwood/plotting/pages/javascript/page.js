@@ -691,7 +691,16 @@ function copy(text, button) {
     button.textContent = said;
     setTimeout(() => { button.textContent = before; }, 1500);
   };
-  navigator.clipboard.writeText(text).then(() => told("Copied"), () => window.prompt("Copy this:", text));
+  const another = () => { // in the frame of a notebook the clipboard is not to be had
+    const field = element("textarea", { readonly: true }, text);
+    button.after(field);
+    field.select();
+    const done = document.execCommand("copy");
+    field.remove();
+    if (done) told("Copied");
+    else window.prompt("Copy this:", text);
+  };
+  (navigator.clipboard?.writeText(text) ?? Promise.reject(new Error())).then(() => told("Copied"), another);
 }
 
 /** Build the page, and give those who embed it a way to it; a `host` has a root, and is told what is set and that time moves. */
