@@ -1,5 +1,7 @@
 """Pages in notebooks: in a frame, and as a widget whose other end is played here."""
 
+import base64
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -49,9 +51,7 @@ def test_pages_are_shown_in_frames(show: Callable[..., Any], tmp_path: Path) -> 
 
 
 def test_a_widget_tells_what_is_set_and_hears_it(show: Callable[..., Any], tmp_path: Path) -> None:
-    import base64
-    import json
-
+    pytest.importorskip("anywidget")
     viewer = Viewer(simulate(SCENES["double-pendulum"](), t_end=0.5, outputs=11), sliders="rod1.length=0.5:2")
     state = {name: getattr(viewer.widget, name) for name in ("look", "packets", "settings", "time")}
     module = base64.b64encode(widget_script().encode()).decode()

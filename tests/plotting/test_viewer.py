@@ -33,12 +33,22 @@ def test_what_is_set_is_run_and_shown(viewer: Viewer) -> None:
     assert viewer._repr_mimebundle_()
 
 
-def test_components_of_vectors_are_set() -> None:
-    viewer = Viewer(simulate(SCENES["heavy-top"](), t_end=0.1, outputs=3))
-    viewer.set("top.moments[2]", 1.01 * viewer.parameters["top.moments[2]"])
-    wanted = viewer.parameters["top.moments[2]"]
-    viewer.run(t_end=0.1, outputs=3)
-    assert viewer.parameters["top.moments[2]"] == wanted
+@pytest.mark.parametrize(
+    ("name", "path"),
+    [
+        ("heavy-top", "top.moments[2]"),
+        ("chain", "rod[3].length"),
+        ("four-bar-row", "ground[1].position[0]"),
+        ("overhead-crane", "rope.motion[hoist]"),
+        ("foucault-pendulum", "gravity"),
+    ],
+)
+def test_numbers_in_vectors_arrays_and_functions_are_set(name: str, path: str) -> None:
+    viewer = Viewer(simulate(SCENES[name](), t_end=0.01, outputs=3))
+    wanted = 1.01 * viewer.parameters[path]
+    viewer.set(path, wanted)
+    viewer.run(t_end=0.01, outputs=3)
+    assert viewer.parameters[path] == wanted
 
 
 def test_what_cannot_be_set_is_refused(viewer: Viewer, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 from atwood.arguments import TEXT, instance, number, takes
 from atwood.errors import UsageError, suggestion
 from atwood.forms.assembly import Assembly
+from atwood.forms.other_values import Slot, find_slots
 from atwood.model.compose.composite import Model
 from atwood.pipeline import simulate
 from atwood.plotting.pages.document import pack, page_style, widget_script
@@ -54,12 +55,9 @@ class Viewer:
             )
         self._shown = [show] if isinstance(show, str) else list(show)
         self._bounds = dict(read_slider(text) for text in ([sliders] if isinstance(sliders, str) else sliders))
-        self.result = scene if isinstance(scene, Result) else simulate(scene)
         self._first: dict[str, dict[str, float]] = {}
         self._reason = ""
-        for path in self._shown:
-            known_path(path, list(self.result.paths), "show")
-        self.widget = _make_widget(self._packets())
+        self.widget = _make_widget(self._take(scene if isinstance(scene, Result) else simulate(scene)))
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -95,10 +93,7 @@ class Viewer:
     @takes(result=instance("a Result, as simulate returns it", Result))
     def show(self, result: Result) -> None:
         """Show a result in the place of what is shown; its parameters and its start are those that are set then."""
-        for path in self._shown:
-            known_path(path, list(result.paths), "show")
-        self.result = result
-        packets = self._packets()
+        packets = self._take(result)
         with self.widget.hold_sync():
             self.widget.settings = {}
             self.widget.packets = packets
@@ -120,9 +115,13 @@ class Viewer:
     def _repr_mimebundle_(self, **options: Any) -> Any:
         return self.widget._repr_mimebundle_(**options)
 
-    def _packets(self) -> dict[str, str]:
-        content = page_content({self.result.method: self.result}, self._shown, self._bounds, "auto")
-        self._reason, data = content.program.reason, content.program.data if content.modules else {}
+    def _take(self, result: Result) -> dict[str, str]:
+        """Take up a result, and return the packets that show it."""
+        for path in self._shown:
+            known_path(path, list(result.paths), "show")
+        content = page_content({result.method: result}, self._shown, self._bounds, "auto")
+        self.result, self._reason = result, content.program.reason
+        data = content.program.data if content.modules else {}
         self._first = {
             kind: {one["path"]: float(one["value"]) for one in data.get(kind, ())} for kind in ("parameters", "starts")
         }
@@ -140,18 +139,38 @@ class Viewer:
         return {path: settings.get(path, value) for path, value in self._first[kind].items()}
 
     def _assembly(self, settings: Mapping[str, float]) -> Assembly:
-        """Return the scene with what is set."""
+        """Return the scene with what is set, and nothing else changed."""
+        before = self.result.assembly
         starts = {path: value for path, value in settings.items() if path in self._first["starts"]}
-        assembly, values = self.result.assembly, dict[str, Any]()
+        slots, values = {slot.path: slot for _, slot in find_slots(before.flat)}, dict[str, Any]()
         for path, value in settings.items():
-            whole, bracket, number_of = path.partition("[")
-            if bracket:  # one component of a vector
-                part, _, name = whole.rpartition(".")
-                vector = values.setdefault(whole, list(assembly.flat.parts[part].values[name]))
-                vector[int(number_of[:-1])] = value
-            elif path not in starts:
-                values[path] = value
-        return assembly.with_values(values, start=starts)
+            if path in starts:
+                continue
+            slot = slots[path]
+            if isinstance(slot.axis, int):  # one component of a vector
+                whole = f"{slot.part}.{slot.name}"
+                values.setdefault(whole, list(before.flat.parts[slot.part].values[slot.name]))[slot.axis] = value
+            else:
+                values[path if slot.axis is None else _read_by_name(before, slot)] = value
+        made = before.with_values(values, start=starts)
+        for slot in dict(find_slots(made.flat)).values():
+            now = slot.read(made.flat)
+            if slot.path not in settings and isinstance(now, float) and now != slots[slot.path].read(before.flat):
+                raise UsageError(
+                    f"{slot.path} follows what is set here, so that the page and Python would differ",
+                    where=", ".join(settings),
+                    advice="Set the parameter in the scene, and make a viewer of that.",
+                )
+        return made
+
+
+def _read_by_name(assembly: Assembly, slot: Slot) -> str:
+    """Return the parameter of the scene that a function takes by its name."""
+    assert assembly.source is not None
+    assert assembly.source.scene is not None
+    part = assembly.source.scene[slot.part]
+    scope = part._parent if slot.name in part._settings else part
+    return ".".join(filter(None, (scope.path, str(slot.axis))))
 
 
 def _make_widget(packets: Mapping[str, str]) -> Any:

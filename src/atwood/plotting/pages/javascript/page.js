@@ -381,6 +381,12 @@ class Page {
     if (on) requestAnimationFrame((now) => this.tick(now));
   }
 
+  /** Give back what the picture holds of the graphics card, of which a browser has few. */
+  close() {
+    this.play(false);
+    this.view?.renderer.forceContextLoss();
+  }
+
   tick(now) {
     if (!this.playing) return;
     const passed = this.lastFrame === null ? 0 : Math.min(0.1, (now - this.lastFrame) / 1000);

@@ -16,17 +16,18 @@ export default {
       }, PACE_MS);
     };
     const settle = () => { // set what was set in Python
+      if (!page.live) return;
       const wanted = model.get("settings");
       for (const path of new Set([...Object.keys(wanted), ...Object.keys(applied)])) {
-        const value = wanted[path] ?? page.inputs?.get(path)?.value;
-        if (value !== (applied[path] ?? page.inputs?.get(path)?.value)) page.put(path, value);
+        const value = wanted[path] ?? page.inputs.get(path)?.value;
+        if (value !== (applied[path] ?? page.inputs.get(path)?.value)) page.put(path, value);
       }
       applied = { ...wanted };
     };
     const show = async () => {
       build += 1;
       const mine = build;
-      page?.play(false);
+      page?.close();
       page = null;
       applied = {};
       const root = document.createElement("div");
@@ -58,7 +59,7 @@ export default {
       model.off("change:settings", changed);
       clearTimeout(timer);
       build += 1;
-      page?.play(false);
+      page?.close();
       page = null;
     };
   },
