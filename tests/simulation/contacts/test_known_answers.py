@@ -76,6 +76,17 @@ def test_a_ball_bounces_and_comes_to_rest(form: str, size: float) -> None:
     assert result["c.gap_state"][-1] == 1.0
 
 
+@FORMS
+@pytest.mark.parametrize("rtol", [1e-6, 1e-10])
+def test_what_bounces_and_slides_is_rubbed_until_its_impacts_have_accumulated(form: str, rtol: float) -> None:
+    """With e 1/2, mu 1/10, from the floor at (3, 2): hop k takes 4/(g 2^k) at 2.4 + 0.6/2^k; then 2.4 m/s slides away."""
+    scene = on_plane(PointMass(mass=2.0), PointContact(restitution=0.5, friction=0.1))
+    start_at(scene, 0.0, 0.0, 3.0, 2.0)
+    result = simulate(scene, form=form, t_end=4.0, rtol=rtol, outputs=[0.0, 4.0])
+    assert result["m.position.x"][-1] == pytest.approx(51.2 / G, abs=10.0 * rtol)
+    assert times(result, "sticks") == pytest.approx([32.0 / G], abs=10.0 * rtol)
+
+
 @pytest.mark.sample(1)
 @FORMS
 def test_a_ball_in_a_box_is_reflected_as_light_is(form: str) -> None:

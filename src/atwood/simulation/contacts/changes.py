@@ -216,12 +216,34 @@ class _Moment:
         # What has just bounced much faster than the others only passes: its impacts have not come to an end.
         coming = max(0.0, *(-speed for speed in speeds.values()))
         resting = [k for k, speed in speeds.items() if speed <= max(_ALIKE * coming, self.slow[k])]
-        held = [row for k in (*resting, *still) for row in self.units[k]]
-        self._hold(held)
         self.slow = NEAR / _NEAR_REST * self.slow
+        self._end_impacts(resting, still)
         for k in resting[:1]:
             self._tell(k, "impacts have accumulated: it rests", "rests")
             self.events[-1] = replace(self.events[-1], time=self.t + left)
+
+    def _end_impacts(self, resting: list[int], still: list[int]) -> None:
+        """Take away the rates of gaps, and rub as much.
+
+        Impulses yet to come are those of the forces that press from now on, and this one, with a rest of one sign or
+        the other: what still rises has been pressed, and rubbed, too much so far. What would turn round sticks.
+        """
+        values, rates = self.values, self.rates()
+        slips = [k for k in self.slips_at(resting) if k not in still and values.gap_of[k] >= 0]
+        sliding = self._going(slips, rates)
+        while True:
+            states = [
+                (GOES_ON, sliding[k])
+                if k in sliding
+                else (STICKS if k in resting or k in still or k in slips else OPEN, (0.0,) * len(rows))
+                for k, rows in enumerate(self.units)
+            ]
+            after = rates + values.response @ (push := forces_in(values, states, rates))
+            turned = [k for k, way in sliding.items() if float(np.dot(after[list(self.units[k])], way)) <= 0.0]
+            if not turned:
+                break
+            sliding = {k: way for k, way in sliding.items() if k not in turned}
+        self.u = self.u + values.speeds_by(push)
 
     def _impact(self, touching: list[int], rates: FloatArray) -> None:
         values, count = self.values, len(self.contacts)
@@ -462,12 +484,20 @@ def states_of(layout: Layout, held: Sequence[float]) -> list[State]:
     return found
 
 
-def forces_in(values: ContactValues, states: Sequence[State]) -> FloatArray:
-    """Return the forces of all rows in some states of the units, whatever their signs and sizes are."""
-    free, count = values.accelerations(), len(values.contacts)
+def forces_in(values: ContactValues, states: Sequence[State], rates: FloatArray | None = None) -> FloatArray:
+    """Return the forces of all rows in some states of the units, or impulses, whatever their signs and sizes are.
+
+    Parameters
+    ----------
+    values, states
+        Gaps and slips, and what they do.
+    rates
+        Of all rows, which impulses take away where something sticks; accelerations are, by forces, if not given.
+    """
+    free, count = values.accelerations() if rates is None else rates, len(values.contacts)
     forces = np.zeros(count)
     for _ in range(_MOST_TURNS):
-        limits = values.limits_at(forces)
+        limits = values.limits_at(forces) if rates is None else _of_impulses(values.limits_at(forces))
         matrix, right = np.eye(count), np.zeros(count)
         for number, (rows, (state, way)) in enumerate(zip(values.units, states, strict=True)):
             for row, part in zip(rows, way, strict=True):
