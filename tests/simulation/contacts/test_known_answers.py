@@ -79,7 +79,7 @@ def test_a_ball_bounces_and_comes_to_rest(form: str, size: float) -> None:
 @FORMS
 @pytest.mark.parametrize("rtol", [1e-6, 1e-10])
 def test_what_bounces_and_slides_is_rubbed_until_its_impacts_have_accumulated(form: str, rtol: float) -> None:
-    """With e 1/2, mu 1/10, from the floor at (3, 2): hop k takes 4/(g 2^k) at 2.4 + 0.6/2^k; then 2.4 m/s slides away."""
+    """With e 1/2, mu 1/10, from the floor at (3, 2): hop k takes 4/(g 2^k) at 2.4 + 0.6/2^k; then 2.4 m/s go."""
     scene = on_plane(PointMass(mass=2.0), PointContact(restitution=0.5, friction=0.1))
     start_at(scene, 0.0, 0.0, 3.0, 2.0)
     result = simulate(scene, form=form, t_end=4.0, rtol=rtol, outputs=[0.0, 4.0])
