@@ -7,13 +7,12 @@ from pathlib import Path
 
 import click
 
-from atwood.arguments import FILE, FLAG, TEXT, each, optional, whole
+from atwood.arguments import FILE, FLAG, optional, whole
 from atwood.cli.command import Request, command
 from atwood.cli.output import print_json
 from atwood.cli.running import run_of
 from atwood.cli.scenes import prepare
 from atwood.errors import UsageError
-from atwood.lazy_dataclasses import replace
 from atwood.pipeline import assemble, simulate
 from atwood.plotting.diagram import diagram
 from atwood.plotting.pages.page import check_target, page
@@ -79,9 +78,6 @@ def draw(request: Request) -> None:
 
 
 _PAGE = {
-    "file": (FILE, None),
-    "show": (each(replace(TEXT, word="PATH"), "paths of quantities"), None),
-    "sliders": (each(replace(TEXT, word="PATH"), "paths"), None),
     "mode": (optional(whole("the number of a mode", 0)), None),
     "recorded": (FLAG, False),
     "open": (FLAG, False),
@@ -94,7 +90,7 @@ COMMANDS = {
         simulate,
         assemble,
         page,
-        leave=("name", "samples", "live", "file", "show", "sliders"),
+        leave=("name", "samples", "live"),
         more=_PAGE,
         names={"file": "--output,-o"},
     ),

@@ -21,6 +21,9 @@ COLOURS = ("#2a6fbb", "#d1495b", "#2e9e6b", "#c98a1b", "#7b5ea7", "#3aa6b9", "#8
 
 INK, GREY = "#22303c", "#8d99a6"
 
+STEEL, SHADE, PALE, ROPE = "#c8d3de", "#b4c2cf", "#e7ecf1", "#a8642a"
+"""Bodies and their marked faces, wheels, ropes."""
+
 SUFFIXES = (".png", ".svg", ".pdf")
 
 ANIMATED = (".gif", ".webp", ".mp4")

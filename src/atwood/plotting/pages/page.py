@@ -23,6 +23,7 @@ from atwood.model.declare.component import Component
 from atwood.pipeline import simulate
 from atwood.plotting.diagram import draw_diagram
 from atwood.plotting.live import LiveProgram, engine_script, live_program
+from atwood.plotting.live.parameters import with_sliders
 from atwood.plotting.pages.document import kept_text, write_document
 from atwood.plotting.pages.stage import Stage, set_stage
 from atwood.plotting.pages.still import still_picture
@@ -275,13 +276,12 @@ def page_content(
 
 def _live(results: Mapping[str, Result], bounds: Mapping[str, object], live: str) -> LiveProgram:
     """Return the scene as a program of the page, or why it is none."""
-    first = next(iter(results.values()))
-    found = live_program(first.assembly, sliders=list(bounds), drag=True)
-    if live == "never":
-        return replace(found, reason="a record was asked for", model="")
-    if len(results) > 1:
-        return replace(found, reason="several results are compared", model="")
-    return found
+    first = next(iter(results.values())).assembly
+    if live == "auto" and len(results) == 1:
+        return live_program(first, sliders=list(bounds), drag=True)
+    with_sliders(first, list(bounds))  # refuses what is none
+    reason = "a record was asked for" if live == "never" else "several results are compared"
+    return LiveProgram(first.flat.name, first.form, reason)
 
 
 def _engine_sources() -> Iterator[bytes]:

@@ -16,7 +16,7 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.mechanics.kinematics.orientation import body_offsets, plain
 from atwood.plotting.camera import DEFAULT_VIEW, as_camera
-from atwood.plotting.canvas import COLOURS, GREY, INK
+from atwood.plotting.canvas import COLOURS, GREY, INK, PALE
 from atwood.plotting.planar.geometry import Picture, Shape, make_picture
 from atwood.plotting.planar.strokes import Pen, seen_from_front
 from atwood.plotting.scene3d.picture import SpacePicture, make_space_picture
@@ -229,17 +229,13 @@ def _flat_items(picture: Picture, pen: Pen, shape: Shape, number: Mapping[int, i
     if shape.kind == "curve" and shape.line is not None:
         return [{**told, **_line(shape.line, 1.6, GREY)}]
     if shape.kind == "spiral":
-        turn = np.linspace(0.0, 5.0 * np.pi, 80)
-        out = pen.unit * (0.6 + 2.2 * turn / turn[-1])
-        return [{**told, **_line(np.column_stack([out * np.cos(turn), out * np.sin(turn)]), 1.1, INK)}]
+        return [{**told, **_line(pen.spiral(), 1.1, INK)}]
     if shape.kind == "pivot":
         return [{**told, "kind": "disc", "size": 0.8 * pen.unit, "colour": "#ffffff", "edge": INK}]
     if shape.kind == "pulley":
-        radius = picture.radii.get(shape.nodes[0], 2.2 * pen.unit)
-        hub = min(0.16 * radius, pen.unit)
         return [
-            {**told, "kind": "disc", "size": 0.97 * radius, "colour": "#e7ecf1", "edge": INK},
-            {**told, "kind": "disc", "size": hub, "colour": INK, "edge": INK},
+            {**told, "kind": "disc", "size": size, "colour": colour, "edge": INK}
+            for size, colour in zip(pen.wheel(shape), (PALE, INK), strict=True)
         ]
     if shape.kind == "mass":
         return _flat_mass(pen, shape, told)
@@ -259,14 +255,13 @@ def _line(points: FloatArray | None, width: float, colour: str) -> Item:
 def _flat_solid(shape: Shape, told: Item) -> list[Item]:
     assert shape.surface is not None
     mesh = shape.surface
-    front, borders = seen_from_front(mesh)
+    faces, borders = seen_from_front(mesh)
     page = _flat(mesh.vertices[:, [0, 2]]).astype(np.float32)
-    found: list[Item] = []
-    for colour, chosen in (("#c8d3de", front & ~mesh.marked), ("#b4c2cf", front & mesh.marked)):
-        if np.any(chosen):
-            found.append(
-                {**told, "kind": "mesh", "vertices": page, "faces": _triangles(mesh.faces[chosen]), "colour": colour}
-            )
+    found: list[Item] = [
+        {**told, "kind": "mesh", "vertices": page, "faces": _triangles(seen), "colour": colour}
+        for colour, seen in faces.items()
+        if len(seen)
+    ]
     return [*found, {**told, "kind": "edges", "points": page[borders].reshape(-1, 3), "width": 1.3, "colour": INK}]
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray, IndexArray
 from atwood.numerics.rank import decompose
-from atwood.plotting.canvas import COLOURS, GREY, INK
+from atwood.plotting.canvas import COLOURS, GREY, INK, PALE, ROPE, SHADE, STEEL
 from atwood.plotting.planar.geometry import Picture, Shape, hanging
 from atwood.plotting.shapes.meshes import Mesh
 from atwood.plotting.sheet import Sheet
@@ -120,7 +119,7 @@ class Pen:
 
     def _link(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
         front = look["zorder"]
-        for colour, width in ((INK, 8.0), ("#c8d3de", 5.6)):
+        for colour, width in ((INK, 8.0), (STEEL, 5.6)):
             tone = self._tone(colour)
             sheet.line(points, color=tone, linewidth=width, solid_capstyle="round", zorder=front)
 
@@ -130,10 +129,10 @@ class Pen:
         mesh, angle = shape.surface, float(self.picture.angles[shape.nodes[0]][moment])
         c, s = np.cos(angle), np.sin(angle)
         page = points[0] + mesh.vertices[:, [0, 2]] @ np.array([[c, s], [-s, c]])
-        front, borders = seen_from_front(mesh)
-        for tone, chosen in (("#c8d3de", front & ~mesh.marked), ("#b4c2cf", front & mesh.marked)):
+        faces, borders = seen_from_front(mesh)
+        for tone, seen in faces.items():
             colour = self._tone(tone)
-            sheet.polygons(page[mesh.faces[chosen]], [colour], [colour], linewidth=0.4, **look)
+            sheet.polygons(page[seen], [colour], [colour], linewidth=0.4, **look)
         sheet.lines(page[borders], [self._tone(INK)], 1.3, capstyle="round", **look)
 
     def _curve(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
@@ -144,10 +143,13 @@ class Pen:
         sheet.line(line, color=self._tone(GREY), linewidth=1.6, solid_joinstyle="round", **look)
 
     def _spiral(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
+        sheet.line(points[0] + self.spiral(), color=self._tone(INK), linewidth=1.1, **look)
+
+    def spiral(self) -> FloatArray:
+        """Return the line of a spiral spring about its middle, m."""
         turn = np.linspace(0.0, 5.0 * np.pi, 80)
         out = self.unit * (0.6 + 2.2 * turn / turn[-1])
-        line = points[0] + np.column_stack([out * np.cos(turn), out * np.sin(turn)])
-        sheet.line(line, color=self._tone(INK), linewidth=1.1, **look)
+        return np.column_stack([out * np.cos(turn), out * np.sin(turn)])
 
     def _pivot(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
         style: dict[str, Any] = {"markerfacecolor": "white", "markeredgecolor": self._tone(INK), "markeredgewidth": 1.4}
@@ -176,17 +178,22 @@ class Pen:
             return  # it was let go, and its ends are farther apart than it is long
         if len(points) == 2 and spare > 0.0 and not self.picture.direction:
             points = hanging(points, spare)
-            sheet.line(points, color=self._tone("#a8642a"), linewidth=1.6, **look)
+            sheet.line(points, color=self._tone(ROPE), linewidth=1.6, **look)
             return
         line = _rope_line(points, [self.picture.radii.get(node, 0.0) for node in shape.nodes])
-        sheet.line(line, color=self._tone("#a8642a"), linewidth=1.6, solid_joinstyle="round", **look)
+        sheet.line(line, color=self._tone(ROPE), linewidth=1.6, solid_joinstyle="round", **look)
 
     def _pulley(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
-        radius = self.picture.radii.get(shape.nodes[0], 2.2 * self.unit)
-        style = {"facecolor": self._tone("#e7ecf1"), "edgecolor": self._tone(INK), "linewidth": 1.3}
-        sheet.circle(points[0], 0.97 * radius, **style, **look)
+        rim, hub = self.wheel(shape)
+        style = {"facecolor": self._tone(PALE), "edgecolor": self._tone(INK), "linewidth": 1.3}
+        sheet.circle(points[0], rim, **style, **look)
         style = {"facecolor": self._tone(INK), "edgecolor": "none"}
-        sheet.circle(points[0], min(0.16 * radius, self.unit), **style, **look)
+        sheet.circle(points[0], hub, **style, **look)
+
+    def wheel(self, shape: Shape) -> tuple[float, float]:
+        """Return the radii of a pulley and of its hub as they are drawn, m."""
+        radius = self.picture.radii.get(shape.nodes[0], 2.2 * self.unit)
+        return 0.97 * radius, min(0.16 * radius, self.unit)
 
     def _mass(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
         if shape.size <= 0.0:
@@ -213,10 +220,11 @@ class Pen:
         return half, np.array([low, (high[0], low[1]), high, (low[0], high[1])])
 
 
-def seen_from_front(mesh: Mesh) -> tuple[NDArray[np.bool_], IndexArray]:
-    """Return which faces of a surface look towards the front, and the ends of the edges where these end."""
+def seen_from_front(mesh: Mesh) -> tuple[dict[str, IndexArray], IndexArray]:
+    """Return by colour the faces of a surface that look towards the front, and the ends of the edges where they end."""
     front = mesh.normals[:, 1] < -1e-9  # the eye looks along y
-    return front, mesh.border(front)
+    faces = {STEEL: mesh.faces[front & ~mesh.marked], SHADE: mesh.faces[front & mesh.marked]}
+    return faces, mesh.border(front)
 
 
 def draw_trace(sheet: Sheet, points: FloatArray, colour: str) -> None:

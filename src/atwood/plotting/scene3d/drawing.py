@@ -9,7 +9,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.plotting.camera import Camera
-from atwood.plotting.canvas import GREY, INK, new_figure, titled
+from atwood.plotting.canvas import GREY, INK, PALE, ROPE, new_figure, titled
 from atwood.plotting.scene3d.model import AXIS_COLOURS, SpaceModel
 from atwood.plotting.scene3d.painter import Stage, to_rgb
 from atwood.plotting.scene3d.picture import SpacePicture, Trail
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-_ROPE, _ROD = "#a8642a", "#5d6b78"
+_ROD = "#5d6b78"
 
 
 def draw_space(sheet: Sheet, picture: SpacePicture, moment: int) -> None:
@@ -94,7 +94,7 @@ def _draw_rod(stage: Stage, points: FloatArray, aside: FloatArray) -> None:
 
 
 def _draw_rope(stage: Stage, points: FloatArray, aside: FloatArray) -> None:
-    stage.line(points + aside, _ROPE, 1.6)
+    stage.line(points + aside, ROPE, 1.6)
 
 
 def _draw_spring(stage: Stage, points: FloatArray, aside: FloatArray) -> None:
@@ -113,7 +113,7 @@ def _draw_damper(stage: Stage, points: FloatArray, aside: FloatArray) -> None:
     cup = min(9.0 * stage.unit, 0.4 * float(np.linalg.norm(b - a)))
     middle = 0.5 * (a + b) + aside
     stage.line(np.array([a, a + aside, middle, b + aside, b]), INK, 1.2)
-    stage.mesh(cylinder(1.4 * stage.unit, cup, around=20).placed(middle, frame_along(b - a)), "#e7ecf1")
+    stage.mesh(cylinder(1.4 * stage.unit, cup, around=20).placed(middle, frame_along(b - a)), PALE)
 
 
 _TIES: dict[str, Callable[[Stage, FloatArray, FloatArray], None]] = {

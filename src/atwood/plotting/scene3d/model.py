@@ -8,11 +8,11 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.lazy_dataclasses import dataclass
-from atwood.plotting.canvas import COLOURS
+from atwood.plotting.canvas import COLOURS, STEEL
 from atwood.plotting.scene3d.body_shapes import BodyShape, shape_of
 from atwood.plotting.scene3d.pieces import Bench, Piece, Tip
 from atwood.plotting.scene3d.reading import Joining, Reading, Tie
-from atwood.plotting.scene3d.turning_parts import FORK, STEEL, WHITE, add_gimbals, add_shafts, add_tops, pale
+from atwood.plotting.scene3d.turning_parts import FORK, WHITE, add_gimbals, add_shafts, add_tops, pale
 from atwood.plotting.shapes.meshes import box, cylinder, frame_along, revolved
 
 AXIS_COLOURS = (COLOURS[1], COLOURS[2], COLOURS[0])

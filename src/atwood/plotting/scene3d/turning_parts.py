@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.plotting.canvas import COLOURS
+from atwood.plotting.canvas import COLOURS, STEEL
 from atwood.plotting.scene3d.body_shapes import BodyShape
 from atwood.plotting.scene3d.pieces import Bench, Hinge, Tip
 from atwood.plotting.shapes.meshes import cylinder, frame_along, revolved, ring
 
-STEEL, WHITE = "#c8d3de", "#ffffff"
+WHITE = "#ffffff"
 
 FORK = 8.0
 """Half the width of a fork around a cross, in units."""

@@ -211,15 +211,20 @@ export class View {
     this.renderer.render(this.scene, this.camera);
   }
 
-  /** Return the part under a place of the window, and where it is hit; null where there is nothing. */
-  pick(event) {
+  /** Return the line of sight through the pointer. */
+  rayAt(event) {
     const box = this.renderer.domElement.getBoundingClientRect();
-    const at = new Vector2(
-      (2 * (event.clientX - box.left)) / box.width - 1, 1 - (2 * (event.clientY - box.top)) / box.height,
-    );
+    const across = (2 * (event.clientX - box.left)) / box.width - 1;
+    const up = 1 - (2 * (event.clientY - box.top)) / box.height;
     const ray = new Raycaster();
     ray.params.Line2 = { threshold: 6 };
-    ray.setFromCamera(at, this.camera);
+    ray.setFromCamera(new Vector2(across, up), this.camera);
+    return ray;
+  }
+
+  /** Return the part under a place of the window, and where it is hit; null where there is nothing. */
+  pick(event) {
+    const ray = this.rayAt(event);
     const hits = ray.intersectObjects(this.runs.map((run) => run.shapes.group), true).filter((hit) => hit.object.userData.part);
     if (!hits.length) return null;
     if (this.flat) hits.sort((a, b) => b.object.renderOrder - a.object.renderOrder);
@@ -228,14 +233,8 @@ export class View {
 
   /** Return the place under the pointer in the plane of the screen through a point; of a flat scene in its own plane. */
   under(event, point) {
-    const box = this.renderer.domElement.getBoundingClientRect();
-    const at = new Vector2(
-      (2 * (event.clientX - box.left)) / box.width - 1, 1 - (2 * (event.clientY - box.top)) / box.height,
-    );
-    const ray = new Raycaster();
-    ray.setFromCamera(at, this.camera);
     const normal = this.flat ? new Vector3(0, 1, 0) : this.camera.getWorldDirection(new Vector3());
-    const { origin, direction } = ray.ray;
+    const { origin, direction } = this.rayAt(event).ray;
     const along = normal.dot(new Vector3().subVectors(point, origin)) / normal.dot(direction);
     return origin.clone().addScaledVector(direction, along);
   }
