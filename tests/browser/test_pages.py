@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from atwood import Scene, assemble, page, simulate
+from atwood import Scene, assemble, equilibria, page, simulate
+from atwood.plotting.pages.modes import mode_page
 from atwood_library import Ground, PointMass, Rod
 from atwood_library.scenes import SCENES
 
@@ -64,6 +65,22 @@ def test_a_recorded_page_shows_the_values_of_the_run_and_says_why(show: Callable
     assert float(shown.inner_text()) == result["ball.position.z"][k]
     assert float(shown.get_attribute("data-t")) == result.time[k]
     assert tab.locator("html").get_attribute("data-reason") == made.reason
+
+
+def test_a_mode_swings_as_wide_as_asked_and_shows_its_shape(show: Callable[..., Any], tmp_path: Path) -> None:
+    modes = next(one.modes for one in equilibria(SCENES["four-bar"]()) if one.stable)
+    mode_page(modes, 0).save(tmp_path / "a.html")
+    tab = show(tmp_path / "a.html", "t=0")
+    amplitude = tab.get_by_label("Amplitude, in steps")
+    for step, wanted in (("1", 0.1), ("4", 0.3)):
+        amplitude.fill(step)
+        said = tab.get_by_label("Amplitude", exact=True).inner_text()
+        assert float(said.partition("±")[2].split()[0]) == pytest.approx(wanted, rel=0.01)
+        swung = modes.motion(0, wanted, 61)
+        assert tab.evaluate("atwood.value('rocker.angle')") == pytest.approx(swung["rocker.angle"][0], abs=1e-12)
+    cells = tab.get_by_role("table", name="Shape of the mode").get_by_role("cell").all_inner_texts()
+    assert any(text == f"{modes.shapes[0]['rocker.angle'].real:.4g} rad" for text in cells)
+    assert f"{modes.frequencies[0]:.6g} Hz, period {modes.periods[0]:.6g} s" in tab.locator("header").inner_text()
 
 
 @pytest.mark.parametrize("name", ["double-pendulum", "four-bar", "lagrange-top", "stewart-platform"])

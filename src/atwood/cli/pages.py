@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import webbrowser
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -15,8 +16,7 @@ from atwood.cli.scenes import prepare
 from atwood.errors import UsageError
 from atwood.pipeline import assemble, simulate
 from atwood.plotting.diagram import diagram
-from atwood.plotting.pages.page import check_target, page
-from atwood.result.result import Result
+from atwood.plotting.pages.page import Page, check_target, page
 
 
 def write_page(request: Request) -> None:
@@ -33,14 +33,17 @@ def write_page(request: Request) -> None:
     """
     target = Path(f"{Path(request.scene).stem}.html") if request.file is None else request.file
     check_target(target)
-    result = run_of(request) if request.mode is None else _mode(request)
-    made = page(
-        result,
-        target,
-        show=request.show or (),
-        sliders=request.sliders or (),
-        live="never" if request.recorded or request.mode is not None else "auto",
-    )
+    shown = request.show or ()
+    if request.mode is None:
+        made = page(
+            run_of(request),
+            target,
+            show=shown,
+            sliders=request.sliders or (),
+            live="never" if request.recorded else "auto",
+        )
+    else:
+        made = _mode(request, shown).save(target)
     if request.as_json:
         print_json({"file": str(target), "mode": made.mode, "reason": made.reason, "bytes": target.stat().st_size})
     else:
@@ -50,13 +53,14 @@ def write_page(request: Request) -> None:
         webbrowser.open(target.absolute().as_uri())
 
 
-def _mode(request: Request) -> Result:
-    """Return a small oscillation about the start, or about the first stable equilibrium."""
+def _mode(request: Request, shown: Sequence[str]) -> Page:
+    """Return the page of a small oscillation about the start, or about the first stable equilibrium."""
     from atwood.cli.theory import modes_of_scene
+    from atwood.plotting.pages.modes import mode_page
 
     scene, name = prepare(request.scene, request.settings, request.start_values)
     found = modes_of_scene(assemble(scene, name=name, **request.of(assemble)))
-    return found[0].motion(request.mode, frames=121)
+    return mode_page(found[0], request.mode, shown)
 
 
 def draw(request: Request) -> None:

@@ -262,7 +262,7 @@ def page_content(
         "show": list(shown) or _first_shown(first),
         "sliders": bounds,
         "runs": [
-            _run(label, one, stage, not program.model)
+            run_data(label, one, stage, not program.model)
             for (label, one), stage in zip(results.items(), stages, strict=True)
         ],
         "equations": equations,
@@ -303,7 +303,7 @@ def _first_shown(result: Result) -> list[str]:
     return (found or list(result.paths))[:3]
 
 
-def _run(label: str, result: Result, stage: Stage, is_whole: bool) -> dict[str, Any]:
+def run_data(label: str, result: Result, stage: Stage, is_whole: bool) -> dict[str, Any]:
     """Return what a page holds of a result; of one that it computes itself, how it begins."""
     shown = slice(None) if is_whole else slice(0, 2)
     table = result.table()

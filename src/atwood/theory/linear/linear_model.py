@@ -201,11 +201,13 @@ class LinearModel(Shown):
     def tables(self) -> tuple[Table, ...]:
         """Return states, inputs, outputs and eigenvalues, and the matrices where there are few states."""
         zeros = f"; {self.spectrum.zeros} times 0" if self.spectrum.zeros else ""
+        swinging = [value for value in self.spectrum.others if value.imag > 0.0]
         rows = [
             ("states", ", ".join(self.states)),
             ("inputs", ", ".join(self.inputs) or "none: name some with --input"),
             ("outputs", ", ".join(self.outputs) or "none: name some with --output"),
             ("eigenvalues", ", ".join(complex_text(value) for value in self.spectrum.others) + f" 1/s{zeros}"),
+            *([("frequencies", ", ".join(map(_oscillation, swinging)))] if swinging else []),
             *([("contacts", words_text(self.contacts))] if self.contacts else []),
             ("stability", "no deviation grows" if self.is_stable else "some deviations grow"),
         ]
@@ -234,6 +236,10 @@ _GROWING = 1e-9
 """Relative to the fastest eigenvalue: a real part below it is rounding."""
 
 _ABOUT = {"rest": "state of rest", "steady motion": "steady motion", "motion": "state of a motion"}
+
+
+def _oscillation(value: complex) -> str:
+    return f"{value.imag / (2.0 * np.pi):.6g} Hz with damping ratio {-value.real / abs(value):.4g}"
 
 
 def complex_text(value: complex) -> str:

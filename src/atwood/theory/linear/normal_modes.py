@@ -89,6 +89,19 @@ class NormalModes(Shown):
         return self.angular_frequencies / (2.0 * np.pi)
 
     @property
+    def periods(self) -> FloatArray:
+        """Periods, s; infinite for modes that do not oscillate."""
+        found: FloatArray = np.full(len(self), np.inf)
+        return np.divide(1.0, self.frequencies, out=found, where=self.frequencies > 0.0)
+
+    @property
+    def damping_ratios(self) -> FloatArray:
+        """Shares of the critical damping; negative for modes that grow, not a number for free ones."""
+        size = np.abs(self.eigenvalues)
+        found: FloatArray = np.full(len(self), np.nan)
+        return np.divide(0.0 - self.growth_rates, size, out=found, where=size > 0.0)
+
+    @property
     def is_stable(self) -> bool:
         """Whether no mode grows."""
         return bool(np.all(self.growth_rates <= 1e-9 * np.max(np.abs(self.eigenvalues), initial=0.0)))
@@ -126,15 +139,17 @@ class NormalModes(Shown):
     def to_data(self) -> dict[str, Any]:
         """Return them as plain data, for JSON."""
         shapes = [{path: _number(value) for path, value in shape.items()} for shape in self.shapes]
-        told = data_of(self, "scene", "contacts", "values", "angular_frequencies", "growth_rates")
+        told = data_of(
+            self, "scene", "contacts", "values", "angular_frequencies", "growth_rates", "periods", "damping_ratios"
+        )
         return {**told, "shapes": shapes, "spaces": plain(self.spaces)}
 
     def tables(self) -> tuple[Table, ...]:
         """Return frequencies, growth and shape of each mode."""
-        columns = zip(self.angular_frequencies, self.frequencies, self.growth_rates, self.shapes, strict=True)
+        numbers = self.angular_frequencies, self.frequencies, self.periods, self.growth_rates, self.damping_ratios
         rows = [
-            (str(k), f"{omega:.9g}", f"{hertz:.6g}", f"{growth:.6g}", shape_text(shape))
-            for k, (omega, hertz, growth, shape) in enumerate(columns)
+            (str(k), f"{omega:.9g}", *(f"{one:.6g}" for one in others), shape_text(shape))
+            for k, (omega, *others, shape) in enumerate(zip(*numbers, self.shapes, strict=True))
         ]
         notes = [
             f"Modes {', '.join(map(str, group))} have equal eigenvalues: any combination of them is a mode."
@@ -143,7 +158,11 @@ class NormalModes(Shown):
         ]
         notes += [f"Contacts: {words_text(self.contacts)}."] if self.contacts else []
         title = f"{self.scene}: {len(self)} modes about {values_text(self.values)}"
-        return (table(("mode", "rad/s>", "Hz>", "growth, 1/s>", "shape"), rows, title, notes),)
+        return (
+            table(
+                ("mode", "rad/s>", "Hz>", "period, s>", "growth, 1/s>", "damping ratio>", "shape"), rows, title, notes
+            ),
+        )
 
     __str__ = Shown.as_text
 

@@ -22,6 +22,8 @@ class Page {
     this.vectors = [];
     this.mode = "recorded";
     this.reason = payload.reason;
+    this.swings = payload.oscillation?.swings.map((one) => ({ ...one, track: Track.recorded(one) }));
+    if (this.swings) this.speed = payload.oscillation.speed;
     if (model && createEngine) this.goLive(createEngine, model);
     this.time = this.track.first;
     this.build();
@@ -88,7 +90,7 @@ class Page {
     this.clock = element("output", { class: "clock", "aria-label": "Time, s" });
     this.pace = element("span", { class: "pace" });
     const speeds = element("select", { "aria-label": "Speed", onchange: (event) => { this.speed = Number(event.target.value); } },
-      ...SPEEDS.map((one) => element("option", { value: one, selected: one === 1 }, `${one} ×`)));
+      ...SPEEDS.map((one) => element("option", { value: one * this.speed, selected: one === 1 }, `${shortNumber(one * this.speed, 2)} ×`)));
     const loop = element("input", { type: "checkbox", checked: true, onchange: (event) => { this.loops = event.target.checked; } });
     this.marks = element("div", { class: "marks" });
     return element("div", { class: "timebar" },
@@ -131,7 +133,9 @@ class Page {
   }
 
   tabs() {
-    const pages = [["Curves", this.curves()], ["Energy", this.energies()]];
+    const pages = [["Curves", this.curves()]];
+    if (this.swings) pages.unshift(["Shape", this.shape()]);
+    else pages.push(["Energy", this.energies()]);
     if (this.live) pages.unshift(["Set", this.settings()]);
     if (this.payload.equations) pages.push(["Equations", this.written(this.payload.equations)]);
     pages.push(["Parts", this.parts()], ["About", this.about()]);
@@ -140,7 +144,7 @@ class Page {
       const id = `panel-${name.toLowerCase()}`;
       const panel = element("div", { class: "panel", role: "tabpanel", id, hidden: k > 0, "aria-label": name, tabindex: 0 }, content);
       const tab = element("button", {
-        type: "button", role: "tab", "aria-selected": k === 0, "aria-controls": id, onclick: () => this.choose(name),
+        type: "button", role: "tab", "aria-selected": String(k === 0), "aria-controls": id, onclick: () => this.choose(name),
       }, name);
       list.append(tab);
       return { name, panel, tab };
@@ -158,6 +162,39 @@ class Page {
 
   isOpen(name) {
     return this.panels?.some((one) => one.name === name && !one.panel.hidden);
+  }
+
+  // -- a small oscillation --------------------------------------------------------------------------------------
+
+  /** Return how wide it is to be, and its shape as bars: to the right and to the left, or, with phases, their sizes. */
+  shape() {
+    const { shape, largest, first } = this.payload.oscillation;
+    const out = element("output", { "aria-label": "Amplitude" });
+    const swing = (k) => {
+      const { track, energy } = this.swings[k];
+      Object.assign(this.runs[0], { track, energy });
+      if (!track.places.has(largest)) return;
+      const values = track.series(largest);
+      const half = 0.5 * (Math.max(...values) - Math.min(...values));
+      out.textContent = `${largest} swings by ±${shortNumber(half, 3)}${unitText(this.units.get(largest))}`;
+    };
+    swing(first);
+    const range = element("input", { type: "range", min: 0, max: this.swings.length - 1, step: 1, value: first, "aria-label": "Amplitude, in steps", class: "alone",
+      oninput: () => { swing(Number(range.value)); this.show(); } });
+    const isReal = shape.every((one) => one.signed !== null);
+    const most = Math.max(...shape.map((one) => one.size)) || 1;
+    const bars = shape.map(({ path, size, signed, degrees, unit }) => {
+      const bar = element("span", { class: "bar" });
+      const share = (isReal ? 50 : 100) * (size / most);
+      bar.style.left = `${isReal ? (signed < 0 ? 50 - share : 50) : 0}%`;
+      bar.style.width = `${share}%`;
+      const value = isReal ? shortNumber(signed, 4) : `${shortNumber(size, 4)} at ${shortNumber(degrees, 3)}°`;
+      return element("tr", {}, element("th", { scope: "row" }, path),
+        element("td", {}, element("div", { class: isReal ? "bars signed" : "bars", "aria-hidden": true }, bar)),
+        element("td", { class: "number" }, `${value}${unitText(unit)}`));
+    });
+    return element("div", {}, element("div", { class: "slider" }, element("label", {}, "Amplitude"), range, out),
+      element("table", { class: "shape", "aria-label": "Shape of the mode" }, ...bars));
   }
 
   // -- curves ---------------------------------------------------------------------------------------------------
