@@ -11,6 +11,7 @@ from collections.abc import Callable
 from math import inf, isfinite
 
 import numpy as np
+from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.errors import StartError, UsageError
@@ -153,6 +154,10 @@ class ExplicitSession(SteppingSession):
         elif events is not None and self._notices and read is not None:
             self._compiled = CompiledLocator(problem, events, read, horizon, signs)
         return self._compiled or super()._new_locator(horizon, signs)
+
+    def nearest(self, t: FloatArray, y: FloatArray) -> NDArray[np.bool_] | None:
+        """Take states, one row each, onto the constraints as steps are; return which could be, None where none can."""
+        return self._stepper.nearest(t, y)
 
     def set_monitor(self, monitor: StepMonitor) -> bool:
         """Let the motion be looked at, and end with `Status.NOTICED` where something is seen; return whether it can."""

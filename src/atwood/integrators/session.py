@@ -9,6 +9,7 @@ from math import inf
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, UsageError
@@ -53,6 +54,10 @@ class Session(ABC):
         An event that the session has just reported at this time, and whose value is still about zero, does not
         happen again.  Explicit methods find the rates by themselves.
         """
+
+    def nearest(self, t: FloatArray, y: FloatArray) -> NDArray[np.bool_] | None:
+        """Take states, one row each, onto the constraints as steps are; return which could be, None where none can."""
+        return None
 
     @property
     @abstractmethod

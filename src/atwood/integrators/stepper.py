@@ -132,6 +132,10 @@ class Stepper(ABC):
         """Come back with `Outcome.NOTICED` whenever the problem seems stiff, where that can be told."""
         return
 
+    def nearest(self, t: FloatArray, y: FloatArray) -> NDArray[np.bool_] | None:
+        """Take states, one row each, onto the constraints as steps are; return which could be, None where none can."""
+        return None
+
     def set_monitor(self, monitor: StepMonitor) -> bool:
         """Let the motion be looked at, and come back where something is seen; return whether it can."""
         return False

@@ -16,6 +16,7 @@ from math import inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.codegen.llvm.build import RoutineSource, once
@@ -166,6 +167,14 @@ class CompiledStepper(NativeStepper):
             return None
         self._set(waits=0)
         return self._count("found")
+
+    def nearest(self, t: FloatArray, y: FloatArray) -> NDArray[np.bool_] | None:
+        """Take states, one row each, onto the constraints as steps are; return which could be, None where none can."""
+        if self._calls_python or not self._count("project"):
+            return None
+        project, data = _PROJECTION(self._count("project")), self._count("project_data")
+        places = range(y.ctypes.data, y.ctypes.data + y.nbytes, y.nbytes // len(y))
+        return np.array([project(*one, data) == 0 for one in zip(t.tolist(), places, strict=True)], dtype=np.bool_)
 
     def set_monitor(self, monitor: StepMonitor) -> bool:
         """Let the motion be looked at, and come back with `Outcome.NOTICED` where something is seen."""

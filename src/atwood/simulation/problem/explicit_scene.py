@@ -79,6 +79,19 @@ def first_order(kernel: BoundKernel, coordinates: int) -> Callable[[float, Float
     return rates
 
 
+def first_order_rows(kernel: BoundKernel, coordinates: int) -> Callable[[FloatArray, FloatArray], FloatArray]:
+    """Return the same for many states, one row each, from a kernel for many."""
+
+    def rates(t: FloatArray, states: FloatArray) -> FloatArray:
+        u = states[:, coordinates:].T
+        found = kernel(t[None, :], states[:, :coordinates].T, u)
+        first = u if len(found) == 1 else found[0]
+        both = [np.broadcast_to(one, (len(one), len(states))) for one in (first, found[-1])]
+        return np.concatenate(both).T
+
+    return rates
+
+
 def compiled_rates(assembly: Assembly, found: AccelerationProgram) -> CompiledAccelerations:
     """Return the accelerations of a scene as machine code, for any parameter values."""
     return assembly.shared.get(_COMPILED, lambda: CompiledAccelerations(found.program), found)

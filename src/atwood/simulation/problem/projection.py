@@ -8,7 +8,8 @@ safe where constraints nearly depend on each other.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +23,12 @@ from atwood.simulation.problem.problem import SceneProblem
 from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
-    from atwood.numerics.sparse_batch import Normal
+    from atwood.numerics.sparse_batch import Normal, Pattern
 
 
 _NORMAL: Key[Normal] = Key("normal equations of the constraints")
+
+_PATTERN: Key[Pattern] = Key("where the constraint Jacobian has entries")
 
 _LEAST = 1e-17
 """What is less is less than rounding, although it may go on to shrink."""
@@ -40,6 +43,10 @@ _FEW, _MANY = 12, 100
 
 _CHUNK = 4_000_000
 """Numbers in the matrices that are worked on at once."""
+
+
+Nearest: TypeAlias = Callable[[FloatArray, FloatArray], NDArray[np.bool_] | None]
+"""Takes states, one row each, onto the constraints, and says for which it could; None where it can for none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,23 +73,28 @@ class Projected:
 class ConstraintsAt:
     """Constraints at many states, each in units of how much it changes with a displacement of the size that counts.
 
-    The slope is of shape (states, constraints, coordinates), or (entries, states) with normal equations; the units,
-    in `rows`, of shape (states, constraints).
+    The slopes are entries of a pattern, of shape (entries, states); the units, in `rows`, of shape (states,
+    constraints).
     """
 
     value: FloatArray
-    jacobian: FloatArray
+    entries: FloatArray
     explicit_rate: FloatArray
     kept: list[int]
+    pattern: Pattern
     normal: Normal | None
     rows: FloatArray
 
+    @cached_property
+    def jacobian(self) -> FloatArray:
+        """The slopes as arrays, of shape (states, constraints, coordinates)."""
+        full = np.zeros((len(self.value), *self.pattern.shape))
+        full[:, self.pattern.rows, self.pattern.columns] = self.entries.T
+        return full
+
     def rate(self, speeds: FloatArray) -> FloatArray:
         """Return the constraints on velocity for speeds in units of the scales, shape (states, number)."""
-        if self.normal is not None:
-            return self.normal.whole.times(self.jacobian, speeds.T).T + self.explicit_rate
-        moved: FloatArray = np.einsum("smn,sn->sm", self.jacobian, speeds)
-        return moved + self.explicit_rate
+        return self.pattern.times(self.entries, speeds.T).T + self.explicit_rate
 
     def step(self, right: FloatArray, rows: Sequence[int] | None = None) -> FloatArray:
         """Return the shortest displacements that change independent constraints by so much."""
@@ -95,18 +107,22 @@ class ConstraintsAt:
         """Return what gives such displacements for one right-hand side after another."""
         kept = self.kept
         if self.normal is not None:
-            solve = self.normal.factorised(self.jacobian)
+            solve = self.normal.factorised(self.entries)
             return lambda right: solve(right[:, kept].T).T
         dense = _least_norm(self.jacobian[:, kept])
         return lambda right: dense(right[:, kept])
 
 
-def project_states(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray) -> Projected:
-    """Return the nearest states that fulfil the constraints on position and velocity."""
+def project_states(
+    plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray, nearest: Nearest | None = None
+) -> Projected:
+    """Return the nearest states that fulfil the constraints on position and velocity.
+
+    What machine code finds, if it is given, is taken where it misses nothing.
+    """
     chunk = _chunk(plan)
-    parts = [
-        _project(plan, t[i : i + chunk], q[:, i : i + chunk], u[:, i : i + chunk]) for i in range(0, len(t), chunk)
-    ]
+    places = [slice(i, i + chunk) for i in range(0, len(t), chunk)]
+    parts = [_project(plan, t[one], q[:, one], u[:, one], nearest) for one in places]
     if len(parts) == 1:
         return parts[0]
     joined = (
@@ -179,13 +195,20 @@ def _normal(plan: SceneProblem) -> Normal | None:
     plain = plan.balance.kinematic_map.is_plain and len(program.holonomic) == program.constraints
     if not plain or is_best_full((program.constraints, program.speeds), len(program.jacobian_rows), many=True):
         return None
-    from atwood.numerics.sparse_batch import Normal, Pattern
+    from atwood.numerics.sparse_batch import Normal
 
-    def make() -> Normal:
-        pattern = Pattern(program.jacobian_rows, program.jacobian_columns, (program.constraints, program.speeds))
-        return Normal(pattern, plan.finding.kept)
+    kept = plan.finding.kept
+    return plan.assembly.shared.get(_NORMAL, lambda: Normal(_pattern(plan), kept), plan.assembly.form, kept)
 
-    return plan.assembly.shared.get(_NORMAL, make, plan.assembly.form, plan.finding.kept)
+
+def _pattern(plan: SceneProblem) -> Pattern:
+    """Return where the constraint Jacobian has entries."""
+    from atwood.numerics.sparse_batch import Pattern
+
+    program, assembly = plan.balance.program, plan.assembly
+    shape = program.constraints, program.speeds
+    places = program.jacobian_rows, program.jacobian_columns
+    return assembly.shared.get(_PATTERN, lambda: Pattern(*places, shape), assembly.form)
 
 
 def _largest_entry(values: FloatArray) -> FloatArray:
@@ -204,31 +227,24 @@ def _largest(now: ConstraintsAt, speeds: FloatArray) -> FloatArray:
 
 def constraints_at(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray) -> ConstraintsAt:
     """Return the constraints at states, of shape (states,) and (number, states)."""
-    p, count = plan.balance.program, len(t)
-    program = p.constraints_alone
+    program, count = plan.balance.program.constraints_alone, len(t)
     if count == 1:  # numbers one by one take a tenth of the time of arrays with one number each
         alone = plan.assembly.kernel(program)(t, q[:, 0], u[:, 0])
-        value, jacobian, explicit_rate = (np.reshape(one, (-1, 1)) for one in alone)
+        value, entries, explicit_rate = (np.reshape(one, (-1, 1)) for one in alone)
     else:
-        value, jacobian, explicit_rate = plan.columns(program)(t[None, :], q, u)
-    kept, normal = list(plan.finding.kept), _normal(plan)
+        value, entries, explicit_rate = plan.columns(program)(t[None, :], q, u)
+    kept, pattern = list(plan.finding.kept), _pattern(plan)
     farthest = int(np.argmax(np.max(np.abs(q), axis=0, initial=0.0)))
     errors = plan.balance.errors.near(float(t[farthest]), q[:, farthest], plan.sizes)
-    if normal is not None:
-        pattern = normal.whole
-        jacobian = jacobian * plan.sizes[pattern.columns, None]
-        rows = trusted_sizes(pattern.largest(jacobian).T, errors)
-        return ConstraintsAt(
-            value.T / rows, jacobian / rows.T[pattern.rows], explicit_rate.T / rows, kept, normal, rows
-        )
-    full = np.zeros((count, p.constraints, p.speeds))
-    full[:, p.jacobian_rows, p.jacobian_columns] = jacobian.T
-    full *= plan.sizes
-    rows = trusted_sizes(_largest_entry(full), errors)
-    return ConstraintsAt(value.T / rows, full / rows[:, :, None], explicit_rate.T / rows, kept, None, rows)
+    entries = entries * plan.sizes[pattern.columns, None]
+    rows = trusted_sizes(pattern.largest(entries).T, errors)
+    entries /= rows.T[pattern.rows]
+    return ConstraintsAt(value.T / rows, entries, explicit_rate.T / rows, kept, pattern, _normal(plan), rows)
 
 
-def _project(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray) -> Projected:
+def _project(
+    plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray, nearest: Nearest | None = None
+) -> Projected:
     sizes = plan.sizes[:, None]
     kinematic_map, holding = plan.balance.kinematic_map, plan.balance.holding(list(plan.finding.kept))
     q, speeds = kinematic_map.normalized(q.copy()), (u / sizes).T
@@ -236,6 +252,14 @@ def _project(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray) ->
     held = _largest(now, speeds)
     if np.all(held[0] <= _EXACT) and np.all(held[1] * plan.scales.time <= _EXACT):
         return Projected(q, u.copy(), held, np.zeros(len(t), dtype=bool))
+    found = None if nearest is None else _taken(plan, t, q, u, nearest)
+    if found is not None:
+        near, moving, done = found
+        doubtful = np.zeros(len(t), dtype=bool)
+        if not done.all():
+            rest = _project(plan, t[~done], q[:, ~done], u[:, ~done])
+            near[:, ~done], moving[:, ~done], doubtful[~done] = rest.coordinates, rest.speeds, rest.doubtful
+        return Projected(near, moving, held, doubtful)
     last = np.full(len(t), np.inf)
     active = np.ones(len(t), dtype=bool)
     for _ in range(_STEPS):
@@ -253,6 +277,20 @@ def _project(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray) ->
     left = _largest(now, speeds) * np.array([[1.0], [plan.scales.time]])
     doubtful = active | ~np.all(left <= 10.0 * tolerances.MET, axis=0)
     return Projected(q, sizes * speeds.T, held, doubtful)
+
+
+def _taken(
+    plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray, nearest: Nearest
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]] | None:
+    """Return states that machine code has taken onto the constraints, and which of them meet all."""
+    rows = np.ascontiguousarray(np.concatenate([q, u]).T)
+    met = nearest(t, rows)
+    if met is None:
+        return None
+    q, u = (part.copy() for part in plan.program.split(rows.T))
+    q = plan.balance.kinematic_map.normalized(q)
+    left = _largest(constraints_at(plan, t, q, u), (u / plan.sizes[:, None]).T)
+    return q, u, met & np.all(left * np.array([[1.0], [plan.scales.time]]) <= tolerances.MET, axis=0)
 
 
 def _least_norm(jacobian: FloatArray) -> Callable[[FloatArray], FloatArray]:

@@ -24,13 +24,13 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, KernelEvaluationError, UsageError, suggestion
 from atwood.expr import Expression, depends_on
+from atwood.forms.accelerations import accelerations_of
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.integrators.methods import AUTO, EXPLICIT, IDA, IDA_SUNDAE, METHODS, TAYLOR, Method, advise
-from atwood.integrators.protocol import Values
 from atwood.lazy_dataclasses import dataclass
 from atwood.simulation.events.modes import find_event_functions
-from atwood.simulation.problem.explicit_scene import constrained_problem, explicit_problem, explicit_problem_of
+from atwood.simulation.problem.explicit_scene import first_order_rows, program_on_constraints, values_on_constraints
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.problem.problem import SceneProblem
 
@@ -239,26 +239,29 @@ def stiffness_of(
     assembly = plan.assembly
     if not can_be_stiff(assembly):
         return None
-    y, count, time = np.concatenate([q, u]), len(q), plan.scales.time
+    y, count, time, solved = np.concatenate([q, u]), len(q), plan.scales.time, None
     scale = np.concatenate([plan.coordinate_sizes, plan.sizes / plan.scales.time])
     if plan.balance.constraints:
         solved = solved_loops(plan, t, q, u)
         if solved is not None:
-            problem = explicit_problem_of(assembly, solved.form.accelerations, solved.values)
+            program, values = solved.form.accelerations.program, solved.values
             y, scale, count = solved.reduced(y), solved.reduced(scale), len(solved.independent)
-        else:
-            problem = constrained_problem(plan, t, y)
-    elif assembly.form == "dae":
-        problem = constrained_problem(plan, t, y)
-    else:
-        found = explicit_problem(assembly)
-        if found is None:
+    if solved is None and (plan.balance.constraints or assembly.form == "dae"):
+        program, values = program_on_constraints(plan, t, y).accelerations, values_on_constraints(plan)
+    elif solved is None:
+        found = accelerations_of(assembly)
+        if found is None or not len(q):
             return None
-        problem = found
+        program, values = found.program, assembly.parameter_values
+    many = first_order_rows(assembly.compiled(program, vectorized=True).bind(values), count)
+
+    def rates(states: FloatArray) -> FloatArray:
+        return many(np.full(len(states), t), states)
+
     span = max(options.t_end - t, 0.0)
     if goes_on:
-        time = present_time(problem.rates, t, y, scale, count, time, span)
-    return find_stiffness(problem.rates, t, y, scale, time, span, options.relative_tolerance)
+        time = present_time(rates, y, scale, count, time, span)
+    return find_stiffness(rates, y, scale, time, span, options.relative_tolerance)
 
 
 def describe_choices(choices: Sequence[Choice]) -> str:
@@ -328,25 +331,26 @@ def can_be_stiff(assembly: Assembly) -> bool:
 
 
 def find_stiffness(
-    rates: Callable[[float, FloatArray], Values],
-    t: float,
+    rates: Callable[[FloatArray], FloatArray],
     y: FloatArray,
     scale: FloatArray,
     time: float,
     span: float,
     relative_tolerance: float,
 ) -> Stiffness:
-    """Return how stiff ``y' = f(t, y)``, ``y = (q, u)``, is at a state, from the eigenvalues of its Jacobian."""
+    """Return how stiff ``y' = f(y)``, ``y = (q, u)``, is at a state, from the eigenvalues of its Jacobian.
+
+    The rates are those of many states, one row each.
+    """
     try:
-        matrix = _jacobians(lambda rows: np.asarray([rates(t, rows[0])], dtype=float), y[None], scale[None])[0]
+        matrix = _jacobians(lambda moved: rates(moved[:, 0])[:, None], y[None], scale[None])[0]
     except (KernelEvaluationError, ArithmeticError):
         return Stiffness(0.0, 0.0, RATIO)
     return _judged(matrix, time, span, relative_tolerance)
 
 
 def present_time(
-    rates: Callable[[float, FloatArray], Values],
-    t: float,
+    rates: Callable[[FloatArray], FloatArray],
     y: FloatArray,
     scale: FloatArray,
     coordinates: int,
@@ -355,7 +359,7 @@ def present_time(
 ) -> float:
     """Return the time in which something happens at a state, s, by how fast it changes."""
     try:
-        changes = np.abs(np.asarray(rates(t, y), dtype=float)) / scale
+        changes = np.abs(rates(y[None])[0]) / scale
     except (KernelEvaluationError, ArithmeticError):
         return time
     fastest = max(np.max(changes[:coordinates]), np.sqrt(np.max(changes[coordinates:], initial=0.0) / time))
@@ -396,14 +400,14 @@ def _judged(matrix: FloatArray, time: float, span: float, relative_tolerance: fl
 
 
 def _jacobians(rates: Callable[[FloatArray], FloatArray], y: FloatArray, scale: FloatArray) -> FloatArray:
-    """Return the Jacobians of runs in units of their sizes, by differences; not finite where they have no value."""
-    runs, count = y.shape
-    matrix = np.empty((runs, count, count))
+    """Return the Jacobians of runs in units of their sizes, by differences; not finite where they have no value.
+
+    The rates are given states of shape (places, runs, unknowns): the runs, and these with one unknown moved each.
+    """
+    count = y.shape[1]
     with np.errstate(all="ignore"):
-        here = rates(y)
-        for j in range(count):
-            moved = y.copy()
-            moved[:, j] += 1e-7 * scale[:, j]
-            step = moved[:, j] - y[:, j]
-            matrix[:, :, j] = (rates(moved) - here) * (scale[:, j] / step)[:, None] / scale
-    return matrix
+        moved = y + np.concatenate([np.zeros((1, count)), 1e-7 * np.eye(count)])[:, None, :] * scale
+        steps = np.diagonal(moved[1:] - y, axis1=0, axis2=2).T
+        found = rates(moved)
+        slopes = (found[1:] - found[0]) * (scale.T / steps)[:, :, None] / scale
+        return np.moveaxis(slopes, 0, 2)

@@ -15,7 +15,7 @@ from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, made_of
 from atwood.simulation.problem.problem import SceneProblem
-from atwood.simulation.problem.projection import misses_of, project_safely, project_states
+from atwood.simulation.problem.projection import Nearest, misses_of, project_safely, project_states
 
 if TYPE_CHECKING:
     from atwood.integrators.jumps import Jump
@@ -98,11 +98,17 @@ class Recorder:
     ----------
     plan
         The scene in its mode.
+
+    Attributes
+    ----------
+    nearest
+        How the session projects states, if it can.
     """
 
     def __init__(self, plan: SceneProblem) -> None:
         self.plan = plan
         self.singular_crossings: list[SingularCrossing] = []
+        self.nearest: Nearest | None = None
         self._jumps: list[float] = []
         # What is done, and states that wait: changed together, so that an interruption loses and repeats nothing.
         self._samples: tuple[tuple[_Block, ...], list[tuple[float, FloatArray, bool]]] = ((), [])
@@ -160,7 +166,10 @@ class Recorder:
             )  # an output at a jump is that after it
             t, y, shown = t[once], y[once], shown[once]
             self._jumps += times[::2].tolist()
-        if len(t) and pending:  # projected together
+        if self.plan.balance.constraints and len(pending) + len(t) < _PENDING:  # projected with what follows
+            pending.extend(zip(t.tolist(), y, shown.tolist(), strict=True))
+            return
+        if len(t) and pending:
             t = np.concatenate([[one[0] for one in pending], t])
             y = np.concatenate([[one[1] for one in pending], y])
             shown = np.concatenate([[one[2] for one in pending], shown])
@@ -263,7 +272,7 @@ class Recorder:
         if not self.plan.balance.constraints:
             self._add(_Block(t, q, u, shown, np.zeros((2, len(t)))), waiting)
             return
-        made = project_states(self.plan, t, q, u)
+        made = project_states(self.plan, t, q, u, self.nearest)
         if not self.plan.is_projected:
             self._add(_Block(t, q, u, shown, made.held), waiting)
             return

@@ -295,6 +295,7 @@ class _Runner:
             if not choice.method.is_implicit:
                 pack_state(segment.plan, t, *segment.plan.program.split(y))  # says what has no value, if it can
             raise
+        self.recorder.nearest = self.session.nearest
         self._watch(self.session)
         return self.session
 

@@ -28,7 +28,12 @@ from atwood.simulation.dynamics.reactions import accelerations_at
 from atwood.simulation.dynamics.scales import coordinate_scales, find_times, motion_scales
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.closed_loops import ManyBranches, Solved, solve_at
-from atwood.simulation.problem.explicit_scene import compiled_rates, explicit_problem, explicit_problem_of
+from atwood.simulation.problem.explicit_scene import (
+    compiled_rates,
+    explicit_problem,
+    explicit_problem_of,
+    first_order_rows,
+)
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.problem.preparation import make_problem
 from atwood.simulation.problem.step_guard import step_guard
@@ -333,13 +338,10 @@ def are_stiff(
         return np.zeros(len(t), dtype=np.bool_)
     program = motion.program.program
     kernel = assembly.compiled(program, vectorized=True).bind(assembly.parameter_values if values is None else values.T)
-    n = len(program.inputs[1].symbols)
+    rates = first_order_rows(kernel, len(program.inputs[1].symbols))
 
-    def rates(states: FloatArray) -> FloatArray:
-        found = kernel(t[None, :], states[:, :n].T, states[:, n:].T)
-        first = states[:, n:].T if len(found) == 1 else found[0]
-        both = [np.broadcast_to(one, (len(one), len(t))) for one in (first, found[-1])]
-        return np.asarray(np.concatenate(both).T, dtype=np.float64)
+    def each(moved: FloatArray) -> FloatArray:
+        return np.array([rates(t, one) for one in moved])
 
     relative = options.relative_tolerance
-    return find_stiff_rows(rates, y, tolerances / min(relative, LOOSEST), time, options.t_end - t, relative)
+    return find_stiff_rows(each, y, tolerances / min(relative, LOOSEST), time, options.t_end - t, relative)
