@@ -20,6 +20,7 @@ from atwood.simulation.initialization.start import find_start, own_state
 from atwood.simulation.problem.explicit_scene import constrained_problem
 from atwood.simulation.problem.preparation import make_problem
 from atwood.simulation.problem.problem import SceneProblem
+from atwood.simulation.problem.projection import misses_of, project_states
 from atwood_library import PointMass
 from atwood_library.scenes import (
     BenchmarkBicycle,
@@ -253,3 +254,40 @@ def test_series_are_refused_where_constraints_stay() -> None:
     with pytest.raises(UsageError, match="Taylor series") as caught:
         simulate(Bricard(), solver="taylor", t_end=0.1)
     assert "'explicit'" in str(caught.value)
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("scene", [Bricard, RollingDisc, DoublePendulum, StewartPlatform])
+def test_outputs_taken_onto_constraints_by_machine_code_are_the_nearest_states(scene: type[Scene], form: str) -> None:
+    """They are those of the normal equations, which have the rest: here every third is left to these."""
+    plan, problem, y = opened(scene(), form)
+    rng = np.random.default_rng(1)
+    t = np.full(40, plan.assembly.flat.t_start)
+    rough = y[:, None] + absolute(plan, 1e-4)[:, None] * rng.uniform(-1.0, 1.0, (len(y), len(t)))
+    q, u = plan.program.split(rough)
+    session = ExplicitSession(
+        problem, SolverOptions(), CompiledStepper(problem, SolverOptions(), TABLEAU), float(t[0]), y
+    )
+    missed: list[int] = []
+
+    def every_third_is_left(t: FloatArray, rows: FloatArray) -> Any:
+        met = session.nearest(t, rows)
+        if met is not None:
+            assert met.all()
+            missed.append(len(met[::3]))
+            met[::3] = False
+        return met
+
+    plain = project_states(plan, t, q, u)
+    by_code = project_states(plan, t, q, u, session.nearest)
+    mixed = project_states(plan, t, q, u, every_third_is_left)
+    assert bool(missed) == bool(plan.balance.constraints)
+    for one in (by_code, mixed):
+        assert not one.doubtful.any()
+        assert_allclose(one.held, plain.held, rtol=1e-12)
+        miss = (one.coordinates - plain.coordinates) / plan.coordinate_sizes[:, None]
+        assert np.max(np.abs(miss), initial=0.0) < 1e-7  # of second order in how far they were taken
+        assert np.max(misses_of(plan, t, one.coordinates, one.speeds), initial=0.0) < 1e-11
+    if missed:
+        left = (mixed.coordinates - plain.coordinates)[:, ::3] / plan.coordinate_sizes[:, None]
+        assert np.max(np.abs(left)) < 1e-15  # sums of other numbers of states are rounded otherwise

@@ -70,8 +70,8 @@ def test_a_start(break_down: Break) -> None:
 def test_a_projection_in_the_middle_of_a_run(form: str, break_down: Break, monkeypatch: pytest.MonkeyPatch) -> None:
     project = record.project_states
 
-    def doubtful(plan: Any, t: Any, q: Any, u: Any) -> Any:
-        made = project(plan, t, q, u)
+    def doubtful(plan: Any, t: Any, *given: Any) -> Any:
+        made = project(plan, t, *given)
         made.doubtful[t > 0.5] = True
         if np.any(t > 0.5):
             break_down("lstsq", "dynamics.balance")

@@ -261,7 +261,12 @@ def stiffness_of(
     span = max(options.t_end - t, 0.0)
     if goes_on:
         time = present_time(rates, y, scale, count, time, span)
-    return find_stiffness(rates, y, scale, time, span, options.relative_tolerance)
+    judged = time, span, options.relative_tolerance
+    about = program, t, *judged, *(one.tobytes() for one in (values, y, scale))
+    return assembly.kept.get(_STIFFNESS, lambda: find_stiffness(rates, y, scale, *judged), *about)
+
+
+_STIFFNESS: Key[Stiffness] = Key("how stiff a scene is at the state that was last asked about")
 
 
 def describe_choices(choices: Sequence[Choice]) -> str:
