@@ -30,7 +30,7 @@ _NO_CODE = {
     tokenize.ENDMARKER,
 }
 _LLVM = ("getelementptr", "define ", " phi ", "fadd ", "load double", "load ptr", "br i1", "br label")
-SOLVERS = ("ida", "ida-sundae", "explicit", "tsitouras", "taylor", "gauss", "composition")
+SOLVERS = ("ida", "ida-sundae", "explicit", "tsitouras", "taylor", "gauss", "composition", "moreau")
 _FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 _ALGEBRA = {"svd", "matrix_rank", "lstsq", "pinv"}
 

@@ -252,10 +252,12 @@ def simulate(
         stiff, or turns out so, and for index 1; else an explicit method. `Result.solver` says which, and why.
         ``"gauss"``: a symplectic method with equal steps, whose energy error does not grow, for scenes that have a
         Hamiltonian, closed loops that formulas solve included. ``"composition"``: the same where that is
-        T(p) + V(q, t), by explicit steps.
+        T(p) + V(q, t), by explicit steps. ``"moreau"``: time stepping over impacts, with equal steps that look for no
+        event, for scenes with gaps and dry friction in which very much happens.
     order, step
         Of ``"gauss"`` the order, 2, 4, 6, 8, 10 or 12, and of ``"composition"``, up to 8 (8 if not given), and the
-        step, s. A step that is not given is chosen so that the first steps are within the tolerances.
+        step, s. A step that is not given is chosen so that the first steps are within the tolerances; ``"moreau"``
+        must be given its step.
     samples
         The run is sampled at least so often, whatever is shown of it: for the work that is put in, and for angles to
         count their turns. More are taken where functions of time change faster, unless this is 1.

@@ -177,6 +177,8 @@ def test_turns_are_counted_with_every_solver() -> None:
         scene.connect(one, other)
     scene.start.update({"hinge.angle": 0.3, "hinge.angular_velocity": 5.0})
     for solver, method in METHODS.items():
+        if not method.looks_for_events:
+            continue
         given = {"step": 0.01} if method.has_equal_steps else {}
         result = simulate(scene, solver=solver, t_end=4.0, outputs=3, samples=1, **given)
         assert result["sensor.angle"] == pytest.approx(0.3 + 5.0 * result.time, abs=1e-6)

@@ -184,7 +184,7 @@ def _option(name: str, kind: Kind, default: Any, told: Sequence[Callable[..., An
     return made
 
 
-_SHORT = 9
+_SHORT = 10
 """Of so many words a list is too long to be shown with an option."""
 
 

@@ -2,6 +2,7 @@
 
 from atwood.integrators.methods.dormand_prince import EXPLICIT
 from atwood.integrators.methods.ida import IDA, IDA_SUNDAE
+from atwood.integrators.methods.moreau import MOREAU
 from atwood.integrators.methods.record import LEAST, Method, Task
 from atwood.integrators.methods.symplectic import COMPOSITION, GAUSS
 from atwood.integrators.methods.taylor import TAYLOR
@@ -15,6 +16,7 @@ __all__ = [
     "IDA_SUNDAE",
     "LEAST",
     "METHODS",
+    "MOREAU",
     "TAYLOR",
     "TSITOURAS",
     "Method",
@@ -25,7 +27,7 @@ __all__ = [
 AUTO = "auto"
 """What asks for the method that suits a scene."""
 
-METHODS = {one.key: one for one in (IDA, IDA_SUNDAE, EXPLICIT, TSITOURAS, TAYLOR, GAUSS, COMPOSITION)}
+METHODS = {one.key: one for one in (IDA, IDA_SUNDAE, EXPLICIT, TSITOURAS, TAYLOR, GAUSS, COMPOSITION, MOREAU)}
 """All methods, by how they are asked for."""
 
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from atwood.integrators.session import Session
     from atwood.integrators.symplectic.stepper import Hamiltonian
     from atwood.integrators.taylor.stepper import TaylorProblem
+    from atwood.integrators.time_stepping.session import ImpulsiveProblem
 
 
 LEAST = 1e-15
@@ -45,6 +46,8 @@ class Task:
         Their Taylor recurrences, and Hamilton's equations.
     implicit
         The equations ``F(t, y, y') = 0``; given whether compiled functions look for events.
+    impulsive
+        The equations where nothing touches, and what contacts do.
     angles
         Unknowns of the implicit equations that are angles.
     """
@@ -60,6 +63,7 @@ class Task:
     series: Callable[[], TaylorProblem] | None = None
     hamiltonian: Callable[[], Hamiltonian] | None = None
     implicit: Callable[[bool], ImplicitProblem] | None = None
+    impulsive: ImpulsiveProblem | None = None
     angles: tuple[int, ...] = ()
 
     @property
@@ -80,7 +84,8 @@ class Method:
     citation
         Where it is described.
     kind
-        What its equations are: ``F(t, y, y') = 0``, ``y' = f(t, y)``, their recurrences, or Hamilton's.
+        What its equations are: ``F(t, y, y') = 0``, ``y' = f(t, y)``, their recurrences, Hamilton's, or those of
+        a motion with contacts whose events are not looked for.
     orders
         The orders that it has; several are chosen from by the method, or by whoever asks where steps are equal.
     open
@@ -120,7 +125,7 @@ class Method:
     key: str
     title: str
     citation: str
-    kind: Literal["implicit", "explicit", "series", "hamiltonian"]
+    kind: Literal["implicit", "explicit", "series", "hamiltonian", "impulsive"]
     orders: tuple[int, ...]
     open: Callable[[Task], Session]
     nodes_in_step: int
@@ -143,6 +148,11 @@ class Method:
     def is_implicit(self) -> bool:
         """Whether it solves equations of multipliers and rates."""
         return self.kind == "implicit"
+
+    @property
+    def looks_for_events(self) -> bool:
+        """Whether steps end where something happens; else what contacts do in a step is at its end."""
+        return self.kind != "impulsive"
 
     @property
     def has_equal_steps(self) -> bool:

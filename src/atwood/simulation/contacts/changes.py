@@ -35,6 +35,7 @@ from atwood.simulation.dynamics.orientation_coordinates import to_regular
 from atwood.simulation.dynamics.scales import Scales
 from atwood.simulation.events.mode_change import generalized_speeds
 from atwood.simulation.events.modes import EventRecord, Impact
+from atwood.tolerances import tolerances
 
 NEAR = 10.0
 """Times the relative tolerance, in sizes of the scene: what is nearer to zero is there."""
@@ -60,10 +61,10 @@ _ALIKE = 100.0
 _SEEN = 2.0
 """Times what is slow: what has come to rest may go by that still, or again, where its event is seen."""
 
-_MOST_TURNS = 50
+MOST_TURNS = 50
 """Limits that are curved in the forces are met in so many turns at most."""
 
-_CONTRADICT = "Contacts contradict each other here: look at what moves them, and at their friction."
+CONTRADICT = "Contacts contradict each other here: look at what moves them, and at their friction."
 
 _MOST_IMPACTS = 1000
 """So many impacts one after the other happen at one moment at most."""
@@ -288,13 +289,13 @@ class _Moment:
     def _impulses(self, chosen: list[int], free: FloatArray) -> FloatArray:
         """Return the impulses of all rows: velocities take the place of accelerations, and limits are of impulses."""
         values, found = self.values, np.zeros(len(self.contacts))
-        for _ in range(_MOST_TURNS):
+        for _ in range(MOST_TURNS):
             limits = _of_impulses(values.limits_at(found))
             solved = find_states(values.chosen(chosen, free, {}, limits), self._at_rest(chosen))
             if solved is None:
                 raise self._contradiction("no impulses satisfy the laws of impact and friction", chosen)
             last, found = found, self._on_all(chosen, solved)
-            if not self.layout.is_curved or _is_same(last, found):
+            if not self.layout.is_curved or is_same(last, found):
                 break
         return found
 
@@ -357,13 +358,13 @@ class _Moment:
         """Return states that contradict nothing at accelerations; limits may be curved in the forces."""
         values, free = self.values, self.values.accelerations()
         forces, found = np.zeros(len(self.contacts)), None
-        for _ in range(_MOST_TURNS):
+        for _ in range(MOST_TURNS):
             found = find_states(values.chosen(chosen, free, given, values.limits_at(forces)), states)
             if found is None:
                 return None
             last, forces = forces, self._on_all(chosen, found)
             states = list(found.states)
-            if not self.layout.is_curved or _is_same(last, forces):
+            if not self.layout.is_curved or is_same(last, forces):
                 break
         return found
 
@@ -399,28 +400,16 @@ class _Moment:
 
     def _take(self, chosen: list[int], found: Found) -> None:
         """Take the states over, and tell what has changed."""
-        states = dict(zip(chosen, found.states, strict=True))
-        for k, one in enumerate(self.first):
-            state, way = states.get(k, (OPEN, (0.0,) * len(self.units[k])))
-            at = self.values.gap_of[k]
-            if one.is_slip and at >= 0 and states.get(at, (OPEN, (0.0,)))[0] == OPEN:
-                state, way = OPEN, (0.0,) * len(way)
-            values = (float(state), *way) if one.is_slip else (float(state == STICKS),)
-            for place, value in zip(self.places[k], values, strict=True):
-                self.held[place] = value
-            was, name = self.before[k], one.row.key[1]
-            if not one.is_slip and state != was[0]:
-                self._tell(k, *((f"{name} closes", "closes") if state else (f"{name} opens", "opens")))
-            elif one.is_slip and state == was[0] == GOES_ON and float(np.dot(way, was[1])) < 0.0:
-                self._tell(k, f"{name} reverses", "reverses")
-            elif one.is_slip and state != was[0] and state:
-                self._tell(k, *((f"{name} sticks", "sticks") if state == STICKS else (f"{name} goes on", "slips")))
+        known = dict(zip(chosen, found.states, strict=True))
+        states = [known.get(k, (OPEN, (0.0,) * len(rows))) for k, rows in enumerate(self.units)]
+        self.held = values_of_states(self.layout, self.held, states)
+        self.events += told_changes(self.t, self.layout, self.before, states)
 
     def _tell(self, k: int, said: str, kind: str) -> None:
         part, law, _ = self.first[k].row.key
         self.events.append(EventRecord(self.t, part, law, said, "", kind in ("impact", "jams", "rests"), kind))
 
-    def _contradiction(self, what: str, chosen: list[int], advice: str = _CONTRADICT) -> SolveError:
+    def _contradiction(self, what: str, chosen: list[int], advice: str = CONTRADICT) -> SolveError:
         names = ", ".join(dict.fromkeys(self.first[k].row.key[0] for k in chosen))
         return SolveError(
             f"at t = {self.t:.9g} {what} ({names})",
@@ -445,6 +434,11 @@ class _Moment:
                     where=one.row.key[0],
                     advice="Start where the gap is zero or positive.",
                 )
+
+
+def check_start(assembly: Assembly, state: tuple[float, FloatArray, FloatArray], length: float, scales: Scales) -> None:
+    """Refuse a start inside of something; arguments as of `resolve`."""
+    _Moment(ContactValues(assembly, *state, length), scales, 0.1 * tolerances.CLOSED, ()).check_start()
 
 
 def told_impact(
@@ -475,6 +469,36 @@ def _of_impulses(limits: tuple[Limits, Limits]) -> tuple[Limits, Limits]:
     return ahead, back
 
 
+def values_of_states(layout: Layout, held: Sequence[float], states: Sequence[State]) -> list[float]:
+    """Return discrete states with those of all units; a slip at a gap that is open is open, too."""
+    found = list(held)
+    for one, at, places, (state, way) in zip(layout.first, layout.gap_of, layout.places, states, strict=True):
+        if one.is_slip and at >= 0 and states[at][0] == OPEN:
+            state, way = OPEN, (0.0,) * len(way)
+        for place, value in zip(
+            places, (float(state), *way) if one.is_slip else (float(state == STICKS),), strict=True
+        ):
+            found[place] = value
+    return found
+
+
+def told_changes(t: float, layout: Layout, before: Sequence[State], states: Sequence[State]) -> list[EventRecord]:
+    """Return what is told of units whose states change."""
+    events: list[EventRecord] = []
+    for one, at, was, (state, way) in zip(layout.first, layout.gap_of, before, states, strict=True):
+        (part, name, _), is_loose = one.row.key, one.is_slip and at >= 0 and states[at][0] == OPEN
+        said = ""
+        if not one.is_slip and state != was[0]:
+            said, kind = (f"{name} closes", "closes") if state else (f"{name} opens", "opens")
+        elif one.is_slip and not is_loose and state == was[0] == GOES_ON and float(np.dot(way, was[1])) < 0.0:
+            said, kind = f"{name} reverses", "reverses"
+        elif one.is_slip and not is_loose and state != was[0] and state:
+            said, kind = (f"{name} sticks", "sticks") if state == STICKS else (f"{name} goes on", "slips")
+        if said:
+            events.append(EventRecord(t, part, name, said, "", False, kind))
+    return events
+
+
 def states_of(layout: Layout, held: Sequence[float]) -> list[State]:
     """Return the states of all units that discrete states say."""
     found: list[State] = []
@@ -496,7 +520,7 @@ def forces_in(values: ContactValues, states: Sequence[State], rates: FloatArray 
     """
     free, count = values.accelerations() if rates is None else rates, len(values.contacts)
     forces = np.zeros(count)
-    for _ in range(_MOST_TURNS):
+    for _ in range(MOST_TURNS):
         limits = values.limits_at(forces) if rates is None else _of_impulses(values.limits_at(forces))
         matrix, right = np.eye(count), np.zeros(count)
         for number, (rows, (state, way)) in enumerate(zip(values.units, states, strict=True)):
@@ -508,12 +532,13 @@ def forces_in(values: ContactValues, states: Sequence[State], rates: FloatArray 
                     matrix[row] = matrix[row] + part * side.shares[number]
                     right[row] = -part * side.free[number]
         last, forces = forces, least_norm(matrix, right)
-        if not values.layout.is_curved or _is_same(last, forces):
+        if not values.layout.is_curved or is_same(last, forces):
             break
     return forces
 
 
-def _is_same(last: FloatArray, now: FloatArray) -> bool:
+def is_same(last: FloatArray, now: FloatArray) -> bool:
+    """Return whether forces are the same but for rounding."""
     return float(np.max(np.abs(now - last), initial=0.0)) <= 1e-12 * float(np.max(np.abs(now), initial=0.0))
 
 

@@ -94,6 +94,20 @@ def check_solver(asked: str) -> None:
         raise UsageError(f"IDA cannot be driven directly: {missing}", advice=advise(IDA_SUNDAE))
 
 
+def check_asked(options: RunOptions) -> None:
+    """Refuse what the solver that was asked for cannot do."""
+    asked = options.solver
+    if asked == AUTO or METHODS[asked].looks_for_events:
+        return
+    given = (("accuracy=", options.accuracy is not None), ("conditions to watch", bool(options.conditions)))
+    for what, is_given in given:
+        if is_given:
+            raise UsageError(
+                f"{METHODS[asked].title} has steps of one length and looks for no event: it takes no {what}",
+                advice=f"Leave it out, or leave solver={asked!r} out.",
+            )
+
+
 def implicit_solver() -> str:
     """Return how IDA is driven, by its key: directly, or through scikit-sundae where its libraries cannot be found.
 

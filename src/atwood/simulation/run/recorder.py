@@ -19,6 +19,7 @@ from atwood.simulation.problem.projection import Nearest, misses_of, project_saf
 
 if TYPE_CHECKING:
     from atwood.integrators.jumps import Jump
+    from atwood.integrators.time_stepping.session import Change
     from atwood.simulation.singular.crossing import SingularCrossing
 
 
@@ -110,6 +111,7 @@ class Recorder:
         self.singular_crossings: list[SingularCrossing] = []
         self.nearest: Nearest | None = None
         self._jumps: list[float] = []
+        self._changes: list[Change] = []
         # What is done, and states that wait: changed together, so that an interruption loses and repeats nothing.
         self._samples: tuple[tuple[_Block, ...], list[tuple[float, FloatArray, bool]]] = ((), [])
 
@@ -148,7 +150,7 @@ class Recorder:
         t: FloatArray,
         y: FloatArray,
         shown: NDArray[np.bool_],
-        jumps: Sequence[Jump] = (),
+        jumps: Sequence[Jump | Change] = (),
         shows_jumps: bool = True,
     ) -> None:
         """Record states of the solver after the last sample, one row each, with those at jumps among them."""
@@ -175,6 +177,19 @@ class Recorder:
             shown = np.concatenate([[one[2] for one in pending], shown])
         if len(t):
             self._finish(t, y, shown)
+
+    def take_changes(self, changes: Sequence[Change]) -> None:
+        """Record states of contacts from some moments on."""
+        self._changes += changes
+
+    def _plan_from(self, time: float, known: dict[tuple[float, ...], SceneProblem]) -> SceneProblem:
+        """Return the plan in the states that contacts have from a time on."""
+        held = next((one.held for one in reversed(self._changes) if one.time <= time), None)
+        if held is None:
+            return self.plan
+        if held not in known:
+            known[held] = self.plan.in_piece(self.plan.assembly.with_held(held))
+        return known[held]
 
     def pass_over(self, crossing: SingularCrossing, t: FloatArray, shown: NDArray[np.bool_]) -> None:
         """Record a singular crossing, in place of all samples since its start; its states are not to be projected."""
@@ -250,10 +265,11 @@ class Recorder:
         crossings = tuple(one for one in self.singular_crossings if one.path is None or one.time <= time[-1])
         cuts = np.searchsorted(time, self._jumps) + 1 if self._jumps else ()
         ends = [0, *(int(one) for one in cuts if one < len(time)), len(time)]
+        known: dict[tuple[float, ...], SceneProblem] = {}
         return [
             made_of(
                 SegmentRecord,
-                plan=self.plan,
+                plan=self._plan_from(time[first], known),
                 impact=impact or first > 0,
                 time=time[first:last],
                 coordinates=q[:, first:last],

@@ -13,6 +13,7 @@ from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Shared
 from atwood.forms.loose import has_touched
+from atwood.integrators.methods import AUTO, METHODS
 from atwood.integrators.protocol import Statistics
 from atwood.lazy_dataclasses import replace
 from atwood.mechanics.outputs.event_functions import CONTACT, UPDATE
@@ -34,7 +35,7 @@ from atwood.simulation.problem.arguments import check_span
 from atwood.simulation.problem.options import RunOptions, Samples, sample_times
 from atwood.simulation.problem.preparation import problem_of_run
 from atwood.simulation.problem.problem import SceneProblem
-from atwood.simulation.run.choice import Choice, check_solver, choose
+from atwood.simulation.run.choice import Choice, check_asked, check_solver, choose
 from atwood.simulation.run.recorder import Recorder, SegmentRecord
 from atwood.simulation.run.run_record import (
     Outcome,
@@ -62,6 +63,7 @@ def run(
     """Run a scene from its start to its end."""
     check_span(start.time, options.t_end, options.max_step, options.step, options.first_step)
     check_solver(options.solver)
+    check_asked(options)
     options = allowed(options)
     clock = Clock(options.max_seconds) if clock is None else clock
 
@@ -291,10 +293,14 @@ class _Walk:
         triggers, self._unsettled = self._unsettled, None
         if triggers is None or not plan.assembly.own_equations.contacts:
             return plan
-        from atwood.simulation.contacts.changes import resolve
+        from atwood.simulation.contacts.changes import check_start, resolve
         from atwood.simulation.problem.explicit_scene import nearest_place
 
         options, is_start = self.options, not self.segments
+        if not self.choice_looks_for_events:
+            if is_start:
+                check_start(plan.assembly, (self.t, self.q, self.u), self.start.length, plan.scales)
+            return plan
         changed = resolve(
             self.assembly,
             (self.t, self.q, self.u),
@@ -317,6 +323,11 @@ class _Walk:
         self.assembly = self.assembly.with_held(self.held)
         self.probe, self._plans, self._handed = None, {}, ()
         return plan.in_piece(self._sides.like(self.assembly, plan))
+
+    @property
+    def choice_looks_for_events(self) -> bool:
+        """Whether the solver that was asked for ends its steps at events."""
+        return self.options.solver == AUTO or METHODS[self.options.solver].looks_for_events
 
     def _remember(self, events: Sequence[EventRecord]) -> None:
         """Remember the impacts among some events."""

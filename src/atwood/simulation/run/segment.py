@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,7 @@ from atwood.errors import AtwoodError, SolveError, StartError
 from atwood.integrators.methods import AUTO, Method
 from atwood.integrators.protocol import Budget, Statistics, Status, StepResult
 from atwood.integrators.session import Session
+from atwood.integrators.time_stepping.session import Change, TimeSteppingSession
 from atwood.lazy_dataclasses import replace
 from atwood.simulation.dynamics.numerical_failure import (
     find_undefined_value,
@@ -38,6 +39,7 @@ from atwood.simulation.run.session import SolverRequest, open_session
 from atwood.simulation.run.stall_diagnosis import explain_stuck, too_tight
 
 if TYPE_CHECKING:
+    from atwood.integrators.jumps import Jump
     from atwood.simulation.singular.crossing import SingularCrossing
     from atwood.simulation.singular.monitor import SingularityMonitor
 
@@ -59,7 +61,7 @@ def run_segment(segment: Segment, recorder: Recorder, t: float, q: FloatArray, u
     with more_time():  # so that there is its start, whatever comes
         y, yp = _first_state(segment, t, q, u)
         recorder.take(t, y, segment.first_shown)
-    already = segment.probe.broken_at_start(t)
+    already = segment.probe.broken_at_start(t) if segment.choice.method.looks_for_events else None
     if already is not None:
         return Outcome(t, "event", "", Statistics(), (segment.choice,), already)
     if t >= segment.end:  # what has changed at the end of the run is shown
@@ -344,11 +346,7 @@ class _Runner:
             times = samples.times[done : ends[np.searchsorted(ends, done, side="right")]]
             y, _, step_result = session.sample(times)
             count = len(y)
-            jumps = session.take_jumps()
-            if jumps:
-                from atwood.simulation.contacts.bounces import told_bounces
-
-                self.noted += told_bounces(jumps, segment.plan, segment.probe)
+            jumps = self._take_jumps(session)
             shows = isinstance(segment.options.outputs, (int, np.integer))  # or just the times that were asked for
             self.recorder.take_many(times[:count], y, segment.samples.shown[done : done + count], jumps, shows)
             done += count
@@ -360,6 +358,20 @@ class _Runner:
             if progress is not None:
                 progress(float(times[-1]))
         return done, None
+
+    def _take_jumps(self, session: Session) -> Sequence[Jump | Change]:
+        """Return the jumps of a session since this was last asked, and note what is told of them."""
+        if isinstance(session, TimeSteppingSession):
+            changes = session.take_changes()
+            self.noted += [event for one in changes for event in one.told]
+            self.recorder.take_changes(changes)
+            return [one for one in changes if one.time > self.began]
+        jumps = session.take_jumps()
+        if jumps:
+            from atwood.simulation.contacts.bounces import told_bounces
+
+            self.noted += told_bounces(jumps, self.segment.plan, self.segment.probe)
+        return jumps
 
     def _sample_watched(self, session: Session, done: int) -> tuple[int, StepResult | None]:
         """Let an explicit method fill tables, with looks at the motion where constraints stay."""

@@ -122,6 +122,8 @@ def open_session(
 ) -> Session:
     """Start a method."""
     plan = request.plan
+    if not method.looks_for_events:
+        return _open_time_stepping(request, method, t, y)
     if plan.assembly.own_equations.contacts and (method.is_implicit or not method.keeps_constraints):
         raise UsageError(
             f"{method.title} does not end its steps on gaps that are closed and on what sticks",
@@ -144,6 +146,22 @@ def open_session(
         session = _open_tree(request, method, t, y, on_stiff)
     session.limit_steps(longest_step(plan.assembly.own_equations, plan.program.split(y)[1]))
     return session
+
+
+def _open_time_stepping(request: SolverRequest, method: Method, t: float, y: FloatArray) -> Session:
+    """Start a method whose steps look for no event."""
+    from atwood.simulation.contacts.time_stepping import impulsive_problem
+
+    options = request.options
+    if options.step is None or options.order not in (None, *method.orders):
+        raise UsageError(
+            f"{method.title} takes a step, and is of order {method.orders[0]} where nothing touches",
+            where=request.plan.assembly.flat.name,
+            advice=f"Give step= in seconds, with solver={method.key!r}, and no other order.",
+        )
+    motion = impulsive_problem(request.plan, request.probe, t, y, options.step, options.impacts)
+    settings = request.settings(t, method.loosest_tolerance)
+    return method.open(Task(settings, t, y, budget=request.budget, end=request.end, impulsive=motion))
 
 
 def _implicit_task(request: SolverRequest, method: Method, t: float, y: FloatArray, yp: FloatArray) -> Task:

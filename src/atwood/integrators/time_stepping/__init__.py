@@ -1,0 +1,1 @@
+"""Time stepping over impacts: equal steps that look for no event."""
