@@ -129,6 +129,54 @@ def impact_program(
     return Program(f"{name} (impact)", groups, (*parameters, *sizes), (OutputGroup("impact", found),))
 
 
+def contacts_program(
+    name: str,
+    equations: Equations,
+    rows: Sequence[Expression],
+    contacts: Sequence[Sequence[ContactRow]],
+    parameters: Sequence[Expression],
+    kept: Sequence[int],
+    light: Sequence[int],
+) -> tuple[Program, list[tuple[int, int]]]:
+    """Return the program of what asks for a set of contacts, and which limits read which forces.
+
+    Equations are those where nothing touches, and contacts the rows of each gap and slip. Its inputs are (t, q, u). Its
+    outputs are, of each row, values, rates, accelerations without contacts and restitutions; how all rows, and speeds,
+    move by a unit of force along each; of each gap and slip four limits at no forces, and their slopes: sliding and
+    static, then both backwards. Its parameters are those of `ConstrainedProgram`.
+    """
+    graph, held, flat = equations.graph, keep_constraints(equations, kept), [one for some in contacts for one in some]
+    zero, sizes = graph.zero, tuple(graph.symbol(f"size of {one.name}") for one in equations.speed_names)
+    slopes, entries, joints = _slopes(equations, [one.row for one in flat]), *_masses(held, rows)
+    at_rest, still = dict.fromkeys(equations.accelerations, 0.0), [zero] * len(held.constraints)
+    bias = substitute(list(rows), at_rest)
+    gamma = substitute([one.second for one in held.constraints], at_rest)
+    falling = _balanced(dict(entries), joints, bias, gamma, sizes, light)
+    free = substitute([one.row.second for one in flat], dict(zip(equations.accelerations, falling, strict=True)))
+    each = [
+        _balanced(dict(entries), joints, [-row.get(i, zero) for i in range(len(bias))], still, sizes, light)
+        for row in slopes
+    ]
+    response = [sum((e * one[i] for i, e in row.items()), zero) for row in slopes for one in each]
+    reads = [one.read for one in flat]
+    limits = [some[0].towards(way)[i] for way in (1.0, -1.0) for i in (0, 1) for some in contacts]
+    shares = jacobian(limits, reads)
+    pattern = sorted({(row % len(contacts), column) for row, column, _ in shares.triples})
+    places = {(row, column): entry for row, column, entry in shares.triples}
+    found = [
+        *(zero if one.row.value is None else one.row.value for one in flat),
+        *(one.row.rate for one in flat),
+        *free,
+        *(zero if one.restitution is None else one.restitution for one in flat),
+        *response,
+        *(x for one in each for x in one),
+        *substitute(limits, dict.fromkeys(reads, zero)),
+        *(places.get((k + g * len(contacts), column), zero) for g in range(4) for k, column in pattern),
+    ]
+    outputs = (OutputGroup("contacts", tuple(map(graph.convert, found))),)
+    return Program(f"{name} (contacts)", state_groups(equations), (*parameters, *sizes), outputs), pattern
+
+
 def _masses(equations: Equations, rows: Sequence[Expression]) -> tuple[dict[Place, Expression], list[_Slopes]]:
     """Return the entries of the mass matrix, and the rows of the constraint Jacobian."""
     mass = jacobian(list(rows), list(equations.accelerations))

@@ -30,16 +30,16 @@ SLACK = 1e-9
 _MOST_SETS = 20_000
 """More sets than these are not looked through."""
 
-_CLEAR = 1e-8
+CLEAR = 1e-8
 """A pivot of scaled rows that is no larger may be rounding: rows then depend on each other."""
 
 _SWEEPS = 5000
 """So often all forces are projected; each time takes some ten microseconds for each."""
 
-_STILL = 1e-12
+STILL = 1e-12
 """Directions that change by so little are found."""
 
-_TURNS = 60
+TURNS = 60
 """So many turns find the direction in which something begins to slip."""
 
 Direction = tuple[float, ...]
@@ -245,7 +245,7 @@ def _choices(unit: Unit) -> list[State]:
 def _improved(contacts: _Listed, tried: tuple[State, ...]) -> Found | None:
     """Change the state that contradicts most, until none does or a set comes again."""
     seen: set[tuple[State, ...]] = set()
-    while tried not in seen and len(seen) < _TURNS * (1 + len(contacts.units)):
+    while tried not in seen and len(seen) < TURNS * (1 + len(contacts.units)):
         seen.add(tried)
         tried, forces, motions = _met(contacts, tried)
         number, better = _contradiction(contacts, tried, forces, motions)
@@ -271,7 +271,7 @@ def _met(contacts: _Listed, states: tuple[State, ...]) -> tuple[tuple[State, ...
     slipping = zip(contacts.units, states, strict=True)
     cones = [k for k, (unit, state) in enumerate(slipping) if state[0] == GOES_ON and unit.is_free_cone]
     cones = [k for k in cones if not _is_loose(states, contacts.units[k])]
-    for _ in range(_TURNS if cones else 0):
+    for _ in range(TURNS if cones else 0):
         turned, most = list(states), 0.0
         for k in cones:
             pair = contacts.units[k].rows
@@ -281,7 +281,7 @@ def _met(contacts: _Listed, states: tuple[State, ...]) -> tuple[tuple[State, ...
                 return states, forces, motions
             most = max(most, *(abs(new - old) for new, old in zip(way, states[k][1], strict=True)))
             turned[k] = (GOES_ON, way)
-        if most <= _STILL:
+        if most <= STILL:
             break
         states = tuple(turned)
         acting, rows, right = _equations(contacts, states)
@@ -338,7 +338,7 @@ def _solved(matrix: list[list[float]], right: list[float]) -> list[float]:
     left = [[*(x / size for x in row), one / size] for row, one, size in zip(matrix, right, sizes, strict=True)]
     for i in range(count):
         best = max(range(i, count), key=lambda k: abs(left[k][i]))
-        if not abs(left[best][i]) > _CLEAR:
+        if not abs(left[best][i]) > CLEAR:
             size = np.array(sizes)
             found: list[float] = least_norm(np.array(matrix) / size[:, None], np.array(right) / size).tolist()
             return found

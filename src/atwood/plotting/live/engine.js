@@ -2,6 +2,7 @@
 // each request. FIELD, ROW, SOUGHT, SEARCHED, POINTS, steps and searches are printed before it.
 
 const STACK = 4096;                             // words for arrays of calls
+const PAST = 64, INSIDE = 2, GAINS = 4;          // impacts that are remembered, and how sets are refused that name a part
 const TOO_SMALL = 2, FOUND = 1, HAPPENED = 2;   // how steps and searches end, and what a search is told of the start
 const HELD = 1e-6;                              // what constraints may miss, in the scene's sizes
 const MET = 1e-7;                               // the same of what a start is to fulfil
@@ -43,6 +44,16 @@ function leastNorm(rows, right) {
   return found;
 }
 
+// The memory of gaps and slips.
+function layContacts({keys, size, pattern}, m, room) {
+  const counts = {
+    sets: Object.keys(SETS).length, units: Object.keys(UNIT).length * keys.length, rows: SET.rows * size, matrix: size * size,
+    left: size * (size + 1), shares: 4 * keys.length * size, at: pattern.length, impacts: 2 * PAST,
+    log: SET.capacity * (size + SET.entry),
+  };
+  return {...Object.fromEntries(Object.entries(counts).map(([name, count]) => [name, room(count)])), past: []};
+}
+
 // The programs of one mode with their memory: one array, in which everything has its place.
 function openMode(mode, options) {
   const {data} = mode, {words} = data, n = data.coordinates.length, m = data.speeds.length, size = n + m;
@@ -58,6 +69,7 @@ function openMode(mode, options) {
   const judged = room(4), session = room(Object.keys(FIELD).length), arrays = room(ROW.all * padded), shifts = room(count);
   const sought = room(Object.keys(SOUGHT).length), [sy, syp, shifted, turns] = [size, size, size, 2 * size].map(room);
   const rows = room(Object.keys(SEARCHED).length * count + POINTS * (1 + 2 * count));
+  const touch = data.contacts && layContacts(data.contacts, m, room);
   const M = new Float64Array(end), F = [null], values = Float64Array.from(data.values);
   M[0] = 16;
   const functions = mode.open(M, F), method = steps(M, F), search = searches(M, F);
@@ -87,9 +99,9 @@ function openMode(mode, options) {
     return M.subarray(at, at + words[name].outputs[k]);
   };
 
-  function fill() {
+  function fill(names = Object.keys(words)) {
     M.set(values, own);
-    for (const name of Object.keys(words)) functions[`${name}_prologue`](own, places[name].derived, scratch);
+    for (const name of names) functions[`${name}_prologue`](own, places[name].derived, scratch);
   }
 
   // Entries at their places in a matrix, each column in units of a size.
@@ -220,6 +232,101 @@ function openMode(mode, options) {
     return count ? listen(t, fired) : null;
   }
 
+  // What becomes of gaps and slips at a moment: a state, and what has happened; or what stands in the way.
+  // Triggers are pairs of a gap or slip and what has happened to it.
+  function resolve(t, state, triggers, isStart) {
+    const {keys, places, rates, size} = data.contacts, near = 10 * Math.max(options.rtol, 1e-13), count = keys.length;
+    const units = (name, length = count) => M.subarray(touch.units + count * UNIT[name], touch.units + count * UNIT[name] + length);
+    const known = data.contacts.units, isSlip = k => known[UNIT.slip][k] !== 0;
+    const set = fields => { for (const [name, one] of Object.entries(fields)) M[touch.sets + SETS[name]] = one; };
+    known.forEach((row, i) => { M.set(row, touch.units + count * i); });
+    ["small", "slow"].forEach(name => units(name).set(known[UNIT[name]].map(x => near * x)));
+    for (const [k, code] of triggers) units("trigger")[k] = code;
+    const before = places.map(some => some.map(i => values[i]));
+    before.forEach(([is, x = 0, y = 0], k) => {
+      [units("state")[k], units("state_x")[k], units("state_y")[k]] = [isSlip(k) ? is : 2 * is, x, y];
+    });
+    if (isStart) touch.past = [];
+    touch.past.flat().forEach((x, i) => { M[touch.impacts + i] = x; });
+    set({known: touch.past.length, inside: isStart ? 1 : Math.max(1, HELD / near), ahead: 10 * Math.sqrt(options.rtol) * data.time});
+    M.set(state, y);
+    const code = functions.resolve(touch.sets, t, 1, 1), at = name => M[touch.sets + SETS[name]];
+    if (code !== 0) {
+      const number = at("number"), part = [INSIDE, GAINS].includes(code) && number >= 0 ? `${keys[number][0]}: ` : "";
+      return {failed: `${part}${REFUSED[code]}`};
+    }
+    const told = [], tell = (k, kind, message, time = t) => told.push({time, part: keys[k][0], law: keys[k][1], message, target: "", kind});
+    if (at("stops")) tell(Array.from(units("stopped")).indexOf(1), "rests", "impacts have accumulated: it rests", t + at("ahead"));
+    for (let i = 0; i < at("logged"); i++) {
+      const [k, speed] = read_(touch.log + i * (size + SET.entry), 2);
+      tell(k, "impact", `an impact at ${Number((-speed).toPrecision(6))} ${rates[k]}`);
+      touch.past = [...touch.past.slice(1 - PAST), [t, known[UNIT.part][k]]];
+    }
+    const found = places.map((some, k) => {
+      const is = units("next")[k];
+      return isSlip(k) ? [is, units("next_x")[k], units("next_y")[k]].slice(0, some.length) : [is / 2];
+    });
+    const closed = Array.from(units("closed")), take = states => {
+      places.forEach((some, k) => some.forEach((i, j) => { values[i] = states[k][j]; }));
+      fill(["kernel", "nearer", "events"].filter(name => words[name]));
+    };
+    let after = read_(y);
+    if (!isStart && closed.includes(1)) { // what is found to be closed is so to rounding
+      take(places.map((some, k) => some.map(() => closed[k])));
+      if (!project(t)) return {failed: "what touches cannot be met near this state"};
+      after = Float64Array.from([...read_(y, n), ...after.slice(n)]);
+    }
+    take(found);
+    fill();
+    found.forEach(([is, ...way], k) => {
+      const [was, ...last] = before[k], name = keys[k][1];
+      if (!isSlip(k)) {
+        if (is !== was) tell(k, is ? "closes" : "opens", `${name} ${is ? "closes" : "opens"}`);
+      } else if (is === 1 && was === 1) {
+        if (way.reduce((sum, x, i) => sum + x * last[i], 0) < 0) tell(k, "reverses", `${name} reverses`);
+      } else if (is && is !== was) tell(k, is === 2 ? "sticks" : "slips", `${name} ${is === 2 ? "sticks" : "goes on"}`);
+    });
+    return {state: after, events: isStart ? told.filter(one => one.kind === "impact") : told};
+  }
+
+  // Margins of gaps and slips at a start, and which events these keep from having happened there.
+  function arm(t) {
+    const rates = data.events.some(one => one.contact) && call("contacts", t) ? Float64Array.from(output("contacts", 0)) : null;
+    let later = null;
+    return data.events.map(({contact, target, small: unit}, i) => {
+      const small = unit * options.rtol, at = M[sy + i], size = Math.abs(at), given = seen("given") + i;
+      if (!contact) return false;
+      M[given] = 1; // what a state watches is positive in it, also where that is less than rounding
+      if (target === "contact closes" && !data.contacts.units[UNIT.speed][contact[0]]) {
+        const rate = rates[data.contacts.size + data.contacts.units[UNIT.first][contact[0]]];
+        const opens = size <= small && rate * data.time > small;
+        if (opens) M[shifts + i] = at > 0 ? 0 : 2 * size + 1e-300;
+        return opens;
+      }
+      if (target !== "contact comes to rest" && target !== "contact runs") return false;
+      let runs = size > 1000 * small;
+      if (size > small && !runs) { // several come to rest together, and one of them is first
+        later ??= soon(t);
+        runs = Math.abs(later[i]) < size;
+      }
+      M[shifts + i] = runs === (target === "contact runs") ? 2 * size + 2 : runs ? -small : 1000 * small;
+      return true;
+    });
+  }
+
+  // The values of events a moment later.
+  function soon(t) {
+    const moment = 1e-12 * data.time, state = read_(y), kept = read_(shifts, count);
+    functions.rates(t, y, yp, block);
+    M.set(state.map((x, i) => x + moment * M[yp + i]), y);
+    M.fill(0, shifts, shifts + count);
+    eventsAt(t + moment, y, syp);
+    M.set(state, y);
+    M.set(kept, shifts);
+    return read_(syp, count);
+  }
+
+  let calm = [];
   // Take the signs of events at a start; those that start at zero have a margin to pass, in the direction that counts.
   function listen(t, fired) {
     M.fill(0, shifts, shifts + count);
@@ -231,8 +338,9 @@ function openMode(mode, options) {
       M[seen("given") + i] = fired?.[i] ? HAPPENED : 0;
       M[seen("direction") + i] = one.direction;
     });
+    calm = touch ? arm(t) : [];
     M.fill(0, seen("sign"), seen("sign") + count);
-    M[sought + SOUGHT.is_first] = 0;
+    M[sought + SOUGHT.is_first] = touch ? 1 : 0;
     return search.restart(sought, t) === 0 ? null : "an event has no value";
   }
 
@@ -287,7 +395,7 @@ function openMode(mode, options) {
   // The event that has happened where a mode begins; -1 where none has.
   const broken = () => data.events.findIndex((one, i) => {
     const small = one.small * options.rtol;
-    return !one.noted && one.direction * (M[seen("known") + i] - M[shifts + i]) > 0.9 * small;
+    return !one.noted && !calm[i] && one.direction * (M[seen("known") + i] - M[shifts + i]) > 0.9 * small;
   });
 
   // The first event between two times of the last step; null where there is none.
@@ -354,6 +462,14 @@ function openMode(mode, options) {
   [places.kernel.derived, scratch, places.nearer?.derived, scratch, nearer].forEach((one, i) => { M[block + i] = one ?? 0; });
   put({arrays, size, padded, function: address(functions.rates), data: block});
   if (functions.project) put({project: address(functions.project), project_data: block + 2});
+  if (touch) {
+    const {keys, size, pattern} = data.contacts, {sets, units, rows: numbers, matrix: square, left, shares, at, impacts, log} = touch;
+    const fields = {derived: places.contacts.derived, scratch, y, out: places.contacts.outputs[0], units, rows: numbers, left, shares};
+    Object.assign(fields, {matrix: square, pattern: at, past: impacts, log, count: keys.length, size, entries: pattern.length / 2});
+    Object.assign(fields, {coordinates: n, speeds: m});
+    for (const [name, one] of Object.entries(fields)) M[sets + SETS[name]] = one;
+    M.set(pattern, at);
+  }
   if (functions.guard) {
     [places.judge.derived, scratch, ...data.judged].forEach((one, i) => { M[judged + i] = one; });
     put({guard: address(functions.guard), guard_data: judged});
@@ -371,7 +487,7 @@ function openMode(mode, options) {
   }
   return {
     data, M, n, m, y, values, fill, begin, broken, step, at, event, missed, singular, evaluate, load, settle, call, output, matrix,
-    normalize, held, moved, get time() { return field("t"); }, get begun() { return field("t_old"); },
+    normalize, held, moved, resolve, get time() { return field("t"); }, get begun() { return field("t_old"); },
     get statistics() { return ["steps", "failures", "evaluations"].map(field); },
   };
 }
@@ -595,10 +711,16 @@ function createEngine(model, options = {}) {
     return moment < 0 || update(mode.data.updates.due[moment], moment);
   }
 
-  function begin(t, from, fired = null, samples = false, changed = []) {
+  function begin(t, from, fired = null, samples = false, changed = [], triggers = []) {
     inPiece(t);
     take(t, Float64Array.from(from));
     if (samples && !sample(t)) return say("failed", "an update has no value", t);
+    if (mode.data.contacts) {
+      const met = mode.resolve(t, state, triggers, samples);
+      if (met.failed) return say("failed", met.failed, t);
+      take(t, met.state);
+      events.push(...met.events);
+    }
     if (mode.data.sides) {
       const sides = mode.settle(t, state, changed);
       if (!sides) return say("failed", "the motion stays where a law switches, which a page does not follow", t);
@@ -617,7 +739,13 @@ function createEngine(model, options = {}) {
 
   // What an event leads to.
   function happen(i, fired = null) {
-    const {part, law, message, target, updates} = mode.data.events[i];
+    const {part, law, message, target, updates, contact} = mode.data.events[i];
+    if (contact) {
+      [changes, changedAt] = [time - changedAt <= 1e-9 * settings.horizon ? changes + 1 : 0, time];
+      if (changes > 10000) return say("failed", `${part}: ${law} changes without end`);
+      const triggers = mode.data.events.flatMap((one, j) => (one.contact && (j === i || fired?.[j]) ? [one.contact] : []));
+      return begin(time, state, null, false, [], triggers);
+    }
     events.push({time, part, law, message, target});
     if (target === "stop") return say("stopped", `${part}: ${message}`);
     if (updates.length) return alter(time, state, () => update(updates), fired);

@@ -28,16 +28,23 @@ from atwood.forms.event_program import solved_reactions
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import find_observables
 from atwood.forms.sides import in_pieces
+from atwood.integrators import set_routines as sets
 from atwood.integrators.embedded.rates import write_routines as write_rates
 from atwood.integrators.methods.dormand_prince import EXPLICIT
+from atwood.integrators.set_routines import write_routines as write_sets
 from atwood.integrators.step_guard import write_routines as write_guard
 from atwood.lazy_dataclasses import replace
 from atwood.mechanics.kinematics.mechanism import Mechanism, world_position
+from atwood.mechanics.outputs.event_functions import CLOSES, CONTACT, OPENS, RESTS, STOPS, YIELDS
 from atwood.mechanics.outputs.observables import Observable
 from atwood.mechanics.outputs.totals import energies
 from atwood.model.values.space import planar_axes
+from atwood.model.values.units import ALONG
+from atwood.numerics.contact_sets import STICKS
 from atwood.plotting.live.parameters import find_parameters
 from atwood.plotting.live.pulls import PULL, pulls_of
+from atwood.simulation.contacts.compiled import set_data, why_in_python
+from atwood.simulation.contacts.values import layout_of
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.reactions import ReactionSolver
 from atwood.simulation.events.modes import MARGIN, EventProbe
@@ -48,9 +55,16 @@ from atwood.simulation.problem.explicit_scene import program_on_constraints
 from atwood.simulation.problem.preparation import problem_of_run
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.step_guard import guard_program, shortest_judged
+from atwood.simulation.run.session import OF_CONTACTS
 
 _BEYOND = 4.0
 """So many times as long as the scene's run switches of functions of time are known beforehand."""
+
+
+_MOST_CONTACTS = 20
+"""So many gaps and slips are resolved in a page."""
+
+_HAPPENED = {CLOSES: sets.CLOSES, OPENS: sets.OPENS, YIELDS: sets.YIELDS, STOPS: sets.STOPS, RESTS: sets.STOPS}
 
 
 class NotLiveError(AtwoodError):
@@ -88,7 +102,8 @@ class ModeText:
     """
 
     def __init__(self, plan: SceneProblem, y: FloatArray, quantities: Sequence[str] | None) -> None:
-        self.plan, self.assembly = plan, plan.assembly
+        self.plan = plan = _touching(plan)
+        self.assembly = plan.assembly
         self.equations, self.flat = self.assembly.own_equations, self.assembly.flat
         self.programs: dict[str, Program] = {}
         self.known: list[Observable] = []
@@ -101,6 +116,7 @@ class ModeText:
             "modes": dict(self.assembly.modes),
             "state": y.tolist(),
         }
+        self._add_contacts(y)
         self._add_motion(y)
         self._add_guard()
         self._add_quantities(quantities, y)
@@ -115,7 +131,8 @@ class ModeText:
         n, m = len(self.equations.coordinates), len(self.equations.speeds)
         given, projects = len(self.programs["kernel"].outputs) == 2, "nearer" in self.programs
         judges = write_guard("judge") if "judge" in self.programs else []
-        routines = [*write_elimination(), *write_rates(n, m, given, projects), *judges]
+        contact = write_sets() if "contacts" in self.programs else []
+        routines = [*write_elimination(), *write_rates(n, m, given, projects), *judges, *contact]
         texts = [FUNCTIONS, BITS, print_routines(routines)]
         words = self.data["words"] = {}
         for name, program in self.programs.items():
@@ -124,7 +141,7 @@ class ModeText:
             sizes = [len(one.expressions) for one in program.outputs]
             words[name] = {"derived": len(program.prologue), "scratch": scratch, "outputs": sizes}
         names = [*self.programs, *(f"{name}_prologue" for name in self.programs), "rates"]
-        names += [*(["project"] if projects else []), *(["guard"] if judges else [])]
+        names += [*(["project"] if projects else []), *(["guard"] if judges else []), *(["resolve"] if contact else [])]
         body = "\n".join(texts)
         return f"(M, F) => {{\n{body}\nreturn {{{', '.join(names)}}};\n}}"
 
@@ -133,7 +150,7 @@ class ModeText:
         assembly, plan = self.assembly, self.plan
         self.data["constraints"] = [one.label for one in self.equations.constraints]
         self.data["kept"] = list(plan.finding.kept)
-        if assembly.form == "reduced" and not self.equations.constraints:
+        if assembly.form == "reduced" and not plan.holds:
             found = accelerations_of(assembly)
             if found is None:
                 raise NotLiveError("its accelerations have no formulas")
@@ -144,9 +161,35 @@ class ModeText:
         self.programs["kernel"] = made.accelerations
         if plan.holds:
             balance = assembly.balance(assembly.form)
-            self.programs |= {"nearer": made.projection, "held": balance.constraints_alone}
-            self.data["watched"] = bool(assembly.reduced.constraints)
+            self.programs["nearer"] = made.projection
+            if self.equations.constraints:
+                self.programs["held"] = balance.constraints_alone
+            self.data["watched"] = bool(assembly.form == "reduced" and assembly.reduced.constraints)
             self.data["slopes"] = [balance.jacobian_rows.tolist(), balance.jacobian_columns.tolist()]
+
+    def _add_contacts(self, y: FloatArray) -> None:
+        """Add what the routine of a set of contacts is given; none of them holds yet."""
+        if not self.equations.contacts:
+            return
+        why = why_in_python(self.assembly)
+        if why:
+            raise NotLiveError(f"it has {why}, which pages do not resolve")
+        found = set_data(self.plan, self.flat.t_start, y)
+        layout, before = found.layout, len(self.assembly.mechanism.table.values)
+        if len(layout.first) > _MOST_CONTACTS:
+            raise NotLiveError(f"it has {len(layout.first)} gaps and slips, and pages resolve {_MOST_CONTACTS}")
+        places = [[before + place for place in some] for some in layout.places]
+        for place in (place for some in places for place in some):
+            self.data["values"][place] = 0.0
+        self.programs["contacts"] = found.program
+        self.data["contacts"] = {
+            "keys": [one.row.key[:2] for one in layout.first],
+            "rates": [f"{ALONG[one.law.options.unit]}/s" for one in layout.first],
+            "units": found.units.tolist(),
+            "places": places,
+            "size": len(layout.contacts),
+            "pattern": [one for some in zip(*found.pattern, strict=True) for one in some],
+        }
 
     def _add_guard(self) -> None:
         """Add what judges steps that laws could slip through, whichever values parameters get."""
@@ -214,10 +257,11 @@ class ModeText:
         """Add in which units errors are measured."""
         plan, kinematic_map = self.plan, kinematic_map_of(self.assembly, self.assembly.form)
         n, m = len(self.equations.coordinates), len(self.equations.speeds)
+        share = OF_CONTACTS if self.equations.contacts else 1.0
         homogeneous = [one for one in kinematic_map.program.orientation_coordinates if one.is_homogeneous]
         self.data |= {
-            "tolerances": plan.tolerances(1.0, {})[: n + m].tolist(),
-            "relative": plan.relative_share,
+            "tolerances": plan.tolerances(share, {})[: n + m].tolist(),
+            "relative": plan.relative_share * share,
             "sizes": plan.sizes.tolist(),
             "time": plan.scales.time,
             "stiffness": plan.scales.force / plan.scales.length,
@@ -263,6 +307,10 @@ class ModeText:
             }
             for one in probe.event_functions
         ]
+        keys = self.data.get("contacts", {}).get("keys", [])
+        for event, function in zip(self.data["events"], probe.event_functions, strict=True):
+            if function.target in CONTACT:
+                event["contact"] = [keys.index((function.part, function.law)), _HAPPENED.get(function.target, 0)]
 
     def _add_sides(self) -> None:
         """Add the relations of what moves: their kinds, what each compares with zero, and how large its terms are."""
@@ -274,6 +322,17 @@ class ModeText:
         self.programs["sides"] = Program(known.name, groups, self.assembly.parameters, known.outputs)
         first = self.assembly.parameters.index(sides.symbols[0])
         self.data["sides"] = {"first": first, "kinds": [one.kind for one in sides.relations]}
+
+
+def _touching(plan: SceneProblem) -> SceneProblem:
+    """Return a plan with the programs for all states of gaps and slips, if there are any."""
+    layout = layout_of(plan.assembly) if plan.assembly.own_equations.contacts else None
+    if layout is None:
+        return plan
+    held = list(plan.assembly.held_now)
+    for places, is_slip in zip(layout.places, layout.is_slip, strict=True):
+        held[places[0]] = float(STICKS) if is_slip else 1.0
+    return plan.in_piece(plan.assembly.with_held(held))
 
 
 def nodes_of(mode: ModeText) -> list[int]:

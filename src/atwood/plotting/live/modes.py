@@ -11,7 +11,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
 from atwood.mechanics.constraints.knots import BALANCES
-from atwood.mechanics.outputs.event_functions import UPDATE
+from atwood.mechanics.outputs.event_functions import CONTACT, UPDATE
 from atwood.pipeline import simulate
 from atwood.plotting.live.mode import ModeText, NotLiveError, bodies_of, nodes_of, plan_of
 from atwood.plotting.live.start import add_tangent
@@ -69,7 +69,7 @@ def _key(modes: Mapping[str, str]) -> Modes:
 def _ahead(mode: ModeText) -> Iterator[dict[str, str]]:
     """Yield the modes that events of a mode lead to."""
     for one in mode.data["events"]:
-        if one["target"] not in ("", "stop", UPDATE, SIDE):
+        if one["target"] not in ("", "stop", UPDATE, SIDE, *CONTACT):
             yield {**mode.assembly.modes, one["part"]: one["target"]}
 
 

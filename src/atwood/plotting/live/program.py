@@ -19,6 +19,7 @@ from atwood.codegen.javascript.printer import print_routines
 from atwood.errors import UnsupportedError
 from atwood.forms.assembly import Assembly
 from atwood.integrators.compiled_location import FIELDS as SEARCH_FIELDS, ROWS as SEARCH_ROWS, STACK
+from atwood.integrators import set_routines as sets
 from atwood.integrators.embedded.stepper import FIELDS
 from atwood.integrators.embedded.steps import write_routines as write_steps
 from atwood.integrators.event_location import MOST
@@ -72,7 +73,9 @@ def engine_script() -> str:
     """Return the JavaScript that runs every live scene: it defines ``createEngine``."""
     engine = files("atwood.plotting.live").joinpath("engine.js").read_text(encoding="utf-8")
     names: dict[str, object] = {"FIELD": _numbered(FIELDS), "ROW": TABLEAU.rows, "SOUGHT": _numbered(SEARCH_FIELDS)}
-    names |= {"SEARCHED": SEARCH_ROWS, "POINTS": _POINTS}
+    names |= {"SEARCHED": SEARCH_ROWS, "POINTS": _POINTS, "SETS": _numbered(sets.FIELDS), "UNIT": sets.UNITS}
+    names["SET"] = {"rows": len(sets.ROWS), "capacity": sets.CAPACITY, "entry": len(sets.ENTRY)}
+    names |= {"REFUSED": sets.REFUSED}
     return "\n".join(
         [
             "const createEngine = (() => {",
@@ -142,9 +145,9 @@ def live_program(
 
 def _refuse(assembly: Assembly) -> None:
     """Say what keeps a scene from being live."""
-    for path, local in assembly.mechanism.locals_.items():
-        for contact in local.contacts:
-            raise NotLiveError(f"{path}.{contact.law.name} is a gap or dry friction, which pages do not resolve yet")
+    if assembly.modes and assembly.own_equations.contacts:
+        part, law, _ = assembly.own_equations.contacts[0].row.key
+        raise NotLiveError(f"{part}.{law} is a gap or dry friction beside modes, which pages do not resolve")
     if kinematic_map_of(assembly, assembly.form).has_singular_coordinates:
         raise NotLiveError("its orientations have three coordinates, which are switched; quaternions are live")
 

@@ -185,7 +185,7 @@ def impact_code(plan: SceneProblem, t: float, y: FloatArray, gaps: Sequence[Cont
     Its parameters are those of `values_on_constraints`.
     """
     assembly, kept = plan.assembly, plan.finding.kept
-    light = assembly.kept.get(_LIGHT, lambda: _light_speeds(plan, t, y))
+    light = light_speeds(plan, t, y)
     rows = assembly.rows if assembly.form == "reduced" else assembly.maximal.rows
 
     def make() -> JumpCode | None:
@@ -209,7 +209,7 @@ def nearest_place(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) ->
 def program_on_constraints(plan: SceneProblem, t: float, y: FloatArray) -> ConstrainedProgram:
     """Return accelerations and projections of a scene whose constraints stay."""
     assembly, kept = plan.assembly, plan.finding.kept
-    light = assembly.kept.get(_LIGHT, lambda: _light_speeds(plan, t, y))
+    light = light_speeds(plan, t, y)
     rows = assembly.rows if assembly.form == "reduced" else assembly.maximal.rows
     name = f"{assembly.flat.name} ({assembly.form})"
 
@@ -217,6 +217,11 @@ def program_on_constraints(plan: SceneProblem, t: float, y: FloatArray) -> Const
         return constrained_program(name, *loose_equations(assembly, rows), assembly.parameters, kept, light)
 
     return assembly.shared.get(_PROGRAM, make, assembly.form, kept, light, is_loose(assembly))
+
+
+def light_speeds(plan: SceneProblem, t: float, y: FloatArray) -> tuple[int, ...]:
+    """Return the speeds of what has no inertia of its own in each of its directions; see `_light_speeds`."""
+    return plan.assembly.kept.get(_LIGHT, lambda: _light_speeds(plan, t, y))
 
 
 def _light_speeds(plan: SceneProblem, t: float, y: FloatArray) -> tuple[int, ...]:

@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 _MANY_IMPACTS = 3
 """From so many on it pays to compile what an impact does."""
 
-_OF_CONTACTS = 0.01
+OF_CONTACTS = 0.01
 """Of the tolerance, where gaps and slips decide how the motion goes on."""
 
 
@@ -97,7 +97,7 @@ class SolverRequest:
         options = self.options
         relative = min(options.relative_tolerance, loosest)
         if not self.kept.is_undisturbed:  # errors add up over impacts, and decide when the next one is
-            relative, loosest = _OF_CONTACTS * relative, _OF_CONTACTS * loosest
+            relative, loosest = OF_CONTACTS * relative, OF_CONTACTS * loosest
         return SolverOptions(
             relative_tolerance=max(relative * self.plan.relative_share, LEAST),
             absolute_tolerances=self.plan.tolerances(

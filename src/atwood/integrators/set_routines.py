@@ -1,0 +1,883 @@
+"""The routine of a set of contacts: impacts of gaps, and which gaps and slips hold from a moment on.
+
+The rules are those of `atwood.numerics.contact_sets` and `atwood.simulation.contacts.changes`, word by word, without
+what these do where a set that contradicts nothing is not found by changing the worst state: then the routine says so.
+A program gives rates, accelerations, responses and limits, and the speeds change in place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from math import inf
+
+from atwood.codegen.routines import (
+    ADDRESS,
+    BOOLEAN,
+    CODE,
+    INTEGER,
+    NUMBER,
+    Kind,
+    Operand,
+    Record,
+    Routine,
+    Value,
+    Variable,
+    call_kernel,
+    place_of,
+)
+from atwood.numerics.contact_sets import CLEAR, GOES_ON, OPEN, SLACK, STICKS, STILL, TURNS
+
+FIELDS: dict[str, Kind] = {
+    **dict.fromkeys(("derived", "scratch", "y", "out", "units", "rows", "matrix", "left"), ADDRESS),
+    **dict.fromkeys(("shares", "pattern", "past", "log"), ADDRESS),
+    **dict.fromkeys(("finite", "blur", "pace", "tolerance", "inside", "ahead", "better_x", "better_y"), NUMBER),
+    **dict.fromkeys(("count", "size", "entries", "coordinates", "speeds", "number", "better"), INTEGER),
+    **dict.fromkeys(("logged", "known", "stops"), INTEGER),
+}
+"""The memory of sets. `finite` is 0 where limits are of impulses, which finite forces do not have; `blur` and `pace` are
+multiples of what is small and slow; `inside` is how deep a gap may be, in multiples of what is small; `ahead` is how
+long impacts may still go on that are summed, and then how long they do."""
+
+UNITS = {
+    name: k
+    for k, name in enumerate(
+        (
+            *("first", "width", "slip", "at", "speed", "poisson", "part", "small", "slow"),
+            *("trigger", "state", "state_x", "state_y", "next", "next_x", "next_y", "closed"),
+            *("chosen", "given", "given_x", "given_y", "turned_x", "turned_y", "struck", "stopped"),
+        )
+    )
+}
+"""Of each gap and slip: its first row and their number, its kind and gap, what is zero but for errors, what has happened,
+its state and direction before and after, and whether it was closed at that moment; the rest is work."""
+
+ROWS = {
+    name: k
+    for k, name in enumerate(
+        (
+            *("rates", "wanted", "forces", "motions", "acting", "slot", "right", "solution", "across"),
+            *("impulses", "again", "after", "work"),
+        )
+    )
+}
+"""Numbers of each row: a gap has one, a slip one or two."""
+
+CLOSES, OPENS, YIELDS, STOPS = range(1, 5)
+"""What has happened to a gap or a slip."""
+
+ENTRY = ("unit", "before", "after", "loss")
+"""What begins an entry of the log of impacts; impulses of all rows follow."""
+
+NO_VALUE, INSIDE, ENDLESS, GAINS, NO_IMPULSES, NO_SET, FULL = range(1, 8)
+"""Why a set is not found: something has no value, a gap begins inside, impacts follow each other without end, energy
+would grow, or no impulses, or no set, contradict nothing by the rules here; or the log is full."""
+
+REFUSED = {
+    NO_VALUE: "something has no value where it touches",
+    INSIDE: "it begins inside",
+    ENDLESS: "impacts follow each other without end",
+    GAINS: "Newton's law of impact would make energy",
+    NO_IMPULSES: "no impulses are found that satisfy the laws of impact and friction",
+    NO_SET: "no accelerations are found that satisfy contact and friction",
+    FULL: "impacts follow each other without end",
+}
+"""The same in words."""
+
+CAPACITY = 64
+"""Entries of the log."""
+
+SPANS, EVEN, SEEN, ALIKE = (4, 12), 4.0, 2.0, 100.0
+"""As of `atwood.simulation.contacts.changes`."""
+
+NEAR_REST = 100.0
+"""Times what is small and slow, where impacts have accumulated."""
+
+_SETS = 12
+"""Times the number of gaps and slips: so many sets are tried."""
+
+_GAIN = 1e-9
+"""Of the work of impulses: more than this is energy that an impact would make."""
+
+_SHORT = 1e-20
+"""Squares of rows of length one that are no larger are rounding."""
+
+_MOVED = 1e-12
+"""Of the largest response: what moves less by an impulse does not move."""
+
+
+class Sets(Record):
+    """The memory of sets within a routine."""
+
+    def unit(self, name: str) -> Value:
+        """Return the address of a number for each gap and slip."""
+        units: Value = self.units
+        return units.at(self.count * UNITS[name])
+
+    def row(self, name: str) -> Value:
+        """Return the address of a number for each row."""
+        rows: Value = self.rows
+        return rows.at(self.size * ROWS[name])
+
+    def result(self, name: str) -> Value:
+        """Return the address of results of the program."""
+        n, out = self.size, self.out
+        each = n * 4 + n * n
+        limits = each + n * self.speeds
+        places: dict[str, Operand] = {"values": 0, "rates": n, "free": n * 2, "restitution": n * 3, "response": n * 4}
+        places |= {"each": each, "limits": limits, "shares": limits + self.count * 4}
+        found: Value = out.at(places[name])
+        return found
+
+
+def _open(
+    name: str, more: Mapping[str, Kind] | None = None, result: Kind | None = CODE, exported: bool = False
+) -> tuple[Routine, Sets, list[Value]]:
+    routine = Routine(name, {"place": ADDRESS, **(more or {})}, result, exported)
+    return routine, Sets(routine.arguments[0], FIELDS), routine.arguments[1:]
+
+
+def _do(r: Routine, name: str, *arguments: Operand) -> None:
+    """Call a routine, and return with its code where that is not zero."""
+    code = r.call(name, r.arguments[0], *arguments)
+    with r.when(code != 0):
+        r.give(code)
+
+
+def _sum(r: Routine, count: Operand, a: Value, b: Value) -> Value:
+    """Return the scalar product of two arrays."""
+    total = r.variable(0.0)
+    with r.count(count) as i:
+        total.now = total.now + a[i] * b[i]
+    return total.now
+
+
+def _norm(r: Routine, x: Value, y: Value) -> Value:
+    return r.sqrt(x * x + y * y)
+
+
+@contextmanager
+def _each(r: Routine, m: Sets, flag: str) -> Iterator[tuple[Value, Value, Value]]:
+    """Go through the units with a flag: their number, first row, and whether they have two rows."""
+    flags, firsts, widths = m.unit(flag), m.unit("first"), m.unit("width")
+    with r.count(m.count) as k, r.when(flags[k] != 0.0):
+        yield k, r.truncated(firsts[k]), widths[k] == 2.0
+
+
+@contextmanager
+def _rows(r: Routine, m: Sets, k: Value) -> Iterator[tuple[Value, Value]]:
+    """Go through the rows of a unit: the number within it, and that of the row."""
+    first = r.truncated(m.unit("first")[k])
+    with r.count(r.truncated(m.unit("width")[k])) as i:
+        yield i, first + i
+
+
+def _is_loose(r: Routine, m: Sets, k: Value) -> Value:
+    """Tell whether a slip is one at a gap that is open."""
+    at = m.unit("at")[k]
+    gap = r.truncated(r.most(at, 0.0))
+    return (at >= 0.0) & (m.unit("next")[gap] == float(OPEN))
+
+
+def _limit(r: Routine, m: Sets, k: Value, group: Operand) -> Value:
+    """Return the limit of a unit at the present forces: one of limit, static limit, and both backwards."""
+    count, size = m.count, m.size
+    place = (k * 0 + group) * count + k
+    own: Value = m.result("limits")[place] * m.finite
+    return own + _sum(r, size, m.shares.at(place * size), m.row("forces"))
+
+
+# -- linear systems -------------------------------------------------------------------------------------------------
+
+
+def _solve() -> Routine:
+    """Solve the system of the acting rows; where they depend on each other, by least norm."""
+    r, m, (count,) = _open("solve_forces", {"count": INTEGER})
+    matrix, left, right, solution, size = m.matrix, m.left, m.row("right"), m.row("solution"), m.size
+    stride, largest = size + 1, r.variable(0.0)
+    with r.count(count) as i:
+        row, own = matrix.at(i * size), left.at(i * stride)
+        largest.now = 0.0
+        with r.count(count) as j:
+            largest.now = r.most(r.size(row[j]), largest.now)
+        unit = r.choose(largest.now > 0.0, largest.now, 1.0)
+        with r.count(count) as j:
+            row[j] = row[j] / unit
+            own[j] = row[j]
+        right[i] = right[i] / unit
+        own[count] = right[i]
+    best = r.variable(0, INTEGER)
+    with r.count(count) as i:
+        largest.now = -1.0
+        with r.count(count, i) as k:
+            entry = r.size(left[k * stride + i])
+            with r.when(entry > largest.now):
+                largest.now, best.now = entry, k
+        with r.when(~(largest.now > CLEAR)):
+            r.give(r.call("least_forces", r.arguments[0], count))
+        pivot, other = left.at(i * stride), left.at(best.now * stride)
+        with r.count(count + 1, i) as j:
+            a, b = pivot[j], other[j]
+            pivot[j] = b
+            other[j] = a
+        with r.count(count, i + 1) as k:
+            row = left.at(k * stride)
+            share = row[i] / pivot[i]
+            with r.count(count + 1, i + 1) as j:
+                row[j] = row[j] - share * pivot[j]
+    total = r.variable(0.0)
+    with r.count(count) as turn:
+        i = count - 1 - turn
+        row = left.at(i * stride)
+        total.now = 0.0
+        with r.count(count, i + 1) as k:
+            total.now = total.now + row[k] * solution[k]
+        solution[i] = (row[count] - total.now) / row[i]
+    r.give(0)
+    return r
+
+
+def _least() -> Routine:
+    """Find the shortest solution: rows are made square to each other, the largest first; what follows is left out."""
+    r, m, (count,) = _open("least_forces", {"count": INTEGER})
+    matrix, right, solution, across, size = m.matrix, m.row("right"), m.row("solution"), m.row("across"), m.size
+    r.clear(solution, solution.at(count))
+    with r.count(count) as i:
+        row = matrix.at(i * size)
+        length = r.sqrt(_sum(r, count, row, row))
+        unit = r.choose(length > 0.0, length, 1.0)
+        with r.count(count) as j:
+            row[j] = row[j] / unit
+        right[i] = right[i] / unit
+    best, largest = r.variable(0, INTEGER), r.variable(0.0)
+    with r.count(count):
+        largest.now = 0.0
+        with r.count(count) as k:
+            row = matrix.at(k * size)
+            square = _sum(r, count, row, row)
+            with r.when(square > largest.now):
+                largest.now, best.now = square, k
+        with r.when(~(largest.now > _SHORT)):
+            r.give(0)
+        one, unit = matrix.at(best.now * size), r.sqrt(largest.now)
+        value = right[best.now] / unit
+        with r.count(count) as j:
+            across[j] = one[j] / unit
+            solution[j] = solution[j] + value * across[j]
+            one[j] = 0.0
+        with r.count(count) as k:
+            row = matrix.at(k * size)
+            with r.count(2):
+                share = _sum(r, count, row, across)
+                with r.count(count) as j:
+                    row[j] = row[j] - share * across[j]
+                right[k] = right[k] - share * value
+    r.give(0)
+    return r
+
+
+# -- sets -----------------------------------------------------------------------------------------------------------
+
+
+def _equations() -> Routine:
+    """Write the equations of the rows that act in the states that are tried; return their number."""
+    r, m, () = _open("contact_equations", result=INTEGER)
+    acting, slot, right, matrix, size, count = m.row("acting"), m.row("slot"), m.row("right"), m.matrix, m.size, m.count
+    state, ways, free = m.unit("next"), (m.unit("next_x"), m.unit("next_y")), m.row("wanted")
+    response, limits, shares = m.result("response"), m.result("limits"), m.shares
+    n = r.variable(0, INTEGER)
+    with _each(r, m, "chosen") as (k, _, _), r.when((state[k] != float(OPEN)) & ~_is_loose(r, m, k)):
+        with _rows(r, m, k) as (_, row):
+            acting[n.now] = row.number()
+            slot[row] = n.now.number()
+            n.now = n.now + 1
+    with _each(r, m, "chosen") as (k, _, is_pair), r.when((state[k] != float(OPEN)) & ~_is_loose(r, m, k)):
+        back = (~is_pair & (ways[0][k] < 0.0)).integer() * 2
+        with _rows(r, m, k) as (i, row):
+            place = r.truncated(slot[row])
+            own, part = matrix.at(place * size), r.choose(i == 0, ways[0][k], ways[1][k])
+            with r.when(state[k] == float(STICKS)):
+                with r.count(n.now) as j:
+                    own[j] = response[row * size + r.truncated(acting[j])]
+                right[place] = 0.0 - free[row]
+            with r.otherwise():
+                which = back * count + k
+                with r.count(n.now) as j:
+                    own[j] = part * shares[which * size + r.truncated(acting[j])]
+                own[place] = own[place] + 1.0
+                right[place] = (0.0 - part) * (limits[which] * m.finite)
+    r.give(n.now)
+    return r
+
+
+def _moved() -> Routine:
+    """Solve for the forces of the acting rows, and find how all rows move by them."""
+    r, m, (count,) = _open("move_by_forces", {"count": INTEGER})
+    forces, motions, free, acting, size = m.row("forces"), m.row("motions"), m.row("wanted"), m.row("acting"), m.size
+    response, solution = m.result("response"), m.row("solution")
+    r.call("solve_forces", r.arguments[0], count)
+    r.clear(forces, forces.at(size))
+    with r.count(count) as k:
+        forces[r.truncated(acting[k])] = solution[k]
+    with r.count(size) as i:
+        motions[i] = free[i] + _sum(r, size, response.at(i * size), forces)
+    r.give(0)
+    return r
+
+
+def _met() -> Routine:
+    """Find the directions that cones of two rows take, and forces and motions of the states that are tried."""
+    r, m, () = _open("meet_states")
+    place, motions, size = r.arguments[0], m.row("motions"), m.size
+    state, x, y, given = m.unit("next"), m.unit("next_x"), m.unit("next_y"), m.unit("given")
+    turned = m.unit("turned_x"), m.unit("turned_y")
+    count = r.variable(r.call("contact_equations", place, result=INTEGER), INTEGER)
+    r.call("move_by_forces", place, count.now)
+    most, some = r.variable(0.0), r.variable(False, BOOLEAN)
+
+    def is_cone(k: Value, is_pair: Value) -> Value:
+        return is_pair & (state[k] == float(GOES_ON)) & (given[k] == 0.0) & ~_is_loose(r, m, k)
+
+    with r.count(TURNS):
+        most.now, some.now = 0.0, False
+        with _each(r, m, "chosen") as (k, row, is_pair), r.when(is_cone(k, is_pair)):
+            some.now = True
+            a, b = motions[row], motions[row + 1]
+            length = _norm(r, a, b)
+            unit = r.choose(length > 0.0, length, 1.0)
+            with r.when(~(a * x[k] + b * y[k] > 0.0)):
+                r.give(0)
+            turned[0][k], turned[1][k] = a / unit, b / unit
+            most.now = r.most(r.size(a / unit - x[k]), r.most(r.size(b / unit - y[k]), most.now))
+        with r.when(~some.now | (most.now <= STILL)):
+            r.give(0)
+        with _each(r, m, "chosen") as (k, row, is_pair), r.when(is_cone(k, is_pair)):
+            x[k], y[k] = turned[0][k], turned[1][k]
+        count.now = r.call("contact_equations", place, result=INTEGER)
+        with _each(r, m, "chosen") as (k, row, is_pair), r.when(is_cone(k, is_pair)):
+            _turn(r, m, k, row, count.now, size)
+        r.call("move_by_forces", place, count.now)
+    r.give(0)
+    return r
+
+
+def _turn(r: Routine, m: Sets, k: Value, row: Value, count: Value, size: Value) -> None:
+    """Add to the equations of a cone how its direction turns with the forces."""
+    x, y, forces, motions = m.unit("next_x")[k], m.unit("next_y")[k], m.row("forces"), m.row("motions")
+    response, acting, right, matrix = m.result("response"), m.row("acting"), m.row("right"), m.matrix
+    first, second, across = response.at(row * size), response.at((row + 1) * size), m.row("across")
+    with r.count(size) as j:
+        across[j] = x * second[j] - y * first[j]
+    share = _limit(r, m, k, 0) / _norm(r, motions[row], motions[row + 1])
+    before = _sum(r, size, across, forces)
+    for i, part in ((0, 0.0 - y), (1, x)):
+        slot = r.truncated(m.row("slot")[row + i])
+        own = matrix.at(slot * size)
+        with r.count(count) as j:
+            own[j] = own[j] + share * part * across[r.truncated(acting[j])]
+        right[slot] = right[slot] + share * part * before
+
+
+class _Worst:
+    """The state that contradicts most while it is looked for."""
+
+    def __init__(self, r: Routine, m: Sets) -> None:
+        self.r, self.m, self.miss = r, m, r.variable(SLACK)
+        m.number = -1
+
+    def consider(self, k: Value, miss: Value, state: int, x: Operand = 0.0, y: Operand = 0.0) -> None:
+        """Take note of a state that would not contradict, where the present one does so more than others."""
+        with self.r.when(miss > self.miss.now):
+            self.miss.now = miss
+            self.m.number, self.m.better, self.m.better_x, self.m.better_y = k, state, x, y
+
+
+def _contradiction() -> Routine:
+    """Find the unit whose state contradicts most, and the state it has then; -1 where none does."""
+    r, m, () = _open("contradiction")
+    forces, motions, free, size = m.row("forces"), m.row("motions"), m.row("wanted"), m.size
+    response, worst = m.result("response"), _Worst(r, m)
+    pushes, moves, total = r.variable(0.0), r.variable(0.0), r.variable(0.0)
+    with _each(r, m, "chosen") as (k, _, _):
+        pushes.now = r.most(r.size(_limit(r, m, k, 0)), pushes.now)
+        with _rows(r, m, k) as (_, row):
+            pushes.now = r.most(r.size(forces[row]), pushes.now)
+            by = response.at(row * size)
+            total.now = 0.0
+            with r.count(size) as j:
+                total.now = total.now + r.size(by[j] * forces[j])
+            moves.now = r.most(r.size(free[row]), r.most(total.now, moves.now))
+    push, move = (r.choose(one.now > 0.0, one.now, 1.0) for one in (pushes, moves))
+    with _each(r, m, "chosen") as (k, row, is_pair), r.when(~_is_loose(r, m, k)):
+        second = row + is_pair.integer()
+        f = forces[row] / push, r.choose(is_pair, forces[second] / push, 0.0)
+        a = motions[row] / move, r.choose(is_pair, motions[second] / move, 0.0)
+        with r.when(m.unit("slip")[k] == 0.0):
+            _check_gap(r, m, worst, k, f[0], a[0], _limit(r, m, k, 1) / push)
+        with r.otherwise():
+            _check_slip(r, m, worst, k, (f, a, push, is_pair))
+    r.give(0)
+    return r
+
+
+def _check_gap(r: Routine, m: Sets, worst: _Worst, k: Value, f: Value, a: Value, static: Value) -> None:
+    with r.when(m.unit("next")[k] == float(STICKS)):
+        worst.consider(k, 0.0 - f - static, OPEN)
+    worst.consider(k, 0.0 - a, STICKS)
+
+
+def _check_slip(
+    r: Routine,
+    m: Sets,
+    worst: _Worst,
+    k: Value,
+    at: tuple[tuple[Value, Value], tuple[Value, Value], Value, Value],
+) -> None:
+    """See by how much the state of a slip contradicts each law; see `atwood.numerics.contact_sets`."""
+    f, a, push, is_pair = at
+    state, x, y, given = m.unit("next")[k], m.unit("next_x")[k], m.unit("next_y")[k], m.unit("given")[k] != 0.0
+    goes, sticks = state == float(GOES_ON), state == float(STICKS)
+    back = (~is_pair & r.choose(goes, x < 0.0, f[0] > 0.0, BOOLEAN)).integer() * 2
+    limit, static = _limit(r, m, k, back) / push, _limit(r, m, k, back + 1) / push
+    reads, shares = r.variable(False, BOOLEAN), m.shares.at((back * m.count + k) * m.size)
+    with r.count(m.size) as j:
+        reads.now = reads.now | (shares[j] != 0.0)
+    alone = (m.unit("at")[k] < 0.0) & ~reads.now
+    idle = alone & (r.most(limit, static) <= 0.0)
+    with r.when(idle):
+        worst.consider(k, r.choose(state == float(OPEN), 0.0, 1.0), OPEN)
+    size, motion = _norm(r, *f), _norm(r, *a)
+    with r.when(~idle & sticks):
+        unit = r.choose(size > 0.0, size, 1.0)
+        way = r.choose(size > 0.0, 0.0 - f[0] / unit, 1.0), 0.0 - f[1] / unit
+        worst.consider(k, size - static, GOES_ON, *way)
+        worst.consider(k, motion, GOES_ON, *way)
+    with r.when(~idle & goes):
+        with r.when(alone):
+            worst.consider(k, 0.0 - limit, OPEN)
+        with r.when(~given):
+            worst.consider(k, _norm(r, f[0] + limit * x, f[1] + limit * y), STICKS)
+            along = a[0] * x + a[1] * y
+            with r.when(along <= 0.0):
+                worst.consider(k, 0.0 - along, STICKS)
+            with r.otherwise():
+                worst.consider(k, _norm(r, a[0] - along * x, a[1] - along * y), GOES_ON, a[0] / motion, a[1] / motion)
+    with r.when(~idle & ~goes & ~sticks):
+        miss = r.most(r.most(limit, static), r.choose(reads.now, 1.0, 0.0))
+        with r.when(given):
+            worst.consider(k, miss, GOES_ON, m.unit("given_x")[k], m.unit("given_y")[k])
+        with r.otherwise():
+            worst.consider(k, miss, STICKS)
+
+
+def _improved() -> Routine:
+    """Change the state that contradicts most, until none does; 1 where that does not end."""
+    r, m, () = _open("improve")
+    state, x, y = m.unit("next"), m.unit("next_x"), m.unit("next_y")
+    with r.count((m.count + 1) * _SETS):
+        r.call("meet_states", r.arguments[0])
+        r.call("contradiction", r.arguments[0])
+        number = m.number
+        with r.when(number < 0):
+            r.give(0)
+        state[number] = m.better.number()
+        x[number], y[number] = m.better_x, m.better_y
+    r.give(1)
+    return r
+
+
+def _find() -> Routine:
+    """Find states of the chosen units that contradict nothing, near to those that are given; 1 where there are none."""
+    r, m, () = _open("find_states")
+    state, x, y, given = m.unit("next"), m.unit("next_x"), m.unit("next_y"), m.unit("given")
+
+    def allow(closes: bool) -> None:
+        with _each(r, m, "chosen") as (k, _, _):
+            is_slip, goes = m.unit("slip")[k] != 0.0, (state[k] == float(GOES_ON)) & ((x[k] != 0.0) | (y[k] != 0.0))
+            kept = (goes | (~is_slip & (state[k] == 0.0))) if not closes else (state[k] != state[k])
+            with r.when(given[k] != 0.0):
+                state[k], x[k], y[k] = float(GOES_ON), m.unit("given_x")[k], m.unit("given_y")[k]
+            with r.otherwise(), r.when(~kept):
+                state[k], x[k], y[k] = float(STICKS), 0.0, 0.0
+
+    allow(closes=False)
+    with r.when(r.call("improve", r.arguments[0]) == 0):
+        r.give(0)
+    allow(closes=True)
+    r.give(r.call("improve", r.arguments[0]))
+    return r
+
+
+# -- moments --------------------------------------------------------------------------------------------------------
+
+
+def _read() -> Routine:
+    """Evaluate the program at the present state."""
+    r, m, (t,) = _open("read_contacts", {"t": NUMBER})
+    y, shares, pattern, size, count, entries = m.y, m.shares, m.pattern, m.size, m.count, m.entries
+    inputs = [place_of(r, t), y, y.at(m.coordinates)]
+    with r.when(call_kernel(r, "contacts", inputs, m.derived, m.scratch, [m.out]) != 0):
+        r.give(NO_VALUE)
+    found = m.result("shares")
+    r.clear(shares, shares.at(count * size * 4))
+    with r.count(4) as group, r.count(entries) as e:
+        place = (group * count + r.truncated(pattern[e])) * size + r.truncated(pattern[entries + e])
+        shares[place] = found[group * entries + e]
+    r.copy(m.row("rates"), m.result("rates"), size)
+    r.give(0)
+    return r
+
+
+def _push() -> Routine:
+    """Change speeds and rates by impulses."""
+    r, m, (impulses,) = _open("push", {"impulses": ADDRESS})
+    size, speeds, rates, response, each = m.size, m.speeds, m.row("rates"), m.result("response"), m.result("each")
+    u = m.y.at(m.coordinates)
+    with r.count(size) as i:
+        by = impulses[i]
+        with r.when(by != 0.0):
+            own = each.at(i * speeds)
+            with r.count(speeds) as j:
+                u[j] = u[j] + own[j] * by
+            with r.count(size) as j:
+                rates[j] = rates[j] + response[j * size + i] * by
+    r.give(0)
+    return r
+
+
+def _touch() -> Routine:
+    """Choose the gaps that are closed, or at zero; return whether there are some."""
+    r, m, () = _open("touching", result=INTEGER)
+    chosen, state, values, rates = m.unit("chosen"), m.unit("state"), m.result("values"), m.row("rates")
+    some = r.variable(0, INTEGER)
+    with r.count(m.count) as k:
+        row = r.truncated(m.unit("first")[k])
+        closed = state[k] == float(STICKS)
+        is_near = closed | (values[row] <= m.unit("small")[k] * m.blur)
+        is_slow = (m.unit("speed")[k] == 0.0) | closed | (rates[row] <= m.unit("slow")[k] * m.pace)
+        is_one = (m.unit("slip")[k] == 0.0) & is_near & is_slow
+        chosen[k] = r.choose(is_one, 1.0, 0.0)
+        some.now = some.now + is_one.integer()
+    r.give(some.now)
+    return r
+
+
+def _choose_slips(r: Routine, m: Sets) -> None:
+    """Choose the slips that may rub where some gaps are closed."""
+    chosen, at = m.unit("chosen"), m.unit("at")
+    with r.count(m.count) as k, r.when(m.unit("slip")[k] != 0.0):
+        gap = r.truncated(r.most(at[k], 0.0))
+        chosen[k] = r.choose((at[k] < 0.0) | (chosen[gap] != 0.0), 1.0, 0.0)
+
+
+def _impulses() -> Routine:
+    """Find the impulses of the chosen units, and add them to those that there are."""
+    r, m, () = _open("find_impulses")
+    state, given, impulses, forces = m.unit("next"), m.unit("given"), m.row("impulses"), m.row("forces")
+    with r.count(m.count) as k:
+        state[k], given[k], m.unit("next_x")[k], m.unit("next_y")[k] = float(STICKS), 0.0, 0.0, 0.0
+    m.finite = 0.0
+    code = r.call("find_states", r.arguments[0])
+    m.finite = 1.0
+    with r.when(code != 0):
+        r.give(NO_IMPULSES)
+    with r.count(m.size) as i:
+        impulses[i] = impulses[i] + forces[i]
+    r.give(0)
+    return r
+
+
+def _strike() -> Routine:
+    """Let the chosen gaps collide, by Newton's or Poisson's law, with friction."""
+    r, m, () = _open("strike")
+    place, size, rates, free = r.arguments[0], m.size, m.row("rates"), m.row("wanted")
+    impulses, again, share = m.row("impulses"), m.row("again"), m.result("restitution")
+    response, gap, poisson = m.result("response"), m.unit("slip"), m.unit("poisson")
+    r.copy(free, rates, size)
+    r.clear(impulses, impulses.at(size))
+    r.clear(again, again.at(size))
+    with _each(r, m, "chosen") as (k, row, _), r.when((gap[k] == 0.0) & (poisson[k] == 0.0)):
+        free[row] = free[row] - share[row] * r.most(0.0 - rates[row], 0.0)
+    _do(r, "find_impulses")
+    more = r.variable(False, BOOLEAN)
+    with _each(r, m, "chosen") as (k, row, _), r.when((gap[k] == 0.0) & (poisson[k] != 0.0)):
+        again[row] = share[row] * impulses[row]
+        more.now = more.now | (again[row] > 0.0)
+    with r.when(more.now):
+        with r.count(size) as i:
+            impulses[i] = impulses[i] + again[i]
+        with r.count(size) as i:
+            free[i] = free[i] + _sum(r, size, response.at(i * size), impulses)
+        _do(r, "find_impulses")
+    _do(r, "account")
+    r.call("push", place, impulses)
+    r.give(0)
+    return r
+
+
+def _account() -> Routine:
+    """Refuse impulses that make energy, and log the impacts of gaps that approach."""
+    r, m, () = _open("account")
+    size, rates, impulses, after, work = m.size, m.row("rates"), m.row("impulses"), m.row("after"), m.row("work")
+    response, log, total, sizes = m.result("response"), m.log, r.variable(0.0), r.variable(0.0)
+    worst = r.variable(-inf)
+    with r.count(size) as i:
+        by, before = impulses[i], rates[i]
+        after[i] = before + _sum(r, size, response.at(i * size), impulses)
+        work[i] = by * (before + after[i]) * 0.5
+        total.now = total.now + work[i]
+        sizes.now = sizes.now + r.size(by) * (r.size(before) + r.size(after[i])) * 0.5
+    with r.when(total.now > sizes.now * _GAIN):
+        with _each(r, m, "chosen") as (k, row, _), r.when((m.unit("slip")[k] == 0.0) & (work[row] > worst.now)):
+            worst.now, m.number = work[row], k
+        r.give(GAINS)
+    with _each(r, m, "struck") as (k, row, _), r.when(0.0 - rates[row] > m.unit("slow")[k] * m.pace):
+        with r.when(m.logged >= CAPACITY):
+            r.give(FULL)
+        entry = log.at(m.logged * (size + len(ENTRY)))
+        loss = r.variable(0.0 - work[row])
+        with _each(r, m, "chosen") as (j, _, _), r.when(m.unit("at")[j] == k.number()):
+            with _rows(r, m, j) as (_, i):
+                loss.now = loss.now - work[i]
+        entry[0], entry[1], entry[2], entry[3] = k.number(), rates[row], after[row], loss.now
+        r.copy(entry.at(len(ENTRY)), impulses, size)
+        m.logged = m.logged + 1
+    r.give(0)
+    return r
+
+
+def _collide() -> Routine:
+    """Let what approaches collide, until nothing does."""
+    r, m, () = _open("collide")
+    chosen, struck = m.unit("chosen"), m.unit("struck")
+    coming = r.variable(False, BOOLEAN)
+    with r.count(CAPACITY):
+        r.call("touching", r.arguments[0], result=INTEGER)
+        coming.now = False
+        with r.count(m.count) as k:
+            struck[k] = chosen[k]
+        with _each(r, m, "chosen") as (k, row, _):
+            coming.now = coming.now | (m.row("rates")[row] < 0.0 - m.unit("slow")[k] * m.pace)
+        with r.when(~coming.now):
+            r.give(0)
+        with r.count(m.count) as k, r.when(m.unit("speed")[k] != 0.0):
+            chosen[k] = 1.0
+        _choose_slips(r, m)
+        _do(r, "strike")
+    r.give(ENDLESS)
+    return r
+
+
+def _hold() -> Routine:
+    """Take away the rates of the chosen units."""
+    r, m, () = _open("hold")
+    acting, right, forces, rates, size = m.row("acting"), m.row("right"), m.row("forces"), m.row("rates"), m.size
+    response, matrix, solution, n = m.result("response"), m.matrix, m.row("solution"), r.variable(0, INTEGER)
+    with _each(r, m, "chosen") as (k, _, _), _rows(r, m, k) as (_, row):
+        acting[n.now] = row.number()
+        n.now = n.now + 1
+    with r.when(n.now == 0):
+        r.give(0)
+    with r.count(n.now) as i:
+        row = r.truncated(acting[i])
+        right[i] = 0.0 - rates[row]
+        with r.count(n.now) as j:
+            matrix[i * size + j] = response[row * size + r.truncated(acting[j])]
+    r.call("solve_forces", r.arguments[0], n.now)
+    r.clear(forces, forces.at(size))
+    with r.count(n.now) as i:
+        forces[r.truncated(acting[i])] = solution[i]
+    r.call("push", r.arguments[0], forces)
+    r.give(0)
+    return r
+
+
+def _stop() -> Routine:
+    """Stop whatever touches: impacts have accumulated; what has stuck goes on to."""
+    r, m, () = _open("stop")
+    chosen, slow, rates = m.unit("chosen"), m.unit("slow"), m.row("rates")
+    r.call("touching", r.arguments[0], result=INTEGER)
+    coming = r.variable(0.0)
+    with _each(r, m, "chosen") as (_, row, _):
+        coming.now = r.most(0.0 - rates[row], coming.now)
+    with _each(r, m, "chosen") as (k, row, _), r.when(rates[row] > r.most(coming.now * ALIKE, slow[k] * m.pace)):
+        chosen[k] = 0.0  # it only passes: its impacts have not come to an end
+    r.copy(m.unit("stopped"), chosen, m.count)
+    with r.count(m.count) as k, r.when((m.unit("slip")[k] != 0.0) & (m.unit("state")[k] == float(STICKS))):
+        chosen[k] = 1.0
+    r.call("hold", r.arguments[0])
+    m.pace = 1.0
+    r.give(0)
+    return r
+
+
+def _going(r: Routine, m: Sets, some: Variable) -> None:
+    """Find the directions of the slips that go on already, and of those that begin to, which is as their event says."""
+    place, given, trigger, slip = r.arguments[0], m.unit("given"), m.unit("trigger"), m.unit("slip")
+    ways, rates, forces, state = (m.unit("given_x"), m.unit("given_y")), m.row("rates"), m.row("forces"), m.unit("state")
+    yields = r.variable(False, BOOLEAN)
+    with r.count(m.count) as k:
+        given[k] = 0.0
+        yields.now = yields.now | (trigger[k] == float(YIELDS))
+
+    def along(row: Value, is_pair: Value, values: Value) -> tuple[Value, Value, Value]:
+        a, b = values[row], r.choose(is_pair, values[row + is_pair.integer()], 0.0)
+        return a, b, _norm(r, a, b)
+
+    def direct(k: Value, way: tuple[Value, Value, Value], sign: float) -> None:
+        a, b, length = way
+        unit = r.choose(length > 0.0, length, 1.0) * sign
+        given[k], ways[0][k], ways[1][k] = r.choose(length > 0.0, 1.0, 0.0), a / unit, b / unit
+
+    with r.when(yields.now):  # the forces in the states before
+        with r.count(m.count) as k:
+            m.unit("struck")[k], m.unit("chosen")[k] = m.unit("chosen")[k], 1.0
+            given[k] = 1.0
+            for one in ("", "_x", "_y"):
+                m.unit(f"next{one}")[k] = m.unit(f"state{one}")[k]
+        r.call("meet_states", place)
+        with r.count(m.count) as k:
+            m.unit("chosen")[k], given[k] = m.unit("struck")[k], 0.0
+    with _each(r, m, "chosen") as (k, row, is_pair), r.when(slip[k] != 0.0):
+        way = along(row, is_pair, rates)
+        still = r.choose(trigger[k] == float(STOPS), SEEN, 1.0) * m.unit("slow")[k] * m.pace
+        with r.when(way[2] > still):
+            direct(k, way, 1.0)
+        with r.otherwise(), r.when(trigger[k] == float(YIELDS)):
+            direct(k, along(row, is_pair, forces), -1.0)
+    with _each(r, m, "chosen") as (k, _, _):
+        rests = (slip[k] == 0.0) | (trigger[k] == float(STOPS))
+        m.unit("next")[k] = r.choose(rests, float(STICKS), state[k])
+        for one in ("_x", "_y"):
+            m.unit(f"next{one}")[k] = r.choose(rests, 0.0, m.unit(f"state{one}")[k])
+        some.now = some.now | True
+
+
+def _settle() -> Routine:
+    """Find the states that hold from now on."""
+    r, m, (t,) = _open("settle_contacts", {"t": NUMBER})
+    chosen, state, x, y = m.unit("chosen"), m.unit("next"), m.unit("next_x"), m.unit("next_y")
+    some = r.variable(False, BOOLEAN)
+    r.call("touching", r.arguments[0], result=INTEGER)
+    with _each(r, m, "chosen") as (k, row, _):
+        passes = r.size(m.row("rates")[row]) > m.unit("slow")[k] * m.pace
+        with r.when(passes | (m.unit("trigger")[k] == float(OPENS))):
+            chosen[k] = 0.0
+    _choose_slips(r, m)
+    _do(r, "read_contacts", t)
+    r.copy(m.row("wanted"), m.result("free"), m.size)
+    _going(r, m, some)
+    with r.when(some.now), r.when(r.call("find_states", r.arguments[0]) != 0):
+        r.give(NO_SET)
+    with r.count(m.count) as k:
+        off = (chosen[k] == 0.0) | (state[k] == float(OPEN))
+        state[k] = r.choose(off, float(OPEN), state[k])
+        is_still = off | (state[k] == float(STICKS))
+        x[k], y[k] = r.choose(is_still, 0.0, x[k]), r.choose(is_still, 0.0, y[k])
+    with r.count(m.count) as k, r.when(_is_loose(r, m, k)):
+        state[k], x[k], y[k] = float(OPEN), 0.0, 0.0
+    with r.count(m.count) as k:
+        chosen[k] = r.choose(state[k] == float(STICKS), 1.0, 0.0)
+    r.give(r.call("hold", r.arguments[0]))
+    return r
+
+
+def _check() -> Routine:
+    """Refuse a gap that begins inside, or a freewheel that begins the way that is locked."""
+    r, m, () = _open("check_inside")
+    values, rates = m.result("values"), m.row("rates")
+    with r.count(m.count) as k, r.when((m.unit("slip")[k] == 0.0) & (m.unit("state")[k] == float(OPEN))):
+        row = r.truncated(m.unit("first")[k])
+        is_speed = m.unit("speed")[k] != 0.0
+        value, small = r.choose(is_speed, rates[row], values[row]), r.choose(is_speed, m.unit("slow")[k], m.unit("small")[k])
+        with r.when(value < 0.0 - small * m.inside):
+            m.number = k
+            r.give(INSIDE)
+    r.give(0)
+    return r
+
+
+def _series() -> Routine:
+    """Find in how long impacts that follow each other ever faster have come to an end; see `_Moment.left_of`."""
+    r, m, (t,) = _open("series", {"t": NUMBER}, result=None)
+    closing, past, response = r.variable(-1, INTEGER), m.past, m.result("response")
+    m.stops = 0
+    with r.count(m.count) as i:
+        k = m.count - 1 - i
+        is_one = (m.unit("trigger")[k] == float(CLOSES)) & (m.unit("speed")[k] == 0.0)
+        closing.now = r.choose(is_one, k, closing.now)
+    with r.when((closing.now < 0) | (m.known < SPANS[0])):
+        r.give()
+    row, largest = r.truncated(m.unit("first")[closing.now]), r.variable(0.0)
+    moved = response.at(row * m.size)
+    with r.count(m.size) as j:
+        largest.now = r.most(r.size(moved[j]), largest.now)
+    spans, turn = r.array(SPANS[1]), r.variable(m.known, INTEGER)
+    count, last, end, counts = r.variable(0, INTEGER), r.variable(t), r.variable(inf), r.variable(False, BOOLEAN)
+    with r.forever() as loop:
+        with r.when((turn.now == 0) | (count.now == SPANS[1])):
+            r.leave(loop)
+        turn.now = turn.now - 1
+        time, part = past[turn.now * 2], past[turn.now * 2 + 1]
+        counts.now = False
+        with r.count(m.count) as k, r.when(m.unit("part")[k] == part), _rows(r, m, k) as (_, i):
+            counts.now = counts.now | (r.size(moved[i]) > largest.now * _MOVED)
+        with r.when(~counts.now | (time == end.now)):
+            r.repeat(loop)
+        end.now = time
+        span = last.now - time
+        with r.when((count.now > 0) & (span <= spans[r.choose(count.now > 0, count.now - 1, 0, INTEGER)])):
+            r.leave(loop)
+        spans[count.now] = span
+        count.now, last.now = count.now + 1, time
+    with r.when((count.now < SPANS[0]) | ~(spans[0] > 0.0)):
+        r.give()
+    # Impacts that only happen to be near each other are no series: each interval shrinks about as the one before.
+    cube, typical = spans[0] / spans[SPANS[0] - 1], r.variable(0.5)
+    with r.count(60):  # the cube root: the mean factor of three intervals
+        typical.now = typical.now - (typical.now - cube / (typical.now * typical.now)) * (1.0 / 3.0)
+    even = r.variable(1, INTEGER)
+    with r.count(count.now, 1) as k, r.when(even.now == k):
+        factor = spans[k - 1] / spans[k] / typical.now
+        even.now = r.choose((factor <= EVEN) & (factor * EVEN >= 1.0), k + 1, even.now)
+    with r.when(even.now < SPANS[0]):
+        r.give()
+    oldest, share = spans[even.now - 1], r.variable(typical.now)
+    ratio, power = spans[0] / oldest, r.variable(1.0)
+    with r.count(60):  # the root of the factor from the oldest to the newest, by Newton's method
+        power.now = 1.0
+        with r.count(even.now - 2):
+            power.now = power.now * share.now
+        share.now = share.now - (share.now - ratio / power.now) / (even.now - 1).number()
+    left = spans[0] * share.now / (1.0 - share.now)
+    with r.when(left < m.ahead):
+        m.ahead, m.stops, m.blur, m.pace = left, 1, NEAR_REST, NEAR_REST
+    r.give()
+    return r
+
+
+def _resolve() -> Routine:
+    """Find what becomes of gaps and slips at a moment: the speeds change, and the states after it are written."""
+    r, m, (t, checks, sums) = _open("resolve", {"t": NUMBER, "checks": INTEGER, "sums": INTEGER}, exported=True)
+    m.finite, m.blur, m.pace, m.logged, m.stops = 1.0, 1.0, 1.0, 0, 0
+    _do(r, "read_contacts", t)
+    with r.when(sums != 0):
+        r.call("series", r.arguments[0], t, result=None)
+    with r.when(checks != 0):
+        _do(r, "check_inside")
+    r.call("touching", r.arguments[0], result=INTEGER)
+    r.copy(m.unit("closed"), m.unit("chosen"), m.count)
+    with r.when(m.stops != 0):
+        r.call("stop", r.arguments[0])
+    with r.otherwise():
+        _do(r, "collide")
+    _do(r, "settle_contacts", t)
+    r.give(0)
+    return r
+
+
+def write_routines() -> list[Routine]:
+    """Return the routines; they take the address of the memory of sets, and ``resolve`` is the one to be called."""
+    sets = (_solve, _least, _equations, _moved, _met, _contradiction, _improved, _find)
+    moments = (_read, _push, _touch, _impulses, _strike, _account, _collide, _hold, _stop, _settle, _check, _series)
+    return [_resolve(), *(write() for write in (*sets, *moments))]
