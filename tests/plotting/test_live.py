@@ -14,11 +14,13 @@ from atwood import Scene, assemble, floor, sign, simulate
 from atwood.errors import ParameterError
 from atwood.plotting.live import LiveProgram, engine_script, live_program
 from atwood.plotting.live.pulls import Pull
-from atwood_library import Ground, PointMass, Rope, Spring
+from atwood_library import BallContact, Ground, PointMass, Rope, Sphere, Spring
 from atwood_library.scenes import SCENES
 
 from ..helpers.node import run_node
 from ..library.test_tables import hoisted
+from ..simulation.contacts.test_drive_trains import lossy_train
+from ..simulation.contacts.test_known_answers import on_plane, start_at
 from ..simulation.test_brief_laws import on_a_line
 from ..simulation.test_sides import band, moving
 
@@ -218,7 +220,7 @@ def test_parameters_that_are_zero_stay_where_they_have_a_slider() -> None:
 
 
 def test_scenes_that_are_not_live_say_why() -> None:
-    assert live_program(SCENES["bouncing-ball"]()).reason.startswith("floor.gap is a gap or dry friction")
+    assert live_program(lossy_train(bearing=True)).reason.startswith("the limit of gear.")
     hostile = live_program(assemble(SCENES["double-pendulum"](), name="</script><!-- "))
     assert hostile.data["name"] == "</script><!-- "
     assert "</script" not in hostile.model
@@ -284,3 +286,71 @@ def test_a_chaotic_motion_agrees_with_taylor_series_to_the_end() -> None:
     expected = state_at(SCENES["double-pendulum"](), 10.0, form="reduced", rtol=1e-15, solver="taylor")
     assert code == "reached"
     np.testing.assert_allclose(state, expected, rtol=0.0, atol=1e-12)
+
+
+CONTACTS = (
+    ("bouncing-ball", "dae", 2.5, {"floor.restitution": 0.6}),  # to its rest
+    ("newtons-cradle", "reduced", 0.8, {"gravity": 5.0}),
+    ("woodpecker", "dae", 0.2, {"lower.friction": 0.35}),
+    ("clutches", "reduced", 1.2, {"rotor1.moment": 1.5}),
+    ("stick-slip", "dae", 1.5, {"belt.friction": 0.3}),
+    ("cue-ball", "reduced", 0.3, {"c.friction": 0.3}),
+)
+CONTACT_RUN = """
+print(given.map(([name, span, values]) => {
+  const engine = start(name), said = engine.advance(0.1 * span), changed = engine.set(values);
+  engine.reset();
+  return [said.code, changed.code, engine.advance(span), Array.from(engine.state), engine.events];
+}));
+"""
+
+
+def test_contacts_are_those_of_simulate_in_events_and_states() -> None:
+    def scene_of(name: str) -> Scene:
+        return SCENES[name]() if name in SCENES else cue_ball()
+
+    made = {f"{name} {form}": live_program(scene_of(name), form) for name, form, *_ in CONTACTS}
+    given = [[f"{name} {form}", span, values] for name, form, span, values in CONTACTS]
+    for (name, form, span, values), found in zip(CONTACTS, played(made, CONTACT_RUN, given), strict=True):
+        *codes, said, state, events = found
+        assert (*codes, said["code"]) == ("reached", "ready", "reached"), (name, said)
+        scene = scene_of(name)
+        for path, value in values.items():
+            if path == "gravity":
+                scene.gravity = value
+            else:
+                scene.set(path, value)
+        run = simulate(scene, form=form, rtol=RTOL, outputs=[0.0, span], t_end=span, solver="explicit").run
+        last = run.segments[-1]
+        there = np.concatenate([last.coordinates[:, -1], last.speeds[:, -1]])
+        np.testing.assert_allclose(state, there, rtol=0.0, atol=1e-9, err_msg=name)
+        # Balls of the cradle that rest touch, and rounding decides which of them open.
+        kinds = {"impact"} if name == "newtons-cradle" else {one.kind for one in run.events}
+        theirs, ours = (
+            [one for one in run.events if one.kind in kinds],
+            [one for one in events if one["kind"] in kinds],
+        )
+        told = [(one.part, one.law, one.kind) for one in theirs]
+        assert [(one["part"], one["law"], one["kind"]) for one in ours] == told, name
+        np.testing.assert_allclose([one["time"] for one in ours], [one.time for one in theirs], rtol=0.0, atol=1e-9)
+        assert len(ours) > 0
+
+
+def cue_ball() -> Scene:
+    """Return a ball that slides with spin until it rolls."""
+    scene = on_plane(Sphere(mass=1.0, radius=0.0286), BallContact(friction=0.25, radius=0.0286), space="space")
+    start_at(scene, 0.0, 0.0286, 2.0, 0.0)
+    scene.start.update({"m.position.y": 0.0, "m.velocity.y": 0.0})
+    scene.start.update({f"m.angular_velocity.{axis}": value for axis, value in zip("xyz", (30, 40, 10), strict=True)})
+    scene.t_end = 0.5
+    return scene
+
+
+def test_a_page_refuses_a_start_inside_with_the_part() -> None:
+    script = """
+    const ball = start("ball"), path = ball.starts.find(one => one.path.endsWith("position.z")).path;
+    print([ball.set(path, -0.5), ball.advance(1.0).code]);
+    """
+    said, code = played({"ball": live_program(SCENES["bouncing-ball"](), "reduced")}, script)
+    assert (said["code"], code) == ("refused", "reached")
+    assert "floor: it begins inside" in said["text"]

@@ -35,9 +35,9 @@ FIELDS: dict[str, Kind] = {
     **dict.fromkeys(("count", "size", "entries", "coordinates", "speeds", "number", "better"), INTEGER),
     **dict.fromkeys(("logged", "known", "stops"), INTEGER),
 }
-"""The memory of sets. `finite` is 0 where limits are of impulses, which finite forces do not have; `blur` and `pace` are
-multiples of what is small and slow; `inside` is how deep a gap may be, in multiples of what is small; `ahead` is how
-long impacts may still go on that are summed, and then how long they do."""
+"""The memory of sets. `finite` is 0 where limits are of impulses, which finite forces do not have; `blur` and `pace`
+are multiples of what is small and slow; `inside` is how deep a gap may be, in multiples of what is small; `ahead` is
+how long impacts may still go on that are summed, and then how long they do."""
 
 UNITS = {
     name: k
@@ -45,12 +45,12 @@ UNITS = {
         (
             *("first", "width", "slip", "at", "speed", "poisson", "part", "small", "slow"),
             *("trigger", "state", "state_x", "state_y", "next", "next_x", "next_y", "closed"),
-            *("chosen", "given", "given_x", "given_y", "turned_x", "turned_y", "struck", "stopped"),
+            *("chosen", "given", "given_x", "given_y", "turned_x", "turned_y", "struck", "stopped", "acts"),
         )
     )
 }
-"""Of each gap and slip: its first row and their number, its kind and gap, what is zero but for errors, what has happened,
-its state and direction before and after, and whether it was closed at that moment; the rest is work."""
+"""Of each gap and slip: its first row and their number, its kind and gap, what is zero but for errors, what has
+happened, its state and direction before and after, and whether it was closed at that moment; the rest is work."""
 
 ROWS = {
     name: k
@@ -286,12 +286,14 @@ def _equations() -> Routine:
     state, ways, free = m.unit("next"), (m.unit("next_x"), m.unit("next_y")), m.row("wanted")
     response, limits, shares = m.result("response"), m.result("limits"), m.shares
     n = r.variable(0, INTEGER)
-    with _each(r, m, "chosen") as (k, _, _), r.when((state[k] != float(OPEN)) & ~_is_loose(r, m, k)):
-        with _rows(r, m, k) as (_, row):
-            acting[n.now] = row.number()
-            slot[row] = n.now.number()
-            n.now = n.now + 1
-    with _each(r, m, "chosen") as (k, _, is_pair), r.when((state[k] != float(OPEN)) & ~_is_loose(r, m, k)):
+    acts = m.unit("acts")
+    with r.count(m.count) as k:
+        acts[k] = r.choose((m.unit("chosen")[k] != 0.0) & (state[k] != float(OPEN)) & ~_is_loose(r, m, k), 1.0, 0.0)
+    with _each(r, m, "acts") as (k, _, _), _rows(r, m, k) as (_, row):
+        acting[n.now] = row.number()
+        slot[row] = n.now.number()
+        n.now = n.now + 1
+    with _each(r, m, "acts") as (k, _, is_pair):
         back = (~is_pair & (ways[0][k] < 0.0)).integer() * 2
         with _rows(r, m, k) as (i, row):
             place = r.truncated(slot[row])
@@ -636,9 +638,9 @@ def _account() -> Routine:
             r.give(FULL)
         entry = log.at(m.logged * (size + len(ENTRY)))
         loss = r.variable(0.0 - work[row])
-        with _each(r, m, "chosen") as (j, _, _), r.when(m.unit("at")[j] == k.number()):
-            with _rows(r, m, j) as (_, i):
-                loss.now = loss.now - work[i]
+        rubs = _each(r, m, "chosen")
+        with rubs as (j, _, _), r.when(m.unit("at")[j] == k.number()), _rows(r, m, j) as (_, i):
+            loss.now = loss.now - work[i]
         entry[0], entry[1], entry[2], entry[3] = k.number(), rates[row], after[row], loss.now
         r.copy(entry.at(len(ENTRY)), impulses, size)
         m.logged = m.logged + 1
@@ -692,59 +694,89 @@ def _hold() -> Routine:
     return r
 
 
+def _size_of_slip(r: Routine, row: Value, is_pair: Value, values: Value) -> tuple[Value, Value, Value]:
+    """Return a slip's values in both directions, and their size."""
+    a, b = values[row], r.choose(is_pair, values[row + is_pair.integer()], 0.0)
+    return a, b, _norm(r, a, b)
+
+
+def _give(r: Routine, m: Sets, k: Value, way: tuple[Value, Value, Value], sign: float) -> None:
+    """Let a slip go on the way of some values, or against it."""
+    a, b, length = way
+    unit = r.choose(length > 0.0, length, 1.0) * sign
+    m.unit("given")[k] = r.choose(length > 0.0, 1.0, 0.0)
+    m.unit("given_x")[k], m.unit("given_y")[k] = a / unit, b / unit
+
+
+def _is_still(r: Routine, m: Sets, k: Value, size: Value) -> Value:
+    """Tell whether a slip is at rest; what has come to rest is as slow as its event sees."""
+    return ~(size > r.choose(m.unit("trigger")[k] == float(STOPS), SEEN, 1.0) * m.unit("slow")[k] * m.pace)
+
+
 def _stop() -> Routine:
-    """Stop whatever touches: impacts have accumulated; what has stuck goes on to."""
+    """Stop whatever touches: impacts have accumulated; what bounced rubs as much. What has stuck goes on to."""
     r, m, () = _open("stop")
-    chosen, slow, rates = m.unit("chosen"), m.unit("slow"), m.row("rates")
+    chosen, slow, rates, given = m.unit("chosen"), m.unit("slow"), m.row("rates"), m.unit("given")
     r.call("touching", r.arguments[0], result=INTEGER)
-    coming = r.variable(0.0)
+    coming, turned = r.variable(0.0), r.variable(False, BOOLEAN)
     with _each(r, m, "chosen") as (_, row, _):
         coming.now = r.most(0.0 - rates[row], coming.now)
     with _each(r, m, "chosen") as (k, row, _), r.when(rates[row] > r.most(coming.now * ALIKE, slow[k] * m.pace)):
         chosen[k] = 0.0  # it only passes: its impacts have not come to an end
     r.copy(m.unit("stopped"), chosen, m.count)
-    with r.count(m.count) as k, r.when((m.unit("slip")[k] != 0.0) & (m.unit("state")[k] == float(STICKS))):
-        chosen[k] = 1.0
-    r.call("hold", r.arguments[0])
-    m.pace = 1.0
-    r.give(0)
+    m.pace, m.finite = 1.0, 0.0
+    _choose_slips(r, m)
+    with r.count(m.count) as k, r.when(m.unit("slip")[k] != 0.0):
+        still = m.unit("state")[k] == float(STICKS)
+        chosen[k] = r.choose(still, 1.0, r.choose(m.unit("at")[k] >= 0.0, chosen[k], 0.0))
+    r.clear(given, given.at(m.count))
+    with _each(r, m, "chosen") as (k, row, is_pair):
+        slides = (m.unit("slip")[k] != 0.0) & (m.unit("state")[k] != float(STICKS))
+        way = _size_of_slip(r, row, is_pair, rates)
+        with r.when(slides & ~_is_still(r, m, k, way[2])):
+            _give(r, m, k, way, 1.0)
+    r.copy(m.row("wanted"), rates, m.size)
+    with r.forever() as loop:
+        with r.count(m.count) as k:
+            state = r.choose(given[k] != 0.0, float(GOES_ON), float(STICKS))
+            m.unit("next")[k] = r.choose(chosen[k] != 0.0, state, float(OPEN))
+            for one in "xy":
+                m.unit(f"next_{one}")[k] = r.choose(given[k] != 0.0, m.unit(f"given_{one}")[k], 0.0)
+        r.call("meet_states", r.arguments[0])
+        turned.now = False
+        with _each(r, m, "given") as (k, row, is_pair):
+            a, b, _ = _size_of_slip(r, row, is_pair, m.row("motions"))
+            with r.when(a * m.unit("given_x")[k] + b * m.unit("given_y")[k] <= 0.0):
+                given[k], turned.now = 0.0, True
+        with r.when(~turned.now):
+            r.leave(loop)
+    m.finite = 1.0
+    r.give(r.call("push", r.arguments[0], m.row("forces")))
     return r
 
 
 def _going(r: Routine, m: Sets, some: Variable) -> None:
     """Find the directions of the slips that go on already, and of those that begin to, which is as their event says."""
-    place, given, trigger, slip = r.arguments[0], m.unit("given"), m.unit("trigger"), m.unit("slip")
-    ways, rates, forces, state = (m.unit("given_x"), m.unit("given_y")), m.row("rates"), m.row("forces"), m.unit("state")
+    given, trigger, slip, state = m.unit("given"), m.unit("trigger"), m.unit("slip"), m.unit("state")
     yields = r.variable(False, BOOLEAN)
     with r.count(m.count) as k:
         given[k] = 0.0
         yields.now = yields.now | (trigger[k] == float(YIELDS))
-
-    def along(row: Value, is_pair: Value, values: Value) -> tuple[Value, Value, Value]:
-        a, b = values[row], r.choose(is_pair, values[row + is_pair.integer()], 0.0)
-        return a, b, _norm(r, a, b)
-
-    def direct(k: Value, way: tuple[Value, Value, Value], sign: float) -> None:
-        a, b, length = way
-        unit = r.choose(length > 0.0, length, 1.0) * sign
-        given[k], ways[0][k], ways[1][k] = r.choose(length > 0.0, 1.0, 0.0), a / unit, b / unit
-
     with r.when(yields.now):  # the forces in the states before
         with r.count(m.count) as k:
             m.unit("struck")[k], m.unit("chosen")[k] = m.unit("chosen")[k], 1.0
             given[k] = 1.0
             for one in ("", "_x", "_y"):
                 m.unit(f"next{one}")[k] = m.unit(f"state{one}")[k]
-        r.call("meet_states", place)
+        r.call("meet_states", r.arguments[0])
         with r.count(m.count) as k:
             m.unit("chosen")[k], given[k] = m.unit("struck")[k], 0.0
     with _each(r, m, "chosen") as (k, row, is_pair), r.when(slip[k] != 0.0):
-        way = along(row, is_pair, rates)
-        still = r.choose(trigger[k] == float(STOPS), SEEN, 1.0) * m.unit("slow")[k] * m.pace
-        with r.when(way[2] > still):
-            direct(k, way, 1.0)
+        way = _size_of_slip(r, row, is_pair, m.row("rates"))
+        with r.when(~_is_still(r, m, k, way[2])):
+            _give(r, m, k, way, 1.0)
         with r.otherwise(), r.when(trigger[k] == float(YIELDS)):
-            direct(k, along(row, is_pair, forces), -1.0)
+            _give(r, m, k, _size_of_slip(r, row, is_pair, m.row("forces")), -1.0)
     with _each(r, m, "chosen") as (k, _, _):
         rests = (slip[k] == 0.0) | (trigger[k] == float(STOPS))
         m.unit("next")[k] = r.choose(rests, float(STICKS), state[k])
@@ -789,7 +821,10 @@ def _check() -> Routine:
     with r.count(m.count) as k, r.when((m.unit("slip")[k] == 0.0) & (m.unit("state")[k] == float(OPEN))):
         row = r.truncated(m.unit("first")[k])
         is_speed = m.unit("speed")[k] != 0.0
-        value, small = r.choose(is_speed, rates[row], values[row]), r.choose(is_speed, m.unit("slow")[k], m.unit("small")[k])
+        value, small = (
+            r.choose(is_speed, rates[row], values[row]),
+            r.choose(is_speed, m.unit("slow")[k], m.unit("small")[k]),
+        )
         with r.when(value < 0.0 - small * m.inside):
             m.number = k
             r.give(INSIDE)

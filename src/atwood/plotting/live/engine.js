@@ -65,9 +65,10 @@ function openMode(mode, options) {
   }
   const scratch = room(Math.max(...Object.values(words).map(one => one.scratch)));
   const wide = Math.max(size, data.passage?.counts.reduce((a, b) => a + b) ?? 0); // bodies have more coordinates
-  const [own, block, clock, y, yp, nearer] = [data.values.length, 8, 1, wide, wide, size + m].map(room);
+  const most = Math.max(wide, count); // where states are, events are read, too
+  const [own, block, clock, y, yp, nearer] = [data.values.length, 8, 1, wide, most, size + m].map(room);
   const judged = room(4), session = room(Object.keys(FIELD).length), arrays = room(ROW.all * padded), shifts = room(count);
-  const sought = room(Object.keys(SOUGHT).length), [sy, syp, shifted, turns] = [size, size, size, 2 * size].map(room);
+  const sought = room(Object.keys(SOUGHT).length), [sy, syp, shifted, turns] = [most, most, size, 2 * size].map(room);
   const rows = room(Object.keys(SEARCHED).length * count + POINTS * (1 + 2 * count));
   const touch = data.contacts && layContacts(data.contacts, m, room);
   const M = new Float64Array(end), F = [null], values = Float64Array.from(data.values);

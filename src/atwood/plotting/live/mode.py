@@ -62,7 +62,7 @@ _BEYOND = 4.0
 
 
 _MOST_CONTACTS = 20
-"""So many gaps and slips are resolved in a page."""
+"""So many gaps, and slips without a gap, are resolved in a page."""
 
 _HAPPENED = {CLOSES: sets.CLOSES, OPENS: sets.OPENS, YIELDS: sets.YIELDS, STOPS: sets.STOPS, RESTS: sets.STOPS}
 
@@ -173,11 +173,12 @@ class ModeText:
             return
         why = why_in_python(self.assembly)
         if why:
-            raise NotLiveError(f"it has {why}, which pages do not resolve")
+            raise NotLiveError(f"{why}, which pages do not resolve")
         found = set_data(self.plan, self.flat.t_start, y)
         layout, before = found.layout, len(self.assembly.mechanism.table.values)
-        if len(layout.first) > _MOST_CONTACTS:
-            raise NotLiveError(f"it has {len(layout.first)} gaps and slips, and pages resolve {_MOST_CONTACTS}")
+        count = sum(at < 0 for at in layout.gap_of)
+        if count > _MOST_CONTACTS:
+            raise NotLiveError(f"it has {count} contacts, and pages resolve up to {_MOST_CONTACTS}")
         places = [[before + place for place in some] for some in layout.places]
         for place in (place for some in places for place in some):
             self.data["values"][place] = 0.0

@@ -18,8 +18,8 @@ from atwood.arrays import FloatArray
 from atwood.codegen.javascript.printer import print_routines
 from atwood.errors import UnsupportedError
 from atwood.forms.assembly import Assembly
-from atwood.integrators.compiled_location import FIELDS as SEARCH_FIELDS, ROWS as SEARCH_ROWS, STACK
 from atwood.integrators import set_routines as sets
+from atwood.integrators.compiled_location import FIELDS as SEARCH_FIELDS, ROWS as SEARCH_ROWS, STACK
 from atwood.integrators.embedded.stepper import FIELDS
 from atwood.integrators.embedded.steps import write_routines as write_steps
 from atwood.integrators.event_location import MOST

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.expr import Program
+from atwood.expr import Program, depends_on, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.forms.constrained import contacts_program
 from atwood.forms.loose import loose_equations
@@ -29,7 +29,7 @@ class SetData:
     layout
         The gaps and slips.
     units
-        What is known beforehand of each, by the rows of `UNITS`; small and slow are those of a relative tolerance of one.
+        What is known beforehand of each, by the rows of `UNITS`; what is small and slow is that of a tolerance of one.
     """
 
     program: Program
@@ -39,11 +39,20 @@ class SetData:
 
 
 def why_in_python(assembly: Assembly) -> str:
-    """Return what the routine cannot do in a scene; empty where it can do all."""
+    """Return which limit of friction the routine cannot read, and why; empty where it reads all."""
     layout = layout_of(assembly)
-    if layout.is_curved:
-        return "limits of friction that are curved in a force"
-    return "limits of friction that read forces of joints" if layout.is_borne else ""
+    if not (layout.is_curved or layout.is_borne):
+        return ""
+    own = [one.read for one in layout.contacts]
+    borne = [x for x in layout.read if x not in own]
+    for one in layout.contacts:
+        limits = [limit for way in (1.0, -1.0) for limit in one.towards(way)]
+        name = ".".join(one.row.key[:2])
+        if depends_on(limits, borne):
+            return f"the limit of {name} reads forces of joints"
+        if depends_on(list(jacobian(limits, own).entries), own):
+            return f"the limit of {name} is curved in a force"
+    raise AssertionError("no limit is curved, and none reads forces of joints")
 
 
 def in_no_contact(assembly: Assembly) -> Assembly:
@@ -94,5 +103,3 @@ def _units(layout: Layout, plan: SceneProblem) -> FloatArray:
             found[UNITS[name], k] = value
         first += len(rows)
     return found
-
-
