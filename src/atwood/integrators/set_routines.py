@@ -911,7 +911,7 @@ def _resolve() -> Routine:
     return r
 
 
-def write_routines() -> list[Routine]:
+def write_sets() -> list[Routine]:
     """Return the routines; they take the address of the memory of sets, and ``resolve`` is the one to be called."""
     sets = (_solve, _least, _equations, _moved, _met, _contradiction, _improved, _find)
     moments = (_read, _push, _touch, _impulses, _strike, _account, _collide, _hold, _stop, _settle, _check, _series)
