@@ -188,7 +188,6 @@ def _choose_on_constraints(
     is_for_ida = (
         plan.program.level not in ("", "ggl")
         or bool(plan.not_compilable)
-        or bool(equations.read)
         or kinematic_map.has_singular_coordinates
         or (can_be_stiff(plan.assembly) and len(q) + len(u) > _MANY)
     )
