@@ -181,7 +181,7 @@ def _place(plan: SceneProblem, t: float, q: FloatArray) -> Place:
 def can_be_solved(plan: SceneProblem) -> bool:
     """Return whether a scene is one of which loops are solved by formulas, if their form is right.
 
-    Its constraints hold positions, its rates are speeds, and no law reads a multiplier.
+    Its constraints hold positions, and its rates are speeds.
     """
     equations = plan.assembly.reduced
     return bool(
@@ -189,8 +189,6 @@ def can_be_solved(plan: SceneProblem) -> bool:
         and equations.constraints
         and plan.finding.kept
         and len(equations.speeds) > plan.finding.rank
-        and not equations.read
-        and not equations.states
         and all(one.is_homogeneous for one in equations.orientation_coordinates)
         and _freedoms_besides(plan) >= 0
         and (len(equations.speeds) - plan.finding.rank) * len(equations.speeds) <= _LARGEST
@@ -233,7 +231,7 @@ def _solve_at(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> Sol
             continue
         if best is None or found.margin > best.margin:
             best = found
-        if found.least or (len(independent) > 1 and found.margin > _AMPLE):
+        if found.least or (form is not None and len(form.loops.speeds) > 1 and found.margin > _AMPLE):
             return found
     return best
 
@@ -387,13 +385,14 @@ class ManyBranches:
         """
         loops, runs = self.form.loops, len(y)
         count, names = len(loops.margins), self.assembly.reduced.names
-        if not count or len(loops.independent) > 1 or names[loops.independent[0]].unit != "rad":
+        if not count or not loops.speeds or len(loops.speeds) > 1 or names[loops.independent[0]].unit != "rad":
             return np.zeros(runs), np.zeros(runs)
         turn = np.linspace(0.0, 2.0 * np.pi, TURN + 1)
         angles = (y[:, :1] + turn[None, :]).ravel()
-        own, speeds = np.repeat(values, len(turn), axis=0), np.repeat(y[:, 1], len(turn))
+        own, others = np.repeat(values, len(turn), axis=0), np.repeat(y[:, 1:], len(turn), axis=0).T  # states, speed
         with np.errstate(all="ignore"):
-            ahead, _ = self._call(self.form.watched, own, np.full(len(angles), t), angles[None, :], speeds[None, :])
+            groups = np.concatenate([angles[None, :], others[:-1]]), others[-1:]
+            ahead, _ = self._call(self.form.watched, own, np.full(len(angles), t), *groups)
             margins = ahead[:count].reshape(count, runs, len(turn))
             least = np.min(margins, axis=(0, 2))
             steepest = np.max(np.abs(np.diff(margins, axis=2)), axis=(0, 2))

@@ -182,9 +182,9 @@ def _choose_on_constraints(
     """Return what solves a scene whose constraints stay: an explicit method with steps on them, unless it is stiff.
 
     Its errors are a thousandth of IDA's, in a tenth of the time. Where a form at index 1 was asked for, it is what IDA
-    makes of it that is to be seen; multipliers that forces read are unknowns of IDA's.
+    makes of it that is to be seen.
     """
-    equations, kinematic_map = plan.assembly.own_equations, plan.balance.kinematic_map
+    kinematic_map = plan.balance.kinematic_map
     is_for_ida = (
         plan.program.level not in ("", "ggl")
         or bool(plan.not_compilable)
