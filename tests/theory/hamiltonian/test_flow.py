@@ -95,7 +95,7 @@ def test_the_algebra_of_angular_momentum_and_of_kepler() -> None:
 def test_what_a_scene_conserves_and_poisson_s_theorem() -> None:
     h = hamiltonian(SCENES["kepler"]())
     found = bracket_algebra(h)
-    assert tuple(map(str, found.names)) == ("h", "L", "Q", "Q_2")
+    assert tuple(map(str, found.names)) == ("h", "L", "A", "A_2")
     assert all(found.brackets[0, k] == 0 for k in range(4))
     for one in found.functions:
         assert total_derivative(one, h) == 0

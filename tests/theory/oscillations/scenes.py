@@ -85,6 +85,25 @@ def governor(rate: float = 6.0, ball: float = 0.7, sleeve: float = 1.3, length: 
     return scene
 
 
+def turning_rod(scale: float = 1.0) -> Scene:
+    """Return a bead on a rod that turns about the vertical, held to the axle by a spring."""
+    scene = Scene(space="space", gravity=0.0)
+    ground, clock = scene.add("ground", Ground()), scene.add("clock", Ramp(slope=2.0))
+    motor = scene.add("motor", RotaryDrive(axis=(0.0, 0.0, 1.0)))
+    rail = scene.add("rail", Slider(axis=(0.6, 0.8, 0.0)))
+    coil = scene.add("coil", Spring(stiffness=9.0, natural_length=0.5 * scale))
+    bead = scene.add("bead", PointMass())
+    scene.connect(clock.output("value"), motor.input("rotation"))
+    scene.connect(ground.frame, motor.a)
+    scene.connect(motor.b, rail.a)
+    scene.connect(rail.b, bead.point)
+    scene.connect(motor.b, coil.a)
+    scene.connect(coil.b, bead.point)
+    scene.start["rail.displacement"] = 0.8 * scale
+    scene.symbols.update({"clock.slope": "Omega", "coil.natural_length": "l", "coil.stiffness": "k", "bead.mass": "m"})
+    return scene
+
+
 def hanging(names: tuple[str, str] = ("upper", "lower"), turn: tuple[float, float] | None = None) -> Scene:
     """Return a double pendulum whose parts have names of their own, perhaps with gravity in another direction."""
     scene = Scene() if turn is None else Scene(gravity=turn)

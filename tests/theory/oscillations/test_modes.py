@@ -22,7 +22,7 @@ from atwood_library.scenes import (
     WilberforcePendulum,
 )
 
-from .scenes import chain, hanging, rotor, trap
+from .scenes import chain, hanging, rotor, trap, turning_rod
 
 g, l, k, m = sympy.symbols("g l k m", positive=True)
 
@@ -136,10 +136,25 @@ def test_the_bead_s_frequencies_about_the_bottom_and_aside() -> None:
     aside = {"hoop.angle": math.acos(-9.81 / 25.0)}
     (tilted,) = squares(atwood.normal_modes(scene, at=aside, symbolic=True, symbols=letters))
     assert sympy.simplify(tilted - (omega**2 - g**2 / (a**2 * omega**2))) == 0
-    with pytest.raises(atwood.UsageError, match=r"2 of its states of rest are stable.*1\.97404"):
-        atwood.normal_modes(scene, symbolic=True)
+    (mirrored,) = squares(atwood.normal_modes(scene, symbolic=True, symbols=letters))  # of two that mirror each other
+    assert sympy.simplify(mirrored - tilted) == 0
     with pytest.raises(atwood.UsageError, match="0 of its states of rest have these values"):
         atwood.normal_modes(scene, at={"hoop.angle": 0.3}, symbolic=True)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-3])
+def test_a_bead_on_a_spring_rests_on_both_sides_of_a_rod_that_turns(scale: float) -> None:
+    """At ``k l/(k - m Omega^2)``, where ``k > m Omega^2``, and swings there with ``Omega_0^2 = k/m - Omega^2``."""
+    scene = turning_rod(scale)
+    omega = sympy.Symbol("Omega", positive=True)
+    found = atwood.equilibria(scene, symbolic=True)
+    there = k * l / (k - m * omega**2)
+    for one, place in zip(found, (there, -there), strict=True):
+        assert sympy.simplify(plain(one.values["rail.displacement"]) - place) == 0
+    assert sorted(one.numbers["rail.displacement"] for one in found) == pytest.approx([-0.9 * scale, 0.9 * scale])
+    assert all(one.stability == "stable" for one in found)
+    (square,) = squares(atwood.normal_modes(scene, symbolic=True))
+    assert sympy.simplify(square - (k / m - omega**2)) == 0
 
 
 def test_normal_coordinates_make_both_energies_sums_of_squares_and_lead_back() -> None:

@@ -187,6 +187,7 @@ def _separate(
     for k, part in enumerate(parts):
         if k != last:
             constant = sympy.Symbol("_".join(["alpha", *(str(q) for q, _ in part)]))
+            sums[k] = sympy.collect(sums[k], [*constants, *(p for _, p in group)], tidied)
             constants[constant] = sums[k]
             rest += constant
             _separate(sums[k] - constant, part, None, constants, made, total, name)

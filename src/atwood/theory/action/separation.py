@@ -344,9 +344,7 @@ def separation(
     if h.depends_on_time:
         raise UnsupportedError("H depends on time", where=h.name)
     plain = [sympy.Symbol(f"{by}{one.func.__name__}") for by in ("", "p_") for one in h.coordinates]
-    places = (
-        dict(zip(h.paths, plain, strict=False)) if coordinates is None else read_places(coordinates, h.paths, h.name)
-    )
+    places = dict(zip(h.paths, plain, strict=False)) if coordinates is None else read_places(coordinates, h.paths, h)
     named = {symbol for one in places.values() for symbol in one.free_symbols} - set(h.values)
     new = tuple(sorted(named, key=str))
     if len(new) != len(h.paths):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -49,6 +50,7 @@ class PhaseSpace:
         """Return an expression on the plain symbols; a symbol with the name of one of the given stands for it."""
         found = value.xreplace(dict(zip(self.given, self._own, strict=True)))
         named = {sympy.Symbol(_plain(given)): own for given, own in zip(self.given, self._own, strict=True)}
+        found = spelled(found, (*named, *(self.parameters or ())), new)
         found = found.xreplace({name: own for name, own in named.items() if name not in new})
         stray = found.atoms(sympy.Derivative) | found.atoms(sympy.core.function.AppliedUndef)
         if stray:
@@ -380,6 +382,15 @@ def _by_symbol(value: Any) -> dict[Any, Any]:
     if not isinstance(value, Mapping):
         raise Refused
     return {as_symbol(key): as_expression(one) for key, one in value.items()}
+
+
+def spelled(value: Sympy, known: Iterable[Sympy], new: Sequence[Sympy] = ()) -> Sympy:
+    """Return an expression in which ``m1`` is ``m_1`` where that is known and ``m1`` is not, as it is printed."""
+    names = {str(one): one for one in known}
+    stray = (one for one in value.free_symbols if str(one) not in names and one not in new)
+    figures = re.compile(r"(?<=[A-Za-z])(?=\d)")
+    meant = {one: names.get(figures.sub("_", str(one)), one) for one in stray}
+    return value.xreplace(meant)
 
 
 def _inverse(value: Any) -> dict[Any, Any]:

@@ -29,7 +29,7 @@ from atwood.theory.formulas.notation import SYMBOLS as LETTERS
 from atwood.theory.formulas.printers import Sympy
 from atwood.theory.formulas.reading import text_of
 from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, hamiltonian, start_of
-from atwood.theory.hamiltonian.phase_space import EXPRESSION, SYMBOLS
+from atwood.theory.hamiltonian.phase_space import EXPRESSION, SYMBOLS, spelled
 from atwood.theory.hamiltonian.tidied import is_positive, length, tidied
 
 
@@ -185,8 +185,8 @@ def point_transformation(
     else:
         h = hamiltonian(scene, symbols=symbols)
         paths = h.paths
-    old = read_places(old, paths, h.name)
     new = tuple(coordinates)
+    old = read_places(old, paths, h, new)
     if len(new) != len(paths) or len(set(new)) != len(paths):
         advice = f"Give {', '.join(paths)}, each in terms of {len(paths)} new ones that are all different."
         raise UsageError(f"{len(paths)} new coordinates are needed", where=h.name, advice=advice)
@@ -198,8 +198,11 @@ def point_transformation(
     return point_transformation_of(h, old, new)
 
 
-def read_places(given: Mapping[str, Any], paths: Sequence[str], where: str) -> dict[str, Sympy]:
-    """Return expressions by the paths of all coordinates."""
+def read_places(
+    given: Mapping[str, Any], paths: Sequence[str], h: Hamiltonian, new: Sequence[Sympy] = ()
+) -> dict[str, Sympy]:
+    """Return expressions by the paths of all coordinates, in new ones and the parameters of H."""
+    where = h.name
     for path in given:
         if path not in paths:
             advice = suggestion(path, paths) or f"There are {', '.join(paths)}."
@@ -208,7 +211,7 @@ def read_places(given: Mapping[str, Any], paths: Sequence[str], where: str) -> d
     if missing:
         advice = f"Give {', '.join(paths)}, each in terms of others."
         raise UsageError(f"the coordinates leave out {', '.join(missing)}", where=where, advice=advice)
-    return {path: check(EXPRESSION, given[path], path, where) for path in paths}
+    return {path: spelled(check(EXPRESSION, given[path], path, where), h.values, new) for path in paths}
 
 
 def equations_of(h: Hamiltonian) -> EquationsOfMotion:
@@ -257,7 +260,7 @@ def _moved(
             where=h.name,
             advice="Give as many independent coordinates as the scene has.",
         )
-    positive = _factors(determinant, new)
+    positive = _factors(tidied(determinant, known), new)
     own = (by_new.T * (linear + mass * explicit)).applyfunc(lambda one: tidied(one, [*known, *positive]))
     rest = plain.xreplace(still) + (linear.T * explicit)[0, 0] + (explicit.T * mass * explicit)[0, 0] / 2
     rates = sympy.Matrix([sympy.Symbol(f"{one.name}'") for one in new])
@@ -296,15 +299,19 @@ def _inverted(matrix: Sympy, known: Sequence[Sympy]) -> tuple[Sympy, Sympy]:
     for block in sympy.utilities.iterables.connected_components(
         (list(range(n)), [(i, j) for i in range(n) for j in range(n) if matrix[i, j] != 0])
     ):
-        part = matrix.extract(block, block)
-        own = tidied(part.det(method="berkowitz"), known)
-        determinant *= own
-        if determinant == 0:
-            break
-        inside = part.adjugate() if len(block) > 1 else sympy.ones(1, 1)
+        size = len(block)
+        part = matrix.extract(block, block).row_join(sympy.eye(size))
+        for k in range(size):  # by Gauss and Jordan: each entry is made short before others are made of it
+            pivot = part[k, k]
+            determinant *= pivot
+            if pivot == 0:
+                return inverse, pivot
+            part[k, :] = (part[k, :] / pivot).applyfunc(lambda one: tidied(one, known))
+            for i in set(range(size)) - {k}:
+                part[i, :] = (part[i, :] - part[i, k] * part[k, :]).applyfunc(lambda one: tidied(one, known))
         for a, i in enumerate(block):
             for b, j in enumerate(block):
-                inverse[i, j] = tidied(inside[a, b] / own, known)
+                inverse[i, j] = part[a, size + b]
     return inverse, determinant
 
 

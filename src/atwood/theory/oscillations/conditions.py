@@ -102,7 +102,11 @@ def _without_roots(equations: Sequence[Sympy], unknowns: Sequence[Sympy]) -> tup
     def is_root(value: Sympy) -> bool:
         return bool(value.is_Pow and value.exp.is_Rational and value.exp.q == 2 and value.base.has(*unknowns))
 
-    plain = [one.replace(is_root, named) for one in equations]
+    def magnitude(inside: Sympy) -> Sympy:
+        square = sympy.Pow(inside, 2, evaluate=False)
+        return named(sympy.Pow(square, sympy.S.Half, evaluate=False)) if inside.has(*unknowns) else abs(inside)
+
+    plain = [one.replace(sympy.Abs, magnitude).replace(is_root, named) for one in equations]
     return [*plain, *(root**2 - inside for root, inside in roots.items())], roots
 
 

@@ -337,7 +337,10 @@ def _upper(value: complex) -> complex:
 
 
 def _chosen(plain: PlainEquations, at: Mapping[str, Any] | None) -> tuple[SymbolicEquilibrium, State]:
-    """Return the state that was asked for: that of given values, the start if it is at rest, or the only stable one."""
+    """Return the state that was asked for: that of given values, the start if it is at rest, or one that is stable.
+
+    Those that are stable must have the same frequencies.
+    """
     numbers = _start(plain) if at is None else {path: _in_si(plain, path, value) for path, value in at.items()}
     exact = _at_rest(plain, numbers)
     if exact is not None:
@@ -346,7 +349,7 @@ def _chosen(plain: PlainEquations, at: Mapping[str, Any] | None) -> tuple[Symbol
     there = [one for one in found if numbers and _is_there(plain, one[0], numbers)]
     if at is None and not there:
         there = [one for one in found if one[0].stability == "stable"]
-    if len(there) == 1:
+    if len(there) == 1 or (at is None and len({_frequencies(one) for _, one in there}) == 1):
         return there[0]
     ahead = "its start is not at rest, and " if at is None else ""
     listed = "; ".join(
@@ -358,6 +361,12 @@ def _chosen(plain: PlainEquations, at: Mapping[str, Any] | None) -> tuple[Symbol
         where=plain.name,
         advice="Say about which state with `at`.",
     )
+
+
+def _frequencies(state: State) -> Sympy:
+    """Return what the frequencies about a state are roots of: states that mirror each other have the same."""
+    one, s = state.expansion, sympy.Symbol("s")
+    return None if one is None else characteristic(one.mass, one.damping, one.stiffness, s).monic()
 
 
 def _start(plain: PlainEquations) -> dict[str, float]:

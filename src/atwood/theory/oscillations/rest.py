@@ -187,13 +187,19 @@ def expand(plain: PlainEquations, solution: Solution) -> Expansion | None:
 
 
 def _signed(value: Sympy, positive: Sequence[Sympy]) -> Sympy:
-    """Return an expression in which the magnitude of what is positive, or of its opposite, is that itself."""
+    """Return an expression in which magnitudes and signs of what is positive, or of its opposite, are known."""
 
-    def said(inside: Sympy) -> Sympy:
-        shares = ((one, (inside / one).cancel()) for one in positive)
-        return next((one * abs(share) for one, share in shares if share.is_positive or share.is_negative), abs(inside))
+    def turned(inside: Sympy) -> int:
+        shares = ((inside / one).cancel() for one in positive)
+        return next((1 if share.is_positive else -1 for share in shares if share.is_positive or share.is_negative), 0)
 
-    return value.replace(sympy.Abs, said) if positive else value
+    def bare(inside: Sympy) -> Sympy:
+        return turned(inside) * inside or abs(inside)
+
+    def sign(inside: Sympy) -> Sympy:
+        return turned(inside) or sympy.sign(inside)
+
+    return value.replace(sympy.Abs, bare).replace(sympy.sign, sign) if positive else value
 
 
 _ASIDE = 1e-3

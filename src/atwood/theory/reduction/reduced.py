@@ -21,7 +21,7 @@ from atwood.simulation.initialization.start import find_start
 from atwood.theory.formulas.described import Described
 from atwood.theory.formulas.notation import SYMBOLS
 from atwood.theory.hamiltonian.hamiltonian import hamiltonian, start_of
-from atwood.theory.hamiltonian.phase_space import EXPRESSION
+from atwood.theory.hamiltonian.phase_space import EXPRESSION, spelled
 from atwood.theory.hamiltonian.point_transformations import PointTransformation, point_transformation, start_in
 from atwood.theory.hamiltonian.tidied import tidied
 from atwood.theory.reduction.orbit import RadialFormulas
@@ -334,9 +334,9 @@ def _in_others(
     scene: Model | Assembly | PointTransformation, old: Mapping[str, Any], symbols: Mapping[str, str] | None
 ) -> PointTransformation:
     """Return a scene in the coordinates that its own are given in terms of."""
-    letters = {one for path, value in old.items() for one in check(EXPRESSION, value, path, "reduced").free_symbols}
     h = scene.source if isinstance(scene, PointTransformation) else hamiltonian(scene, symbols=symbols)
-    new = sorted(letters - {*h.values, sympy.Symbol("t")}, key=str)
+    given = (spelled(check(EXPRESSION, value, path, "reduced"), h.values) for path, value in old.items())
+    new = sorted({*sympy.Tuple(*given).free_symbols} - {*h.values, sympy.Symbol("t")}, key=str)
     return point_transformation(scene, old, new, symbols=symbols)
 
 

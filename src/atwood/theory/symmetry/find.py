@@ -49,7 +49,7 @@ _INTEGRALS = {
     "first": ("C", "affine symmetry", "integral of a symmetry that is affine in the coordinates"),
     "time": ("C", "symmetry in time", "integral of a symmetry with coefficients in time"),
     "second": (
-        "Q",
+        "A",
         "quadratic in momenta",
         "integral of second order in the momenta, as those of Laplace, Runge and Lenz",
     ),
