@@ -226,6 +226,12 @@ def _series(f: Sympy, g: Sympy, space: PhaseSpace, s: Sympy, order: int) -> Symp
 def _closed(f: Sympy, space: PhaseSpace, s: Sympy) -> tuple[Sympy, ...]:
     """Return where a flow leads all coordinates and momenta, as linear equations among finitely many functions."""
     own = (*space.coordinates, *space.momenta)
+    if f.xreplace({one: sympy.Dummy(real=True) for one in f.free_symbols}).has(sympy.Abs, sympy.sign):
+        raise UnsupportedError(
+            f"{space.shown(f)} has a magnitude, so that its flow is another formula on each side",
+            where="flow_of",
+            advice="Integrate in numbers: flow_of(..., order=1).integrated(...).",
+        )
     functions: list[Sympy] = list(own)
     rows: list[dict[Sympy, Sympy]] = []
     while len(rows) < len(functions):

@@ -526,5 +526,6 @@ def total_derivative(f: Any, hamiltonian: Hamiltonian) -> Sympy:
 
 def bracket(f: Sympy, g: Sympy, space: PhaseSpace) -> Sympy:
     """Return the Poisson bracket of functions on the plain symbols of a phase space, as it comes."""
+    f, g = (one.replace(sympy.Abs, lambda inside: sympy.sqrt(inside**2)) for one in (f, g))  # all is real
     pairs = zip(space.coordinates, space.momenta, strict=True)
     return sympy.Add(*(f.diff(q) * g.diff(p) - f.diff(p) * g.diff(q) for q, p in pairs))
