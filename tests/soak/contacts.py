@@ -298,7 +298,7 @@ def laws_missed(made: Made, result: aw.Result, draft: Draft) -> list[Finding]:
 
 
 def _run(made: Made, form: str) -> aw.Result:
-    return simulate(made.scene, form=form, t_end=END, rtol=RTOL, outputs=201, max_seconds=30.0)
+    return simulate(made.scene, form=form, t_end=END, rtol=RTOL, outputs=201)
 
 
 def check(seed: int) -> Trial:

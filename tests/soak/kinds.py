@@ -24,6 +24,7 @@ KINDS = {
     "poles": "poles",
     "rest": "rest",
     "scenes": "scenes",
+    "sets": "sets",
     "stiff": "stiff",
     "tables": "tables",
     "metamorphic": "metamorphic",
