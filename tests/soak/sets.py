@@ -378,11 +378,22 @@ def every_set(oracle: Oracle, speeds: np.ndarray) -> list[np.ndarray]:
 
     Of forces that are not determined the least are looked at, and others where a linear program finds them.
     """
-    touches, rates = oracle.draft.touches, oracle.rates(speeds)
-    fast, width = _size(speeds), 2
+    rates = oracle.rates(speeds)
+    fast = _size(speeds)
     free = oracle.accelerations(speeds, np.zeros_like(rates)).ravel()
+    found: list[np.ndarray] = []
+    for states in itertools.product(*_choices(oracle, rates, fast)):
+        forces = _forces_in(oracle, states, free, _weight(oracle))
+        if forces is not None and force_missed(oracle, speeds, forces.reshape(-1, 2))[0] <= SMALL:
+            fall = oracle.accelerations(speeds, forces.reshape(-1, 2)).ravel()
+            if not any(np.max(np.abs(fall - other)) <= 1e-5 * _size(free, G) for other in found):
+                found.append(fall)
+    return found
+
+
+def _choices(oracle: Oracle, rates: np.ndarray, fast: float) -> list[list[tuple[str, float]]]:
     choices: list[list[tuple[str, float]]] = []
-    for one, rate in zip(touches, rates, strict=True):
+    for one, rate in zip(oracle.draft.touches, rates, strict=True):
         if rate[0] > SMALL * fast:
             choices.append([("open", 0.0)])
         elif abs(rate[1]) > SMALL * fast:
@@ -391,18 +402,30 @@ def every_set(oracle: Oracle, speeds: np.ndarray) -> list[np.ndarray]:
             choices.append([("open", 0.0), ("slips", 1.0)])
         else:
             choices.append([("open", 0.0), ("sticks", 0.0), ("slips", 1.0), ("slips", -1.0)])
-    found: list[np.ndarray] = []
-    for states in itertools.product(*choices):
-        forces = _forces_in(oracle, states, free)
-        if forces is not None and force_missed(oracle, speeds, forces.reshape(-1, width))[0] <= SMALL:
-            fall = oracle.accelerations(speeds, forces.reshape(-1, width)).ravel()
-            if not any(np.max(np.abs(fall - other)) <= 1e-5 * _size(free, G) for other in found):
-                found.append(fall)
+    return choices
+
+
+def every_impact(oracle: Oracle, speeds: np.ndarray) -> list[np.ndarray]:
+    """Return the speeds after each impact that meets the laws, in a plane."""
+    rates = oracle.rates(speeds)
+    fast, found = _size(speeds), list[np.ndarray]()
+    least = np.array([one.restitution for one in oracle.draft.touches]) * np.maximum(-rates[:, 0], 0.0)
+    free = rates.copy()
+    free[:, 0] -= least
+    by = oracle.moves @ oracle.inverse @ oracle.moves.T @ oracle.rows.T
+    for states in itertools.product(*_choices(oracle, np.zeros_like(rates), fast)):
+        pushes = _forces_in(oracle, states, free.ravel(), fast * float(np.max(oracle.masses)))
+        if pushes is not None:
+            after = speeds + by @ pushes
+            if impact_missed(oracle, speeds, after) <= SMALL:
+                found.append(after)
     return found
 
 
-def _forces_in(oracle: Oracle, states: tuple[tuple[str, float], ...], free: np.ndarray) -> np.ndarray | None:
-    """Return forces of a set of states; None where there are none that push and hold."""
+def _forces_in(
+    oracle: Oracle, states: tuple[tuple[str, float], ...], free: np.ndarray, most: float
+) -> np.ndarray | None:
+    """Return forces, or impulses, of a set of states; None where there are none that push and hold."""
     held, columns = [], []
     for k, (state, way) in enumerate(states):
         if state == "open":
@@ -432,9 +455,9 @@ def _forces_in(oracle: Oracle, states: tuple[tuple[str, float], ...], free: np.n
             line[1:, k] = [1.0, -1.0]
             k += 1
         limits += list(line if state == "sticks" else line[:1])
-    scale = _size(x, _weight(oracle))
+    scale = _size(x, most)
     # Equations hold to rounding only: rows that depend on each other would contradict each other by it.
-    room = np.full(len(held), 1e-9 * _size(free, G))
+    room = np.full(len(held), 1e-9 * _size(free))
     found = linprog(
         np.zeros(len(x)),
         A_ub=np.vstack([np.array(limits), matrix, -matrix]),
@@ -523,13 +546,15 @@ def _refused(oracle: Oracle, before: np.ndarray, error: AtwoodError) -> tuple[li
             return [f"refused: {words}"], []
     if " at t = 0 " not in f" {said}" and "t = 0 " not in said:
         return ["refused later"], [Finding("refused", f"later: {type(error).__name__}", said)]
-    rates = oracle.rates(before)
-    if np.min(rates[:, 0]) < -SMALL * _size(before) or oracle.draft.space == "space":
-        return ["refused"], [Finding("refused", f"{type(error).__name__}", said)]
-    every = every_set(oracle, before)
-    if every:
-        return ["refused"], [Finding("refused", f"{type(error).__name__} though a set contradicts nothing", said)]
-    return ["refused: no set"], []
+    if oracle.draft.space == "space":
+        return ["refused in space"], [Finding("refused", f"{type(error).__name__} in space", said)]
+    is_impact = np.min(oracle.rates(before)[:, 0]) < -SMALL * _size(before)
+    every = every_impact(oracle, before) if is_impact else every_set(oracle, before)
+    if not every:
+        return ["refused: no impact" if is_impact else "refused: no set"], []
+    if is_impact and "impulses" not in said:
+        return ["refused after an impact"], [Finding("refused", f"{type(error).__name__} after an impact", said)]
+    return ["refused"], [Finding("refused", f"{type(error).__name__} though a set contradicts nothing", said)]
 
 
 def _taken(draft: Draft, oracle: Oracle, result: aw.Result) -> tuple[np.ndarray, np.ndarray]:

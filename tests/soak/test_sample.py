@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from atwood.numerics import contact_sets
+
 from . import hostile, metamorphic, methods, poles, tables
 from .draw import draw
 from .kinds import run_trial
@@ -91,6 +93,20 @@ def test_laws_of_contact_hold(seed: int) -> None:
     trial, _ = run_trial("contacts", seed)
     assert "compared" in trial.tried
     assert not trial.findings, trial.findings[0].detail
+
+
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("seed", [1, 4, 8])
+def test_sets_of_contacts_are_among_all_there_are(seed: int) -> None:
+    trial, _ = run_trial("sets", seed)
+    assert "compared" in trial.tried
+    assert not trial.findings, trial.findings[0].detail
+
+
+@pytest.mark.parametrize("seed", [4, 5])
+def test_sets_of_contacts_that_contradict_a_law_are_found(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(contact_sets, "_contradiction", lambda *given: (-1, (0, (0.0,))))  # whatever is tried is taken
+    assert any(one.gravity == "wrong" for one in run_trial("sets", seed)[0].findings)
 
 
 def test_rates_beside_a_pole_do_not_ask_for_more_samples_than_there_can_be() -> None:

@@ -19,7 +19,8 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.lazy_dataclasses import dataclass
-from atwood.numerics.matrices import least_norm
+from atwood.numerics.matrices import least_norm, or_one
+from atwood.numerics.rank import decompose, null_space
 
 OPEN, GOES_ON, STICKS = 0, 1, 2
 """States: a gap is open or sticks (is closed); a slip is free, goes on or sticks."""
@@ -32,6 +33,9 @@ _MOST_SETS = 20_000
 
 CLEAR = 1e-8
 """A pivot of scaled rows that is no larger may be rounding: rows then depend on each other."""
+
+NOTHING = 1e-14
+"""What moves by so small a share of what others do is held by joints but for rounding."""
 
 _SWEEPS = 5000
 """So often all forces are projected; each time takes some ten microseconds for each."""
@@ -105,12 +109,23 @@ class Contacts:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """States that contradict nothing, the forces f, the motions a, and whether redundant forces are the least."""
+    """States that contradict nothing, the forces f and the motions a.
+
+    Attributes
+    ----------
+    states, forces, motions
+        Of all units, and of all rows.
+    is_redundant
+        Whether other forces make the same of what holds, so that nothing determines how it is shared.
+    moving
+        The gaps among whose units forces could be shared otherwise with another motion, as friction can make it.
+    """
 
     states: tuple[State, ...]
     forces: FloatArray
     motions: FloatArray
-    is_least: bool = True
+    is_redundant: bool = False
+    moving: tuple[tuple[int, ...], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +159,48 @@ def is_back(direction: Direction) -> bool:
 
 def find_states(contacts: Contacts, states: Sequence[State]) -> Found | None:
     """Return states that contradict nothing, near to those given; None where there are none."""
+    found = _found(contacts, states)
+    return None if found is None else _judged(contacts, found)
+
+
+def _judged(contacts: Contacts, found: Found) -> Found:
+    """Return the same with what is known of forces that nothing determines.
+
+    They are null vectors of the equations for forces, and what is pressed by no force can only be pressed more.
+    What would slip nowhere sticks then: some share holds it.
+    """
+    acting, rows, _ = _equations(_listed(contacts), found.states)
+    if not acting:
+        return found
+    # A motion of each row by the force that would make it alone: no unit has a say.
+    own = np.diag(contacts.response)
+    every = np.sqrt(np.where(own > NOTHING * np.max(own), own, np.inf))
+    size = np.where(np.isfinite(every), every, 1.0)[acting]
+    matrix = np.where(np.isfinite(every[acting]), 1.0, 0.0)[:, None] * np.array(rows) / size
+    matrix = matrix / or_one(np.max(np.abs(matrix), axis=1, keepdims=True))
+    null = null_space(matrix, CLEAR)
+    if not null.size:
+        return found
+    small = SLACK * float(np.max(np.abs(found.motions), initial=0.0) + np.max(np.abs(contacts.free)))
+    states = tuple(
+        (STICKS, (0.0,) * len(unit.rows))
+        if state[0] == GOES_ON and not unit.is_given and math.hypot(*found.motions[list(unit.rows)]) <= small
+        else state
+        for unit, state in zip(contacts.units, found.states, strict=True)
+    )
+    moved = contacts.response[:, acting] / size @ null / every[:, None]
+    kinds = decompose(moved, math.sqrt(CLEAR))
+    moving = null @ kinds.right[: kinds.rank].T
+    pressed = found.forces[acting] > SLACK * float(np.max(np.abs(found.forces)))
+    gaps = {unit.rows[0]: k for k, unit in enumerate(contacts.units) if not unit.is_slip}
+    bare = np.array([row in gaps for row in acting]) & ~pressed
+    open_ways = [way for way in moving.T if any(np.all(sign * way[bare] >= -CLEAR) for sign in (1.0, -1.0))]
+    shared = [np.flatnonzero(np.abs(way) > math.sqrt(CLEAR)) for way in open_ways]
+    units = tuple(tuple(gaps[acting[i]] for i in some if acting[i] in gaps) for some in shared)
+    return Found(states, found.forces, found.motions, True, units)
+
+
+def _found(contacts: Contacts, states: Sequence[State]) -> Found | None:
     present = tuple(_allowed(unit, *one) for unit, one in zip(contacts.units, states, strict=True))
     listed = _listed(contacts)
     closed = tuple(_allowed(unit, STICKS, (0.0,) * len(unit.rows)) for unit in contacts.units)
@@ -207,7 +264,7 @@ def _shared(contacts: _Listed, states: tuple[State, ...], forces: FloatArray) ->
     found, motions = _moved(contacts, acting, (given + np.array(more)).tolist())
     if _contradiction(contacts, states, found, motions)[0] >= 0:
         return None
-    return Found(states, np.array(found), np.array(motions), is_least=False)
+    return Found(states, np.array(found), np.array(motions))
 
 
 def all_states(contacts: Contacts) -> Iterator[Found]:

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from atwood import Scene, simulate
-from atwood_library import BallContact, Box, BoxContact, Disc, Ground
+from atwood import Scene, SolveError, simulate
+from atwood_library import BallContact, Box, BoxContact, Disc, Force, Ground, RigidBody, VertexContact
 
 from ...soak import contacts as soaked
 
@@ -84,3 +84,40 @@ def test_energies_of_parts_know_impacts_and_friction(form: str) -> None:
 def test_a_corner_that_has_just_bounced_goes_on_where_another_comes_to_rest() -> None:
     # one corner's impacts end six microseconds after the other bounced at .6 m/s: both are as near as the tolerance
     assert soaked.check(5034).findings == ()
+
+
+def in_a_row(friction: tuple[float, ...], push: float, speed: float = 0.0) -> Scene:
+    """Return a bar of 1 kg with places in a row on a floor, of which two would bear it."""
+    scene = Scene()
+    ground, bar = scene.add("ground", Ground()), scene.add("bar", RigidBody(mass=1.0, moments=(0.0, 0.1, 0.0)))
+    force = scene.add("force", Force(direction=(1.0, 0.0, 0.0), value=push))
+    scene.connect(bar.frame, force.point)
+    for i, mu in enumerate(friction):
+        place = scene.add(f"c{i}", VertexContact(place=(i - 1.0, 0.0, 0.0), friction=mu))
+        scene.connect(ground.frame, place.plane)
+        scene.connect(bar.frame, place.body)
+    scene.start.update({"bar.position.x": 0.0, "bar.position.z": 0.0, "bar.angle": 0.0})
+    scene.start.update({"bar.velocity.x": speed, "bar.velocity.z": 0.0, "bar.angular_velocity.y": 0.0})
+    return scene
+
+
+@FORMS
+@pytest.mark.parametrize("friction", [(0.1, 0.5, 0.1), (0.1, 0.1, 0.5)])
+def test_shares_of_friction_that_nothing_determines_contradict_no_law(friction: tuple[float, ...], form: str) -> None:
+    """A third of the push at each place is more than two of them can hold; the other one holds it all."""
+    result = simulate(in_a_row(friction, 1.5), form=form, t_end=0.1, rtol=1e-10)
+    assert abs(result["bar.velocity.x"][-1]) < 1e-12
+    rubs, pressed = (
+        np.array([result[f"c{i}.{name}"] for i in range(3)]) for name in ("friction_force", "normal_force")
+    )
+    assert np.all(np.abs(rubs) <= np.array(friction)[:, None] * pressed + 1e-9)
+    assert np.sum(rubs, axis=0) == pytest.approx(np.full(rubs.shape[1], -1.5), abs=1e-9)
+    assert np.sum(pressed, axis=0) == pytest.approx(np.full(rubs.shape[1], G), abs=1e-9)
+
+
+@FORMS
+def test_friction_that_is_not_the_same_everywhere_needs_shares_that_are_determined(form: str) -> None:
+    with pytest.raises(SolveError, match=r"depends on how forces are shared.*\(c0, c1, c2\)"):
+        simulate(in_a_row((0.1, 0.5, 0.1), 0.0, speed=1.0), form=form, t_end=0.1)
+    result = simulate(in_a_row((0.3, 0.3, 0.3), 0.0, speed=1.0), form=form, t_end=0.2, rtol=1e-10)
+    assert result["bar.velocity.x"][-1] == pytest.approx(1.0 - 0.3 * G * 0.2, abs=1e-9)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import combinations, islice, pairwise
 
 import numpy as np
 
@@ -19,8 +19,11 @@ from atwood.lazy_dataclasses import dataclass, made_of, replace
 from atwood.mechanics.outputs.event_functions import CLOSES, OPENS, RESTS, STOPS, YIELDS
 from atwood.model.values.units import ALONG
 from atwood.numerics.contact_sets import (
+    CLEAR,
     GOES_ON,
+    NOTHING,
     OPEN,
+    SLACK,
     STICKS,
     Found,
     Limits,
@@ -30,6 +33,7 @@ from atwood.numerics.contact_sets import (
     is_back,
 )
 from atwood.numerics.matrices import least_norm
+from atwood.numerics.rank import rank
 from atwood.simulation.contacts.values import ContactValues, Layout
 from atwood.simulation.dynamics.orientation_coordinates import to_regular
 from atwood.simulation.dynamics.scales import Scales
@@ -65,6 +69,15 @@ MOST_TURNS = 50
 """Limits that are curved in the forces are met in so many turns at most."""
 
 CONTRADICT = "Contacts contradict each other here: look at what moves them, and at their friction."
+
+_UNDETERMINED = "friction depends on how forces are shared, which nothing determines"
+_SHARES = "Give one of them no friction, or put a spring where it is stiff."
+
+_SHARED = 100.0
+"""Times the slack of one inequality: shares that nothing determines come from other equations."""
+
+_MOST_SHARES = 500
+"""So many shares of forces that nothing determines are tried."""
 
 _MOST_IMPACTS = 1000
 """So many impacts one after the other happen at one moment at most."""
@@ -294,6 +307,7 @@ class _Moment:
             solved = find_states(values.chosen(chosen, free, {}, limits), self._at_rest(chosen))
             if solved is None:
                 raise self._contradiction("no impulses satisfy the laws of impact and friction", chosen)
+            self._check_determined(chosen, solved)
             last, found = found, self._on_all(chosen, solved)
             if not self.layout.is_curved or is_same(last, found):
                 break
@@ -327,14 +341,66 @@ class _Moment:
         found = self._found(chosen, states, given)
         if found is None:
             found = self._jammed(chosen)
-        if not found.is_least:
-            what = "friction depends on how forces are shared, which nothing determines"
-            raise self._contradiction(what, chosen, "Give one of them no friction, or put a spring where it is stiff.")
+        self._check_determined(chosen, found)
+        if found.is_redundant:
+            found = self._shared(chosen, found)
         self._take(chosen, found)
         held = [row for k, one in zip(chosen, found.states, strict=True) if one[0] == STICKS for row in self.units[k]]
         if held:  # what holds from now on holds to rounding
             self._hold(held)
         return None
+
+    def _check_determined(self, chosen: list[int], found: Found) -> None:
+        """Refuse friction that depends on shares that nothing determines; corners of one part share by least forces."""
+        for some in found.moving:
+            if len({self.first[chosen[i]].row.key[0].rpartition(".")[0] or i for i in some}) > 1:
+                raise self._contradiction(_UNDETERMINED, [chosen[i] for i in some], _SHARES)
+
+    def _shared(self, chosen: list[int], found: Found) -> Found:
+        """Let go what need not hold, as long as the least forces that hold contradict a law.
+
+        Where rows depend on each other some forces meet all laws, and others move everything alike. What is let go
+        neither presses nor rubs, and stays where it is.
+        """
+        states, is_slip = self._on_every(chosen, found), self.layout.is_slip
+        states = self._without(states, [k for k, one in enumerate(states) if one[0] == OPEN and not is_slip[k]])
+        holding = [k for k, one in enumerate(states) if one[0] == STICKS]
+        holding.sort(key=lambda k: not is_slip[k])
+        some = (gone for count in range(len(holding)) for gone in combinations(holding, count))
+        least = self._rank(states)
+        for gone in islice(some, _MOST_SHARES):
+            tried = self._without(states, gone)
+            if self._rank(tried) == least and self._is_shared(tried):
+                return replace(found, states=tuple(tried[k] for k in chosen))
+        raise self._contradiction(_UNDETERMINED, chosen, _SHARES)
+
+    def _is_shared(self, states: list[State]) -> bool:
+        """Return whether the forces that are reported contradict no law."""
+        values = self.values.with_held(values_of_states(self.layout, self.held, states))
+        forces = values.least_forces(states)
+        limits, small = values.limits_at(forces)[0], _SHARED * SLACK * float(np.max(np.abs(forces)))
+        for k, (rows, one) in enumerate(zip(self.units, states, strict=True)):
+            own, most = forces[list(rows)], float(limits.static_free[k] + limits.static_shares[k] @ forces)
+            if one[0] == STICKS and (math.hypot(*own) - most if self.layout.is_slip[k] else -most - own[0]) > small:
+                return False
+        return True
+
+    def _on_every(self, chosen: list[int], found: Found) -> list[State]:
+        """Return the states of all units."""
+        known = dict(zip(chosen, found.states, strict=True))
+        return [known.get(k, (OPEN, (0.0,) * len(rows))) for k, rows in enumerate(self.units)]
+
+    def _without(self, states: list[State], let_go: Sequence[int]) -> list[State]:
+        gone = {*let_go, *(k for k, gap in enumerate(self.values.gap_of) if gap in let_go)}
+        return [(OPEN, (0.0,) * len(one[1])) if k in gone else one for k, one in enumerate(states)]
+
+    def _rank(self, states: list[State]) -> int:
+        """Return how many of the rows that hold are independent."""
+        held = [row for rows, one in zip(self.units, states, strict=True) if one[0] == STICKS for row in rows]
+        response = self.values.response[np.ix_(held, held)]
+        own = np.diag(response)
+        size = np.sqrt(np.where(own > NOTHING * np.max(own, initial=0.0), own, np.inf))
+        return rank(response / size / size[:, None], CLEAR) if held else 0
 
     def _hold(self, rows: list[int]) -> None:
         """Take away the rates of some rows."""
@@ -400,8 +466,7 @@ class _Moment:
 
     def _take(self, chosen: list[int], found: Found) -> None:
         """Take the states over, and tell what has changed."""
-        known = dict(zip(chosen, found.states, strict=True))
-        states = [known.get(k, (OPEN, (0.0,) * len(rows))) for k, rows in enumerate(self.units)]
+        states = self._on_every(chosen, found)
         self.held = values_of_states(self.layout, self.held, states)
         self.events += told_changes(self.t, self.layout, self.before, states)
 

@@ -6,6 +6,7 @@ A unit force along a row i makes accelerations ``X_i``, with the joints holding:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
 
@@ -19,14 +20,15 @@ from atwood.forms.loose import state_paths
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import to_maximal
 from atwood.lazy_dataclasses import dataclass
-from atwood.mechanics.dynamics.equations import ContactRow
-from atwood.numerics.contact_sets import Contacts, Limits, Unit
+from atwood.mechanics.dynamics.equations import ContactRow, Equations
+from atwood.numerics.contact_sets import GOES_ON, Contacts, Limits, State, Unit, is_back
 from atwood.numerics.matrices import least_norm, or_one, to_array
 from atwood.simulation.dynamics.balance import LIGHT, BalanceValues, balance_of, even_balance
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.scales import motion_scales
 
 _LAYOUT: Key[Layout] = Key("gaps and slips")
+_FORCES: Key[Program] = Key("forces of gaps and slips")
 
 _LIMITS = ("limits", "static limits", "limits backwards", "static limits backwards")
 
@@ -130,6 +132,12 @@ def _layout(assembly: Assembly) -> Layout:
     )
 
 
+def _forces(equations: Equations, parameters: tuple[Expression, ...]) -> Program:
+    """Return the program of the multipliers of all rows."""
+    found = substitute([one.row.multiplier for one in equations.contacts], dict(equations.read))
+    return Program("forces of contacts", state_groups(equations), parameters, (OutputGroup("forces", tuple(found)),))
+
+
 class ContactValues:
     """Gaps and slips at a state.
 
@@ -165,6 +173,26 @@ class ContactValues:
         made.u = u.copy()
         made._take(made.u)
         return made
+
+    def with_held(self, held: Sequence[float]) -> ContactValues:
+        """Return the same with other values of the discrete states."""
+        made = copy(self)
+        made.assembly = self.assembly.with_held(tuple(held))
+        return made
+
+    def least_forces(self, states: Sequence[State]) -> FloatArray:
+        """Return the forces of all rows as they are reported in states, of which the discrete states are the values."""
+        equations, assembly = self.assembly.maximal, self.assembly
+        program = assembly.shared.get(_FORCES, lambda: _forces(equations, assembly.parameters))
+        (found,) = assembly.kernel(program)([self.t], self.q, self.u)
+        forces = np.array(found)
+        for _ in range(len(self.units)):  # limits may read other friction
+            limits = self.limits_at(forces)
+            for k, (rows, (state, way)) in enumerate(zip(self.units, states, strict=True)):
+                if state == GOES_ON:
+                    side = limits[is_back(way)]
+                    forces[list(rows)] = -(side.free[k] + float(side.shares[k] @ forces)) * np.array(way)
+        return forces
 
     def _take(self, u: FloatArray) -> None:
         found = [np.array(x) for x in self._kernel([self.t], self.q, u, self.read)]
