@@ -96,15 +96,15 @@ def build_equations(mechanism: Mechanism, forest: SpanningForest) -> Equations:
         solved_speeds=tuple(s.name.removeprefix("u:") for s in taken.speeds),
         integrals=(*taken.integrals, *integrals.values()),
         states=parts,
-        decisions=tuple(derivation.decided),
         constants=dict(derivation.found),
         contacts=contact_rows(derivation, site, state, signals),
     )
     read = _read_multipliers(derivation, signals) if derivation.can_read_multipliers else []
     if forest.form == "reduced":
-        return replace(made, read=dict(zip(read, read, strict=True)))
+        return replace(made, read=dict(zip(read, read, strict=True)), decisions=tuple(derivation.decided))
     with derivation.relations.reading(False):
-        return with_known(made, known_multipliers(derivation, made, read)) if read else made
+        made = with_known(made, known_multipliers(derivation, made, read)) if read else made
+    return replace(made, decisions=tuple(derivation.decided))  # with those about what is read
 
 
 def _moving(

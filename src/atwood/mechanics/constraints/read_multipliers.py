@@ -15,13 +15,16 @@ of Inverse Problems, section 5.1), since no choice of independent constraints ne
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
+
+import numpy as np
 
 from atwood.errors import AtwoodError, UnsupportedError
-from atwood.expr import Expression, absolute, depends_on, jacobian, select, solve, sqrt, substitute
+from atwood.expr import Expression, absolute, depends_on, evaluate, jacobian, select, solve, sqrt, substitute
 from atwood.lazy_dataclasses import replace
 from atwood.mechanics.dynamics.augmented import SymmetricSystem, back_substitute, eliminate, fill_of, minimum_degree
 from atwood.mechanics.dynamics.equations import Constraint, ContactRow, Equations
-from atwood.mechanics.kinematics.mechanism import Mechanism
+from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide
 from atwood.model.local.parts import multiplier_symbol
 
 _ITERATIONS = 6
@@ -35,6 +38,9 @@ _ADDED = 1e-6
 
 _TIMES = 4
 """So often the system is solved with it; of a direction with an eigenvalue of 1e-4 a share of 1e-8 is missing then."""
+
+_LEAST_INERTIA = 1e-9
+"""In units of the diagonal of the mass matrix: what has less in some direction has none there."""
 
 _LARGEST_FILL = 20_000
 """Beyond so many products the system is solved in numbers."""
@@ -57,7 +63,7 @@ def _check_reads(mechanism: Mechanism, read: Sequence[Expression], equations: Eq
 
 
 def known_multipliers(
-    mechanism: Mechanism, equations: Equations, read: Sequence[Expression]
+    mechanism: Derivation, equations: Equations, read: Sequence[Expression]
 ) -> dict[Expression, Expression]:
     """Return the multipliers that forces read, in terms of time, coordinates and speeds.
 
@@ -84,6 +90,9 @@ def known_multipliers(
     system = _System(rows, speeds, accelerations, constraints, right, contacts)
     can_repeat = _close_loops(mechanism, [*constraints, *(one.row for one in contacts)])
     can_repeat = can_repeat or (bool(contacts) and _are_crowded(system))
+    if can_repeat:
+        symbols = (*equations.coordinates, *speeds)
+        system.has_inertia = decide(mechanism, partial(_has_inertia, dict(system.mass), symbols))
     solved = _without_choice(system, speeds) if can_repeat else _solve_system(system)
     if wanted:
         known |= _forces_met(wanted, [solved[number[symbol]] for symbol in wanted], stand_ins, bias)
@@ -130,7 +139,9 @@ class _System:
     of_contacts
         The rows of gaps and slips.
     is_regular
-        Whether nothing on the diagonal is zero, so that the system can be solved in any order.
+        Whether C is positive definite.
+    has_inertia
+        Whether M is so, but for accelerations that have no entries in it: these come last, and all others in any order.
     """
 
     def __init__(
@@ -154,7 +165,7 @@ class _System:
         self.diagonal: list[Expression] = []
         if contacts:
             self.diagonal = [*([zero] * count), *(1.0 - one.mask for one in contacts)]
-        self.is_regular = False
+        self.is_regular = self.has_inertia = False
         self.of_contacts = range(self.masses + count, len(self.right)) if contacts else range(0)
 
     def times(self, solved: Sequence[Expression], diagonal: Sequence[Expression]) -> list[Expression]:
@@ -168,6 +179,22 @@ class _System:
         for r, entry in enumerate(diagonal, self.masses):
             found[r] = found[r] + entry * solved[r]
         return found
+
+
+def _has_inertia(
+    mass: Mapping[tuple[int, int], Expression], symbols: Sequence[Expression], mechanism: Mechanism
+) -> bool:
+    """Return whether all accelerations with entries in the mass matrix have inertia, in units of their diagonal."""
+    random = np.random.default_rng(0)  # how bodies are turned makes no difference
+    place = dict(zip(symbols, random.uniform(-1.0, 1.0, len(symbols)).tolist(), strict=True))
+    number = {i: k for k, i in enumerate(sorted({i for one in mass for i in one}))}
+    full = np.zeros((len(number), len(number)))
+    for (i, j), entry in zip(mass, evaluate(list(mass.values()), {**mechanism.known_at_start(), **place}), strict=True):
+        full[number[i], number[j]] = entry
+    own = np.diag(full)
+    if not (np.isfinite(full).all() and np.all(own > 0.0)):
+        return False
+    return bool(np.min(np.linalg.eigvalsh(full / np.sqrt(own[:, None] * own)), initial=1.0) > _LEAST_INERTIA)
 
 
 def _close_loops(mechanism: Mechanism, constraints: Sequence[Constraint]) -> bool:
@@ -212,9 +239,14 @@ def _without_choice(system: _System, speeds: Sequence[Expression]) -> list[Expre
     """Return accelerations and multipliers, of which those that are not determined have any value that fits."""
     graph, n = speeds[0].graph, system.masses
     diagonal = [graph.zero] * (len(system.right) - n)
+    own: dict[int, list[Expression]] = {}
     for (r, c), entry in system.slopes.items():
         if (c, c) in system.mass:
+            own.setdefault(r, []).append(1.0 / system.mass[c, c])
             diagonal[r - n] = diagonal[r - n] + entry * entry / system.mass[c, c]
+    for (r, c), entry in system.slopes.items():  # what has no inertia counts as what has some in the same row
+        if (c, c) not in system.mass and r in own:
+            diagonal[r - n] = diagonal[r - n] + entry * entry * (sum(own[r], graph.zero) / float(len(own[r])))
     added = [_ADDED * one if not one.is_zero else graph.constant(_ADDED) for one in diagonal]
     masked = system.diagonal or [graph.zero] * len(added)
     system.is_regular = True
@@ -232,10 +264,15 @@ def _solve_system(system: _System) -> list[Expression]:
     graph = right[0].graph
     upper = {(r, c): e for (r, c), e in full.items() if r <= c} | {(c, r): e for (r, c), e in system.slopes.items()}
     upper |= {(n + i, n + i): one for i, one in enumerate(system.diagonal) if not one.is_zero}
-    order = [*range(n), *(i for i in minimum_degree(_after(list(upper), n, size), size) if i >= n)]
+    places, light = list(upper), {i for i in range(n) if (i, i) not in full}
+    any_order = system.is_regular and system.has_inertia
+    if any_order:
+        order = sorted(minimum_degree(places, size), key=lambda i: i in light)
+    else:
+        order = [*range(n), *(i for i in minimum_degree(_after(places, n, size), size) if i >= n)]
     if all((i, i) in upper for i in system.of_contacts) and system.is_regular:  # many at a body of few coordinates
         order = [*system.of_contacts, *(i for i in order if i not in system.of_contacts)]
-    if all((i, i) in full for i in range(n)) and fill_of(list(upper), order) <= _LARGEST_FILL:
+    if (any_order or not light) and fill_of(places, order) <= _LARGEST_FILL:
         try:
             steps = eliminate(SymmetricSystem(upper, right, [1] * n + [-1] * (size - n)), order)
         except (AtwoodError, KeyError):  # a pivot that is always zero
