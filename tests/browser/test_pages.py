@@ -178,6 +178,19 @@ def test_a_body_is_pulled_by_the_pointer_and_let_go(show: Callable[..., Any], tm
     tab.mouse.move(x, y)
     tab.mouse.down()
     tab.mouse.move(x + 60.0, y, steps=4)
+    tab.mouse.up()
+    assert tab.evaluate("[atwood.time, atwood.value('bob2.velocity.x')]") == [0.2, 0.0], (
+        "at rest it is put somewhere else"
+    )
+    assert tab.evaluate("atwood.value('bob2.position.x')") > 0.05
+    tab.mouse.move(x + 60.0, y)
+    tab.mouse.down()
+    tab.mouse.move(x, y, steps=4)
+    tab.mouse.up()
+    assert abs(tab.evaluate("atwood.value('bob2.position.x')")) < 0.03
+    tab.evaluate("atwood.play(true)")
+    tab.mouse.down()
+    tab.mouse.move(x + 60.0, y, steps=4)
     tab.wait_for_timeout(800)
     assert tab.evaluate("atwood.value('bob2.position.x')") > 0.05
     tab.mouse.up()

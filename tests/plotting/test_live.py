@@ -279,6 +279,38 @@ def test_a_body_that_is_pulled_moves_as_on_a_damped_spring(form: str) -> None:
     np.testing.assert_allclose(pulled, expected, rtol=0.0, atol=1e-8)
 
 
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+def test_at_rest_a_point_is_put_where_it_is_nearest_to_the_pointer(form: str) -> None:
+    """What is out of reach is stretched to; a crank turns to the same side, and its loop stays closed."""
+    names = {"double-pendulum": "bob2.point", "four-bar": "crank.b"}
+    lives = {name: live_program(SCENES[name](), form) for name in names}
+    script = """
+    print(given.map(([name, node, place]) => {
+      const engine = start(name), at = engine.model.data.nodes.findIndex(one => one.node === node);
+      engine.advance(0.1);
+      const said = engine.place(node, place), found = Array.from(engine.places().slice(3 * at, 3 * at + 3));
+      const {kinetic} = engine.energy();
+      return [said.code, found, kinetic, engine.place(node, [1, 2]).code, engine.advance(0.5).code];
+    }));
+    """
+    node = {
+        name: next(one["node"] for one in lives[name].data["nodes"] if path in one["connectors"])
+        for name, path in names.items()
+    }
+    crank = SCENES["four-bar"]().crank.length
+    far = np.array([math.cos(-1.2), 0.0, math.sin(-1.2)])
+    given = [
+        ("double-pendulum", [0.9, 0.0, -1.1], [0.9, 0.0, -1.1]),
+        ("double-pendulum", [3.0, 0.0, -4.0], [1.2, 0.0, -1.6]),
+        ("four-bar", (7.0 * far).tolist(), (crank * far).tolist()),
+    ]
+    found = played(lives, script, [[name, node[name], place] for name, place, _ in given])
+    for (said, place, kinetic, wrong, after), (_, _, wanted) in zip(found, given, strict=True):
+        assert (said, wrong, after) == ("ready", "refused", "reached")
+        np.testing.assert_allclose(place, wanted, rtol=0.0, atol=1e-6)
+        assert kinetic == pytest.approx(0.0, abs=1e-20)
+
+
 def test_a_chaotic_motion_agrees_with_taylor_series_to_the_end() -> None:
     live = live_program(SCENES["double-pendulum"](), "reduced")
     script = 'const engine = start("x", {rtol: 1e-15}); print([engine.advance(10.0).code, Array.from(engine.state)]);'

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from atwood.arguments import FILE, instance, optional, takes
-from atwood.arrays import FloatArray
+from atwood.arrays import FloatArray, IndexArray
 from atwood.errors import UsageError
 from atwood.files import check_directory, write_atomically
 from atwood.forms.assembly import Assembly
@@ -22,6 +22,12 @@ _LOOP, _FOREST, _OTHER = "#b23a48", "#1f5fa8", "#55626e"
 
 _STEP = 75.0
 """Mean distance of what is connected, in the units of the picture."""
+
+_EVENLY = np.array([0.7548776662466927, 0.5698402909980532])
+"""Multiples of these, without whole numbers, fill a square evenly (Roberts 2018)."""
+
+_PAIRS = 3e7
+"""So many pairs are looked at to place what is drawn."""
 
 
 @dataclass(frozen=True)
@@ -82,22 +88,23 @@ def diagram(scene: Model | Assembly, file: str | os.PathLike[str] | None = None)
 
 def draw_diagram(assembly: Assembly) -> str:
     """Return the diagram of a scene as an SVG element."""
-    import networkx as nx
-
     mechanism = assembly.mechanism
-    network: nx.Graph[tuple[str, object]] = nx.Graph()
-    for (part, _), node in mechanism.graph.node_of.items():
-        network.add_edge(("part", part), ("node", node))
-    network.add_edges_from((("part", one.part), ("node", 0)) for one in mechanism.graph.joints if 0 in (one.a, one.b))
-    network.add_nodes_from(("part", path) for path in assembly.flat.parts)
-    placed = nx.spring_layout(network, seed=1, k=1.2 / max(1.0, float(len(network))) ** 0.5, iterations=300)
-    names = list(placed)
-    at = np.array([placed[name] for name in names]).reshape(-1, 2)
-    lengths = [float(np.linalg.norm(placed[a] - placed[b])) for a, b in network.edges]
-    at = (at - at.min(axis=0, initial=np.inf)) * (_STEP / (float(np.mean(lengths)) if lengths else 1.0)) + [80.0, 40.0]
+    edges = dict.fromkeys((("part", part), ("node", node)) for (part, _), node in mechanism.graph.node_of.items())
+    edges |= dict.fromkeys((("part", one.part), ("node", 0)) for one in mechanism.graph.joints if 0 in (one.a, one.b))
+    names = list(
+        dict.fromkeys([*(name for edge in edges for name in edge), *(("part", path) for path in assembly.flat.parts)])
+    )
+    number = {name: k for k, name in enumerate(names)}
+    ends = np.array([[number[a], number[b]] for a, b in edges], dtype=int).reshape(-1, 2)
+    at = _placed(len(names), ends)
+    lengths = np.linalg.norm(at[ends[:, 0]] - at[ends[:, 1]], axis=1)
+    at = (at - at.min(axis=0, initial=np.inf)) * (_STEP / (float(np.mean(lengths)) if len(lengths) else 1.0)) + [
+        80.0,
+        40.0,
+    ]
     where = dict(zip(names, at, strict=True))
     width, height = (at.max(axis=0) + np.array([80.0, 40.0])).tolist()
-    lines = [_line(where[a], where[b]) for a, b in network.edges]
+    lines = [_line(where[a], where[b]) for a, b in edges]
     colours = _colours(assembly)
     marks = [_mark(name, where[name], mechanism.graph.nodes, colours) for name in names]
     head = (
@@ -105,6 +112,24 @@ def draw_diagram(assembly: Assembly) -> str:
     )
     title = f"<title>Parts and connections of {escape(assembly.flat.name)}</title>"
     return f'{head} font-family="system-ui, sans-serif" font-size="12">{title}{"".join((*lines, *marks))}</svg>'
+
+
+def _placed(count: int, ends: IndexArray) -> FloatArray:
+    """Return places where what is joined attracts, and all else repels (Fruchterman and Reingold 1991)."""
+    near = 1.2 / max(1.0, float(count)) ** 0.5
+    joined = np.zeros((count, count))
+    joined[ends[:, 0], ends[:, 1]] = joined[ends[:, 1], ends[:, 0]] = 1.0
+    at: FloatArray = np.arange(1, count + 1)[:, None] * _EVENLY % 1.0
+    rounds = int(np.clip(_PAIRS / max(count, 1) ** 2, 20, 300))
+    for share in np.linspace(1.0, 0.0, rounds, endpoint=False):
+        apart = at[:, None] - at[None]
+        distance = np.maximum(np.linalg.norm(apart, axis=-1), 0.01)
+        push = np.einsum("ijk,ij->ik", apart, near**2 / distance**2 - joined * distance / near)
+        step = 0.1 * share * push / np.maximum(np.linalg.norm(push, axis=-1), 0.01)[:, None]
+        at += step
+        if np.linalg.norm(step) < 1e-4 * count:
+            break
+    return at
 
 
 def _colours(assembly: Assembly) -> dict[str, str]:

@@ -434,14 +434,16 @@ def _quantities(space: str, around: Mapping[str, object]) -> Iterator[tuple[str,
     read: Mapping[str, Scalar] = around
     mass, first = read["mass"], read["first_moment"]
     yield "mass", mass, "kg", "Mass of all parts."
-    yield "center_of_mass", first / mass, "m", "Centre of mass in world axes."
+    has_mass = not is_zero(mass)  # else nothing has a centre
+    if has_mass:
+        yield "center_of_mass", first / mass, "m", "Centre of mass in world axes."
     yield "momentum", read["momentum"], "kg*m/s", "Momentum in world axes."
     yield "kinetic_energy", read["kinetic"], "J", "Kinetic energy of all parts."
     yield "potential_energy", read["potential"], "J", "Potential energy of all parts."
     yield "total_energy", read["kinetic"] + read["potential"], "J", "Kinetic and potential energy of all parts."
     yield "power", read["power"], "W", "Rate of the kinetic and potential energy of all parts."
     # about the centre of mass, by the parallel-axis theorem
-    own = of_mass(-1.0 / mass, first, first, ZERO)
+    own = of_mass(-1.0 / mass if has_mass else 0.0, first, first, ZERO)
     moments = read["moments"] + own.moments
     if space == "space":
         yield "angular_momentum", read["angular_momentum"], "kg*m^2/s", "Angular momentum about the world's origin."

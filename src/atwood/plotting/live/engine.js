@@ -488,7 +488,7 @@ function openMode(mode, options) {
   }
   return {
     data, M, n, m, y, values, fill, begin, broken, step, at, event, missed, singular, evaluate, load, settle, call, output, matrix,
-    normalize, held, moved, resolve, get time() { return field("t"); }, get begun() { return field("t_old"); },
+    constraints: held && constraints, project, normalize, held, moved, resolve, get time() { return field("t"); }, get begun() { return field("t_old"); },
     get statistics() { return ["steps", "failures", "evaluations"].map(field); },
   };
 }
@@ -981,9 +981,53 @@ function createEngine(model, options = {}) {
     return begin(t, from);
   }
 
+  // The state at rest in which a node is as near to a place as it can be: Gauss's and Newton's steps, on the constraints.
+  function place(node, target) {
+    const at = data.nodes.findIndex(one => one.node === node), {m, n} = mode, before = [time, state];
+    if (at < 0 || !(target?.length === 3 && target.every(Number.isFinite))) return status("refused", "a node is put at a place, x y z");
+    const look = q => {
+      mode.M.set(q, mode.y);
+      mode.M.fill(0, mode.y + n, mode.y + n + m);
+      return mode.call("places", time) ? Array.from(mode.output("places", 1).slice(3 * at, 3 * at + 3)) : null;
+    };
+    const apart = place => Math.hypot(...place.map((x, i) => x - target[i]));
+    let q = mode.normalize(state.slice(0, n)), here = look(q), damping = 1e-6;
+    for (let turn = 0; turn < 200 && here; turn++) {
+      const columns = Array.from({length: m}, (_, j) => {
+        const there = look(mode.normalize(mode.moved(time, q, Float64Array.from({length: m}, (_, k) => (k === j ? -1e-6 : 0)))));
+        return there && there.map((x, i) => 1e6 * (x - here[i]));
+      });
+      if (columns.includes(null)) break;
+      look(q);
+      const met = mode.constraints?.(time, mode.y), slopes = met ? met.slopes : [], units = slopes.map(row => largest(row) || 1);
+      const square = columns.map(a => columns.map(b => a.reduce((sum, x, i) => sum + x * b[i], 0)));
+      const most = Math.max(...square.map((row, j) => row[j])) || 1;
+      const top = square.map((row, j) => [...row.map((x, k) => x / most + (j === k ? damping : 0)), ...slopes.map((one, k) => -one[j] / units[k])]);
+      const bottom = slopes.map((row, k) => [...row.map(x => x / units[k]), ...units.map(() => 0)]);
+      const right = columns.map(a => a.reduce((sum, x, i) => sum + x * (target[i] - here[i]), 0) / most);
+      const found = leastNorm([...top, ...bottom], [...right, ...units.map((one, k) => -met.gaps[k] / one)]).slice(0, m);
+      const far = largest(found), next = mode.normalize(mode.moved(time, q, found.map(x => -x * Math.min(1, 0.3 / (far || 1)))));
+      const there = look(next) && mode.project(time) && look(next.map((_, i) => mode.M[mode.y + i]));
+      if (!there || (apart(there) > apart(here) * (1 + 1e-9) && damping < 1e6)) {
+        damping *= 4;
+        continue;
+      }
+      // Far from what can be reached its curve counts: how much nearer it came, beside what was foreseen, says so (Nielsen).
+      const foreseen = found.reduce((sum, x, j) => sum + x * most * (damping * x + right[j]), 0);
+      const share = (apart(here) ** 2 - apart(there) ** 2) / (foreseen || 1);
+      [q, here, damping] = [mode.M.slice(mode.y, mode.y + n), there, Math.max(damping * Math.max(1 / 3, 1 - (2 * share - 1) ** 3), 1e-6)];
+      if (far < 1e-10) break;
+    }
+    started = true;
+    const said = begin(time, [...q, ...new Float64Array(m)]);
+    if (said.code !== "failed") return said;
+    begin(...before);
+    return status("refused", said.text);
+  }
+
   restart();
   return {
-    model, parameters, starts, advance, value, set, setState, drag,
+    model, parameters, starts, advance, value, set, setState, drag, place,
     get time() { return time; },
     get state() { return Float64Array.from(state); },
     get status() { return now; },

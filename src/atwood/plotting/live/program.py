@@ -16,7 +16,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.codegen.javascript.printer import print_routines
-from atwood.errors import UnsupportedError
+from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
 from atwood.integrators import set_routines as sets
 from atwood.integrators.compiled_location import FIELDS as SEARCH_FIELDS, ROWS as SEARCH_ROWS, STACK
@@ -117,9 +117,8 @@ def live_program(
     drag
         Whether bodies can be pulled by a damped spring, which its equations then have.
     """
-    assembly = assembly_of(scene, form=form)
+    assembly, zeros = with_sliders(assembly_of(scene, form=form), sliders)
     try:
-        assembly, zeros = with_sliders(assembly, sliders)
         _refuse(assembly)
         if drag:
             assembly, idle = with_pulls(assembly)
@@ -139,8 +138,8 @@ def live_program(
         texts = ", ".join(f"{{data: {_json(own)},\nopen: {text}}}" for text, own in modes)
         text = f"{{data: {_json(data)},\nmodes: [{texts}]}}"
         return LiveProgram(assembly.flat.name, assembly.form, "", text, data)
-    except (NotLiveError, UnsupportedError) as error:
-        return LiveProgram(assembly.flat.name, assembly.form, error.message)
+    except AtwoodError as error:
+        return LiveProgram(assembly.flat.name, assembly.form, ": ".join(filter(None, (error.where, error.message))))
 
 
 def _refuse(assembly: Assembly) -> None:

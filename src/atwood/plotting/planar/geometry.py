@@ -126,6 +126,8 @@ class Picture:
     def everything(self, shown: slice = slice(None)) -> FloatArray:
         """Return the places that hold all that is drawn at some of the times, shape (places, 2)."""
         places = [points[shown] for points in self.points.values()]
+        if not places:
+            raise UsageError("nothing in it has a place to be drawn", advice="`plot` draws signals over time.")
         for shape in self.shapes:
             if shape.surface is not None or shape.line is not None:
                 angles = self.angles[shape.nodes[0]][shown, None]

@@ -34,6 +34,9 @@ from atwood.theory.formulas.tree import Name, Sum, Symbol, cost, fraction
 _READABLE_COORDINATES, _READABLE_OPERATIONS = 12, 2_500
 """Beyond either nobody reads equations: their structure is shown."""
 
+_WRITTEN_OUT = 1e7
+"""Terms and factors of formulas, with what they share written each time: choices within choices double it."""
+
 _WRITABLE = 5_000
 """Beyond so many operations no formulas are made at all."""
 
@@ -86,10 +89,15 @@ class EquationFormulas:
         every = self.notation.legend
         return every if self.parameters == "symbolic" else tuple(one for one in every if one.kind != "parameter")
 
-    @property
+    @cached_property
     def is_readable(self) -> bool:
         """Whether somebody would read these equations; else `structure` says what there is to see."""
-        return len(self.expressions.coordinates) <= _READABLE_COORDINATES and self._operations <= _READABLE_OPERATIONS
+        if len(self.expressions.coordinates) > _READABLE_COORDINATES or self._operations > _READABLE_OPERATIONS:
+            return False
+        rows, sizes = self.expressions.rows, dict[int, float]()  # with all that is shared written each time anew
+        for node in live(list(rows)):
+            sizes[node.index] = 1.0 + sum(sizes[one.index] for one in node.arguments)
+        return sum(sizes[one.index] for one in rows if one.index in sizes) <= _WRITTEN_OUT
 
     @cached_property
     def _operations(self) -> int:

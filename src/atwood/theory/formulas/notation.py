@@ -339,7 +339,7 @@ def _sampled_values(assembly: Assembly) -> list[_Wanted]:
     made = []
     for one in assembly.discrete_states:
         part, _, name = one.path.rpartition(".")
-        spec = assembly.mechanism.locals_[part].part.component.state_specs()[name]
+        spec = assembly.mechanism.locals_[part].part.component.state_specs()[name.partition("[")[0]]
         unit = spec.unit.text.replace("any", "")
         made.append(_Wanted(one.symbol, _word(name), one.path, part, unit, spec.doc, None, "sampled value"))
     return made

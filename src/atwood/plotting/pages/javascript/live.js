@@ -88,6 +88,13 @@ export class LiveMotion {
     return node === null ? this.engine.drag(null) : this.engine.drag(node, place);
   }
 
+  /** Put a node as near to a place as it can be, at rest. */
+  put(node, place) {
+    const status = this.engine.place(node, place);
+    if (status.code !== "refused") this.sample();
+    return status;
+  }
+
   /** Return the frames of the stage, from where the engine says that bodies and nodes are. */
   frames() {
     const found = new Float64Array(this.track.width);

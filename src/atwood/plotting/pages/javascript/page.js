@@ -605,26 +605,27 @@ class Page {
     });
   }
 
-  /** Let a part be pulled by the pointer: by a spring while the scene moves, or while it is held at the pointer. */
+  /** Let a part be pulled by the pointer: by a spring while the scene moves; at rest it is put where it can be. */
   watchPulls() {
     let held = null;
     this.host.addEventListener("pointerdown", (event) => {
       const found = event.button === 0 && this.view?.pick(event);
       const node = found && this.time === this.live.time ? this.live.nodeAt(found.part, found.point.toArray()) : null;
       if (!node) return;
-      held = { node: node.node, point: found.point };
+      held = { node: node.node, point: found.point, rests: !this.playing };
       this.view.controls.enabled = false;
       this.host.setPointerCapture(event.pointerId);
     }, true);
     this.host.addEventListener("pointermove", (event) => {
       if (!held) return;
-      const status = this.live.pull(held.node, this.view.under(event, held.point).toArray());
-      if (["refused", "failed"].includes(status.code)) this.say(status.text);
-      else this.play(true);
+      const place = this.view.under(event, held.point).toArray();
+      const status = held.rests ? this.live.put(held.node, place) : this.live.pull(held.node, place);
+      this.say(["refused", "failed"].includes(status.code) ? status.text : "");
+      this.show();
     });
     for (const name of ["pointerup", "pointercancel"]) {
       this.host.addEventListener(name, () => {
-        if (held) this.live.pull(null);
+        if (held && !held.rests) this.live.pull(null);
         held = null;
         if (this.view) this.view.controls.enabled = true;
       });
