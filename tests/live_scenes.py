@@ -1,7 +1,7 @@
 """Every scene of the library as a page computes it, in both forms, beside `simulate`: one table.
 
-Milliseconds are those of Node at rtol 1e-8, after a first run: for a second of motion, and for the motion and the poses of
-a frame of 1/60 s, in the middle and at most.
+Milliseconds are those of Node at rtol 1e-8, after a first run: for a second of motion, and for the motion and the
+poses of a frame of 1/60 s, in the middle and at most.
 
 python -m tests.live_scenes [NAME ...]
 """
