@@ -7,7 +7,7 @@ times and events never change the solution.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import inf, isfinite
 
 import numpy as np
@@ -29,6 +29,7 @@ from atwood.integrators.protocol import (
     StepResult,
 )
 from atwood.integrators.session import SteppingSession, copied
+from atwood.integrators.set_jumps import SetJump
 from atwood.integrators.stepper import Outcome, Stepper
 
 FIRST_CHUNK, LARGEST_CHUNK = 4000, 100_000
@@ -98,9 +99,10 @@ class ExplicitSession(SteppingSession):
         self._leaps = False
         self.reinitialize(t, y)
         if self._compiled is not None and self._jumps is not None:
+            self._jumps.begin(t)
             self._leaps = self._stepper.leap(self._compiled, self._jumps, end)
 
-    def take_jumps(self) -> list[Jump]:
+    def take_jumps(self) -> Sequence[Jump | SetJump]:
         """Return the jumps since this was last asked, in order."""
         made = [] if self._jumps is None else self._jumps.take()
         self._starts += len(made)
@@ -278,7 +280,8 @@ class ExplicitSession(SteppingSession):
         if self._leaps and self._jumps is not None:
             t, y = self._jumps.last
             if t > self._here[0]:
-                self._here = t, y, np.array(self._problem.rates(t, y))
+                rates = self._jumps.rates(t, y)
+                self._here = t, y, np.array(self._problem.rates(t, y)) if rates is None else rates
 
     def _tell_signs(self) -> None:
         if self._notices and self._locator is not None:

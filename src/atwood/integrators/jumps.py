@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from atwood.codegen.sundials.events import EventData
+    from atwood.integrators.set_jumps import SetJump
 
 FIELDS: dict[str, Kind] = {
     **dict.fromkeys(("derived", "scratch", "shift", "seen", "table", "parts", "moved", "room", "log"), ADDRESS),
@@ -127,6 +128,13 @@ class Jumps:
         self._told = len(known)
         self._set(logged=self._told, capacity=self._told + _ROOM)
 
+    def begin(self, t: float) -> None:
+        """Learn when the steps begin, where that matters."""
+
+    def rates(self, t: float, y: FloatArray) -> FloatArray | None:
+        """Return the rates after the last jump, where these are others than before; else None."""
+        return None
+
     @property
     def last(self) -> tuple[float, FloatArray]:
         """Time and state after the last jump; minus infinity where there has been none."""
@@ -134,7 +142,7 @@ class Jumps:
         entry = self._log[logged - 1]
         return (float(entry[0]) if logged > self._told else -inf), entry[-self._size :].copy()
 
-    def take(self) -> list[Jump]:
+    def take(self) -> Sequence[Jump | SetJump]:
         """Return the jumps since this was last asked."""
         first, self._told = self._told, int(self._integers[_PLACES["logged"]])
         return [

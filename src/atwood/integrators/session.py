@@ -25,6 +25,7 @@ from atwood.integrators.protocol import (
     StepMonitor,
     StepResult,
 )
+from atwood.integrators.set_jumps import SetJump
 
 _T = TypeVar("_T")
 
@@ -93,7 +94,7 @@ class Session(ABC):
         """
         return np.empty((0, len(self._here[1])))
 
-    def take_jumps(self) -> list[Jump]:
+    def take_jumps(self) -> Sequence[Jump | SetJump]:
         """Return the jumps that were made without stopping since this was last asked, in order."""
         return []
 

@@ -53,6 +53,8 @@ class EventData:
         What the functions remember from step to step.
     arrays
         What depends on parameters alone, and what is added to each value.
+    prologue
+        Addresses of the function that computes the former, and of its scratch.
     keep
         Whatever must live as long as the addresses are used.
     """
@@ -64,6 +66,7 @@ class EventData:
     count: int
     memory: NDArray[np.float64]
     arrays: tuple[NDArray[np.float64], NDArray[np.float64]]
+    prologue: tuple[int, int]
     keep: object
 
     def restart(self, t: float) -> None:
@@ -129,7 +132,8 @@ class EventCode:
         data = (c_void_p * 4)(*(array.ctypes.data for array in arrays))
         functions = self._plain, self._explicit, self._ida
         place, own = ctypes.addressof(data), (derived, shift)
-        return EventData(*functions, place, len(shift), memory, own, (self._built, scratch, data))
+        prologue = self._built.code.addresses["kernel_prologue"], scratch.ctypes.data
+        return EventData(*functions, place, len(shift), memory, own, prologue, (self._built, scratch, data))
 
     def fill(self, data: EventData, parameter_values: ArrayLike, shifts: ArrayLike) -> None:
         """Give the functions of a session other parameters and shifts; arguments as of `bind`."""

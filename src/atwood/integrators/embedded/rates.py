@@ -130,7 +130,8 @@ class CompiledAccelerations:
         addresses, keep = self._built.code.addresses, (self._built, own)
         project = addresses["project"] if projects and self._room else 0
         rates = CompiledRates(addresses["rates"], data, keep, project, data + 16 if project else 0)
-        return OwnRates(rates, addresses["kernel_prologue"], places[0], scratch, tuple(places))
+        prologues = tuple(addresses[f"{name}_prologue"] for name in self._programs)
+        return OwnRates(rates, prologues, places[0], scratch, tuple(places))
 
     def fill(self, own: OwnRates, parameter_values: ArrayLike) -> None:
         """Give rates of a session their parameters."""
@@ -147,14 +148,16 @@ class OwnRates:
     ----------
     rates
         The rates; they have values once the prologue was called.
-    prologue, derived, scratch
-        Address of the function that computes what depends on parameters alone, and of its two arrays.
+    prologues
+        Addresses of the functions that compute what depends on parameters alone, of the rates and of the projection.
+    derived, scratch
+        Arrays of the first of them.
     places
-        Where that is kept of the rates, and of the projection.
+        Where that is kept of both.
     """
 
     rates: CompiledRates
-    prologue: int
+    prologues: tuple[int, ...]
     derived: int
     scratch: int
     places: tuple[int, ...]

@@ -392,10 +392,10 @@ def _leap(pair: Tableau) -> Routine:
     with r.when(m.waits == 2):
         r.give(1)
     own = Record(m.locator, LOCATOR)
-    root = own.root
     m.waits = 2
-    with r.when(r.call(m.jump, m.jump_data, m.locator, root) != 0):
+    with r.when(r.call(m.jump, m.jump_data, m.locator, own.root) != 0):
         r.give(1)
+    root = own.root  # it may have become earlier
     horizon = r.choose(m.finish > root, m.finish - root, 1.0)
     m.horizon, own.moment = horizon, horizon * (100.0 * ROUNDING)
     m.found = NO_STATE

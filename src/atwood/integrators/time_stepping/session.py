@@ -90,12 +90,16 @@ class ImpulsiveProblem:
 
 
 class Change(NamedTuple):
-    """A moment at which contacts change: time, states before and after, those of contacts, and what is told."""
+    """A moment at which contacts change: time, states before and after, those of contacts, and what is told.
+
+    `strikes` says whether velocities may jump.
+    """
 
     time: float
     states: FloatArray
     held: tuple[float, ...] | None
     told: list[Any]
+    strikes: bool = True
 
 
 class TimeSteppingSession(SteppingSession):

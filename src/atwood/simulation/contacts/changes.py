@@ -16,6 +16,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import SolveError, StartError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, made_of, replace
+from atwood.mechanics.dynamics.equations import ContactRow
 from atwood.mechanics.outputs.event_functions import CLOSES, OPENS, RESTS, STOPS, YIELDS
 from atwood.model.values.units import ALONG
 from atwood.numerics.contact_sets import (
@@ -232,9 +233,7 @@ class _Moment:
         resting = [k for k, speed in speeds.items() if speed <= max(_ALIKE * coming, self.slow[k])]
         self.slow = NEAR / _NEAR_REST * self.slow
         self._end_impacts(resting, still)
-        for k in resting[:1]:
-            self._tell(k, "impacts have accumulated: it rests", "rests")
-            self.events[-1] = replace(self.events[-1], time=self.t + left)
+        self.events += [told_rest(self.t, self.first[k].row.key[:2], left) for k in resting[:1]]
 
     def _end_impacts(self, resting: list[int], still: list[int]) -> None:
         """Take away the rates of gaps, and rub as much.
@@ -504,6 +503,25 @@ class _Moment:
 def check_start(assembly: Assembly, state: tuple[float, FloatArray, FloatArray], length: float, scales: Scales) -> None:
     """Refuse a start inside of something; arguments as of `resolve`."""
     _Moment(ContactValues(assembly, *state, length), scales, 0.1 * tolerances.CLOSED, ()).check_start()
+
+
+def told_rest(t: float, key: tuple[str, str], left: float) -> EventRecord:
+    """Return the event of a gap whose impacts have accumulated, which have come to an end some time later."""
+    return EventRecord(t + left, *key, "impacts have accumulated: it rests", "", True, "rests")
+
+
+def told_change(t: float, first: ContactRow, before: State, after: State) -> EventRecord | None:
+    """Return the event of a gap or a slip that has another state; None where it has none, or is loose."""
+    (was, last), (state, way) = before, after
+    part, name, _ = first.row.key
+    said = ""
+    if not first.is_slip and state != was:
+        said, kind = (f"{name} closes", "closes") if state else (f"{name} opens", "opens")
+    elif first.is_slip and state == was == GOES_ON and float(np.dot(way, last)) < 0.0:
+        said, kind = f"{name} reverses", "reverses"
+    elif first.is_slip and state != was and state:
+        said, kind = (f"{name} sticks", "sticks") if state == STICKS else (f"{name} goes on", "slips")
+    return EventRecord(t, part, name, said, "", False, kind) if said else None
 
 
 def told_impact(

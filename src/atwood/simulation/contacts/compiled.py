@@ -2,20 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from atwood.arrays import FloatArray
+from atwood.codegen.sundials.events import EventData
 from atwood.expr import Program, depends_on, jacobian
 from atwood.forms.assembly import Assembly
+from atwood.forms.caches import Key
 from atwood.forms.constrained import contacts_program
-from atwood.forms.loose import loose_equations
+from atwood.forms.loose import is_loose, loose_equations
+from atwood.integrators import set_routines as sets
+from atwood.integrators.embedded.rates import OwnRates
+from atwood.integrators.set_jumps import EVENTS, SetCode, SetJump, SetJumps
 from atwood.integrators.set_routines import UNITS
+from atwood.integrators.time_stepping.session import Change
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import ContactRow
+from atwood.mechanics.outputs.event_functions import CLOSES, CONTACT, OPENS, RESTS, STOPS, YIELDS
 from atwood.model.values.units import ALONG
+from atwood.numerics.contact_sets import STICKS, State
+from atwood.simulation.contacts.changes import LEFT, NEAR, states_of, told_change, told_impact, told_rest
 from atwood.simulation.contacts.values import Layout, layout_of
-from atwood.simulation.problem.explicit_scene import light_speeds
+from atwood.simulation.events.modes import MARGIN, EventProbe, EventRecord
+from atwood.simulation.problem.explicit_scene import light_speeds, values_on_constraints
 from atwood.simulation.problem.problem import SceneProblem
+
+HAPPENED = {CLOSES: sets.CLOSES, OPENS: sets.OPENS, YIELDS: sets.YIELDS, STOPS: sets.STOPS, RESTS: sets.STOPS}
+"""What an event of a gap or a slip means to the routine; others say nothing of how it goes on."""
+
+_CODE: Key[tuple[SetData, SetCode] | None] = Key("machine code of sets")
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +101,7 @@ def set_data(plan: SceneProblem, t: float, y: FloatArray) -> SetData:
 
 
 def _units(layout: Layout, plan: SceneProblem) -> FloatArray:
-    parts: dict[str, int] = {}
+    parts = _parts(layout)
     found, first = np.zeros((len(UNITS), len(layout.first))), 0
     for k, (one, rows) in enumerate(zip(layout.first, layout.units, strict=True)):
         size = plan.scales.of(ALONG[one.law.options.unit])
@@ -95,7 +112,7 @@ def _units(layout: Layout, plan: SceneProblem) -> FloatArray:
             "at": layout.gap_of[k],
             "speed": one.is_speed,
             "poisson": not one.is_slip and one.law.options.impact_law == "poisson",
-            "part": parts.setdefault(one.row.key[0], len(parts)),
+            "part": parts[one.row.key[0]],
             "small": size,
             "slow": size / plan.scales.time,
         }
@@ -103,3 +120,93 @@ def _units(layout: Layout, plan: SceneProblem) -> FloatArray:
             found[UNITS[name], k] = value
         first += len(rows)
     return found
+
+
+def sets_of(
+    plan: SceneProblem, probe: EventProbe, t: float, y: FloatArray, events: EventData, rates: OwnRates
+) -> SetJumps | None:
+    """Return the changes of sets of a session; None where these are left to Python.
+
+    Nothing but gaps and slips in one direction may be watched, and nothing else may hold.
+    """
+    assembly, equations = plan.assembly, plan.assembly.own_equations
+    holds = plan.balance.constraints or equations.orientation_coordinates or assembly.sides
+    if holds or is_loose(assembly) or any(one.target not in CONTACT for one in probe.event_functions):
+        return None
+    if any(len(rows) > 1 for rows in layout_of(assembly).units):
+        return None
+
+    def make() -> tuple[SetData, SetCode] | None:
+        found = None if why_in_python(assembly) else set_data(plan, t, y)
+        if found is None or any(node.operation == "external" for node in found.program.nodes):
+            return None
+        return found, SetCode(found.program)
+
+    made = assembly.shared.get(_CODE, make, assembly.form, plan.finding.kept, light_speeds(plan, t, y))
+    if made is None:
+        return None
+    data, code = made
+    before, layout = len(assembly.mechanism.table.values), data.layout
+    places = np.array([[before + one[0], before + one[1] if len(one) > 1 else -1] for one in layout.places]).T
+    return SetJumps(code, events, rates, data.pattern, data.units, len(layout.contacts), places)
+
+
+def fill_sets(
+    jumps: SetJumps,
+    plan: SceneProblem,
+    probe: EventProbe,
+    relative: float,
+    impacts: Sequence[tuple[float, str]],
+    shortest: float,
+) -> None:
+    """Give the changes of a session other parameters and states, and times and parts of the impacts before."""
+    layout, scales = layout_of(plan.assembly), plan.scales
+    numbers = {one.row.key[:2]: k for k, one in enumerate(layout.first)}
+    table = np.zeros((len(EVENTS), len(probe.event_functions)))
+    for i, one in enumerate(probe.event_functions):
+        k = numbers[one.part, one.law]
+        table[:, i] = (
+            k,
+            HAPPENED.get(one.target, 0),
+            MARGIN * relative * scales.of(one.unit),
+            not layout.first[k].is_speed,
+        )
+    states = np.array(
+        [[state, *way, *[0.0] * (2 - len(way))] for state, way in states_of(layout, plan.assembly.held_now)]
+    ).T
+    parts = _parts(layout)
+    past = [(time, parts[part]) for time, part in impacts if part in parts]
+    near, ahead = NEAR * max(relative, 1e-13), LEFT * relative**0.5 * scales.time
+    jumps.give(values_on_constraints(plan), states, table, (near, shortest, ahead, scales.time), past)
+
+
+def told_sets(jumps: Sequence[SetJump], assembly: Assembly) -> list[Change]:
+    """Return changes with the discrete states after each, and what is told of it."""
+    layout, held, found = layout_of(assembly), list(assembly.held_now), list[Change]()
+    for one in jumps:
+        before, told = states_of(layout, held), list[EventRecord]()
+        if one.stopped >= 0:
+            told.append(told_rest(one.time, layout.first[one.stopped].row.key[:2], one.left))
+        told += [_struck(layout, one.time, row) for row in one.struck.tolist()]
+        for k, (state, *ways) in enumerate(one.set.T.tolist()):
+            after: State = (int(state), tuple(ways[: len(layout.units[k])]))
+            values = (state, *after[1]) if layout.is_slip[k] else (float(after[0] == STICKS),)
+            for place, value in zip(layout.places[k], values, strict=True):
+                held[place] = value
+            change = told_change(one.time, layout.first[k], before[k], after)
+            told += [] if change is None else [change]
+        found.append(Change(one.time, one.states, tuple(held), told, any(each.impact for each in told)))
+    return found
+
+
+def _struck(layout: Layout, t: float, entry: Sequence[float]) -> EventRecord:
+    k, before, after, loss, *impulses = entry
+    number, first = int(k), layout.first[int(k)]
+    rubs = [row for rows, at in zip(layout.units, layout.gap_of, strict=True) if at == number for row in rows]
+    acting = tuple(impulses[row] for row in (*layout.units[number], *rubs))
+    return told_impact(t, first.row.key[:2], first.law.options.unit, acting, (before, after), loss)
+
+
+def _parts(layout: Layout) -> dict[str, int]:
+    """Return numbers of the parts that have contacts."""
+    return {part: i for i, part in enumerate(dict.fromkeys(one.row.key[0] for one in layout.first))}

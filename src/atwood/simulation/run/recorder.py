@@ -182,14 +182,18 @@ class Recorder:
         """Record states of contacts from some moments on."""
         self._changes += changes
 
-    def _plan_from(self, time: float, known: dict[tuple[float, ...], SceneProblem]) -> SceneProblem:
-        """Return the plan in the states that contacts have from a time on."""
-        held = next((one.held for one in reversed(self._changes) if one.time <= time), None)
-        if held is None:
+    def _changed_at(self, times: FloatArray) -> list[Change | None]:
+        """Return the last change of the states of contacts up to each of some times; None where there is none."""
+        found = np.searchsorted([one.time for one in self._changes], times, side="right")
+        return [self._changes[i - 1] if i else None for i in found.tolist()]
+
+    def _plan_of(self, change: Change | None, known: dict[tuple[float, ...], SceneProblem]) -> SceneProblem:
+        """Return the plan in the states that contacts have from a change on."""
+        if change is None or change.held is None:
             return self.plan
-        if held not in known:
-            known[held] = self.plan.in_piece(self.plan.assembly.with_held(held))
-        return known[held]
+        if change.held not in known:
+            known[change.held] = self.plan.in_piece(self.plan.assembly.with_held(change.held))
+        return known[change.held]
 
     def pass_over(self, crossing: SingularCrossing, t: FloatArray, shown: NDArray[np.bool_]) -> None:
         """Record a singular crossing, in place of all samples since its start; its states are not to be projected."""
@@ -266,11 +270,12 @@ class Recorder:
         cuts = np.searchsorted(time, self._jumps) + 1 if self._jumps else ()
         ends = [0, *(int(one) for one in cuts if one < len(time)), len(time)]
         known: dict[tuple[float, ...], SceneProblem] = {}
+        changes = self._changed_at(time[ends[:-1]])
         return [
             made_of(
                 SegmentRecord,
-                plan=self._plan_from(time[first], known),
-                impact=impact or first > 0,
+                plan=self._plan_of(change, known),
+                impact=impact if first == 0 else change is None or change.strikes,
                 time=time[first:last],
                 coordinates=q[:, first:last],
                 speeds=u[:, first:last],
@@ -279,7 +284,7 @@ class Recorder:
                 singular_crossings=crossings,
                 after_time_event=after_time_event and first == 0,
             )
-            for first, last in pairwise(ends)
+            for (first, last), change in zip(pairwise(ends), changes, strict=True)
         ]
 
     def _finish(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_], waiting: _Waiting = ()) -> None:

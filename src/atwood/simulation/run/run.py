@@ -226,6 +226,7 @@ class _Walk:
         assert self.plan is not None
         assert self.probe is not None
         self._kept.impacts = None if self.sampler.updates else self._impacts
+        self._kept.shortest = shortest_mode(self.plan, options, self.start.time)
         contacts = bool(self.plan.assembly.own_equations.contacts)
         self._kept.is_undisturbed = not contacts or not (self.segments or has_touched(self.plan.assembly))
         limit = min(schedule.next(t, options.t_end), self.sampler.next(t, options.t_end))
@@ -247,6 +248,9 @@ class _Walk:
             return recorder, outcome
         for record in recorder.segments(self.impact, after_time_event):
             self.segments.append(self._sides.recorded(record, self.plan, self.assembly, bool(outcome.sides)))
+        if outcome.held is not None and outcome.held != self.held:  # sets of contacts have changed on the way
+            self.held, self.assembly = outcome.held, self.assembly.with_held(outcome.held)
+            self.plan, self.probe, self._plans = self.plan.in_piece(self.assembly), None, {}
         self.statistics = self.statistics + outcome.statistics
         for choice in outcome.choices:
             if not self.choices or not choice.is_like(self.choices[-1]):
@@ -313,6 +317,7 @@ class _Walk:
             is_start,
         )
         events = list(changed.events)
+        self._kept.changes += 1
         self._remember(events)
         self.events += events if not is_start else [one for one in events if one.impact]
         self.impact |= any(one.impact for one in events)

@@ -194,6 +194,8 @@ class Outcome:
         What the next stretch in this mode is to know of the events.
     sides
         Numbers of the relations of what moves that change at its end.
+    held
+        The discrete states at its end, if it has some.
     """
 
     t: float
@@ -207,6 +209,7 @@ class Outcome:
     together: tuple[EventRecord, ...] = ()
     handed: tuple[int, ...] = ()
     sides: tuple[int, ...] = ()
+    held: tuple[float, ...] | None = None
 
 
 def goes_on(outcome: Outcome, end: float) -> bool:

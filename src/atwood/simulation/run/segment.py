@@ -15,6 +15,7 @@ from atwood.errors import AtwoodError, SolveError, StartError
 from atwood.integrators.methods import AUTO, Method
 from atwood.integrators.protocol import Budget, Statistics, Status, StepResult
 from atwood.integrators.session import Session
+from atwood.integrators.set_jumps import SetJump
 from atwood.integrators.time_stepping.session import Change, TimeSteppingSession
 from atwood.lazy_dataclasses import replace
 from atwood.simulation.dynamics.numerical_failure import (
@@ -27,7 +28,7 @@ from atwood.simulation.dynamics.orientation_coordinates import (
     COORDINATE_SWITCH,
 )
 from atwood.simulation.dynamics.redundancy import RankFinding
-from atwood.simulation.events.modes import EventRecord, without_margin
+from atwood.simulation.events.modes import EventProbe, EventRecord, without_margin
 from atwood.simulation.events.sides import SIDE
 from atwood.simulation.problem.preparation import pack_state
 from atwood.simulation.problem.problem import SceneProblem
@@ -191,6 +192,7 @@ class _Runner:
             tuple(self.choices),
             noted=tuple(self.noted),
             handed=self._handed_on(),
+            held=self.segment.plan.assembly.held,
         )
 
     def _handed_on(self) -> tuple[int, ...]:
@@ -367,11 +369,32 @@ class _Runner:
             self.recorder.take_changes(changes)
             return [one for one in changes if one.time > self.began]
         jumps = session.take_jumps()
-        if jumps:
+        sets = [one for one in jumps if isinstance(one, SetJump)]
+        if sets:
+            return self._take_sets(sets)
+        plain = [one for one in jumps if not isinstance(one, SetJump)]
+        if plain:
             from atwood.simulation.contacts.bounces import told_bounces
 
-            self.noted += told_bounces(jumps, self.segment.plan, self.segment.probe)
-        return jumps
+            self.noted += told_bounces(plain, self.segment.plan, self.segment.probe)
+        return plain
+
+    def _take_sets(self, jumps: Sequence[SetJump]) -> Sequence[Change]:
+        """Return the changes of a set of contacts, and go on with the last of them."""
+        from atwood.simulation.contacts.compiled import told_sets
+
+        segment, assembly, options = self.segment, self.segment.plan.assembly, self.segment.options
+        changes = told_sets(jumps, assembly)
+        self.noted += [event for one in changes for event in one.told]
+        self.recorder.take_changes(changes)
+        self.recorder.nearest = None  # it takes states onto what holds now
+        last = changes[-1]
+        assert last.held is not None
+        plan = segment.plan.in_piece(assembly.with_held(last.held))
+        q, u = plan.program.split(last.states[1])
+        probe = EventProbe(plan, last.time, q, u, options.relative_tolerance, options.conditions)
+        self.segment, self.began = replace(segment, plan=plan, probe=probe), last.time
+        return changes
 
     def _sample_watched(self, session: Session, done: int) -> tuple[int, StepResult | None]:
         """Let an explicit method fill tables, with looks at the motion where constraints stay."""

@@ -51,6 +51,9 @@ if TYPE_CHECKING:
 _MANY_IMPACTS = 3
 """From so many on it pays to compile what an impact does."""
 
+_MANY_CHANGES = 16
+"""The same of the change of a set of contacts."""
+
 OF_CONTACTS = 0.01
 """Of the tolerance, where gaps and slips decide how the motion goes on."""
 
@@ -257,11 +260,14 @@ class KeptSession:
     )
     impacts: list[tuple[float, str]] | None = None
     is_undisturbed: bool = True
+    changes: int = 0
+    shortest: float = 0.0
 
     @property
     def has_impacts(self) -> bool:
-        """Whether there were so many impacts that steps are to add to them."""
-        return self.impacts is not None and len(self.impacts) >= _MANY_IMPACTS
+        """Whether there were so many impacts, or changes of a set, that steps are to add to them."""
+        many = self.impacts is not None and len(self.impacts) >= _MANY_IMPACTS
+        return many or (self.impacts is not None and self.changes >= _MANY_CHANGES)
 
     def begin_again(
         self, request: SolverRequest, method: Method, t: float, y: FloatArray, on_stiff: OnStiff | None
@@ -339,10 +345,15 @@ def _filling(
     def fill(request: SolverRequest) -> None:
         code.fill(rates, values(request))
         if jumps is not None:
+            from atwood.integrators.set_jumps import SetJumps
             from atwood.simulation.contacts.bounces import fill_bounces
+            from atwood.simulation.contacts.compiled import fill_sets
 
-            relative = request.options.relative_tolerance
-            fill_bounces(jumps, request.plan, request.probe, relative, request.kept.impacts or ())
+            plan, options, past = request.plan, request.options, request.kept.impacts or ()
+            if isinstance(jumps, SetJumps):
+                fill_sets(jumps, plan, request.probe, options.relative_tolerance, past, request.kept.shortest)
+            else:
+                fill_bounces(jumps, plan, request.probe, options.relative_tolerance, past)
         found = None if events is None else request.probe.code(for_ida=False)
         if found is not None and events is not None:
             found.fill(events, request.plan.assembly.parameter_values, request.probe.shift)
@@ -392,8 +403,13 @@ def _open_on_constraints(
     own = own_rates_on_constraints(plan, t, y) if _can_be_kept(explicit, method) else None
     if own is not None and explicit.compiled_events is not None and kept.has_impacts:
         from atwood.simulation.contacts.bounces import bounces_of
+        from atwood.simulation.contacts.compiled import sets_of
 
-        explicit = replace(explicit, jumps=bounces_of(plan, probe, t, y, explicit.compiled_events))
+        alone = None if request.options.impacts == "one_by_one" else own[1]
+        found = bounces_of(plan, probe, t, y, explicit.compiled_events)
+        if found is None and alone is not None:
+            found = sets_of(plan, probe, t, y, explicit.compiled_events, alone)
+        explicit = replace(explicit, jumps=found)
     fill = None if own is None else _filling(*own, explicit, lambda one: values_on_constraints(one.plan))
     if own is not None and fill is not None:
         fill(request)

@@ -204,7 +204,7 @@ def open_places(motion: Motion, method: Method, options: RunOptions, values: Flo
     task = task_of(motion, method, options, values, own)
     assert method.batch is not None
     places = method.batch(task)
-    return replace(places, parameters=(own.prologue, own.derived, own.scratch)) if method.tableau else places
+    return replace(places, parameters=(own.prologues[0], own.derived, own.scratch)) if method.tableau else places
 
 
 def task_of(

@@ -1,0 +1,223 @@
+"""The routine that changes a set of contacts at an event, and the routines that it calls; see `set_jumps`."""
+
+from __future__ import annotations
+
+from atwood.codegen.routines import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER, Record, Routine, Value
+from atwood.integrators.compiled_location import FIELDS as LOCATOR
+from atwood.integrators.event_routines import Search
+from atwood.integrators.set_jumps import EVENTS, HEAD, JUMP, MOST_IMPACTS, PAST
+from atwood.integrators.set_routines import CLOSES, ENTRY, FIELDS, Sets, write_sets
+from atwood.numerics.contact_sets import OPEN
+
+_SHORT, _LONGEST, _ALIKE = 1e-6, 0.1, 1.0 + 1e-6
+"""As of `atwood.simulation.events.modes.without_margin`."""
+
+_PASSED = 0.9
+"""Of its margin: what has passed zero by more at the start of a set happens there."""
+
+_TINY = 1e-300
+"""Makes zero positive."""
+
+
+class _Leap(Record):
+    """The memory of changes of sets within a routine."""
+
+    def event(self, name: str) -> Value:
+        """Return the address of a number for each event."""
+        table: Value = self.table
+        return table.at(self.events * EVENTS.index(name))
+
+
+def _open(name: str, exported: bool = False) -> tuple[Routine, _Leap, Search, Sets]:
+    more = {"locator": ADDRESS, "t": NUMBER} if exported else {"locator": ADDRESS}
+    r = Routine(name, {"place": ADDRESS, **more}, CODE, exported)
+    m = _Leap(r.arguments[0], JUMP)
+    return r, m, Search(r.arguments[1], LOCATOR), Sets(m.sets, FIELDS)
+
+
+def _triggers() -> Routine:
+    """Say which gaps and slips events belong to that have been found."""
+    r, m, search, sets = _open("take_triggers")
+    found, trigger = search.row("found"), sets.unit("trigger")
+    r.clear(trigger, trigger.at(sets.count))
+    with r.count(search.count) as i, r.when(found[i] != 0.0):
+        trigger[r.truncated(m.event("unit")[i])] = m.event("code")[i]
+    r.give(0)
+    return r
+
+
+def _sharpen() -> Routine:
+    """Find by how much later than zero an event was seen that had a margin to pass, and take the state back to it."""
+    r, m, search, _ = _open("sharpen")
+    time, y, yp, found, shift, size = search.root, search.y, search.yp, search.row("found"), m.shift, search.size
+    now, before, since = search.row("lower"), search.row("upper"), time - m.began
+    m.late = 0.0
+    all_ = r.variable(since > 0.0, BOOLEAN)
+    with r.count(search.count) as i, r.when(found[i] != 0.0):
+        all_.now = all_.now & (shift[i] != 0.0)
+    with r.when(~all_.now):
+        r.give(0)
+    short, shifted = since * _SHORT, search.shifted
+    with r.count(size) as j:
+        shifted[j] = y[j] - short * yp[j]
+    r.call(search.events, time, y, yp, now, search.data)
+    r.call(search.events, time - short, shifted, yp, before, search.data)
+    least, most = r.variable(1e300), r.variable(-1e300)
+    with r.count(search.count) as i, r.when(found[i] != 0.0):
+        value = now[i] - shift[i]
+        rate = (now[i] - before[i]) / short
+        clear = (rate * shift[i] < 0.0) & (r.size(value) < since * _LONGEST * r.size(rate))
+        all_.now = all_.now & clear
+        late = value / rate
+        least.now, most.now = r.least(late, least.now), r.most(late, most.now)
+    with r.when(all_.now & (most.now <= least.now * _ALIKE)):
+        m.late = least.now
+    r.give(0)
+    return r
+
+
+def _take() -> Routine:
+    """Give the programs the states of gaps and slips that are in rows of the units."""
+    r = Routine("take_states", {"place": ADDRESS, "states": ADDRESS}, CODE)
+    m, rows = _Leap(r.arguments[0], JUMP), r.arguments[1]
+    sets, values = Sets(m.sets, FIELDS), m.values
+    count, places = sets.count, m.places
+    with r.count(count) as k:
+        is_slip = sets.unit("slip")[k] != 0.0
+        state = r.choose(is_slip, rows[k], rows[k] * 0.5)
+        values[r.truncated(places[k])] = state
+        way = places[count + k]
+        with r.when(way >= 0.0):
+            values[r.truncated(way)] = rows[count + k]
+    for name in ("kernel", "nearer", "event"):
+        prologue: Value = getattr(m, f"{name}_prologue")
+        scratch = m.event_scratch if name == "event" else m.scratch
+        r.call(prologue, values, getattr(m, f"{name}_derived"), scratch, result=None)
+    r.give(0)
+    return r
+
+
+def _meet() -> Routine:
+    """Take the coordinates to where what was found to be closed is met."""
+    r, m, _, sets = _open("meet_closed")
+    closed, states, some = sets.unit("closed"), m.states, r.variable(False, BOOLEAN)
+    count, size, y, near = sets.count, m.size, sets.y, m.near
+    with r.count(count) as k:
+        states[k], states[count + k] = closed[k] * 2.0, 0.0
+        some.now = some.now | (closed[k] != 0.0)
+    with r.when(~some.now):
+        r.give(0)
+    r.call("take_states", r.arguments[0], states)
+    r.copy(near, y, size)
+    with r.when(r.call(m.project, m.now, near, m.project_data) != 0):
+        r.give(1)
+    r.copy(y, near, sets.coordinates)
+    r.give(0)
+    return r
+
+
+def _arm() -> Routine:
+    """Take margins of the events in the new set; 1 where one of them has happened there already."""
+    r, m, search, sets = _open("arm")
+    shift, values, small = m.shift, search.row("others"), m.event("small")
+    with r.count(search.count) as i:
+        shift[i] = 0.0
+    with r.when(r.call(search.events, m.now, sets.y, search.yp, values, search.data) != 0):
+        r.give(1)
+    rates = sets.row("rates")
+    with r.count(search.count) as i:
+        value = values[i]
+        row = r.truncated(sets.unit("first")[r.truncated(m.event("unit")[i])])
+        is_near = r.size(value) <= small[i]
+        is_gap = (m.event("code")[i] == float(CLOSES)) & (m.event("placed")[i] != 0.0)
+        opens = is_gap & is_near & (rates[row] * m.time > small[i])
+        with r.when((value < small[i] * -_PASSED) & ~opens):
+            r.give(1)
+        margin = r.choose(opens, r.choose(value > 0.0, 0.0, r.size(value) * 2.0 + _TINY), small[i])
+        shift[i] = r.choose(is_near, margin, 0.0)
+    r.give(0)
+    return r
+
+
+def _log() -> Routine:
+    """Write what has happened into the log, and remember impacts."""
+    r, m, _, sets = _open("log_jump")
+    size, count, past = m.size, sets.count, sets.past
+    entry = m.log.at(m.logged * m.stride)
+    stopped = r.variable(-1, INTEGER)
+    with r.count(count) as i:
+        k = count - 1 - i
+        is_one = (sets.unit("stopped")[k] != 0.0) & (sets.unit("slip")[k] == 0.0)
+        stopped.now = r.choose(is_one, k, stopped.now)
+    with r.when(sets.stops == 0):
+        stopped.now = -1
+    entry[0], entry[1], entry[2], entry[3] = m.now, stopped.now.number(), sets.ahead, sets.logged.number()
+    r.copy(entry.at(HEAD), m.before, size)
+    r.copy(entry.at(size + HEAD), sets.y, size)
+    r.copy(entry.at(size * 2 + HEAD), sets.unit("next"), count * 3)
+    r.copy(entry.at(size * 2 + count * 3 + HEAD), sets.log, sets.logged * (sets.size + len(ENTRY)))
+    m.logged = m.logged + 1
+    with r.count(sets.logged) as i:
+        struck = r.truncated(sets.log[i * (sets.size + len(ENTRY))])
+        with r.when(sets.known == PAST):
+            with r.count((PAST - 1) * 2) as j:
+                past[j] = past[j + 2]
+            sets.known = PAST - 1
+        last = past.at(sets.known * 2)
+        last[0], last[1] = m.now, sets.unit("part")[struck]
+        sets.known = sets.known + 1
+    r.give(0)
+    return r
+
+
+def _jump() -> Routine:
+    """Change the set at an event: the state becomes that after it; 1 where that is left to Python, and all stays."""
+    r, m, search, sets = _open("jump", exported=True)
+    place, locator, t = r.arguments
+    size, y, states, count = m.size, sets.y, sets.unit("next"), sets.count
+    with r.when((m.logged >= m.capacity) | (t - m.began <= m.shortest)):
+        r.give(1)
+    r.copy(m.margins, m.shift, search.count)
+    r.call("take_triggers", place, locator)
+    r.call("sharpen", place, locator)
+    m.now = t - m.late
+    with r.count(size) as j:
+        y[j] = search.y[j] - m.late * search.yp[j]
+    r.copy(m.before, y, size)
+    sets.ahead = m.ahead
+    with r.when(r.call("resolve", m.sets, m.now, r.value(0, INTEGER), r.value(1, INTEGER)) != 0):
+        _back(r, m, search)
+    some = r.variable(False, BOOLEAN)
+    with r.count(count) as k:
+        some.now = some.now | (states[k] != float(OPEN))
+    with r.when(~some.now | (sets.logged > MOST_IMPACTS)):
+        _back(r, m, search)
+    with r.when(r.call("meet_closed", place, locator) != 0):
+        _back(r, m, search)
+    r.call("take_states", place, states)
+    with r.when(r.call("arm", place, locator) != 0):
+        _back(r, m, search)
+    r.call("log_jump", place, locator)
+    r.copy(search.y, y, size)
+    r.copy(sets.unit("state"), states, count * 3)
+    m.began, search.root = m.now, m.now
+    given, seen = search.row("given"), m.seen
+    with r.count(search.count) as i:
+        given[i] = 1.0
+    r.clear(seen, seen.at(search.count * 3 + 3))
+    seen[0] = m.now
+    search.is_first = 1
+    r.give(0)
+    return r
+
+
+def _back(r: Routine, m: _Leap, search: Search) -> None:
+    """Leave it to Python, with the states and margins of before."""
+    r.call("take_states", r.arguments[0], Sets(m.sets, FIELDS).unit("state"))
+    r.copy(m.shift, m.margins, search.count)
+    r.give(1)
+
+
+def write_routines() -> list[Routine]:
+    """Return the routine ``jump``, and what it calls; it takes the address of its memory, a search, and a time."""
+    return [*write_sets(), *(write() for write in (_triggers, _sharpen, _take, _meet, _arm, _log, _jump))]

@@ -1,0 +1,241 @@
+"""Changes of a set of contacts at events, without Python; see `atwood.integrators.set_routines`.
+
+What is not clear by the rules there is left to Python, and so is what opens all of them.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping, Sequence
+from ctypes import c_double, c_int, c_void_p
+from math import inf
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.codegen.llvm.build import RoutineSource, build_code, default_options
+from atwood.codegen.llvm.module import Part
+from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Kind
+from atwood.expr.core.program import Program
+from atwood.integrators.jumps import Jumps
+from atwood.integrators.set_routines import CAPACITY, ENTRY, FIELDS, ROWS, UNITS
+
+if TYPE_CHECKING:
+    from atwood.codegen.sundials.events import EventData
+    from atwood.integrators.embedded.rates import OwnRates
+
+_PROGRAMS = tuple(f"{name}_{what}" for name in ("kernel", "nearer", "event") for what in ("prologue", "derived"))
+
+JUMP: dict[str, Kind] = {
+    **dict.fromkeys(("sets", "table", "shift", "margins", "seen", "states", "near", "before", "values"), ADDRESS),
+    **dict.fromkeys(("places", "log", "project", "project_data", "scratch", "event_scratch", *_PROGRAMS), ADDRESS),
+    **dict.fromkeys(("now", "late", "began", "shortest", "ahead", "time"), NUMBER),
+    **dict.fromkeys(("events", "size", "stride", "logged", "capacity"), INTEGER),
+}
+"""The memory of changes. `late` is how much after `now` an event was seen, `began` when the set did, `shortest` how
+long one lasts at least, `time` that of the scene."""
+
+EVENTS = ("unit", "code", "small", "placed")
+"""Of each event: whose it is, what happens, what is zero but for errors, and whether it is that of a gap on places."""
+
+HEAD, PAST, MOST_IMPACTS = 4, 64, 8
+"""Numbers that begin an entry of the log, impacts that are remembered, and how many there may be in an entry."""
+
+_ROOM = 1024
+"""So many changes are made without Python."""
+
+_RATES = ctypes.CFUNCTYPE(c_int, c_double, *[c_void_p] * 3)
+
+
+class SetJump(NamedTuple):
+    """A change of a set: the states before and after, those of gaps and slips, and what has happened.
+
+    `stopped` is the first gap that came to rest as impacts accumulate, or -1, and `left` how long these still go on;
+    `struck` has a row for each impact, as the log of `atwood.integrators.set_routines`.
+    """
+
+    time: float
+    states: FloatArray
+    set: FloatArray
+    stopped: int
+    left: float
+    struck: FloatArray
+
+
+class SetCode:
+    """Changes of sets as machine code, for any parameter values.
+
+    Parameters
+    ----------
+    program
+        See `atwood.forms.constrained.contacts_program`.
+    """
+
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        _, self.coordinates, self.speeds = (len(group.symbols) for group in program.inputs)
+        part = Part("contacts", program)
+        own = tuple(
+            f"integrators/{name}.py"
+            for name in (
+                "compiled_location",
+                "event_routines",
+                "event_location",
+                "protocol",
+                "set_jumps",
+                "set_routines",
+            )
+        )
+        files = (*own, "numerics/contact_sets.py", "codegen/tangents.py")
+        routines = RoutineSource("integrators.set_jump_routines", files)
+        self.built = build_code([part], default_options([part]), exports=["jump"], routines=routines)
+
+
+class SetJumps(Jumps):
+    """The changes of sets of one session.
+
+    Parameters
+    ----------
+    code
+        What they are.
+    events, rates
+        The events at which they happen, and the rates in between.
+    pattern
+        Which limits read which forces.
+    units
+        What is known of each gap and slip.
+    count
+        Number of rows.
+    places
+        Where states and directions of each are among the parameters; -1 where there is none.
+    """
+
+    def __init__(
+        self,
+        code: SetCode,
+        events: EventData,
+        rates: OwnRates,
+        pattern: Sequence[tuple[int, int]],
+        units: FloatArray,
+        count: int,
+        places: FloatArray,
+    ) -> None:
+        own, size, number = code.coordinates + code.speeds, count, units.shape[1]
+        self.set_code, self._size, self._units = code, own, units.copy()
+        self._each = size + len(ENTRY)
+        self._stride = HEAD + 2 * own + 3 * number + MOST_IMPACTS * self._each
+        lengths = {
+            "own": len(JUMP),
+            "sets": len(FIELDS),
+            "derived": len(code.program.prologue),
+            "room": code.built.scratch,
+            "y": own,
+            "out": len(code.program.results),
+            "units": units.size,
+            "rows": len(ROWS) * size,
+            "matrix": size * size,
+            "left": size * (size + 1),
+            "shares": 4 * number * size,
+            "pattern": 2 * len(pattern),
+            "past": 2 * PAST,
+            "struck": CAPACITY * self._each,
+            "table": len(EVENTS) * events.count,
+            "margins": events.count,
+            "states": 2 * number,
+            "near": own,
+            "before": own,
+            "values": len(code.program.parameters),
+            "places": 2 * number,
+            "log": self._stride * _ROOM,
+        }
+        ends = np.cumsum(list(lengths.values()))
+        memory = np.zeros(int(ends[-1]))
+        self._pieces = dict(zip(lengths, np.split(memory, ends[:-1]), strict=True))
+        self._keeps = memory, events, rates
+        at = {name: one.ctypes.data for name, one in self._pieces.items()}
+        same = ("derived", "y", "out", "units", "rows", "matrix", "left", "shares", "pattern", "past")
+        self._put("sets", {name: at[name] for name in same} | {"scratch": at["room"], "log": at["struck"]})
+        self._put("sets", {"count": number, "size": size, "entries": len(pattern), "inside": 1.0})
+        self._put("sets", {"coordinates": code.coordinates, "speeds": code.speeds})
+        named = ("sets", "table", "margins", "states", "near", "before", "values", "places", "log")
+        self._put("own", {name: at[name] for name in named} | {"shift": events.arrays[1].ctypes.data})
+        self._put("own", {"seen": events.memory.ctypes.data, "event_derived": events.arrays[0].ctypes.data})
+        self._put("own", dict(zip(("event_prologue", "event_scratch"), events.prologue, strict=True)))
+        self._put("own", {"project": rates.rates.project, "project_data": rates.rates.project_data})
+        for name, prologue, place in zip(("kernel", "nearer"), rates.prologues, rates.places, strict=True):
+            self._put("own", {f"{name}_prologue": prologue, f"{name}_derived": place})
+        self._put("own", {"scratch": rates.scratch, "events": events.count, "size": own, "stride": self._stride})
+        self._put("own", {"capacity": _ROOM})
+        self._pieces["pattern"][:] = [one for some in zip(*pattern, strict=True) for one in some]
+        self._pieces["places"][:] = places.ravel()
+        self._pieces["units"][:] = units.ravel()
+        self._rates = _RATES(rates.rates.function), rates.rates.data
+        self.function, self.data = code.built.code.addresses["jump"], at["own"]
+
+    def _put(self, piece: str, fields: Mapping[str, float]) -> None:
+        kinds, numbers = (JUMP if piece == "own" else FIELDS), self._pieces[piece]
+        places = {name: k for k, name in enumerate(kinds)}
+        for name, value in fields.items():
+            (numbers if kinds[name] is NUMBER else numbers.view(np.int64))[places[name]] = value
+
+    def _got(self, name: str) -> int:
+        return int(self._pieces["own"].view(np.int64)[list(JUMP).index(name)])
+
+    def give(
+        self,
+        parameter_values: FloatArray,
+        states: FloatArray,
+        table: FloatArray,
+        scales: tuple[float, float, float, float],
+        past: Sequence[tuple[float, float]],
+    ) -> None:
+        """Begin again with other parameters, states of gaps and slips, and impacts that have been.
+
+        Scales are what is small, how long a set lasts at least, how long impacts may go on that are summed, and the
+        time of the scene.
+        """
+        near, shortest, ahead, time = scales
+        self._pieces["values"][:] = parameter_values
+        self._pieces["derived"][:] = self.set_code.built.derive("contacts", self.set_code.program, parameter_values)[0]
+        units = self._pieces["units"].reshape(self._units.shape)
+        for name in ("small", "slow"):
+            units[UNITS[name]] = near * self._units[UNITS[name]]
+        units[UNITS["state"] : UNITS["state"] + 3] = states
+        self._pieces["table"][:] = table.ravel()
+        known = list(past)[-PAST:]
+        self._pieces["past"][: 2 * len(known)] = np.ravel(known)
+        self._put("sets", {"known": len(known)})
+        self._put("own", {"logged": 0, "shortest": shortest, "ahead": ahead, "time": time})
+        self._told = 0
+
+    def begin(self, t: float) -> None:
+        """Learn when the present set begins."""
+        self._put("own", {"began": t})
+
+    def rates(self, t: float, y: FloatArray) -> FloatArray:
+        """Return the rates in the present set."""
+        function, data = self._rates
+        found, state = np.empty(self._size), np.array(y)
+        function(t, state.ctypes.data, found.ctypes.data, data)
+        return found
+
+    @property
+    def last(self) -> tuple[float, FloatArray]:
+        """Time and state after the last change; minus infinity where there has been none."""
+        logged = self._got("logged")
+        entry = self._pieces["log"].reshape(_ROOM, self._stride)[logged - 1]
+        after = HEAD + self._size
+        return (float(entry[0]) if logged else -inf), entry[after : after + self._size].copy()
+
+    def take(self) -> list[SetJump]:
+        """Return the changes since this was last asked."""
+        first, self._told = self._told, self._got("logged")
+        found, states = [], HEAD + 2 * self._size
+        for row in self._pieces["log"].reshape(_ROOM, self._stride)[first : self._told].copy():
+            time, stopped, left, struck = row[:HEAD].tolist()
+            ends = states + 3 * self._units.shape[1]
+            impacts = row[ends : ends + int(struck) * self._each].reshape(-1, self._each)
+            set_ = row[states:ends].reshape(3, -1)
+            found.append(SetJump(time, row[HEAD:states].reshape(2, -1), set_, int(stopped), left, impacts))
+        return found
