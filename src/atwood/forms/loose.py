@@ -44,6 +44,13 @@ def is_loose(assembly: Assembly) -> bool:
     return assembly.kept.get(_LOOSE, find)
 
 
+def kept_touching(assembly: Assembly) -> Assembly:
+    """Return a scene in which nothing touches, slips or sticks, with the programs for all states."""
+    made = replace(assembly)
+    made.kept.get(_LOOSE, lambda: False)
+    return made
+
+
 def has_touched(assembly: Assembly) -> bool:
     """Return whether a scene has gaps or slips, and one of them touches, slips or sticks."""
     return bool(assembly.own_equations.contacts) and not is_loose(assembly)

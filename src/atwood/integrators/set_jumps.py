@@ -1,6 +1,7 @@
 """Changes of a set of contacts at events, without Python; see `atwood.integrators.set_routines`.
 
-What is not clear by the rules there is left to Python, and so is what opens all of them.
+What is not clear by the rules there is left to Python, and so is what opens all of them where other programs are then
+shorter.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from atwood.integrators.set_routines import CAPACITY, ENTRY, FIELDS, ROWS, UNITS
 
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventData
-    from atwood.integrators.embedded.rates import OwnRates
+    from atwood.integrators.protocol import CompiledRates
 
 _PROGRAMS = tuple(f"{name}_{what}" for name in ("kernel", "nearer", "event") for what in ("prologue", "derived"))
 
@@ -31,10 +32,10 @@ JUMP: dict[str, Kind] = {
     **dict.fromkeys(("sets", "table", "shift", "margins", "seen", "states", "near", "before", "values"), ADDRESS),
     **dict.fromkeys(("places", "log", "project", "project_data", "scratch", "event_scratch", *_PROGRAMS), ADDRESS),
     **dict.fromkeys(("now", "late", "began", "shortest", "ahead", "time"), NUMBER),
-    **dict.fromkeys(("events", "size", "stride", "logged", "capacity"), INTEGER),
+    **dict.fromkeys(("events", "size", "stride", "logged", "capacity", "stays"), INTEGER),
 }
 """The memory of changes. `late` is how much after `now` an event was seen, `began` when the set did, `shortest` how
-long one lasts at least, `time` that of the scene."""
+long one lasts at least, `time` that of the scene, `stays` whether all may open."""
 
 EVENTS = ("unit", "code", "small", "placed")
 """Of each event: whose it is, what happens, what is zero but for errors, and whether it is that of a gap on places."""
@@ -76,18 +77,13 @@ class SetCode:
         self.program = program
         _, self.coordinates, self.speeds = (len(group.symbols) for group in program.inputs)
         part = Part("contacts", program)
-        own = tuple(
-            f"integrators/{name}.py"
-            for name in (
-                "compiled_location",
-                "event_routines",
-                "event_location",
-                "protocol",
-                "set_jumps",
-                "set_routines",
-            )
+        files = (
+            "integrators/compiled_location.py",
+            "integrators/event_routines.py",
+            "integrators/set_jumps.py",
+            "integrators/set_routines.py",
+            "numerics/contact_sets.py",
         )
-        files = (*own, "numerics/contact_sets.py", "codegen/tangents.py")
         routines = RoutineSource("integrators.set_jump_routines", files)
         self.built = build_code([part], default_options([part]), exports=["jump"], routines=routines)
 
@@ -99,8 +95,9 @@ class SetJumps(Jumps):
     ----------
     code
         What they are.
-    events, rates
-        The events at which they happen, and the rates in between.
+    events, rates, given
+        The events at which they happen, the rates in between, and the addresses of functions that compute what depends
+        on parameters alone, of the rates and of the projection, of where that is kept, and of their scratch.
     pattern
         Which limits read which forces.
     units
@@ -109,18 +106,23 @@ class SetJumps(Jumps):
         Number of rows.
     places
         Where states and directions of each are among the parameters; -1 where there is none.
+    stays
+        Whether a set in which all are open is one of them.
     """
 
     def __init__(
         self,
         code: SetCode,
         events: EventData,
-        rates: OwnRates,
+        rates: CompiledRates,
+        given: tuple[tuple[int, ...], tuple[int, ...], int],
         pattern: Sequence[tuple[int, int]],
         units: FloatArray,
         count: int,
         places: FloatArray,
+        stays: bool,
     ) -> None:
+        prologues, kept, scratch = given
         own, size, number = code.coordinates + code.speeds, count, units.shape[1]
         self.set_code, self._size, self._units = code, own, units.copy()
         self._each = size + len(ENTRY)
@@ -162,15 +164,15 @@ class SetJumps(Jumps):
         self._put("own", {name: at[name] for name in named} | {"shift": events.arrays[1].ctypes.data})
         self._put("own", {"seen": events.memory.ctypes.data, "event_derived": events.arrays[0].ctypes.data})
         self._put("own", dict(zip(("event_prologue", "event_scratch"), events.prologue, strict=True)))
-        self._put("own", {"project": rates.rates.project, "project_data": rates.rates.project_data})
-        for name, prologue, place in zip(("kernel", "nearer"), rates.prologues, rates.places, strict=True):
+        self._put("own", {"project": rates.project, "project_data": rates.project_data})
+        for name, prologue, place in zip(("kernel", "nearer"), prologues, kept, strict=True):
             self._put("own", {f"{name}_prologue": prologue, f"{name}_derived": place})
-        self._put("own", {"scratch": rates.scratch, "events": events.count, "size": own, "stride": self._stride})
-        self._put("own", {"capacity": _ROOM})
+        self._put("own", {"scratch": scratch, "events": events.count, "size": own, "stride": self._stride})
+        self._put("own", {"capacity": _ROOM, "stays": stays})
         self._pieces["pattern"][:] = [one for some in zip(*pattern, strict=True) for one in some]
         self._pieces["places"][:] = places.ravel()
         self._pieces["units"][:] = units.ravel()
-        self._rates = _RATES(rates.rates.function), rates.rates.data
+        self._rates = _RATES(rates.function), rates.data
         self.function, self.data = code.built.code.addresses["jump"], at["own"]
 
     def _put(self, piece: str, fields: Mapping[str, float]) -> None:

@@ -26,11 +26,14 @@ from atwood.numerics.contact_sets import STICKS, State
 from atwood.simulation.contacts.changes import LEFT, NEAR, states_of, told_change, told_impact, told_rest
 from atwood.simulation.contacts.values import Layout, layout_of
 from atwood.simulation.events.modes import MARGIN, EventProbe, EventRecord
-from atwood.simulation.problem.explicit_scene import light_speeds, values_on_constraints
+from atwood.simulation.problem.explicit_scene import light_speeds, program_on_constraints, values_on_constraints
 from atwood.simulation.problem.problem import SceneProblem
 
 HAPPENED = {CLOSES: sets.CLOSES, OPENS: sets.OPENS, YIELDS: sets.YIELDS, STOPS: sets.STOPS, RESTS: sets.STOPS}
 """What an event of a gap or a slip means to the routine; others say nothing of how it goes on."""
+
+_SHORT = 300
+"""Programs for all states that are no longer than this are used where nothing touches, too."""
 
 _CODE: Key[tuple[SetData, SetCode] | None] = Key("machine code of sets")
 
@@ -127,11 +130,17 @@ def sets_of(
 ) -> SetJumps | None:
     """Return the changes of sets of a session; None where these are left to Python.
 
-    Nothing but gaps and slips in one direction may be watched, and nothing else may hold.
+    Nothing but gaps and slips in one direction may be watched.
     """
     assembly, equations = plan.assembly, plan.assembly.own_equations
-    holds = plan.balance.constraints or equations.orientation_coordinates or assembly.sides
-    if holds or is_loose(assembly) or any(one.target not in CONTACT for one in probe.event_functions):
+    loops = plan.balance.constraints and assembly.form == "reduced"
+    if (
+        loops
+        or equations.orientation_coordinates
+        or assembly.sides
+        or is_loose(assembly)
+        or any(one.target not in CONTACT for one in probe.event_functions)
+    ):
         return None
     if any(len(rows) > 1 for rows in layout_of(assembly).units):
         return None
@@ -148,7 +157,9 @@ def sets_of(
     data, code = made
     before, layout = len(assembly.mechanism.table.values), data.layout
     places = np.array([[before + one[0], before + one[1] if len(one) > 1 else -1] for one in layout.places]).T
-    return SetJumps(code, events, rates, data.pattern, data.units, len(layout.contacts), places)
+    stays = program_on_constraints(plan, t, y).accelerations.size <= _SHORT
+    given, count = (rates.prologues, rates.places, rates.scratch), len(layout.contacts)
+    return SetJumps(code, events, rates.rates, given, data.pattern, data.units, count, places, stays)
 
 
 def fill_sets(

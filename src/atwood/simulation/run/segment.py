@@ -12,6 +12,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.clock import TimeIsUp, check_time, more_time, time_left
 from atwood.errors import AtwoodError, SolveError, StartError
+from atwood.forms.loose import kept_touching
 from atwood.integrators.methods import AUTO, Method
 from atwood.integrators.protocol import Budget, Statistics, Status, StepResult
 from atwood.integrators.session import Session
@@ -390,7 +391,7 @@ class _Runner:
         self.recorder.nearest = None  # it takes states onto what holds now
         last = changes[-1]
         assert last.held is not None
-        plan = segment.plan.in_piece(assembly.with_held(last.held))
+        plan = segment.plan.in_piece(kept_touching(assembly.with_held(last.held)))
         q, u = plan.program.split(last.states[1])
         probe = EventProbe(plan, last.time, q, u, options.relative_tolerance, options.conditions)
         self.segment, self.began = replace(segment, plan=plan, probe=probe), last.time

@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 _MANY_IMPACTS = 3
 """From so many on it pays to compile what an impact does."""
 
-_MANY_CHANGES = 16
+_MANY_CHANGES = 6
 """The same of the change of a set of contacts."""
 
 OF_CONTACTS = 0.01
