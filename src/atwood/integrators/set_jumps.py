@@ -122,7 +122,6 @@ class SetJumps(Jumps):
         places: FloatArray,
         stays: bool,
     ) -> None:
-        prologues, kept, scratch = given
         own, size, number = code.coordinates + code.speeds, count, units.shape[1]
         self.set_code, self._size, self._units = code, own, units.copy()
         self._each = size + len(ENTRY)
@@ -155,25 +154,33 @@ class SetJumps(Jumps):
         memory = np.zeros(int(ends[-1]))
         self._pieces = dict(zip(lengths, np.split(memory, ends[:-1]), strict=True))
         self._keeps = memory, events, rates
-        at = {name: one.ctypes.data for name, one in self._pieces.items()}
+        self._pieces["pattern"][:] = [one for some in zip(*pattern, strict=True) for one in some]
+        self._pieces["places"][:] = places.ravel()
+        self._pieces["units"][:] = units.ravel()
+        self._put("sets", {"count": number, "size": size, "entries": len(pattern), "inside": 1.0})
+        self._put(
+            "own", {"events": events.count, "size": own, "stride": self._stride, "capacity": _ROOM, "stays": stays}
+        )
+        self._place(events, rates, given)
+        self._rates = _RATES(rates.function), rates.data
+        self.function, self.data = code.built.code.addresses["jump"], self._pieces["own"].ctypes.data
+
+    def _place(
+        self, events: EventData, rates: CompiledRates, given: tuple[tuple[int, ...], tuple[int, ...], int]
+    ) -> None:
+        """Say where everything is."""
+        prologues, kept, scratch = given
+        code, at = self.set_code, {name: one.ctypes.data for name, one in self._pieces.items()}
         same = ("derived", "y", "out", "units", "rows", "matrix", "left", "shares", "pattern", "past")
         self._put("sets", {name: at[name] for name in same} | {"scratch": at["room"], "log": at["struck"]})
-        self._put("sets", {"count": number, "size": size, "entries": len(pattern), "inside": 1.0})
         self._put("sets", {"coordinates": code.coordinates, "speeds": code.speeds})
         named = ("sets", "table", "margins", "states", "near", "before", "values", "places", "log")
         self._put("own", {name: at[name] for name in named} | {"shift": events.arrays[1].ctypes.data})
         self._put("own", {"seen": events.memory.ctypes.data, "event_derived": events.arrays[0].ctypes.data})
         self._put("own", dict(zip(("event_prologue", "event_scratch"), events.prologue, strict=True)))
-        self._put("own", {"project": rates.project, "project_data": rates.project_data})
+        self._put("own", {"project": rates.project, "project_data": rates.project_data, "scratch": scratch})
         for name, prologue, place in zip(("kernel", "nearer"), prologues, kept, strict=True):
             self._put("own", {f"{name}_prologue": prologue, f"{name}_derived": place})
-        self._put("own", {"scratch": scratch, "events": events.count, "size": own, "stride": self._stride})
-        self._put("own", {"capacity": _ROOM, "stays": stays})
-        self._pieces["pattern"][:] = [one for some in zip(*pattern, strict=True) for one in some]
-        self._pieces["places"][:] = places.ravel()
-        self._pieces["units"][:] = units.ravel()
-        self._rates = _RATES(rates.function), rates.data
-        self.function, self.data = code.built.code.addresses["jump"], at["own"]
 
     def _put(self, piece: str, fields: Mapping[str, float]) -> None:
         kinds, numbers = (JUMP if piece == "own" else FIELDS), self._pieces[piece]
