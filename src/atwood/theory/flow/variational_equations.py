@@ -24,9 +24,7 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import simulate, smooth_assembly_of
 from atwood.result.result import Result
-from atwood.simulation.dynamics.balance import solve_determined
 from atwood.simulation.dynamics.orientation_coordinates import to_regular
-from atwood.simulation.problem.preparation import find_not_compilable
 from atwood.simulation.run.recorder import SegmentRecord
 from atwood.theory.linear.displacements import Minimal, find_minimal
 from atwood.theory.linear.steady import pace_of
@@ -38,7 +36,7 @@ _SHARE = 0.1
 _LOOKS = 20
 """The pace of a motion is that at so many times."""
 
-_BLOCK = 20_000
+_BLOCK = 5_000
 """The equations are evaluated at so many states at a time."""
 
 
@@ -179,67 +177,16 @@ class VariationalEquations:
 
 def variational_equations(scene: LinearScene, kept: Sequence[int], states: States) -> VariationalEquations:
     """Return the variational equations at some states."""
-    e, rows = scene.equations, list(kept)
-    n, m, count = len(e.speeds), len(rows), len(states)
-    still = _Numbers(scene, states, np.zeros((n, count)), np.zeros((len(e.constraints), count)))
-    mass = still.by("force", "a")
-    matrix = np.zeros((count, n + m, n + m))
-    matrix[:, :n, :n] = mass
-    if m:
-        matrix[:, :n, n:] = still.by("force", "multipliers")[:, :, rows]
-        matrix[:, n:, :n] = still.by("second", "a")[:, rows]
-    right = np.concatenate([still.values["force"].T, still.values["second"].T[:, rows]], axis=1)
-    t = float(states.time[0])
-    solved = solve_determined(matrix, -right, t)
-    held = np.zeros((len(e.constraints), count))
-    held[rows] = solved[:, n:].T
-    now = _Numbers(scene, states, solved[:, :n].T, held)
-    basis = scene.tangents.basis(states.q.T)
-
-    def along(name: str) -> FloatArray:
-        return np.concatenate([now.by(name, "q") @ basis, now.by(name, "u")], axis=2)
-
-    moved = solve_determined(matrix, -np.concatenate([along("force"), along("second")[:, rows]], axis=1), t)
-    moving = (scene.tangents.inverse(states.q.T) @ now.values["rates"].T[:, :, None])[:, :, 0]
-    shift = scene.shift(states.q.T, basis, moving, along("rates"))
-    holding = [i for i in rows if e.constraints[i].holonomic]
+    flow, rows = scene.flow(states.time, states.q.T, states.u.T, kept), list(kept)
+    now, size = flow.variation, flow.field.shape[-1]
+    holding = [i for i in rows if scene.equations.constraints[i].holonomic]
     return VariationalEquations(
-        matrix=np.concatenate([shift, moved[:, :n]], axis=1),
-        mass=mass,
-        by_displacement=now.by("value", "q")[:, holding] @ basis,
-        rate_by_displacement=now.by("rate", "q")[:, rows] @ basis,
-        rate_by_speed=now.by("rate", "u")[:, rows],
+        matrix=flow.matrix[..., :size],
+        mass=now.by["force", "a"],
+        by_displacement=now.by["value", "q"][:, holding] @ now.basis,
+        rate_by_displacement=now.by["rate", "q"][:, rows] @ now.basis,
+        rate_by_speed=now.by["rate", "u"][:, rows],
     )
-
-
-class _Numbers:
-    """The groups of expressions of the equations at many states, and their derivatives.
-
-    Parameters
-    ----------
-    scene, states
-        Which scene, and where.
-    a, held
-        Accelerations and multipliers, shape (number, states).
-    """
-
-    def __init__(self, scene: LinearScene, states: States, a: FloatArray, held: FloatArray) -> None:
-        program, assembly = scene.derivatives, scene.assembly
-        in_python = find_not_compilable(assembly, program)
-        kernel = assembly.kernel(program, vectorized=True) if in_python else assembly.columns(program)
-        found = kernel(states.time[None, :], states.q, states.u, a, held)
-        self._count = len(states)
-        self._parts = {part.name: part for part in scene.parts}
-        self.values = {group.name: np.asarray(x) for group, x in zip(program.outputs, found, strict=True)}
-
-    def by(self, name: str, symbols: str) -> FloatArray:
-        """Return the derivatives of a group as matrices, shape (states, rows, columns)."""
-        part = self._parts[name]
-        matrix = np.zeros((self._count, part.rows, part.columns[symbols]))
-        place = part.places.get(symbols)
-        if place is not None:
-            matrix[:, list(place.rows), list(place.columns)] = self.values[f"{name} by {symbols}"].T
-        return matrix
 
 
 _HALVINGS = 16

@@ -176,7 +176,7 @@ def image_of(scene: LinearScene, flow: Flow, minimal: Minimal) -> tuple[Image, t
     places = _places(scene, now)
     big = LinearScene(scene.assembly, "dae", scene.inputs)
     q, u = places.values["q"], places.values["u"]
-    kept = big.rank(now.t, q).kept
+    kept = big.rank(float(now.t), q).kept
     big_flow = big.flow(now.t, q, u, kept)
     inverse = big.tangents.inverse(q)
     inputs = len(scene.inputs)

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,11 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.simulation.dynamics.balance import balance_of, solve_determined
 from atwood.simulation.dynamics.redundancy import RankFinding, find_rank
 from atwood.simulation.dynamics.scales import motion_scales, scene_length
+from atwood.simulation.problem.preparation import find_not_compilable
 from atwood.topology.orientation_coordinates import OrientationCoordinates
+
+Times: TypeAlias = float | FloatArray
+"""The time of a state, or of many."""
 
 _VARIATIONS: Key[tuple[list[Differentiated], Program]] = Key("derivatives of the equations")
 
@@ -56,6 +60,8 @@ class Differentiated:
 class Variation:
     """Numbers of the equations at a state, with their derivatives along displacements, speeds, time and inputs.
 
+    At many states all arrays have one more axis, the first.
+
     Attributes
     ----------
     t, q, u, a, multipliers
@@ -70,7 +76,7 @@ class Variation:
         Derivatives of each group: ``by["force", "q"]`` and so on, along coordinates.
     """
 
-    t: float
+    t: Times
     q: FloatArray
     u: FloatArray
     a: FloatArray
@@ -109,12 +115,12 @@ class Flow:
     @property
     def field(self) -> FloatArray:
         """The state's own motion: ``s'`` and ``u'``."""
-        return np.concatenate([self.variation.displacement_rates, self.variation.a])
+        return np.concatenate([self.variation.displacement_rates, self.variation.a], axis=-1)
 
     @property
     def matrix(self) -> FloatArray:
         """The derivative of that along displacements and speeds, then time and inputs."""
-        return np.concatenate([self.shift, self.acceleration])
+        return np.concatenate([self.shift, self.acceleration], axis=-2)
 
 
 class LinearScene:
@@ -221,11 +227,13 @@ class LinearScene:
         """The program of the expressions and the entries of their derivatives at a state."""
         return self._made[1]
 
-    @property
-    def _kernel(self) -> BoundKernel:
-        if self._bound is None:
-            self._bound = self.assembly.kernel(self.derivatives)
-        return self._bound
+    def _kernel(self, of_many: bool) -> Any:
+        if self._bound is not None:
+            assert not of_many, "other values of parameters are for one state at a time"
+            return self._bound
+        assembly, program = self.assembly, self.derivatives
+        in_python = of_many and find_not_compilable(assembly, program)
+        return assembly.columns(program) if of_many and not in_python else assembly.kernel(program, of_many)
 
     def _with_values(self, values: FloatArray) -> LinearScene:
         """Return the same with other values of the parameters."""
@@ -258,50 +266,53 @@ class LinearScene:
         return find_rank(balance_of(self.assembly, "dae" if self.form == "dae" else "reduced"), t, q, self.sizes)
 
     def matrices(self, part: Differentiated, values: Mapping[str, FloatArray]) -> dict[tuple[str, str], FloatArray]:
-        """Return the derivatives of a group as matrices."""
+        """Return the derivatives of a group as matrices, shape (..., rows, columns)."""
         found: dict[tuple[str, str], FloatArray] = {}
+        states = next(iter(values.values())).shape[:-1]
         for by, count in part.columns.items():
-            matrix = np.zeros((part.rows, count))
+            matrix = np.zeros((*states, part.rows, count))
             if by in part.numbers:
-                matrix[part.numbers[by]] = values[f"{part.name} by {by}"]
+                matrix[..., *part.numbers[by]] = values[f"{part.name} by {by}"]
             found[part.name, by] = matrix
         return found
 
     def evaluate(self, kernel: Any, program: Program, state: tuple[FloatArray, ...]) -> dict[str, FloatArray]:
-        """Return the output groups of a program by name."""
+        """Return the output groups of a program by name, of states along the first axis."""
         groups = [group.name for group in program.outputs]
-        return {name: np.asarray(x, dtype=float) for name, x in zip(groups, kernel(*state), strict=True)}
+        found = kernel(*(group.T for group in state))
+        return {name: np.asarray(x, dtype=float).T for name, x in zip(groups, found, strict=True)}
 
-    def variation(self, t: float, q: FloatArray, u: FloatArray, a: FloatArray, held: FloatArray) -> Variation:
-        """Return the equations and their derivatives at a state."""
-        values = self.evaluate(self._kernel, self.derivatives, (np.array([t]), q, u, a, held))
+    def variation(self, t: Times, q: FloatArray, u: FloatArray, a: FloatArray, held: FloatArray) -> Variation:
+        """Return the equations and their derivatives at a state, or at many, along the first axis."""
+        kernel = self._kernel(q.ndim > 1)
+        values = self.evaluate(kernel, self.derivatives, (np.asarray(t, dtype=float)[..., None], q, u, a, held))
         by: dict[tuple[str, str], FloatArray] = {}
         for part in self.parts:
             by |= self.matrices(part, values)
         basis, inverse = self.tangents.basis(q), self.tangents.inverse(q)
-        return Variation(t, q, u, a, held, basis, inverse @ values["rates"], values, by)
+        return Variation(t, q, u, a, held, basis, (inverse @ values["rates"][..., None])[..., 0], values, by)
 
-    def flow(self, t: float, q: FloatArray, u: FloatArray, kept: Sequence[int]) -> Flow:
-        """Return how a state and its neighbours move."""
+    def flow(self, t: Times, q: FloatArray, u: FloatArray, kept: Sequence[int]) -> Flow:
+        """Return how a state and its neighbours move, or many states, along the first axis."""
         n, kept = len(self.equations.speeds), list(kept)
-        zero_a, zero_held = np.zeros(n), np.zeros(len(self.equations.constraints))
+        zero_a, zero_held = (np.zeros((*q.shape[:-1], size)) for size in (n, len(self.equations.constraints)))
         still = self.variation(t, q, u, zero_a, zero_held)
-        m = len(kept)
-        matrix = np.zeros((n + m, n + m))
-        matrix[:n, :n] = still.by["force", "a"]
+        m, first = len(kept), float(np.ravel(t)[0])
+        matrix = np.zeros((*q.shape[:-1], n + m, n + m))
+        matrix[..., :n, :n] = still.by["force", "a"]
         if m:
-            matrix[:n, n:] = still.by["force", "multipliers"][:, kept]
-            matrix[n:, :n] = still.by["second", "a"][kept]
-        solved = solve_determined(matrix, -np.concatenate([still.values["force"], still.values["second"][kept]]), t)
-        a, held = solved[:n], zero_held.copy()
-        held[kept] = solved[n:]
+            matrix[..., :n, n:] = still.by["force", "multipliers"][..., kept]
+            matrix[..., n:, :n] = still.by["second", "a"][..., kept, :]
+        right = np.concatenate([still.values["force"], still.values["second"][..., kept]], axis=-1)
+        solved = solve_determined(matrix, -right, first)
+        a, held = solved[..., :n], zero_held.copy()
+        held[..., kept] = solved[..., n:]
         now = self.variation(t, q, u, a, held)
-        force, second = (np.hstack(now.along(name)) for name in ("force", "second"))
-        moved = solve_determined(matrix, -np.concatenate([force, second[kept]]), t)
-        multiplier = np.zeros((len(zero_held), force.shape[1]))
-        multiplier[kept] = moved[n:]
-        shift = self.shift(q, now.basis, now.displacement_rates, np.hstack(now.along("rates")))
-        return Flow(now, shift, moved[:n], multiplier)
+        force, second, rates = (np.concatenate(now.along(name), axis=-1) for name in ("force", "second", "rates"))
+        moved = solve_determined(matrix, -np.concatenate([force, second[..., kept, :]], axis=-2), first)
+        multiplier = np.zeros((*zero_held.shape, force.shape[-1]))
+        multiplier[..., kept, :] = moved[..., n:, :]
+        return Flow(now, self.shift(q, now.basis, now.displacement_rates, rates), moved[..., :n, :], multiplier)
 
     def shift(self, q: FloatArray, basis: FloatArray, moving: FloatArray, rates: FloatArray) -> FloatArray:
         """Return how displacements of neighbours change: ``ds' = N^+ (R_q N - N') ds + N^+ R_u du + ...``."""
