@@ -19,6 +19,8 @@ from atwood_library.scenes import (
     SimplePendulum,
 )
 
+from ..oscillations.scenes import turning_rod
+
 ENERGIES = {
     "free": lambda q: 0.0 * q,
     "harmonic": lambda q: 2.0 * q**2,
@@ -39,6 +41,14 @@ def test_curves_keep_the_energy_of_textbook_oscillators(kind: str) -> None:
     for curve in (*found.curves, *found.separatrices):
         energy = 0.5 * curve[:, 1] ** 2 + ENERGIES[kind](curve[:, 0])
         assert energy == pytest.approx(energy[0], rel=1e-4, abs=1e-4)
+
+
+@pytest.mark.parametrize("across", [None, (-2.0, 2.0), (-2.0, 2.00017)])
+def test_where_a_spring_has_no_length_nothing_rests(across: tuple[float, float] | None) -> None:
+    """A bead on a spring on a rod that turns: accelerations jump at the axle, where they have no value."""
+    found = phase_portrait(turning_rod(), coordinates=across)
+    assert [one.kind for one in found.rest_points] == ["centre"] * 2
+    assert [one.coordinate for one in found.rest_points] == pytest.approx([-0.9, 0.9], abs=1e-9)
 
 
 def test_separatrices_of_the_pendulum_have_the_energy_of_its_top() -> None:

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from atwood.arguments import BY_PATH, FLAG, TEXT, Kind, Refused, command, each, optional, real, takes
 from atwood.arrays import FloatArray
 from atwood.display import count_of, data_of, fitted
-from atwood.errors import SolveError, UsageError
+from atwood.errors import KernelEvaluationError, SolveError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.compose.composite import Model
@@ -211,7 +211,12 @@ def phase_portrait(
     _refuse(assembly, functions)
 
     def field(points: FloatArray) -> FloatArray:
-        accelerations = functions.forward_dynamics(points[:, :1], points[:, 1:])
+        try:
+            accelerations = functions.forward_dynamics(points[:, :1], points[:, 1:])
+        except KernelEvaluationError:  # no value at some of them, as where a spring has no length
+            if len(points) > 1:
+                return np.concatenate([field(half) for half in np.array_split(points, 2)])
+            accelerations = np.full((1, 1), np.nan)
         return np.stack([points[:, 1], accelerations[:, 0]], axis=1)
 
     equations, t = LinearScene(assembly, "reduced"), assembly.flat.t_start
@@ -360,16 +365,18 @@ def _places_of_rest(field: Field, across: tuple[float, float]) -> tuple[list[flo
     still = np.stack([grid, np.zeros_like(grid)], axis=1)
     values = field(still)[:, 1]
     moved = field(still + np.array([0.0, 1e-3 * (across[1] - across[0])]))[:, 1]
-    largest = float(np.max(np.abs(values)))
-    if largest <= _NOTHING * float(np.max(np.abs(moved), initial=0.0)) or largest == 0.0:
+    largest = float(np.nanmax(np.abs(values)))
+    if largest <= _NOTHING * float(np.nanmax(np.abs(moved), initial=0.0)) or largest == 0.0:
         return [], True
 
     def at(place: float) -> float:
-        return float(field(np.array([[place, 0.0]]))[0, 1])
+        return float(np.nan_to_num(field(np.array([[place, 0.0]]))[0, 1], nan=largest))
 
     found = list(grid[np.abs(values) <= 1e-14 * largest])
     for k in np.nonzero(values[:-1] * values[1:] < 0.0)[0]:
-        found.append(float(brentq(at, grid[k], grid[k + 1], xtol=1e-15 * (across[1] - across[0]), rtol=1e-15)))
+        place = float(brentq(at, grid[k], grid[k + 1], xtol=1e-15 * (across[1] - across[0]), rtol=1e-15))
+        if abs(at(place)) <= _JUMP * max(abs(values[k]), abs(values[k + 1])):
+            found.append(place)
     width = across[1] - across[0]
     kept: list[float] = []
     for place in sorted(found):
@@ -377,6 +384,9 @@ def _places_of_rest(field: Field, across: tuple[float, float]) -> tuple[list[flo
             kept.append(float(place) if abs(place) > _ROUNDING * width else 0.0)
     return kept, False
 
+
+_JUMP = 1e-3
+"""Relative to accelerations beside a place: where more is left they jump there from one sign to the other."""
 
 _ROUNDING = 1e-13
 """Relative to the window: coordinates below are zero."""
@@ -408,7 +418,7 @@ def _speeds(
         high = 0.55 * width * max(rates)
     else:
         accelerations = field(np.stack([np.linspace(*across, 11), np.zeros(11)], axis=1))[:, 1]
-        high = max(float(np.sqrt(np.max(np.abs(accelerations)) * width)), 2.0 * abs(start)) or width
+        high = max(float(np.sqrt(np.nanmax(np.abs(accelerations)) * width)), 2.0 * abs(start)) or width
     saddles = [one.coordinate for one in rest_points if one.kind == "saddle"]
     if saddles:
         tall = Window(across, (-20.0 * high, 20.0 * high))
