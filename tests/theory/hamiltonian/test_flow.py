@@ -57,6 +57,21 @@ def test_the_flow_of_h_is_the_motion() -> None:
     assert same(fall.coordinates[0], q + p * s / m - k * s**2 / 2)
 
 
+def test_two_masses_on_a_spring_swing_about_what_moves_evenly() -> None:
+    """``x = (m x + M y + (p + w) s)/(m + M) + M/(m + M) ((x - y) cos + (p/m - w/M) sin/omega)``, as short."""
+    M, w = sympy.symbols("M w")
+    positive = {one: sympy.Symbol(one.name, positive=True) for one in (m, M, k)}
+    h = p**2 / (2 * m) + w**2 / (2 * M) + k * (x - y) ** 2 / 2
+    found = flow_of(h, ((x, y), (p, w)), s).coordinates[0].xreplace(positive)
+    rate = sympy.sqrt(k * (m + M) / (m * M))
+    swing = (x - y) * sympy.cos(rate * s) + (p / m - w / M) * sympy.sin(rate * s) / rate
+    expected = ((m * x + M * y + (p + w) * s + M * swing) / (m + M)).xreplace(positive)
+    assert same(found, expected)
+    assert found.count_ops() < 150
+    with pytest.raises(UnsupportedError, match="another formula on each side"):
+        flow_of(p**2 + sympy.sqrt(q**2), ONE, s)
+
+
 def test_a_series_and_the_run_of_a_scene() -> None:
     scene = SCENES["simple-pendulum"]()
     h = hamiltonian(scene)

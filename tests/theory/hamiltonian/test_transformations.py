@@ -99,6 +99,29 @@ def test_a_generating_function_that_depends_on_time() -> None:
     assert momentum not in found.hamiltonian.free_symbols
 
 
+@pytest.mark.parametrize(
+    ("new_q", "new_p"),
+    [
+        (sympy.log(sympy.sin(p) / q), q * sympy.cot(p)),
+        (
+            sympy.log(1 + sympy.sqrt(q) * sympy.cos(p)),
+            2 * (1 + sympy.sqrt(q) * sympy.cos(p)) * sympy.sqrt(q) * sympy.sin(p),
+        ),
+    ],
+)
+def test_what_is_found_of_the_way_back_leads_back(new_q: Any, new_p: Any) -> None:
+    """Goldstein, chapter 9, exercises: sympy's equations are also met, as it says, where sin p and q are zero."""
+    found = canonical_transformation(ONE, {Q: new_q}, {P: new_p})
+    assert found.is_canonical
+    for place in (
+        {Q: sympy.Rational(1, 10), P: sympy.Rational(3, 10)},
+        {Q: sympy.Rational(1, 5), P: sympy.Rational(7, 10)},
+    ):
+        back = {old: one.subs(place).evalf(50) for old, one in found.inverse.items()}
+        assert abs(new_q.subs(back).evalf(50) - place[Q]) < 1e-40
+        assert abs(new_p.subs(back).evalf(50) - place[P]) < 1e-40
+
+
 def test_questions_without_an_answer() -> None:
     with pytest.raises(UsageError, match="kind 2 is one of q and P"):
         generated_transformation(q * Q, 2, ONE, [Q], [P])

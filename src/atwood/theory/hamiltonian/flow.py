@@ -273,16 +273,45 @@ def _moved(matrix: Sympy, start: Sympy, number: int, s: Sympy) -> Sympy:
     roots = sympy.roots(polynomial.xreplace(positive), x)
     if sum(roots.values()) != len(powers) or any(map(_is_nested, roots)):
         raise UnsupportedError("the rates of its linear equations have no closed form", where="flow_of")
-    equations, right = [], []
+    # Roots and waves are letters until the end: nothing with a root under a root, or a wave, comes below a line.
+    equations, right, way = [], [], s.xreplace(positive)
+    letter, waves = dict[Sympy, Sympy](), dict[Sympy, Sympy]()
     for root, times in roots.items():
+        own = -letter[-root] if -root in letter else sympy.Dummy() if root != 0 else root
+        letter[root] = own
+        wave = _wave(root, -root in roots, -root in letter, way, waves)
         for k in range(times):
-            equations.append([sympy.diff(x**i, x, k).subs(x, root) for i in range(len(powers))])
-            right.append(s.xreplace(positive) ** k * sympy.exp(root * s.xreplace(positive)))
+            equations.append([sympy.diff(x**i, x, k).subs(x, own) for i in range(len(powers))])
+            right.append(way**k * wave)
     shares = sympy.Matrix(equations).LUsolve(sympy.Matrix(right))
-    plain = [sympy.expand(one) for one in shares]
-    is_wave = any(root.has(sympy.I) or (root != 0 and -root in roots) for root in roots)
-    real = [(sympy.expand(one.rewrite(sympy.cos)) if is_wave else one).xreplace(back) for one in plain]
-    return sum(c * (one * start)[0, 0] for c, one in zip(real, powers, strict=True))
+    root_of = {own: root for root, own in letter.items() if own.is_Symbol}
+    bare = dict.fromkeys(waves, sympy.Integer(0))
+    places = [(one * start)[0, 0].xreplace(positive) for one in powers]
+    total = sympy.Integer(0)
+    for wave, value in (None, sympy.Integer(1)), *waves.items():
+        parts = [one.xreplace(bare) if wave is None else one.diff(wave) for one in shares]
+        found = sum(sympy.cancel(part).xreplace(root_of) * one for part, one in zip(parts, places, strict=True))
+        made = sympy.factor(found * value)
+        total += sympy.expand(made) if value.has(sympy.I) else made
+    return total.xreplace(back)
+
+
+def _wave(root: Sympy, is_paired: bool, is_second: bool, way: Sympy, waves: dict[Sympy, Sympy]) -> Sympy:
+    """Return ``e^(root s)`` in letters for what it is made of, which are added to those that are known."""
+    if root == 0:
+        return sympy.Integer(1)
+    if not is_paired:
+        own = sympy.Dummy()
+        value = sympy.exp(root * way)
+        waves[own] = value.rewrite(sympy.cos) if root.has(sympy.I) else value
+        return own
+    values = sympy.cosh(root * way), sympy.sinh(root * way)
+    if is_second:
+        known = {value: one for one, value in waves.items()}
+        return known[values[0]] - known[-values[1]]
+    both = sympy.Dummy(), sympy.Dummy()
+    waves |= dict(zip(both, values, strict=True))
+    return sum(both)
 
 
 def _is_nested(root: Sympy) -> bool:

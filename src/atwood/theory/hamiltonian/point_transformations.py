@@ -337,6 +337,12 @@ def refuse_letters(given: PointTransformation) -> None:
         )
 
 
+def _rounded(values: FloatArray, inverse: FloatArray, sizes: FloatArray) -> FloatArray:
+    """Return new coordinates or rates, zero where they are the rounding of old ones of some sizes."""
+    off = 8.0 * np.finfo(float).eps * np.abs(inverse) @ sizes
+    return np.where(np.abs(values) <= off, 0.0, values)
+
+
 def start_in(given: PointTransformation) -> tuple[float, FloatArray, FloatArray]:
     """Return time, new coordinates and their derivatives where a scene starts."""
     h = given.source
@@ -357,19 +363,22 @@ def start_in(given: PointTransformation) -> tuple[float, FloatArray, FloatArray]
     def missing(x: Any) -> FloatArray:
         return np.asarray(place(*x, start.time), dtype=float) - q
 
-    sizes = [
+    distances = [
         one.is_positive or any(one in factor.free_symbols for factor in given.positive) for one in given.coordinates
     ]
     random = np.random.default_rng(11)
     for trial in range(_TRIALS):
         guess = start.length * random.uniform(0.1, 2.0, len(q)) if trial else np.abs(q) + 0.1 * start.length
         if trial % 2:  # angles may be anywhere
-            guess = np.where(sizes, guess, random.uniform(-np.pi, np.pi, len(q)))
+            guess = np.where(distances, guess, random.uniform(-np.pi, np.pi, len(q)))
         with np.errstate(all="ignore"):
             found = scipy.optimize.least_squares(missing, guess, xtol=3e-16, ftol=3e-16, gtol=3e-16)
         is_met = np.max(np.abs(found.fun)) <= 1e-13 * (np.max(np.abs(q)) + start.length)
         if is_met and min(signs(*found.x, start.time), default=1.0) > 0.0:
             matrix = np.array(slope(*found.x, start.time), dtype=float)
             own = np.asarray(explicit(*found.x, start.time), dtype=float)
-            return start.time, found.x, np.linalg.solve(matrix, v - own)
+            inverse = np.linalg.inv(matrix)
+            sizes = np.array([start.length if one.unit == "m" else 1.0 for one in h.assembly.reduced.names])
+            pace = np.max(np.abs(v - own) / sizes)
+            return start.time, _rounded(found.x, inverse, sizes), _rounded(inverse @ (v - own), inverse, pace * sizes)
     raise StartError("its start is at no values of the new coordinates that are found", where=h.name)

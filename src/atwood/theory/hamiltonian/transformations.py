@@ -346,17 +346,22 @@ def _old_hamiltonian(given: Space, space: PhaseSpace) -> Sympy | None:
     return None if isinstance(given, (tuple, list)) else space.read(given.expression)
 
 
-def _solved(equations: Sequence[Sympy], unknowns: Sequence[Sympy]) -> dict[Sympy, Sympy]:
-    """Return a solution of equations; empty where none is found. Linear ones are solved as such, others in turn."""
+def _solved(equations: Sequence[Sympy], unknowns: Sequence[Sympy], any_branch: bool = False) -> dict[Sympy, Sympy]:
+    """Return a solution of equations, perhaps with roots and arcs of other branches; empty where none is found."""
     if any(one.has(*unknowns) for equation in equations for one in equation.atoms(sympy.Integral)):
         return {}
+    plain = equations if any_branch else [one.rewrite((sympy.tan, sympy.cot), sympy.cos) for one in equations]
     try:
-        found = sympy.solve(list(equations), list(unknowns), dict=True, simplify=False, check=False)
+        found = sympy.solve(list(plain), list(unknowns), dict=True, simplify=False, check=False)
     except UNSOLVED:
         return {}
-    whole = [one for one in found if set(one) == set(unknowns)]
-    chosen = next((one for one in reversed(whole) if _is_real(one.values())), None)
+    whole, held = [one for one in reversed(found) if set(one) == set(unknowns)], () if any_branch else equations
+    chosen = next((one for size in _SIZES for one in whole if _solves(one, held, size)), None)
     return {} if chosen is None else {key: short(value) for key, value in chosen.items()}
+
+
+_SIZES = (1, 0.25)
+"""Some positive numbers are of these sizes: not every transformation leads to all places."""
 
 
 UNSOLVED = (ArithmeticError, AttributeError, LookupError, NotImplementedError, RecursionError, TypeError, ValueError)
@@ -370,7 +375,7 @@ def _in_turn(
 
     Half of a generating function's equations hold one group of the unknowns alone, and the other half gives the others.
     """
-    solved = _solved([one - value for one, value in given.items()], unknowns)
+    solved = _solved([one - value for one, value in given.items()], unknowns, any_branch=True)
     if not solved:
         return {}
     solved = {one: on_branch(value, sign) for one, value in solved.items()}
@@ -393,16 +398,17 @@ def _agree(given: Mapping[Sympy, Sympy], forward: Mapping[Sympy, Sympy]) -> bool
     return all(one.is_number and one.is_finite and abs(one) < 1e-20 for one in off)
 
 
-def _is_real(values: Iterable[Sympy]) -> bool:
-    """Return whether expressions are real where all symbols are some positive numbers."""
-
-    def at(value: Sympy) -> complex:
-        symbols = sorted(value.free_symbols, key=str)
-        point = {one: sympy.Rational(7 + 3 * k, 11 + 2 * k) for k, one in enumerate(symbols)}
-        return complex(value.xreplace(point).evalf(30))
-
-    found = [at(one) for one in values]
-    return all(abs(one.imag) <= 1e-20 * (abs(one) + 1.0) for one in found)
+def _solves(found: Mapping[Sympy, Sympy], equations: Sequence[Sympy], size: float) -> bool:
+    """Return whether a solution is one, and real, where all symbols are some positive numbers."""
+    symbols = set().union(*(one.free_symbols for one in (*equations, *found.values()))) - set(found)
+    point = {one: sympy.Rational(size) * (7 + 3 * k) / (11 + 2 * k) for k, one in enumerate(sorted(symbols, key=str))}
+    there = {one: value.xreplace(point).evalf(30) for one, value in found.items()}
+    if not all(
+        one.is_number and one.is_finite and abs(sympy.im(one)) <= 1e-20 * (abs(one) + 1) for one in there.values()
+    ):
+        return False
+    left = (one.xreplace({**point, **there}).evalf(30) for one in equations)
+    return all(one.is_number and one.is_finite and abs(one) < 1e-20 for one in left)
 
 
 def _added(values: Sequence[Sympy], new: Sequence[Sympy], inverse: Mapping[Sympy, Sympy]) -> Sympy | None:
