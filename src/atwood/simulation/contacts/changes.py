@@ -362,22 +362,30 @@ class _Moment:
         neither presses nor rubs, and stays where it is.
         """
         states, is_slip = self._on_every(chosen, found), self.layout.is_slip
-        states = self._without(states, [k for k, one in enumerate(states) if one[0] == OPEN and not is_slip[k]])
+        own = np.diag(self.values.response)
+        fixed = [bool(np.max(own[list(rows)]) <= NOTHING * np.max(own)) for rows in self.units]  # by joints
+        idle = [k for k, one in enumerate(states) if (one[0] == STICKS and fixed[k] if is_slip[k] else one[0] == OPEN)]
+        states = self._without(states, idle)
         holding = [k for k, one in enumerate(states) if one[0] == STICKS]
         holding.sort(key=lambda k: not is_slip[k])
         some = (gone for count in range(len(holding)) for gone in combinations(holding, count))
         least = self._rank(states)
         for gone in islice(some, _MOST_SHARES):
             tried = self._without(states, gone)
-            if self._rank(tried) == least and self._is_shared(tried):
+            if self._rank(tried) == least and self._is_shared(tried, holding):
                 return replace(found, states=tuple(tried[k] for k in chosen))
         raise self._contradiction(_UNDETERMINED, chosen, _SHARES)
 
-    def _is_shared(self, states: list[State]) -> bool:
-        """Return whether the forces that are reported contradict no law."""
+    def _is_shared(self, states: list[State], holding: list[int]) -> bool:
+        """Return whether the forces that are reported contradict no law, and hold what has to stay."""
         values = self.values.with_held(values_of_states(self.layout, self.held, states))
         forces = values.least_forces(states)
         limits, small = values.limits_at(forces)[0], _SHARED * SLACK * float(np.max(np.abs(forces)))
+        free = values.accelerations()
+        moved, moves = free + values.response @ forces, np.abs(free) + np.abs(values.response) @ np.abs(forces)
+        held = [row for k in holding for row in self.units[k]]
+        if np.max(np.abs(moved[held])) > _SHARED * SLACK * np.max(moves):
+            return False
         for k, (rows, one) in enumerate(zip(self.units, states, strict=True)):
             own, most = forces[list(rows)], float(limits.static_free[k] + limits.static_shares[k] @ forces)
             if one[0] == STICKS and (math.hypot(*own) - most if self.layout.is_slip[k] else -most - own[0]) > small:
