@@ -368,7 +368,7 @@ class _Moment:
         states = self._without(states, idle)
         holding = [k for k, one in enumerate(states) if one[0] == STICKS]
         holding.sort(key=lambda k: not is_slip[k])
-        some = (gone for count in range(len(holding)) for gone in combinations(holding, count))
+        some = (gone for count in range(len(holding) + 1) for gone in combinations(holding, count))
         least = self._rank(states)
         for gone in islice(some, _MOST_SHARES):
             tried = self._without(states, gone)
@@ -384,7 +384,7 @@ class _Moment:
         free = values.accelerations()
         moved, moves = free + values.response @ forces, np.abs(free) + np.abs(values.response) @ np.abs(forces)
         held = [row for k in holding for row in self.units[k]]
-        if np.max(np.abs(moved[held])) > _SHARED * SLACK * np.max(moves):
+        if np.max(np.abs(moved[held]), initial=0.0) > _SHARED * SLACK * np.max(moves):
             return False
         for k, (rows, one) in enumerate(zip(self.units, states, strict=True)):
             own, most = forces[list(rows)], float(limits.static_free[k] + limits.static_shares[k] @ forces)
