@@ -59,6 +59,7 @@ from atwood.model.compose.connection_rules import connect
 from atwood.model.compose.scene import Scene
 from atwood.model.declare.component import Component
 from atwood.model.declare.connectors import Connector, Frame, Groove, Point, Shaft, Slide, connector
+from atwood.model.declare.contact_group import ContactGroup
 from atwood.model.declare.contact_laws import dry_friction, unilateral
 from atwood.model.declare.field_functions import Number, Triple, discrete_state, parameter, signal, state
 from atwood.model.declare.law_results import BodyInertia, CoordinateLoad, Load, Placement, PointInertia
@@ -342,7 +343,7 @@ __all__ += ["Model", "Scene", "connect"]
 
 # Components of one's own
 __all__ += [
-    "FREE", "BodyInertia", "Component", "Connector", "CoordinateLoad", "Expression",
+    "FREE", "BodyInertia", "Component", "Connector", "ContactGroup", "CoordinateLoad", "Expression",
     "ExternalFunction", "Frame", "Groove", "Load", "Number", "Outline", "Placement", "Point", "PointInertia",
     "Rotation", "Scalar", "Shaft", "Slide", "Triple", "Vector", "as_vector", "connector", "constraint",
     "cross", "derivative", "discrete_state", "dissipation", "dot", "dry_friction", "event", "external", "force",

@@ -28,7 +28,7 @@ def library_components() -> list[type[aw.Component]]:
         for value in vars(module).values()
         if inspect.isclass(value)
         and issubclass(value, aw.Component)
-        and not issubclass(value, aw.Model)
+        and not issubclass(value, (aw.Model, aw.ContactGroup))  # a group has no law of its own
         and value.__module__ == module.__name__
     ]
 

@@ -337,7 +337,8 @@ def make_trial(part: Part, space: Space, seed: int) -> Trial:
         name: (number(), number()) for name in connectors if name not in free and not is_offered(component, name)
     }
     frames = frozenset(name for name, one in connectors.items() if isinstance(one, Frame) and space.has_rotation)
-    line_signs = {(a, b): 1.0 if i < j else -1.0 for i, a in enumerate(free) for j, b in enumerate(free)}
+    ends = list(enumerate(free)) if space.is_line else []
+    line_signs = {(a, b): 1.0 if i < j else -1.0 for i, a in ends for j, b in ends}
     bodies = {name: _some_body(draw, length) for name in free}
     for name, state in component.state_specs().items():
         numbers = tuple(number() for _ in state.names(part.values))

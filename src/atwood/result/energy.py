@@ -142,6 +142,8 @@ class Piece:
     switched
         Potential energy that is there in some modes only, which counts as work when such a mode is entered or left;
         None where there is none.
+    lost
+        Energy that contacts of a group have taken since its start, J; None where there is none.
     is_impact
         Whether it began with an impact.
     is_switched
@@ -155,6 +157,7 @@ class Piece:
     rounding: float
     power: FloatArray | None
     switched: FloatArray | None
+    lost: FloatArray | None
     is_impact: bool
     is_switched: bool
 
@@ -239,7 +242,7 @@ def make_ledger(
     done, carried = [], 0.0
     for i, (piece, inside) in enumerate(zip(pieces, work, strict=True)):
         carried += piece.gained_since(pieces[i - 1]) if i else 0.0
-        done.append(carried + inside)
+        done.append(carried + inside if piece.lost is None else carried + inside - piece.lost)
         carried = float(done[-1][-1])
     kinetic, potential = (np.concatenate([getattr(one, name) for one in pieces]) for name in ("kinetic", "potential"))
     all_work = np.concatenate(done)
@@ -279,6 +282,7 @@ def account(reading: SegmentQuantities) -> Piece:
         rounding=_rounding(segment),
         power=power_into(reading),
         switched=None if is_fixed else _values(assembly, switching, segment.time, *state)[0],
+        lost=segment.lost,
         is_impact=segment.impact,
         is_switched=segment.after_time_event,
     )

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import Any
 
 from atwood.clock import check_time
 from atwood.errors import AtwoodError
@@ -184,16 +185,17 @@ def evaluate(
     list of float
         The values, with ``nan`` and infinities as in IEEE arithmetic.
     """
-    by_name = {key: float(value) for key, value in values.items() if isinstance(key, str)}
-    known = {key.index: float(value) for key, value in values.items() if isinstance(key, Expression)}
+    given: Mapping[Any, float] = values  # a large scene has many, of which few are asked for
+    known: dict[int, float] = {}
     unknowns: dict[int, list[float]] = {}
     for node in live(outputs):
-        if node.index in known:
-            continue
-        if node.operation == "symbol":
-            if node.name not in by_name:
+        value = given.get(node)
+        if value is None and node.operation == "symbol":
+            value = given.get(node.name)
+            if value is None:
                 raise AtwoodError(f"no value was given for the symbol {node.name}")
-            known[node.index] = by_name[node.name]
+        if value is not None:
+            known[node.index] = float(value)
         elif node.operation == "solve":
             data = [known[argument.index] for argument in node.arguments]
             split = node.payload**2

@@ -10,6 +10,7 @@ touch is asked at ``q_0 + h/2 q'_0`` (J. J. Moreau 1988; M. Jean 1999, with thet
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable
 from math import isfinite
 from typing import Any, NamedTuple, Protocol
@@ -35,6 +36,9 @@ _MOST_DERIVED = 1000
 """With more unknowns than these, derivatives are not worked out by differences."""
 
 
+_RATES = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, *[ctypes.c_void_p] * 3)
+
+
 class Pushed(NamedTuple):
     """What contacts do in a step.
 
@@ -44,6 +48,8 @@ class Pushed(NamedTuple):
         That of the speeds, at the end of the step.
     is_impact
         Whether something collides, so that speeds jump.
+    loss
+        Energy that is lost in contacts whose work nothing else tells, J.
     states
         States of the contacts from now on, to be compared with those before; None where none are recorded.
     told
@@ -52,6 +58,7 @@ class Pushed(NamedTuple):
 
     change: FloatArray
     is_impact: bool
+    loss: float
     states: tuple[float, ...] | None
     told: Callable[[float], list[Any]]
 
@@ -121,6 +128,8 @@ class TimeSteppingSession(SteppingSession):
         self._motion, self._end, self._n = problem, end, problem.coordinates
         self._steps = self._evaluations = self._failures = 0
         self._changes: list[Change] = []
+        self._losses: list[tuple[float, float]] = [(t, 0.0)]
+        self._native = None if problem.smooth.compiled is None else problem.smooth.compiled()
         super().__init__(problem.smooth, end - t, budget)
         self.reinitialize(t, y)
 
@@ -159,6 +168,17 @@ class TimeSteppingSession(SteppingSession):
         made = [one for one in self._changes if one.time <= self._here[0]]
         self._changes = self._changes[len(made) :]
         return made
+
+    @property
+    def has_losses(self) -> bool:
+        """Whether contacts have taken energy that nothing else tells."""
+        return len(self._losses) > 1
+
+    def loss_until(self, times: FloatArray) -> FloatArray:
+        """Return the energy that was lost by some times in contacts whose work nothing else tells, J."""
+        at, total = np.array(self._losses).T
+        found: FloatArray = total[np.maximum(np.searchsorted(at, times, side="right") - 1, 0)]
+        return found
 
     # -- between two steps ----------------------------------------------------------------------------------------
 
@@ -204,6 +224,8 @@ class TimeSteppingSession(SteppingSession):
         self._newest = self._pre = (end, made, self._rates(end, made))
         self._reached = self._searched = end
         states = None if pushed is None else pushed.states
+        if pushed is not None and pushed.loss:
+            self._losses.append((end, self._losses[-1][1] + pushed.loss))
         is_impact = pushed is not None and pushed.is_impact
         if is_impact and pushed is not None:
             free = made.copy()
@@ -222,22 +244,24 @@ class TimeSteppingSession(SteppingSession):
         n, middle, push = self._n, y + 0.5 * h * yp, np.zeros(len(y))
         if touching is not None and self._last is not None and self._last[0] == h:
             push[n:] = self._last[1]  # what is held goes on to be
-        pushed, last = None, np.inf
+        pushed: Pushed | None = None
+        last, known = np.inf, push[n:]
         for _ in range(_TURNS):
             middle = self._solved(t + 0.5 * h, y + 0.5 * push, middle, 0.5 * h)
             if touching is None:
                 self._last = None
                 return middle, None
             free = 2.0 * middle[n:] - y[n:] - push[n:]
-            pushed = touching.pushed(free)
-            moved = self._relative(pushed.change - push[n:], free, n)
+            if pushed is not None:
+                moved = self._relative(free - known, free, n)
+                # Rounding in what follows from many rows is larger than that of one.
+                if moved <= _MET or (moved <= 1e3 * _MET and moved >= last):
+                    self._last = None if pushed.is_impact else (h, pushed.change)
+                    return middle, pushed
+                last = moved
+            pushed, known = touching.pushed(free), free
             push[n:] = pushed.change
             middle[n:] = 0.5 * (y[n:] + free + pushed.change)
-            # Rounding in what follows from many rows is larger than that of one.
-            if moved <= _MET or (moved <= 1e3 * _MET and moved >= last):
-                self._last = None if pushed.is_impact else (h, pushed.change)
-                return self._solved(t + 0.5 * h, y + 0.5 * push, middle, 0.5 * h), pushed
-            last = moved
         raise self._failure(t, "the impulses of contacts and the forces of a step do not settle")
 
     def _solved(self, t: float, base: FloatArray, guess: FloatArray, half: float) -> FloatArray:
@@ -268,7 +292,10 @@ class TimeSteppingSession(SteppingSession):
 
     def _rates(self, t: float, y: FloatArray) -> FloatArray:
         self._evaluations += 1
-        return np.asarray(self._motion.smooth.rates(t, y), dtype=float)
+        native, found = self._native, np.empty(len(y))
+        if native is None or _RATES(native.function)(t, y.ctypes.data, found.ctypes.data, native.data):
+            found[:] = self._motion.smooth.rates(t, y)  # which says what has no value
+        return found
 
     def _relative(self, move: FloatArray, at: FloatArray, first: int = 0) -> float:
         return float(np.max(np.abs(move) / (self._motion.sizes[first:] + np.abs(at)), initial=0.0))

@@ -168,9 +168,9 @@ def find_end(model: Component, path: str) -> Connector | InputRef | OutputRef:
         component = component._children()[steps[0]]
         steps = steps[1:]
     name = ".".join(steps)
-    connectors = component.connectors()
-    if name in connectors:
-        return connectors[name]
+    connector = component._connector_named(name)
+    if connector is not None:
+        return connector
     if name in component.signal_specs():
         return component.input(name)
     if steps[0] in component.output_names():
@@ -178,7 +178,7 @@ def find_end(model: Component, path: str) -> Connector | InputRef | OutputRef:
     raise UsageError(
         f"there is no connector, input or output {name!r}",
         where=component.path or type(component).__name__,
-        advice=suggestion(name, [*connectors, *component._children()]),
+        advice=suggestion(name, [*component.connectors(), *component._children()]),
     )
 
 

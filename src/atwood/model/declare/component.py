@@ -369,6 +369,14 @@ class Component(metaclass=ComponentType):
         """Return the declared connectors by name."""
         return cls._connectors
 
+    def _connector_named(self, name: str) -> Connector | None:
+        """Return a connector by its name, such as ``point[2]``; None where there is none."""
+        spec = self._connectors.get(name.partition("[")[0])
+        if spec is None or name not in spec.names(self):
+            return None
+        motions = self._bound.motions if self._bound is not None else {}
+        return spec.kind(self, name, motions.get(name))
+
     def connectors(self) -> dict[str, Connector]:
         """Return the connectors by name, each element of an array on its own."""
         return {one.name: one for spec in self._connectors.values() for one in self._made(spec)}

@@ -29,6 +29,7 @@ from atwood.model.local.flatten import FlatScene
 from atwood.model.values.units import ALONG
 from atwood.numerics.contact_sets import GOES_ON, OPEN, STICKS, State
 from atwood.simulation.contacts.changes import forces_in, resolve, states_of
+from atwood.simulation.contacts.crowd import refuse_groups
 from atwood.simulation.contacts.values import ContactValues, layout_of
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.dynamics.reactions import maximal_state
@@ -101,6 +102,7 @@ class ContactSet:
 
 def has_contacts(assembly: Assembly) -> bool:
     """Return whether a scene has gaps or slips in no set that is chosen."""
+    refuse_groups(assembly)
     return any(local.contacts for local in assembly.mechanism.locals_.values())
 
 

@@ -28,12 +28,13 @@ from atwood.simulation.contacts.changes import (
     told_impact,
     values_of_states,
 )
+from atwood.simulation.contacts.crowd import crowd_of
 from atwood.simulation.contacts.values import ContactValues, layout_of
 from atwood.simulation.dynamics.orientation_coordinates import to_regular
 from atwood.simulation.dynamics.scales import Scales
 from atwood.simulation.events.mode_change import generalized_speeds
 from atwood.simulation.events.modes import EventProbe, EventRecord
-from atwood.simulation.problem.explicit_scene import constrained_problem
+from atwood.simulation.problem.explicit_scene import constrained_problem, explicit_problem
 from atwood.simulation.problem.problem import SceneProblem
 
 _CLOSED = 1e-12
@@ -53,6 +54,12 @@ def impulsive_problem(
     _check(plan, probe, impacts)
     n = plan.program.coordinates
     sizes = np.concatenate([plan.coordinate_sizes, plan.sizes / plan.scales.time])
+    crowd = crowd_of(plan, t, y)
+    if crowd is not None:
+        if t <= plan.assembly.flat.t_start:  # behind a time event discs are in each other by as much as they were
+            crowd.check_start(y)
+        smooth = explicit_problem(plan.assembly) if plan.assembly.form == "reduced" else None
+        return ImpulsiveProblem(smooth or constrained_problem(plan, t, y), n, sizes, step, crowd.touching)
     touching = ContactsInSteps(plan.assembly, plan.scales, n).touching
     return ImpulsiveProblem(constrained_problem(plan, t, y), n, sizes, step, touching)
 
@@ -142,7 +149,7 @@ class _InStep:
         if not self.chosen:
             self.contacts.states = states = states_of(values.layout, [0.0] * len(assembly.held_now))
             none = np.zeros(0)
-            return Pushed(0.0 * free, False, None, partial(self._told, [], none, none, none, states))
+            return Pushed(0.0 * free, False, 0.0, None, partial(self._told, [], none, none, none, states))
         start, ahead = values.rates, free
         if assembly.form == "reduced":
             ahead = np.asarray(assembly.kernel(to_maximal(assembly))([values.t], self.q, free)[1], dtype=float)
@@ -168,7 +175,7 @@ class _InStep:
         self._check_energy(work, impulses, by_forces)
         self.contacts.states = states
         held = values_of_states(values.layout, assembly.held_now, states)
-        return Pushed(change, bool(hit), tuple(held) if self.chosen else None, told)
+        return Pushed(change, bool(hit), 0.0, tuple(held) if self.chosen else None, told)
 
     def _solved(self, wanted: FloatArray) -> tuple[FloatArray, list[State]]:
         """Return the impulses that the laws of contact and friction allow, and the states of all units."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -57,6 +57,8 @@ class SegmentRecord:
         Singular positions that it passed through.
     after_time_event
         Whether it began at a time event, at which energy that comes or goes is work of inputs and drives.
+    lost
+        Energy that contacts of a group have taken since its start, J, shape (samples,); None where there is none.
     """
 
     plan: SceneProblem
@@ -68,6 +70,7 @@ class SegmentRecord:
     held: FloatArray
     singular_crossings: tuple[SingularCrossing, ...] = ()
     after_time_event: bool = False
+    lost: FloatArray | None = None
 
     @property
     def assembly(self) -> Assembly:
@@ -112,6 +115,7 @@ class Recorder:
         self.nearest: Nearest | None = None
         self._jumps: list[float] = []
         self._changes: list[Change] = []
+        self.loss_until: Callable[[FloatArray], FloatArray] | None = None
         # What is done, and states that wait: changed together, so that an interruption loses and repeats nothing.
         self._samples: tuple[tuple[_Block, ...], list[tuple[float, FloatArray, bool]]] = ((), [])
 
@@ -282,6 +286,7 @@ class Recorder:
                 shown=shown[first:last],
                 held=held[:, first:last],
                 singular_crossings=crossings,
+                lost=None if self.loss_until is None else self.loss_until(time[first:last]),
                 after_time_event=after_time_event and first == 0,
             )
             for (first, last), change in zip(pairwise(ends), changes, strict=True)

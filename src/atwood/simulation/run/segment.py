@@ -368,6 +368,7 @@ class _Runner:
             changes = session.take_changes()
             self.noted += [event for one in changes for event in one.told]
             self.recorder.take_changes(changes)
+            self.recorder.loss_until = session.loss_until if session.has_losses else None
             return [one for one in changes if one.time > self.began]
         jumps = session.take_jumps()
         sets = [one for one in jumps if isinstance(one, SetJump)]

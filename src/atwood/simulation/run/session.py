@@ -26,6 +26,7 @@ from atwood.integrators.protocol import (
 )
 from atwood.integrators.session import Session
 from atwood.lazy_dataclasses import dataclass, replace
+from atwood.simulation.contacts.crowd import refuse_groups
 from atwood.simulation.dynamics.orientation_coordinates import longest_step
 from atwood.simulation.events.modes import EventProbe
 from atwood.simulation.problem.explicit_scene import (
@@ -127,6 +128,7 @@ def open_session(
     plan = request.plan
     if not method.looks_for_events:
         return _open_time_stepping(request, method, t, y)
+    refuse_groups(plan.assembly)
     if plan.assembly.own_equations.contacts and (method.is_implicit or not method.keeps_constraints):
         raise UsageError(
             f"{method.title} does not end its steps on gaps that are closed and on what sticks",
