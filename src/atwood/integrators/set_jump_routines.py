@@ -190,7 +190,7 @@ def _jump() -> Routine:
     some = r.variable(False, BOOLEAN)
     with r.count(count) as k:
         some.now = some.now | (states[k] != float(OPEN))
-    with r.when(~(some.now | (m.stays != 0)) | (sets.logged > MOST_IMPACTS)):
+    with r.when(~(some.now | (m.stays != 0)) | (sets.logged > MOST_IMPACTS) | (sets.shared != 0)):
         _back(r, m, search)
     with r.when(r.call("meet_closed", place, locator) != 0):
         _back(r, m, search)

@@ -33,11 +33,12 @@ FIELDS: dict[str, Kind] = {
     **dict.fromkeys(("shares", "pattern", "past", "log"), ADDRESS),
     **dict.fromkeys(("finite", "blur", "pace", "tolerance", "inside", "ahead", "better_x", "better_y"), NUMBER),
     **dict.fromkeys(("count", "size", "entries", "coordinates", "speeds", "number", "better"), INTEGER),
-    **dict.fromkeys(("logged", "known", "stops"), INTEGER),
+    **dict.fromkeys(("logged", "known", "stops", "repeats", "shared"), INTEGER),
 }
 """The memory of sets. `finite` is 0 where limits are of impulses, which finite forces do not have; `blur` and `pace`
 are multiples of what is small and slow; `inside` is how deep a gap may be, in multiples of what is small; `ahead` is
-how long impacts may still go on that are summed, and then how long they do."""
+how long impacts may still go on that are summed, and then how long they do; `shared` is 1 where forces of a set that
+was found are not determined, as rows repeat each other, and `repeats` where those solved for last are not."""
 
 UNITS = {
     name: k
@@ -195,6 +196,7 @@ def _solve() -> Routine:
     r, m, (count,) = _open("solve_forces", {"count": INTEGER})
     matrix, left, right, solution, size = m.matrix, m.left, m.row("right"), m.row("solution"), m.size
     stride, largest = size + 1, r.variable(0.0)
+    m.repeats = 0
     with r.count(count) as i:
         row, own = matrix.at(i * size), left.at(i * stride)
         largest.now = 0.0
@@ -214,6 +216,7 @@ def _solve() -> Routine:
             with r.when(entry > largest.now):
                 largest.now, best.now = entry, k
         with r.when(~(largest.now > CLEAR)):
+            m.repeats = 1
             r.give(r.call("least_forces", r.arguments[0], count))
         pivot, other = left.at(i * stride), left.at(best.now * stride)
         with r.count(count + 1, i) as j:
@@ -502,11 +505,12 @@ def _find() -> Routine:
             with r.otherwise(), r.when(~kept):
                 state[k], x[k], y[k] = float(STICKS), 0.0, 0.0
 
-    allow(closes=False)
-    with r.when(r.call("improve", r.arguments[0]) == 0):
-        r.give(0)
-    allow(closes=True)
-    r.give(r.call("improve", r.arguments[0]))
+    for closes in (False, True):
+        allow(closes)
+        with r.when(r.call("improve", r.arguments[0]) == 0):
+            m.shared = r.choose(m.repeats != 0, 1, m.shared, INTEGER)
+            r.give(0)
+    r.give(1)
     return r
 
 
@@ -894,7 +898,7 @@ def _series() -> Routine:
 def _resolve() -> Routine:
     """Find what becomes of gaps and slips at a moment: the speeds change, and the states after it are written."""
     r, m, (t, checks, sums) = _open("resolve", {"t": NUMBER, "checks": INTEGER, "sums": INTEGER}, exported=True)
-    m.finite, m.blur, m.pace, m.logged, m.stops = 1.0, 1.0, 1.0, 0, 0
+    m.finite, m.blur, m.pace, m.logged, m.stops, m.shared = 1.0, 1.0, 1.0, 0, 0, 0
     _do(r, "read_contacts", t)
     with r.when(sums != 0):
         r.call("series", r.arguments[0], t, result=None)

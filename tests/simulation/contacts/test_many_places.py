@@ -8,7 +8,18 @@ import numpy as np
 import pytest
 
 from atwood import Scene, SolveError, simulate
-from atwood_library import BallContact, Box, BoxContact, Disc, Force, Ground, RigidBody, VertexContact
+from atwood_library import (
+    BallContact,
+    Box,
+    BoxContact,
+    Disc,
+    Force,
+    Ground,
+    PointContact,
+    PointMass,
+    RigidBody,
+    VertexContact,
+)
 
 from ...soak import contacts as soaked
 
@@ -121,3 +132,19 @@ def test_friction_that_is_not_the_same_everywhere_needs_shares_that_are_determin
         simulate(in_a_row((0.1, 0.5, 0.1), 0.0, speed=1.0), form=form, t_end=0.1)
     result = simulate(in_a_row((0.3, 0.3, 0.3), 0.0, speed=1.0), form=form, t_end=0.2, rtol=1e-10)
     assert result["bar.velocity.x"][-1] == pytest.approx(1.0 - 0.3 * G * 0.2, abs=1e-9)
+
+
+@FORMS
+def test_shares_are_looked_at_where_sets_change_without_python_too(form: str) -> None:
+    """A ball has bounced so often before the bar lands that changes are compiled."""
+    scene = in_a_row((0.1, 0.3, 0.1), 0.0, speed=2.0)
+    ball, court = (
+        scene.add("ball", PointMass(mass=1.0)),
+        scene.add("court", PointContact(restitution=0.8, friction=0.2)),
+    )
+    scene.connect(scene.ground.frame, court.plane)
+    scene.connect(ball.point, court.point)
+    scene.start.update({"bar.position.z": 3.0, "ball.position.x": 0.0, "ball.position.z": 0.02})
+    scene.start.update({"ball.velocity.x": 1.0, "ball.velocity.z": 0.0})
+    with pytest.raises(SolveError, match=r"at t = 0\.782.*depends on how forces are shared.*\(c0, c1, c2\)"):
+        simulate(scene, form=form, t_end=0.9, rtol=1e-9)
