@@ -54,6 +54,17 @@ def test_a_slider_and_a_number_set_a_parameter(show: Callable[..., Any], tmp_pat
     assert "rod1.length" in tab.locator(".notice").inner_text()
 
 
+def test_clutches_slip_and_stick_live_with_what_is_set(show: Callable[..., Any], tmp_path: Path) -> None:
+    scene = SCENES["clutches"]()
+    assert page(scene, tmp_path / "a.html", show=["rotor4.angular_velocity"]).mode == "live"
+    tab = show(tmp_path / "a.html", "t=1.1&rotor2.moment=1.5")
+    scene.set("rotor2.moment", 1.5)
+    result = simulate(scene, t_end=1.1, outputs=[0.0, 1.1], rtol=1e-10)
+    value = tab.evaluate("atwood.value('rotor4.angular_velocity')")
+    assert value == pytest.approx(result["rotor4.angular_velocity"][-1], abs=1e-7)
+    assert tab.evaluate("atwood.advance(1.15).code") == "reached"
+
+
 def test_a_recorded_page_shows_the_values_of_the_run_and_says_why(show: Callable[..., Any], tmp_path: Path) -> None:
     result = simulate(SCENES["bouncing-ball"](), t_end=2.0)
     made = page(result, tmp_path / "a.html", show=["ball.position.z"], live="never")
