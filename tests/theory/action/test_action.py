@@ -89,6 +89,8 @@ def test_a_path_that_is_no_motion_has_a_first_variation():
     t = (np.arange(200_000) + 0.5) * 3.0 / 200_000
     expected = -np.mean(np.sin(0.5 * t) * np.sin(np.pi * t / 3.0)) * 3.0
     assert found.variation().values[0] == pytest.approx(expected, rel=1e-8)
+    waving = action(pendulum(), {"rod.angle": "cos(7*t)"}, t_end=3.0)
+    assert waving.gradient["rod.angle"] == pytest.approx(-7.0 * np.sin(21.0), rel=1e-14)
     sampled = action(pendulum(), {"rod.angle": lambda t: 0.5 * t}, t_end=3.0)
     assert sampled.value == pytest.approx(found.value, rel=1e-12)
     assert sampled.gradient["rod.angle"] == pytest.approx(0.5, rel=1e-9)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -211,7 +211,7 @@ class Action(Described):
         curves = []
         for piece in self._pieces:
             found = [curves_at(given, self.coordinates, piece.nodes, self.name) for given in chosen.values()]
-            for eta, _, at_ends in found:
+            for eta, _, at_ends, _ in found:
                 ends = [*([0] if piece is self._pieces[0] else []), *([1] if piece is self._pieces[-1] else [])]
                 if np.any(np.abs(at_ends[held][:, ends]) > _AT_ENDS * np.max(np.abs(eta), initial=0.0)):
                     raise UsageError(
@@ -219,7 +219,7 @@ class Action(Described):
                         where=self.name,
                         advice="Multiply it by (t - t0)*(t1 - t).",
                     )
-            curves.append(np.array([np.concatenate([eta, rate]) for eta, rate, _ in found]))
+            curves.append(np.array([np.concatenate([eta, rate]) for eta, rate, *_ in found]))
         return tuple(chosen), curves
 
     def _sines(self) -> dict[str, dict[str, Any]]:
@@ -328,22 +328,21 @@ def action_of_run(run: Run) -> Action:
 
 
 def _of_path(assembly: Assembly, path: Mapping[str, Any], t_end: float | str | None) -> Action:
-    """Return the action of a path; velocities at its ends are those of its polynomials."""
+    """Return the action of a path."""
     equations, name = assembly.own_equations, assembly.flat.name
     names = tuple(one.name for one in equations.names)
     if not rates_are_speeds(equations) and set(names) <= set(path):
         raise UnsupportedError("its speeds are no derivatives of its coordinates", where=name)
-    points, (q, v, at_ends) = _curves_of(assembly, names, path, t_end)
+    points, (q, v, at_ends, speeds) = _curves_of(assembly, names, path, t_end)
     begin, end = points.edges[[0, -1]]
     piece = _piece(assembly, points, q, v)
-    speeds = np.array([points.derivative_at_ends(row) for row in q])
     return _made([piece], [(assembly, np.array([begin, end]), at_ends, speeds)])
 
 
 def _curves_of(
     assembly: Assembly, names: Sequence[str], path: Mapping[str, Any], t_end: float | str | None
-) -> tuple[Nodes, tuple[FloatArray, FloatArray, FloatArray]]:
-    """Return where a path is looked at, with its values and rates there, and its values at the ends."""
+) -> tuple[Nodes, Curves]:
+    """Return where a path is looked at, with its values and rates there and at the ends."""
     missing = [one for one in names if one not in path]
     if missing:
         raise UsageError(f"the path leaves out {', '.join(missing)}", where=assembly.flat.name, advice="Give each one.")
@@ -357,7 +356,7 @@ def _of_phase_path(assembly: Assembly, path: Mapping[str, Any], t_end: float | s
     """Return the action of a path in phase space: that of ``p q' - H`` with q and p for coordinates."""
     h = read_hamiltonian(assembly)
     names, n = (*h.paths, *(f"p:{one}" for one in h.paths)), len(h.paths)
-    points, (state, rates, at_ends) = _curves_of(assembly, names, path, t_end)
+    points, (state, rates, at_ends, _) = _curves_of(assembly, names, path, t_end)
     t, (q, p) = points.times.ravel(), (state[:n], state[n:])
     if h.depends_on_time:
         energies = np.array([float(h(*one)) for one in zip(q.T, p.T, t, strict=True)])
@@ -519,22 +518,27 @@ def panels(edges: FloatArray) -> Nodes:
     return Nodes(edges, middle[:, None] + half[:, None] * points)
 
 
-def curves_at(
-    given: Mapping[str, Any], names: Sequence[str], nodes: Nodes, where: str
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return values and derivatives of functions of time at points, and their values at the two ends."""
+Curves: TypeAlias = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+"""Values and rates of functions of time at points, and both at the two ends."""
+
+
+def curves_at(given: Mapping[str, Any], names: Sequence[str], nodes: Nodes, where: str) -> Curves:
+    """Return functions of time at points and at both ends; rates of what is no formula are those of polynomials."""
     for path in given:
         if path not in names:
             raise UsageError(f"{path!r} is no coordinate of it", where=where, advice=suggestion(path, list(names)))
     t, ends = nodes.times.ravel(), nodes.edges[[0, -1]]
-    values, rates, at_ends = (np.zeros((len(names), size)) for size in (len(t), len(t), 2))
+    values, rates, at_ends, end_rates = (np.zeros((len(names), size)) for size in (len(t), len(t), 2, 2))
     for k, name in enumerate(names):
         if name not in given:
             continue
         function, derivative = _read(given[name], name)
         values[k], at_ends[k] = _called(function, t, name), _called(function, ends, name)
-        rates[k] = nodes.derivative(values[k]).ravel() if derivative is None else _called(derivative, t, name)
-    return values, rates, at_ends
+        if derivative is None:
+            rates[k], end_rates[k] = nodes.derivative(values[k]).ravel(), nodes.derivative_at_ends(values[k])
+        else:
+            rates[k], end_rates[k] = _called(derivative, t, name), _called(derivative, ends, name)
+    return values, rates, at_ends, end_rates
 
 
 Function = Callable[[FloatArray], Any]
