@@ -61,7 +61,7 @@ def loosened(assembly: Assembly, values: Sequence[Expression]) -> list[Expressio
     if not is_loose(assembly):
         return list(values)
     equations, states = assembly.own_equations, assembly.discrete_states
-    known = {equations.read.get(x, x) for one in equations.contacts for x in (one.row.multiplier, one.read)}
+    known = {equations.read.get(one, one) for one in equations.contact_multipliers}
     zeros = {one: equations.graph.zero for one in known if not one.is_constant}
     without = substitute(list(values), zeros)
     return substitute(without, {states[i].symbol: equations.graph.zero for i in _states(assembly)})

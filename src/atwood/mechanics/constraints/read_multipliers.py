@@ -50,7 +50,7 @@ def _check_reads(mechanism: Mechanism, read: Sequence[Expression], equations: Eq
     """Refuse a law of force that reads a multiplier which nothing determines."""
     graph = mechanism.table.graph
     known = {one.multiplier for one in equations.constraints}
-    known |= {symbol for one in equations.contacts for symbol in (one.row.multiplier, one.read)}
+    known |= {*equations.contact_multipliers}
     known |= {multiplier_symbol(graph, *key) for key in mechanism.bodies.idle}
     for symbol in read:
         if symbol not in known:

@@ -236,6 +236,16 @@ class Equations:
         """The symbols of the multipliers."""
         return tuple(one.multiplier for one in self.constraints)
 
+    @property
+    def contact_multipliers(self) -> tuple[Expression, ...]:
+        """Of each gap and slip in turn the symbols of its multiplier: that of its row, and that which is read."""
+        return tuple(symbol for one in self.contacts for symbol in (one.row.multiplier, one.read))
+
+    @property
+    def contact_forces(self) -> dict[Expression, Expression]:
+        """What these are in terms of the state, where that is known."""
+        return {symbol: self.read[symbol] for symbol in self.contact_multipliers if symbol in self.read}
+
 
 def inertia_forces(
     site: Site,

@@ -94,13 +94,10 @@ def part_powers(
             _add(found, flow, -power)
     kept = {flow: value for flow, value in found.items() if not value.is_zero}
     inputs, values = _inputs(equations), list(kept.values())
-    of_contacts = tuple(symbol for one in equations.contacts for symbol in (one.row.multiplier, one.read))
     if of_impulses:
-        inputs = (*inputs, InputGroup("impulses of contacts", of_contacts[::2]))
+        inputs = (*inputs, InputGroup("impulses of contacts", equations.contact_multipliers[::2]))
     else:
-        values = substitute(
-            values, {symbol: equations.read[symbol] for symbol in of_contacts if symbol in equations.read}
-        )
+        values = substitute(values, dict(equations.contact_forces))
     outputs = (OutputGroup("p", tuple(values)),)
     return PartPowers(Program("powers by part", inputs, tuple(parameters), outputs), tuple(kept))
 

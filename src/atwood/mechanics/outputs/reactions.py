@@ -75,9 +75,7 @@ def _counted(torque_W: Vector, axis: int, space: Space) -> Scalar:
 def _all_forces(mechanism: Mechanism, equations: Equations) -> Forces:
     """Return inertia less all other forces, with the sign reversed, node by node."""
     site, kinematics = equations.site, equations.kinematics
-    of_contacts = (symbol for one in equations.contacts for symbol in (one.row.multiplier, one.read))
-    pressing = {symbol: equations.read[symbol] for symbol in of_contacts if symbol in equations.read}
-    signals = resolve_signals(mechanism, site, kinematics, pressing)
+    signals = resolve_signals(mechanism, site, kinematics, equations.contact_forces)
     forces = Forces(equations.graph)
     multipliers = multipliers_by_part(equations)
     for path, local in mechanism.locals_.items():

@@ -89,15 +89,9 @@ def blocks(matrices: Sequence[Sympy]) -> Iterator[Sympy]:
 
 def _components(matrices: Sequence[Sympy]) -> list[list[int]]:
     """Return the coordinates in groups that are not coupled to each other."""
-    left, found = list(range(matrices[0].shape[0])), []
-    while left:
-        group = [left.pop(0)]
-        for i in group:
-            met = [j for j in left if any(one[i, j] != 0 or one[j, i] != 0 for one in matrices)]
-            group += met
-            left = [j for j in left if j not in met]
-        found.append(sorted(group))
-    return found
+    n = range(matrices[0].shape[0])
+    edges = [(i, j) for i in n for j in n if any(one[i, j] != 0 for one in matrices)]
+    return [sorted(one) for one in sympy.utilities.iterables.connected_components((list(n), edges))]
 
 
 def _exchange(matrices: Sequence[Sympy]) -> list[int] | None:
