@@ -99,6 +99,15 @@ def test_a_generating_function_that_depends_on_time() -> None:
     assert momentum not in found.hamiltonian.free_symbols
 
 
+def test_polar_angles_are_told_in_all_quadrants() -> None:
+    x, y, px, py = sympy.symbols("x y p_x p_y", real=True)
+    R, angle, U, V = sympy.symbols("R alpha U V")
+    polar = sympy.sqrt(x**2 + y**2) * U + sympy.atan2(y, x) * V
+    found = generated_transformation(polar, 2, ((x, y), (px, py)), [R, angle], [U, V])
+    assert float(found.new_coordinates[1].subs({x: -1, y: -1})) == pytest.approx(-0.75 * math.pi, rel=1e-15)
+    assert same(found.new_momenta[1], x * py - y * px)
+
+
 @pytest.mark.parametrize(
     ("new_q", "new_p"),
     [

@@ -249,7 +249,8 @@ def on_branch(value: Sympy, sign: int = 1, arcs: bool = True) -> Sympy:
         return value
     positive = {one: sympy.Dummy(one.name, positive=True) for one in value.free_symbols}
     back = {own: one for one, own in positive.items()}
-    made = value.xreplace(positive)
+    all_round = sympy.Function("all_round")  # which is no arc of a tangent where signs are not known
+    made = value.replace(sympy.atan2, all_round).xreplace(positive)
     if arcs:
         made = made.replace(sympy.asin, lambda x: sympy.atan(x / sympy.sqrt(1 - x**2)))
         made = made.replace(sympy.acos, lambda x: sympy.atan(sympy.sqrt(1 - x**2) / x))
@@ -266,7 +267,8 @@ def on_branch(value: Sympy, sign: int = 1, arcs: bool = True) -> Sympy:
     single = [one.base for one in made.atoms(sympy.Pow) if _is_root(one) and one.base.is_Symbol]
     roots = {one: sympy.Dummy(one.name, positive=True) for one in single}
     made = _with_roots_cancelled(made.xreplace({one: root**2 for one, root in roots.items()}))
-    return short(made.xreplace({root: sympy.sqrt(one) for one, root in roots.items()}).xreplace(back))
+    made = made.xreplace({root: sympy.sqrt(one) for one, root in roots.items()}).xreplace(back)
+    return short(made.replace(all_round, sympy.atan2))
 
 
 _ROUNDS = 4
