@@ -1,7 +1,7 @@
 """A small scene for each part of the library, as code: `part_scenes.txt` has one in a line for each.
 
 A line names its parts (`rod=Rod(length=1.0)`), connects them (`ground.frame-rod.a`), passes signals on
-(`sine.value>force.value`) and says how they start (`rod.angle=1.0`).
+(`sine.value>force.value`) and says how they start (`rod.angle=1.0`). `stepped` asks for time stepping.
 """
 
 from __future__ import annotations
@@ -38,10 +38,12 @@ def code_of(part: str) -> str:
     """Return the scene of a part as code."""
     steps = [one.strip() for one in SCENES[part].split(";") if one.strip()]
     told, used = [], []
-    head = "scene = Scene()"
+    head, options = "scene = Scene()", "t_end=2.0"
     for step in steps:
         if step in HEADS:
             head = HEADS[step]
+        elif step == "stepped":
+            options += ", solver='moreau', step=0.01"
         elif match := re.fullmatch(r"(\w+)=(\w+\(.*\))", step):
             used.append(match[2].partition("(")[0])
             told.append(f'{match[1]} = scene.add("{match[1]}", {match[2]})')
@@ -59,4 +61,4 @@ def code_of(part: str) -> str:
         head,
         *told,
     ]
-    return "\n".join([*lines, "result = simulate(scene, t_end=2.0)"]).replace("'", '"') + "\n"
+    return "\n".join([*lines, f"result = simulate(scene, {options})"]).replace("'", '"') + "\n"
