@@ -378,11 +378,16 @@ def cue_ball() -> Scene:
     return scene
 
 
-def test_a_page_refuses_a_start_inside_with_the_part() -> None:
+def test_a_page_refuses_a_start_inside_with_the_part_and_lifts_what_rests() -> None:
     script = """
     const ball = start("ball"), path = ball.starts.find(one => one.path.endsWith("position.z")).path;
-    print([ball.set(path, -0.5), ball.advance(1.0).code]);
+    const belt = start("belt"), {node} = belt.model.data.nodes.find(one => one.connectors.includes("body.point"));
+    const put = to => [belt.place(node, to).code, ...belt.state.slice(0, 2)];
+    print([ball.set(path, -0.5), ball.advance(1.0).code, put([0.1, 0, -0.2]), put([0.1, 0, 0.3])]);
     """
-    said, code = played({"ball": live_program(SCENES["bouncing-ball"](), "reduced")}, script)
+    made = {name: live_program(SCENES[key]()) for name, key in (("ball", "bouncing-ball"), ("belt", "stick-slip"))}
+    said, code, below, above = played(made, script)
     assert (said["code"], code) == ("refused", "reached")
     assert "floor: it begins inside" in said["text"]
+    assert below == ["ready", pytest.approx(0.1), pytest.approx(0.0, abs=1e-12)]
+    assert above == ["ready", pytest.approx(0.1), pytest.approx(0.3)]

@@ -982,7 +982,7 @@ function createEngine(model, options = {}) {
   }
 
   // The state at rest in which a node is as near to a place as it can be: Gauss's and Newton's steps, on the constraints.
-  function place(node, target) {
+  function place(node, target, opens = true) {
     const at = data.nodes.findIndex(one => one.node === node), {m, n} = mode, before = [time, state];
     if (at < 0 || !(target?.length === 3 && target.every(Number.isFinite))) return status("refused", "a node is put at a place, x y z");
     const look = q => {
@@ -991,6 +991,9 @@ function createEngine(model, options = {}) {
       return mode.call("places", time) ? Array.from(mode.output("places", 1).slice(3 * at, 3 * at + 3)) : null;
     };
     const apart = place => Math.hypot(...place.map((x, i) => x - target[i]));
+    const held = mode.data.contacts?.places.flat() ?? [], kept = held.map(i => mode.values[i]);
+    const hold = values => { held.forEach((i, k) => { mode.values[i] = values[k]; }); mode.fill(); };
+    if (opens && held.length) hold(held.map(() => 0)); // first as if nothing touched, then along what does
     let q = mode.normalize(state.slice(0, n)), here = look(q), damping = 1e-6;
     for (let turn = 0; turn < 200 && here; turn++) {
       const columns = Array.from({length: m}, (_, j) => {
@@ -1021,8 +1024,9 @@ function createEngine(model, options = {}) {
     started = true;
     const said = begin(time, [...q, ...new Float64Array(m)]);
     if (said.code !== "failed") return said;
+    hold(kept);
     begin(...before);
-    return status("refused", said.text);
+    return opens && held.length ? place(node, target, false) : status("refused", said.text);
   }
 
   restart();

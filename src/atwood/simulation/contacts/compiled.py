@@ -35,6 +35,9 @@ HAPPENED = {CLOSES: sets.CLOSES, OPENS: sets.OPENS, YIELDS: sets.YIELDS, STOPS: 
 _SHORT = 300
 """Programs for all states that are no longer than this are used where nothing touches, too."""
 
+_MOST_ROWS = 40
+"""Of more rows the responses to each other, which grow with the square, take too long to write and to compile."""
+
 _CODE: Key[tuple[SetData, SetCode] | None] = Key("machine code of sets")
 
 
@@ -142,7 +145,8 @@ def sets_of(
         or any(one.target not in CONTACT for one in probe.event_functions)
     ):
         return None
-    if any(len(rows) > 1 for rows in layout_of(assembly).units):
+    layout = layout_of(assembly)
+    if len(layout.contacts) > _MOST_ROWS or any(len(rows) > 1 for rows in layout.units):
         return None
 
     def make() -> tuple[SetData, SetCode] | None:
@@ -155,7 +159,7 @@ def sets_of(
     if made is None:
         return None
     data, code = made
-    before, layout = len(assembly.mechanism.table.values), data.layout
+    before = len(assembly.mechanism.table.values)
     places = np.array([[before + one[0], before + one[1] if len(one) > 1 else -1] for one in layout.places]).T
     stays = program_on_constraints(plan, t, y).accelerations.size <= _SHORT
     given, count = (rates.prologues, rates.places, rates.scratch), len(layout.contacts)
