@@ -55,10 +55,12 @@ def copy_mathjax(app, error):
 
 
 def setup(app):
-    """Write the gallery and the pages of parts before pages are read, and copy what formulas need."""
+    """Write what is made by programs before pages are read, and copy what formulas need."""
     from gallery import write_gallery
     from parts_pages import write_parts
+    from validation_pages import write_validation
 
     app.connect("builder-inited", write_gallery)
     app.connect("builder-inited", write_parts)
+    app.connect("builder-inited", write_validation)
     app.connect("build-finished", copy_mathjax)
