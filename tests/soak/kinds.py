@@ -14,6 +14,7 @@ KINDS = {
     "arguments": "arguments",
     "broken": "broken",
     "claims": "claims",
+    "contact_accuracies": "contact_accuracies",
     "contacts": "contacts",
     "control": "control",
     "files": "files",

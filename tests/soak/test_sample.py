@@ -96,6 +96,15 @@ def test_laws_of_contact_hold(seed: int) -> None:
 
 
 @pytest.mark.sample(1)
+@pytest.mark.parametrize("seed", [3, 52, 5, 11])
+def test_accuracies_of_contacts_are_reached(seed: int) -> None:
+    """The first two end at an impact but for rounding: no step is left behind it."""
+    trial, _ = run_trial("contact_accuracies", seed)
+    assert "met" in trial.tried
+    assert not trial.findings, trial.findings[0].detail
+
+
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("seed", [1, 4, 8])
 def test_sets_of_contacts_are_among_all_there_are(seed: int) -> None:
     trial, _ = run_trial("sets", seed)

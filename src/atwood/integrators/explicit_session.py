@@ -38,6 +38,9 @@ FIRST_CHUNK, LARGEST_CHUNK = 4000, 100_000
 _MOMENT = 0.02
 """Steps are taken for about so long, in seconds, before limits are looked at and Ctrl-C is heard."""
 
+_NO_STEP = 16.0
+"""What is as near to a time, in roundings of it, is there: an event may come so late before it that no step is left."""
+
 _STALLED = 50
 """So many steps in a row that do not move the time beyond rounding are a failure."""
 
@@ -335,6 +338,11 @@ class ExplicitSession(SteppingSession):
         outcome = self._take(t_out, self._allowed())
         if outcome is Outcome.TOO_SMALL:
             self._here = self._newest
+            if (
+                0.0 <= t_out - self._newest[0] <= _NO_STEP * ROUNDING * abs(t_out)
+                and not self._stepper.counts.undefined
+            ):
+                return StepResult(t_out, *copied(self._here)[1:], Status.REACHED, self._no_events)
             self._stale = True
             reason = "the steps became too small to move the time"
             if self._stepper.counts.undefined:

@@ -216,7 +216,7 @@ class _Runner:
             self.recorder.rewind(step_result.t)
             event, *together = self.segment.probe.changing(step_result)
             end = self.segment.end
-            if event.target == SIDE and end - step_result.t <= _MOMENT * np.spacing(abs(end)):  # no step is left
+            if end - step_result.t <= _MOMENT * np.spacing(abs(end)):  # no step is left
                 step_result = replace(step_result, t=end)
             if event.target not in (COORDINATE_SWITCH, SIDE):
                 self.recorder.take(step_result.t, step_result.y, True)
