@@ -15,7 +15,6 @@ HEADS = {
     "space": "scene = Scene(space='space')",
     "line": "scene = Scene(space='line', line_axis=(0, 0, 1))",
     "weightless": "scene = Scene(gravity=0.0)",
-    "stepping": "scene = Scene()",
 }
 CORNERS = (0, 0, 0), (0.4, 0, 0), (0, 0.2, 0), (0, 0, 0.3)
 
@@ -62,9 +61,4 @@ def code_of(part: str) -> str:
         head,
         *told,
     ]
-<<<<<<< HEAD
     return "\n".join([*lines, f"result = simulate(scene, {options})"]).replace("'", '"') + "\n"
-=======
-    options = ", solver='moreau', step=5e-3" if "stepping" in steps else ""
-    return "\n".join([*lines, f"result = simulate(scene, t_end=2.0{options})"]).replace("'", '"') + "\n"
->>>>>>> 14fb9a4c (A small scene of a group of discs; masses of pulleys that stay on their ropes)
