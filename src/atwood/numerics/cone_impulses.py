@@ -86,7 +86,7 @@ def missing(touches: Touches, v: FloatArray, p: FloatArray, least: FloatArray, c
 
 
 def impulses(
-    touches: Touches, free: FloatArray, least: FloatArray, guess: FloatArray, small: float
+    touches: Touches, free: FloatArray, least: FloatArray, guess: FloatArray, small: float, large: float
 ) -> tuple[FloatArray, FloatArray, float]:
     """Return the speeds of all bodies, the impulses, and by which speed the laws are missed.
 
@@ -100,8 +100,8 @@ def impulses(
         With which speeds contacts open at least.
     guess
         Impulses to begin with, shape (2, contacts).
-    small
-        A speed that is as good as none.
+    small, large
+        A speed that is as good as none, and one for which ten times as much is done before it is left.
     """
     compliance = touches.compliance
     p = _projected(guess, touches.friction)
@@ -115,12 +115,13 @@ def impulses(
     sweep = _SWEEP(_code().code.addresses["sweeps"])
     count, done = len(a), 0
     sweeps = max(_SWEEPS, _EACH // count)
+    most = max(_WORK, 2 * _TURNS * sweeps * count)
     while missed > nothing and not (missed <= small and done >= _LEAST):
         sweep(count, sweeps, touches.friction, *(one.ctypes.data for one in (index, table, v, own)))
         p = own.T
         v = _moved(touches, free, p)
         missed, done = missing(touches, v, p, least, compliance), done + 2 * sweeps * count
-        if done >= max(_WORK, 2 * _TURNS * sweeps * count):
+        if done >= most * (1 if missed <= large else 10):
             break
     return v, p, missed
 

@@ -143,7 +143,7 @@ def test_impulses_meet_the_laws() -> None:
     inverse = np.array([[1.0, 1.0, 200.0]] * 3 + [[0.0] * 3])
     touches = Touches(bodies, normal, arms, inverse, 0.5)
     free = np.array([[2.0, 0.0, 0.0], [0.0, -0.5, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    v, p, missed = impulses(touches, free, np.zeros(4), np.zeros((2, 4)), 1e-12)
+    v, p, missed = impulses(touches, free, np.zeros(4), np.zeros((2, 4)), 1e-12, 1e-9)
     assert missed < 1e-12
     rates = touches.rates(v)
     assert np.all(p[0] >= 0.0)

@@ -167,7 +167,7 @@ class _Pile:
         bounce = crowd.restitution * before[0]
         least = np.where(-bounce > by_forces, -bounce, 0.0)
         fastest = float(np.max(np.abs(np.concatenate([before, now]))))
-        v, p, missed = impulses(self.touches, ahead, least, self.guess, _SMALL * fastest)
+        v, p, missed = impulses(self.touches, ahead, least, self.guess, _SMALL * fastest, _MISSED * fastest)
         if missed > _SMALL * fastest:
             crowd.say(
                 f"at t = {self.t:.9g} the laws of {len(self.names)} contacts are missed by {missed:.2g} m/s of "
