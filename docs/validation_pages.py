@@ -20,8 +20,8 @@ _EXACT = 1e-17
 _INTRODUCTION = """How far the motions that Atwood computes are from true ones: scenes of the library against their
 references, hard cases against what is known of them, and the exact solutions that tests compare with. Figures of scenes
 are those of {date}, on {processor} ({system}; {versions}); errors depend little on the machine.
-`python -m tests.validation` and `python -m tests.hard_cases --write` make all figures anew. How one's own run is judged:
-[how right a run is](../accuracy.md), and [comparing forms and methods](../comparing.md)."""
+`python -m tests.validation` and `python -m tests.hard_cases --write` make all figures anew. How one's own run is
+judged: [how right a run is](../accuracy.md), and [comparing forms and methods](../comparing.md)."""
 _SCENES = """## Scenes of the library
 
 {count} scenes, in both forms, with explicit and implicit methods: the largest difference from the reference, of
