@@ -154,6 +154,9 @@ def smooth_assembly_of(scene: Model | Assembly, name: str | None = None, **asked
 
 def refuse_contacts(assembly: Assembly) -> None:
     """Refuse a scene whose equations depend on which gaps are closed and on what sticks."""
+    from atwood.simulation.contacts.groups import refuse_groups  # few scenes have any
+
+    refuse_groups(assembly)
     part = next((path for path, local in assembly.mechanism.locals_.items() if local.contacts), None)
     if part is not None:
         raise UnsupportedError(

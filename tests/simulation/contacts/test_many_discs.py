@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -157,7 +158,8 @@ def test_what_a_group_cannot_be_is_named() -> None:
     with pytest.raises(aw.StartError, match=r"c: disc\[0\] starts inside disc\[1\], by 0\.05 m"):
         run(scene, 1.0, 0.01)
     scene = group([place(0.0, 0.1), place(0.0, 0.35)])
-    for ask in (lambda: simulate(scene, t_end=0.1), lambda: aw.linearize(scene), lambda: aw.conserved(scene)):
+    asked = (aw.linearize, aw.conserved, aw.equations, aw.equilibria, aw.hamiltonian, aw.routhian, aw.tangent_flow)
+    for ask in (lambda: simulate(scene, t_end=0.1), *(partial(one, scene) for one in asked)):
         with pytest.raises(aw.UnsupportedError, match="c: its contacts are sought in steps of equal length"):
             ask()
     held = group([place(0.0, 0.1), place(0.0, 0.35)])

@@ -34,7 +34,7 @@ from atwood.plotting.live.parameters import live_parameters, with_sliders, with_
 from atwood.plotting.live.pulls import with_pulls
 from atwood.plotting.live.start import add_start, add_tangent
 from atwood.plotting.live.updates import add_updates
-from atwood.simulation.contacts.crowd import refuse_groups
+from atwood.simulation.contacts.groups import refuse_groups
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.initialization.start import Start, settle, start_with_line_signs
 from atwood.simulation.problem.problem import SceneProblem

@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError, StartError, UnsupportedError
 from atwood.forms.assembly import Assembly
-from atwood.integrators.methods import MOREAU, advise
 from atwood.integrators.time_stepping.session import Pushed
 from atwood.mechanics.kinematics.mechanism import world_position
-from atwood.model.declare.contact_group import ContactGroup
 from atwood.numerics.cone_impulses import Touches, impulses
 from atwood.numerics.near_pairs import near_pairs
+from atwood.simulation.contacts.groups import groups_of
 from atwood.simulation.problem.problem import SceneProblem
 
 _CLOSED = 1e-9
@@ -23,22 +22,6 @@ _CLOSED = 1e-9
 
 _SMALL, _MISSED = 1e-4, 1e-2
 """Of the largest speed: by so much the laws may be missed without a word, and from so much on a run fails."""
-
-
-def groups_of(assembly: Assembly) -> list[str]:
-    """Return the paths of the groups of discs in a scene."""
-    return [path for path, part in assembly.flat.parts.items() if isinstance(part.component, ContactGroup)]
-
-
-def refuse_groups(assembly: Assembly) -> None:
-    """Refuse a scene with a group of discs where nothing is known of their contacts."""
-    paths = groups_of(assembly)
-    if paths:
-        raise UnsupportedError(
-            "its contacts are sought in steps of equal length alone, and nothing else knows of them",
-            where=paths[0],
-            advice=f"{advise(MOREAU)} Or declare a contact for each pair.",
-        )
 
 
 def crowd_of(plan: SceneProblem, t: float, y: FloatArray) -> Crowd | None:

@@ -26,7 +26,7 @@ from atwood.integrators.protocol import (
 )
 from atwood.integrators.session import Session
 from atwood.lazy_dataclasses import dataclass, replace
-from atwood.simulation.contacts.crowd import refuse_groups
+from atwood.simulation.contacts.groups import refuse_groups
 from atwood.simulation.dynamics.orientation_coordinates import longest_step
 from atwood.simulation.events.modes import EventProbe
 from atwood.simulation.problem.explicit_scene import (

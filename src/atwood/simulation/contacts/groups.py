@@ -1,0 +1,24 @@
+"""Groups of discs of which any two may touch: which scenes have one, and who refuses them."""
+
+from __future__ import annotations
+
+from atwood.errors import UnsupportedError
+from atwood.forms.assembly import Assembly
+from atwood.integrators.methods import MOREAU, advise
+from atwood.model.declare.contact_group import ContactGroup
+
+
+def groups_of(assembly: Assembly) -> list[str]:
+    """Return the paths of the groups of discs in a scene."""
+    return [path for path, part in assembly.flat.parts.items() if isinstance(part.component, ContactGroup)]
+
+
+def refuse_groups(assembly: Assembly) -> None:
+    """Refuse a scene with a group of discs where nothing is known of their contacts."""
+    paths = groups_of(assembly)
+    if paths:
+        raise UnsupportedError(
+            "its contacts are sought in steps of equal length alone, and nothing else knows of them",
+            where=paths[0],
+            advice=f"{advise(MOREAU)} Or declare a contact for each pair.",
+        )
