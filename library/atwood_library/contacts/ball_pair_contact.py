@@ -46,9 +46,11 @@ class BallPairContact(Touching):
         return 1.0 if self.touches == "outside" else -1.0
 
     def normal_in_world(self) -> Vector:
-        """Return the normal towards b, or towards the middle of the hole that b is in."""
+        """Return the normal towards b, or towards the middle of the hole that b is in; there it has no length."""
         between = self.between()
-        normal: Vector = between * (self.outwards() / norm(between))
+        # Where they touch, the distance in a hole is the room; a pin may be in the middle, where there is no direction.
+        far = norm(between) if self.touches == "outside" else self.radius_a - self.radius_b
+        normal: Vector = between * (self.outwards() / far)
         return normal
 
     def directions_in_world(self) -> tuple[Vector, Vector]:

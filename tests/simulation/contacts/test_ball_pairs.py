@@ -9,7 +9,7 @@ from scipy.special import ellipk
 
 import atwood as aw
 from atwood import Scene, simulate
-from atwood_library import BallPairContact, Ground, Sphere
+from atwood_library import BallPairContact, Ground, Link, Pivot, RigidBody, Slider, Sphere
 
 FORMS = pytest.mark.parametrize("form", ["reduced", "dae"])
 
@@ -128,3 +128,46 @@ def simulate_inside(hole: float, ball: float) -> None:
     scene.connect(ground.frame, touch.a)
     scene.connect(b.frame, touch.b)
     simulate(scene, t_end=0.1)
+
+
+def slider_crank_with_clearance(friction: float) -> Scene:
+    """Return a slider-crank whose rod ends in a pin of 20 mm that has 1 mm of room all around, in its middle."""
+    scene = Scene(space="plane")
+    ground, piston = scene.add("ground", Ground()), scene.add("piston", RigidBody(mass=1.0, moments=(0.0, 0.01, 0.0)))
+    crank, rod = scene.add("crank", Link(length=0.1)), scene.add("rod", Link(length=0.3))
+    main, big_end, guide = scene.add("main", Pivot()), scene.add("big_end", Pivot()), scene.add("guide", Slider())
+    pin = BallPairContact(radius_a=0.021, radius_b=0.02, touches="inside", restitution=0.5, friction=friction)
+    scene.add("pin", pin)
+    for a, b in (
+        (ground.frame, main.a),
+        (main.b, crank.a),
+        (crank.b, big_end.a),
+        (big_end.b, rod.a),
+        (ground.frame, guide.a),
+        (guide.b, piston.frame),
+        (piston.frame, pin.a),
+        (rod.b, pin.b),
+    ):
+        scene.connect(a, b)
+    angle, speed = 0.5, 20.0
+    lean = math.asin(math.sin(angle) / 3.0)
+    scene.start.update({"crank.angle": angle, "crank.angular_velocity": speed, "rod.angle": -lean})
+    scene.start["rod.angular_velocity"] = -speed * math.cos(angle) / (3.0 * math.cos(lean))
+    scene.start["guide.displacement"] = 0.1 * math.cos(angle) + 0.3 * math.cos(lean)
+    return scene
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+def test_a_pin_with_clearance(friction: float) -> None:
+    """Impacts accumulate, and the pin lets go where the load turns, in both forms alike; it starts in the middle."""
+    scene = slider_crank_with_clearance(friction)
+    found = [simulate(scene, form=form, t_end=0.09, rtol=1e-9) for form in ("reduced", "dae")]
+    for result in found:
+        assert result.impacts[0].before == pytest.approx(-1.26046968, rel=1e-3)
+        assert "rests" in {event.kind for event in result.events}
+        assert result.energy.max_drift < 1e-7 + result.energy.uncertainty
+    assert [event.kind for event in found[0].events] == [event.kind for event in found[1].events]
+    for one, other in zip(found[0].events, found[1].events, strict=True):
+        assert one.time == pytest.approx(other.time, abs=1e-9)
+    for path in ("crank.angle", "guide.displacement", "rod.angle"):
+        assert float(found[0][path][-1]) == pytest.approx(float(found[1][path][-1]), abs=1e-9)
