@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from math import inf, isfinite
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +30,10 @@ from atwood.integrators.protocol import (
     StepResult,
 )
 from atwood.integrators.session import SteppingSession, copied
-from atwood.integrators.set_jumps import SetJump
 from atwood.integrators.stepper import Outcome, Stepper
+
+if TYPE_CHECKING:
+    from atwood.integrators.set_jumps import SetJump
 
 FIRST_CHUNK, LARGEST_CHUNK = 4000, 100_000
 """So many steps are taken before limits are looked at: at first, for one unknown, and at most."""

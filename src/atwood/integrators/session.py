@@ -6,7 +6,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from math import inf
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,10 @@ from atwood.integrators.protocol import (
     StepMonitor,
     StepResult,
 )
-from atwood.integrators.set_jumps import SetJump
+
+if TYPE_CHECKING:
+    from atwood.integrators.set_jumps import SetJump
+
 
 _T = TypeVar("_T")
 

@@ -16,8 +16,6 @@ from atwood.forms.loose import kept_touching
 from atwood.integrators.methods import AUTO, Method
 from atwood.integrators.protocol import Budget, Statistics, Status, StepResult
 from atwood.integrators.session import Session
-from atwood.integrators.set_jumps import SetJump
-from atwood.integrators.time_stepping.session import Change, TimeSteppingSession
 from atwood.lazy_dataclasses import replace
 from atwood.simulation.dynamics.numerical_failure import (
     find_undefined_value,
@@ -42,6 +40,8 @@ from atwood.simulation.run.stall_diagnosis import explain_stuck, too_tight
 
 if TYPE_CHECKING:
     from atwood.integrators.jumps import Jump
+    from atwood.integrators.set_jumps import SetJump
+    from atwood.integrators.time_stepping.session import Change
     from atwood.simulation.singular.crossing import SingularCrossing
     from atwood.simulation.singular.monitor import SingularityMonitor
 
@@ -364,21 +364,27 @@ class _Runner:
 
     def _take_jumps(self, session: Session) -> Sequence[Jump | Change]:
         """Return the jumps of a session since this was last asked, and note what is told of them."""
-        if isinstance(session, TimeSteppingSession):
+        if not self.method.looks_for_events:
+            from atwood.integrators.time_stepping.session import TimeSteppingSession  # few runs step over events
+
+            assert isinstance(session, TimeSteppingSession)
             changes = session.take_changes()
             self.noted += [event for one in changes for event in one.told]
             self.recorder.take_changes(changes)
             self.recorder.loss_until = session.loss_until if session.has_losses else None
             return [one for one in changes if one.time > self.began]
         jumps = session.take_jumps()
+        if not jumps:
+            return ()
+        from atwood.integrators.set_jumps import SetJump
+
         sets = [one for one in jumps if isinstance(one, SetJump)]
         if sets:
             return self._take_sets(sets)
         plain = [one for one in jumps if not isinstance(one, SetJump)]
-        if plain:
-            from atwood.simulation.contacts.bounces import told_bounces
+        from atwood.simulation.contacts.bounces import told_bounces
 
-            self.noted += told_bounces(plain, self.segment.plan, self.segment.probe)
+        self.noted += told_bounces(plain, self.segment.plan, self.segment.probe)
         return plain
 
     def _take_sets(self, jumps: Sequence[SetJump]) -> Sequence[Change]:
