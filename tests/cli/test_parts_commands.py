@@ -140,3 +140,9 @@ def test_a_word_that_nothing_mentions_says_where_to_look(word: str) -> None:
     refused = CliRunner().invoke(main, ["info", word])
     assert refused.exit_code == 1
     assert "atwood list --parts" in refused.stderr
+
+
+@pytest.mark.parametrize("word", ["rigidbody", "rigid-body", "RIGID BODY", "rigid_body"])
+def test_a_part_is_found_however_its_name_is_written(word: str) -> None:
+    assert list(parts_called(word)) == ["RigidBody"]
+    assert json.loads(run("info", word, "--json").output)["part"] == "RigidBody"

@@ -54,8 +54,9 @@ def parts_called(name: str) -> dict[str, type[Component]]:
     shorter has to be the end of the longer. Of several parts those are meant that agree in most of it.
     """
     kinds = library_parts()
-    if name in kinds:
-        return {name: kinds[name]}
+    own_names = [one for one in kinds if one == name] or [one for one in kinds if _plain(one) == _plain(name)]
+    if own_names:
+        return {one: kinds[one] for one in own_names}
     agree = {own: _agreement(name, (*([own] if "." in name else ()), *_synonyms(kind))) for own, kind in kinds.items()}
     most = max(agree.values(), default=0)
     return {own: kinds[own] for own, steps in agree.items() if most and steps == most}
