@@ -13,7 +13,7 @@ from matplotlib.image import imread
 
 from atwood import Scene, assemble, equilibria, page, simulate
 from atwood.plotting.pages.modes import mode_page
-from atwood_library import Ground, PointMass, Rod
+from atwood_library import Ground, PointMass, Rod, Sphere
 from atwood_library.scenes import SCENES
 
 _EXACT: dict[str, Any] = {"rtol": 1e-11, "outputs": 21}
@@ -105,6 +105,26 @@ def test_a_live_page_draws_what_a_recorded_one_draws(show: Callable[..., Any], t
     one, other = _pixels(live), _pixels(recorded)
     assert np.mean(np.any(one < 0.9, axis=2)) > 0.005, "the picture is empty"
     assert np.mean(np.any(np.abs(one - other) > 0.1, axis=2)) < 0.002
+
+
+def test_what_falls_on_behind_the_end_of_its_record_stays_in_sight(show: Callable[..., Any], tmp_path: Path) -> None:
+    scene = Scene(space="plane")
+    scene.add("ball", Sphere(radius=0.05))
+    scene.start.update({"ball.position.z": 0.0, "ball.velocity.x": 0.5})
+    page(simulate(scene, t_end=0.2), tmp_path / "a.html")
+    tab = show(tmp_path / "a.html")
+    tab.get_by_label("paths").uncheck()
+
+    def filled() -> float:
+        return float(np.mean(np.any(_pixels(tab) < 0.9, axis=2)))
+
+    at_start = filled()
+    assert at_start > 0.005
+    for time in (1.0, 3.0):
+        tab.evaluate(f"atwood.advance({time})")
+        assert filled() > 0.8 * at_start
+    tab.evaluate("atwood.reset()")
+    assert filled() == pytest.approx(at_start, rel=0.01)
 
 
 def test_a_link_sets_what_it_names_and_says_what_it_cannot(show: Callable[..., Any], tmp_path: Path) -> None:

@@ -24,6 +24,7 @@ export class View {
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, this.renderer.domElement);
     this.controls.addEventListener("change", () => this.render());
+    this.controls.addEventListener("start", () => { this.turned = true; });
     this.lights();
     this.runs = runs.map((run) => ({ ...run, shapes: new Shapes(run.stage, run.tint), paths: [], arrows: [] }));
     for (const run of this.runs) this.scene.add(run.shapes.group);
@@ -81,6 +82,7 @@ export class View {
     const way = new Vector3(
       Math.sin(azimuth) * Math.cos(elevation), -Math.cos(azimuth) * Math.cos(elevation), Math.sin(elevation),
     );
+    this.turned = this.moved = false; // by hand, or after what moves
     this.controls.target.copy(this.middle);
     this.camera.position.copy(this.middle).addScaledVector(way, 4 * this.radius);
     this.camera.near = 0.01 * this.radius;
@@ -98,6 +100,7 @@ export class View {
 
   /** Turn the eye about what is seen, by angles to the right and up. */
   turn(right, up) {
+    this.turned = true;
     const away = this.camera.position.clone().sub(this.controls.target);
     const radius = away.length();
     const elevation = Math.min(1.55, Math.max(-1.55, Math.asin(away.z / radius) + up));
@@ -111,6 +114,7 @@ export class View {
 
   /** Come nearer, or go away. */
   zoom(factor) {
+    this.turned = true;
     this.camera.zoom *= factor;
     this.camera.updateProjectionMatrix();
     this.render();
@@ -195,7 +199,35 @@ export class View {
   /** Draw a run at one time. */
   draw(run, poses, sample) {
     run.shapes.move(poses, sample);
-    if (run === this.runs[0] && run.stage.follows) this.follow(run, poses);
+    if (run !== this.runs[0]) return;
+    if (run.stage.follows) this.follow(run, poses);
+    else if (!this.turned) this.keepInSight(run, poses);
+  }
+
+  /** Move the eye where nothing that moves is seen any more: a live scene may go on farther than its record. */
+  keepInSight(run, poses) {
+    const { stride } = run.stage;
+    let nearest = null;
+    run.first ??= Float64Array.from(poses);
+    for (let o = 0; o < poses.length; o += stride) {
+      if (run.first.subarray(o, o + stride).every((x, k) => x === poses[o + k])) continue; // it is fixed
+      const place = this.flat ? [poses[o], this.middle.y, poses[o + 1]] : poses.slice(o, o + 3);
+      const { x, y } = new Vector3(...place).project(this.camera);
+      const far = Math.max(Math.abs(x), Math.abs(y));
+      if (!(far > 1)) return;
+      if (!nearest || far < nearest.far) nearest = { x, y, far };
+    }
+    if (!nearest) {
+      if (this.moved) this.front(); // all is where it began
+      return;
+    }
+    this.moved = true;
+    const beyond = (x) => x - Math.min(0.8, Math.max(-0.8, x));
+    const by = new Vector3(beyond(nearest.x) * this.camera.right, beyond(nearest.y) * this.camera.top, 0);
+    by.divideScalar(this.camera.zoom).applyQuaternion(this.camera.quaternion);
+    this.controls.target.add(by);
+    this.camera.position.add(by);
+    this.camera.updateMatrixWorld();
   }
 
   follow(run, poses) {
