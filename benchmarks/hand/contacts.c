@@ -192,7 +192,7 @@ static int locate(double t, double h, const double *y, double d[][SIZE], const d
 /* Run from 0 to an end in pieces between times; return the number of events. */
 long integrate(double end, double rtol, double atol, const double *times, double *y, const int *at_start, long *steps)
 {
-    double k[STAGES + 1][SIZE], z[SIZE], d[TERMS][SIZE], old[EVENTS], new_[EVENTS], there[SIZE];
+    double k[STAGES + 1][SIZE], z[SIZE], d[TERMS][SIZE], old[EVENTS], new_[EVENTS], there[SIZE] = {0};
     int fresh[EVENTS] = {0};
     double t = 0.0, h;
     long found = 0, taken = 0;
