@@ -53,6 +53,25 @@ MOST = 200
 SHORTEST = 1e-6
 """Parts of a step that are shorter than this share are not divided: there the depth is rounding."""
 
+TINY = 1e-300
+"""Makes zero positive."""
+
+PASSED = 0.9
+"""What has passed zero by this share of its margin at the start of a mode happens there.
+
+Equal parts pass their margins together. One of them ends the mode, and the others are at the end of theirs to rounding:
+a whole margin would leave them at zero, with a sign that nobody knows.
+"""
+
+SHORT = 1e-6
+"""Share of the time since the mode began in which the rate of an event is read."""
+
+ALIKE = 1.0 + 1e-6
+"""Events that pass their margins at once have passed zero at once, if it was earlier by shares as alike as this."""
+
+LONGEST = 0.1
+"""Share of that time by which an event may be brought forward, by one Euler step back."""
+
 
 @dataclass(frozen=True, eq=False)
 class Point:

@@ -14,6 +14,7 @@ output times, events and limits, is the session's, which is the same for all ste
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable, Sequence
 from enum import Enum
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
@@ -420,6 +421,10 @@ MET = 1e-8
 
 STEPS = 6
 """So many of these are tried; at the end of a step that is good enough one or two are needed."""
+
+
+RATES = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, *[ctypes.c_void_p] * 3)
+"""The function of `CompiledRates`."""
 
 
 @dataclass(frozen=True, eq=False)

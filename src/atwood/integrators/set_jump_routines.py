@@ -4,19 +4,11 @@ from __future__ import annotations
 
 from atwood.codegen.routines import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER, Record, Routine, Value
 from atwood.integrators.compiled_location import FIELDS as LOCATOR
+from atwood.integrators.event_location import ALIKE, LONGEST, PASSED, SHORT, TINY
 from atwood.integrators.event_routines import Search
 from atwood.integrators.set_jumps import EVENTS, HEAD, JUMP, MOST_IMPACTS, PAST
 from atwood.integrators.set_routines import CLOSES, ENTRY, FIELDS, Sets, write_sets
 from atwood.numerics.contact_sets import OPEN
-
-_SHORT, _LONGEST, _ALIKE = 1e-6, 0.1, 1.0 + 1e-6
-"""As of `atwood.simulation.events.modes.without_margin`."""
-
-_PASSED = 0.9
-"""Of its margin: what has passed zero by more at the start of a set happens there."""
-
-_TINY = 1e-300
-"""Makes zero positive."""
 
 
 class _Leap(Record):
@@ -57,7 +49,7 @@ def _sharpen() -> Routine:
         all_.now = all_.now & (shift[i] != 0.0)
     with r.when(~all_.now):
         r.give(0)
-    short, shifted = since * _SHORT, search.shifted
+    short, shifted = since * SHORT, search.shifted
     with r.count(size) as j:
         shifted[j] = y[j] - short * yp[j]
     r.call(search.events, time, y, yp, now, search.data)
@@ -66,11 +58,11 @@ def _sharpen() -> Routine:
     with r.count(search.count) as i, r.when(found[i] != 0.0):
         value = now[i] - shift[i]
         rate = (now[i] - before[i]) / short
-        clear = (rate * shift[i] < 0.0) & (r.size(value) < since * _LONGEST * r.size(rate))
+        clear = (rate * shift[i] < 0.0) & (r.size(value) < since * LONGEST * r.size(rate))
         all_.now = all_.now & clear
         late = value / rate
         least.now, most.now = r.least(late, least.now), r.most(late, most.now)
-    with r.when(all_.now & (most.now <= least.now * _ALIKE)):
+    with r.when(all_.now & (most.now <= least.now * ALIKE)):
         m.late = least.now
     r.give(0)
     return r
@@ -131,9 +123,9 @@ def _arm() -> Routine:
         is_near = r.size(value) <= small[i]
         is_gap = (m.event("code")[i] == float(CLOSES)) & (m.event("placed")[i] != 0.0)
         opens = is_gap & is_near & (rates[row] * m.time > small[i])
-        with r.when((value < small[i] * -_PASSED) & ~opens):
+        with r.when((value < small[i] * -PASSED) & ~opens):
             r.give(1)
-        margin = r.choose(opens, r.choose(value > 0.0, 0.0, r.size(value) * 2.0 + _TINY), small[i])
+        margin = r.choose(opens, r.choose(value > 0.0, 0.0, r.size(value) * 2.0 + TINY), small[i])
         shift[i] = r.choose(is_near, margin, 0.0)
     r.give(0)
     return r

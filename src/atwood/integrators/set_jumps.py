@@ -6,9 +6,7 @@ shorter.
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Mapping, Sequence
-from ctypes import c_double, c_int, c_void_p
 from math import inf
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -20,6 +18,7 @@ from atwood.codegen.llvm.module import Part
 from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Kind
 from atwood.expr.core.program import Program
 from atwood.integrators.jumps import Jumps
+from atwood.integrators.protocol import RATES
 from atwood.integrators.set_routines import CAPACITY, ENTRY, FIELDS, ROWS, UNITS
 
 if TYPE_CHECKING:
@@ -45,8 +44,6 @@ HEAD, PAST, MOST_IMPACTS = 4, 64, 8
 
 _ROOM = 1024
 """So many changes are made without Python."""
-
-_RATES = ctypes.CFUNCTYPE(c_int, c_double, *[c_void_p] * 3)
 
 
 class SetJump(NamedTuple):
@@ -79,6 +76,7 @@ class SetCode:
         part = Part("contacts", program)
         files = (
             "integrators/compiled_location.py",
+            "integrators/event_location.py",
             "integrators/event_routines.py",
             "integrators/set_jumps.py",
             "integrators/set_routines.py",
@@ -162,7 +160,7 @@ class SetJumps(Jumps):
             "own", {"events": events.count, "size": own, "stride": self._stride, "capacity": _ROOM, "stays": stays}
         )
         self._place(events, rates, given)
-        self._rates = _RATES(rates.function), rates.data
+        self._rates = RATES(rates.function), rates.data
         self.function, self.data = code.built.code.addresses["jump"], self._pieces["own"].ctypes.data
 
     def _place(

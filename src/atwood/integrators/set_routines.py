@@ -88,8 +88,17 @@ REFUSED = {
 CAPACITY = 64
 """Entries of the log."""
 
-SPANS, EVEN, SEEN, ALIKE = (4, 12), 4.0, 2.0, 100.0
-"""As of `atwood.simulation.contacts.changes`."""
+SPANS = 4, 12
+"""At least and at most so many intervals between impacts say how fast these follow each other."""
+
+EVEN = 4.0
+"""Intervals of a series shrink by factors that differ by no more than this from their mean."""
+
+ALIKE = 100.0
+"""Gaps that come to rest together part at speeds that differ by no larger factor."""
+
+SEEN = 2.0
+"""Times what is slow: what has come to rest may go by that still, or again, where its event is seen."""
 
 NEAR_REST = 100.0
 """Times what is small and slow, where impacts have accumulated."""
@@ -97,7 +106,7 @@ NEAR_REST = 100.0
 _SETS = 12
 """Times the number of gaps and slips: so many sets are tried."""
 
-_GAIN = 1e-9
+GAIN = 1e-9
 """Of the work of impulses: more than this is energy that an impact would make."""
 
 _SHORT = 1e-20
@@ -633,7 +642,7 @@ def _account() -> Routine:
         work[i] = by * (before + after[i]) * 0.5
         total.now = total.now + work[i]
         sizes.now = sizes.now + r.size(by) * (r.size(before) + r.size(after[i])) * 0.5
-    with r.when(total.now > sizes.now * _GAIN):
+    with r.when(total.now > sizes.now * GAIN):
         with _each(r, m, "chosen") as (k, row, _), r.when((m.unit("slip")[k] == 0.0) & (work[row] > worst.now)):
             worst.now, m.number = work[row], k
         r.give(GAINS)

@@ -24,6 +24,7 @@ from atwood.codegen.routines import CODE, Kind, Routine, Value
 from atwood.errors import KernelEvaluationError
 from atwood.integrators.embedded.tableau import Tableau
 from atwood.integrators.protocol import (
+    RATES,
     CompiledRates,
     ExplicitProblem,
     SolverOptions,
@@ -72,7 +73,6 @@ def open_routine(
     return session_routine(partial(Memory, FIELDS, pair.rows), name, more, result, exported)
 
 
-_RATES = ctypes.CFUNCTYPE(c_int, c_double, c_void_p, c_void_p, c_void_p)
 _PROJECTION = ctypes.CFUNCTYPE(c_int, c_double, c_void_p, c_void_p)
 _GUARDS = ctypes.CFUNCTYPE(c_int, *[c_double, c_void_p, c_void_p] * 2, c_void_p)
 
@@ -231,7 +231,7 @@ class CompiledStepper(NativeStepper):
 
     def _in_python(self, problem: ExplicitProblem) -> CompiledRates:
         """Return rates and projection that call Python."""
-        rates = self._called(_RATES, problem.rates, (1,), 2)
+        rates = self._called(RATES, problem.rates, (1,), 2)
         project = 0 if problem.project is None else self._called(_PROJECTION, problem.project, (1,), 1)
         return CompiledRates(rates, project=project, keep=self._callbacks)
 

@@ -10,7 +10,6 @@ touch is asked at ``q_0 + h/2 q'_0`` (J. J. Moreau 1988; M. Jean 1999, with thet
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable
 from math import isfinite
 from typing import Any, NamedTuple, Protocol
@@ -19,7 +18,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError, StartError
-from atwood.integrators.protocol import Budget, ExplicitProblem, State, Statistics, Status, StepResult
+from atwood.integrators.protocol import RATES, Budget, ExplicitProblem, State, Statistics, Status, StepResult
 from atwood.integrators.session import SteppingSession, copied
 from atwood.lazy_dataclasses import dataclass
 
@@ -34,9 +33,6 @@ _PLAIN, _TURNS = 12, 60
 
 _MOST_DERIVED = 1000
 """With more unknowns than these, derivatives are not worked out by differences."""
-
-
-_RATES = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, *[ctypes.c_void_p] * 3)
 
 
 class Pushed(NamedTuple):
@@ -293,7 +289,7 @@ class TimeSteppingSession(SteppingSession):
     def _rates(self, t: float, y: FloatArray) -> FloatArray:
         self._evaluations += 1
         native, found = self._native, np.empty(len(y))
-        if native is None or _RATES(native.function)(t, y.ctypes.data, found.ctypes.data, native.data):
+        if native is None or RATES(native.function)(t, y.ctypes.data, found.ctypes.data, native.data):
             found[:] = self._motion.smooth.rates(t, y)  # which says what has no value
         return found
 

@@ -15,6 +15,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError, StartError
 from atwood.forms.assembly import Assembly
+from atwood.integrators.set_routines import ALIKE, EVEN, GAIN, NEAR_REST, SEEN, SPANS
 from atwood.lazy_dataclasses import dataclass, made_of, replace
 from atwood.mechanics.dynamics.equations import ContactRow
 from atwood.mechanics.outputs.event_functions import CLOSES, OPENS, RESTS, STOPS, YIELDS
@@ -45,26 +46,11 @@ from atwood.tolerances import tolerances
 NEAR = 10.0
 """Times the relative tolerance, in sizes of the scene: what is nearer to zero is there."""
 
-_SPANS = 4, 12
-"""At least and at most so many intervals between impacts say how fast these follow each other."""
-
-_EVEN = 4.0
-"""Intervals of a series shrink by factors that differ by no more than this from their mean."""
-
 LEFT = 10.0
 """Times the root of the tolerance, in units of the scene's time: so long may impacts still go on that are summed.
 
 What still rises in one interval rises by some tolerances, and rounding does not tell in its intervals yet.
 """
-
-_NEAR_REST = 1000.0
-"""The same where impacts have accumulated: what still bounces is as near as that."""
-
-_ALIKE = 100.0
-"""Gaps that come to rest together part at speeds that differ by no larger factor."""
-
-_SEEN = 2.0
-"""Times what is slow: what has come to rest may go by that still, or again, where its event is seen."""
 
 MOST_TURNS = 50
 """Limits that are curved in the forces are met in so many turns at most."""
@@ -193,7 +179,7 @@ class _Moment:
         It counts what moves together with the gap that closes now.
         """
         closing = [k for k, one in enumerate(self.first) if self.trigger(k) == CLOSES and not one.is_speed]
-        if not closing or len(impacts) < _SPANS[0]:
+        if not closing or len(impacts) < SPANS[0]:
             return None
         response = np.abs(self.values.response[self.units[closing[0]][0]])
         moved = response > 1e-12 * float(np.max(response))
@@ -203,24 +189,24 @@ class _Moment:
             if part not in parts or time == end:
                 continue
             end = time
-            if len(spans) == _SPANS[1] or (spans and last - time <= spans[-1]):
+            if len(spans) == SPANS[1] or (spans and last - time <= spans[-1]):
                 break
             spans.append(last - time)
             last = time
-        if len(spans) < _SPANS[0] or spans[0] <= 0.0:
+        if len(spans) < SPANS[0] or spans[0] <= 0.0:
             return None
         # Impacts that only happen to be near each other are no series: each interval shrinks about as the one before.
         ratios = np.array([after / before for after, before in pairwise(spans)])
-        typical = float(np.exp(np.mean(np.log(ratios[: _SPANS[0] - 1]))))
-        uneven = np.flatnonzero(np.abs(np.log(ratios / typical)) > math.log(_EVEN))
+        typical = float(np.exp(np.mean(np.log(ratios[: SPANS[0] - 1]))))
+        uneven = np.flatnonzero(np.abs(np.log(ratios / typical)) > math.log(EVEN))
         count = int(uneven[0]) if len(uneven) else len(ratios)
-        if count < _SPANS[0] - 1:
+        if count < SPANS[0] - 1:
             return None
         share = float(np.exp(np.mean(np.log(ratios[:count]))))
         left: float = spans[0] * share / (1.0 - share)
         if not left < LEFT * unit:
             return None
-        self.small, self.slow = _NEAR_REST / NEAR * self.small, _NEAR_REST / NEAR * self.slow
+        self.small, self.slow = NEAR_REST * self.small, NEAR_REST * self.slow
         return left
 
     def stop(self, left: float) -> None:
@@ -230,8 +216,8 @@ class _Moment:
         speeds = {k: self.rate(k, rates) for k in self.touching}
         # What has just bounced much faster than the others only passes: its impacts have not come to an end.
         coming = max(0.0, *(-speed for speed in speeds.values()))
-        resting = [k for k, speed in speeds.items() if speed <= max(_ALIKE * coming, self.slow[k])]
-        self.slow = NEAR / _NEAR_REST * self.slow
+        resting = [k for k, speed in speeds.items() if speed <= max(ALIKE * coming, self.slow[k])]
+        self.slow = 1.0 / NEAR_REST * self.slow
         self._end_impacts(resting, still)
         self.events += [told_rest(self.t, self.first[k].row.key[:2], left) for k in resting[:1]]
 
@@ -276,7 +262,7 @@ class _Moment:
             impulses = impulses + self._impulses(chosen, free + values.response @ impulses)
         after = rates + values.response @ impulses
         work, size = 0.5 * impulses * (rates + after), 0.5 * np.abs(impulses) * (np.abs(rates) + np.abs(after))
-        if float(np.sum(work)) > 1e-9 * float(np.sum(size)):
+        if float(np.sum(work)) > GAIN * float(np.sum(size)):
             worst = max(touching, key=lambda k: float(work[self.units[k][0]]))
             raise SolveError(
                 f"at t = {self.t:.9g} Newton's law of impact would make energy, {float(np.sum(work)):.3g} J",
@@ -421,7 +407,7 @@ class _Moment:
         return {
             k: tuple(float(x) / size for x in rates[list(self.units[k])])
             for k, size in sizes.items()
-            if size > (_SEEN if k in stops else 1.0) * self.slow[k]
+            if size > (SEEN if k in stops else 1.0) * self.slow[k]
         }
 
     def _stopped(self, slips: list[int]) -> list[int]:

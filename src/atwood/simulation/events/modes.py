@@ -16,6 +16,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.loose import has_touched, is_loose, loosened
 from atwood.forms.quantities import known_program
+from atwood.integrators.event_location import ALIKE, LONGEST, PASSED, SHORT, TINY
 from atwood.integrators.protocol import StepResult
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.outputs.event_functions import (
@@ -153,21 +154,11 @@ def _find_needs(assembly: Assembly, event_functions: Sequence[EventFunction]) ->
 MARGIN = 10.0
 """What starts at zero must pass it by so many tolerances, lest errors of a step set it off."""
 
-_TINY = 1e-300
-"""Makes zero positive."""
-
 _RUNS = 1000.0
 """Times what is small: slips in two directions that are faster than this may come to rest again."""
 
 _MOMENT = 1e-12
 """In units of the scene's time: so much later it is seen whether something slows down."""
-
-_PASSED = 0.9
-"""What has passed zero by this share of its margin at the start of a mode happens there.
-
-Equal parts pass their margins together. One of them ends the mode, and the others are at the end of theirs to rounding:
-a whole margin would leave them at zero, with a sign that nobody knows.
-"""
 
 
 def margins_at_start(
@@ -176,7 +167,7 @@ def margins_at_start(
     """Return which events have happened where a mode starts, and what is added to those that start at zero."""
     directions = np.array([one.direction for one in functions], dtype=np.float64)
     counts = np.array([not one.is_noted for one in functions], dtype=np.bool_)
-    happened: BoolArray = counts & (directions * values > _PASSED * small)
+    happened: BoolArray = counts & (directions * values > PASSED * small)
     return happened, np.where(counts & (np.abs(values) <= small), -directions * small, 0.0)
 
 
@@ -231,9 +222,9 @@ class EventProbe:
         self._sides = np.where(np.abs(values) > small, np.sign(values), 0.0)
         sided = np.array([one.target == SIDE for one in self.event_functions], dtype=np.bool_)
         # What has just passed zero, or will soon, is off by rounding.
-        self.shift = np.where(sided & (values <= 0.0), 2.0 * np.abs(values) + _TINY, self.shift)
+        self.shift = np.where(sided & (values <= 0.0), 2.0 * np.abs(values) + TINY, self.shift)
         opening = self._opening(t, q, u, small) & (np.abs(values) <= small)
-        self.shift = np.where(opening, np.where(values > 0.0, 0.0, 2.0 * np.abs(values) + _TINY), self.shift)
+        self.shift = np.where(opening, np.where(values > 0.0, 0.0, 2.0 * np.abs(values) + TINY), self.shift)
         happened &= ~opening
         self._arm(values, small, happened, (t, q, u))
         self.broken = next((one for one, has in zip(self.event_functions, happened, strict=True) if has), None)
@@ -409,16 +400,6 @@ class EventProbe:
         return EventRecord(t, function.part, function.law, function.message, function.target, function.impact)
 
 
-_SHORT = 1e-6
-"""Share of the time since the mode began in which the rate of an event is read."""
-
-_ALIKE = 1.0 + 1e-6
-"""Events that pass their margins at once have passed zero at once, if it was earlier by shares as alike as this."""
-
-_LONGEST = 0.1
-"""Share of that time by which an event may be brought forward, by one Euler step back."""
-
-
 def without_margin(
     values: Callable[[float, FloatArray], FloatArray], shift: FloatArray, step: StepResult, began: float
 ) -> StepResult:
@@ -432,12 +413,12 @@ def without_margin(
     since = step.t - began
     if not fired or not all(shift[fired]) or not since > 0.0:
         return step
-    margins, short = shift[fired], _SHORT * since
+    margins, short = shift[fired], SHORT * since
     now, before = (values(step.t - t, step.y - t * step.yp)[fired] - margins for t in (0.0, short))
     rates = (now - before) / short
-    if np.any(rates * margins >= 0.0) or not np.all(np.abs(now) < _LONGEST * since * np.abs(rates)):
+    if np.any(rates * margins >= 0.0) or not np.all(np.abs(now) < LONGEST * since * np.abs(rates)):
         return step
     earlier = float(np.min(now / rates))  # equal ones happen at once
-    if not np.max(now / rates) <= _ALIKE * earlier:
+    if not np.max(now / rates) <= ALIKE * earlier:
         return step
     return replace(step, t=step.t - earlier, y=step.y - earlier * step.yp)

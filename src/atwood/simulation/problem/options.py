@@ -104,6 +104,11 @@ class RunOptions:
     first_step: float | None = None
     impacts: str = "together"
 
+    @property
+    def looks_for_events(self) -> bool:
+        """Whether the solver that was asked for ends its steps at events."""
+        return self.solver == AUTO or METHODS[self.solver].looks_for_events
+
     def out_of_time(self, t: float) -> str:
         """Return what is said of a run that its limit of time ended, at a time of its own."""
         return f"the limit of {self.max_seconds:g} s was used up (at t = {t:.9g})"

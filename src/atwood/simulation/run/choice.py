@@ -97,7 +97,7 @@ def check_solver(asked: str) -> None:
 def check_asked(options: RunOptions) -> None:
     """Refuse what the solver that was asked for cannot do."""
     asked = options.solver
-    if asked == AUTO or METHODS[asked].looks_for_events:
+    if options.looks_for_events:
         return
     given = (("accuracy=", options.accuracy is not None), ("conditions to watch", bool(options.conditions)))
     for what, is_given in given:

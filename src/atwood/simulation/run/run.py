@@ -13,7 +13,6 @@ from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Shared
 from atwood.forms.loose import has_touched
-from atwood.integrators.methods import AUTO, METHODS
 from atwood.integrators.protocol import Statistics
 from atwood.lazy_dataclasses import replace
 from atwood.mechanics.outputs.event_functions import CONTACT, UPDATE
@@ -301,7 +300,7 @@ class _Walk:
         from atwood.simulation.problem.explicit_scene import nearest_place
 
         options, is_start = self.options, not self.segments
-        if not self.choice_looks_for_events:
+        if not self.options.looks_for_events:
             if is_start:
                 check_start(plan.assembly, (self.t, self.q, self.u), self.start.length, plan.scales)
             return plan
@@ -328,11 +327,6 @@ class _Walk:
         self.assembly = self.assembly.with_held(self.held)
         self.probe, self._plans, self._handed = None, {}, ()
         return plan.in_piece(self._sides.like(self.assembly, plan))
-
-    @property
-    def choice_looks_for_events(self) -> bool:
-        """Whether the solver that was asked for ends its steps at events."""
-        return self.options.solver == AUTO or METHODS[self.options.solver].looks_for_events
 
     def _remember(self, events: Sequence[EventRecord]) -> None:
         """Remember the impacts among some events."""

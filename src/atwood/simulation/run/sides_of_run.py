@@ -50,7 +50,7 @@ class SidesOfRun:
 
     def in_pieces(self, assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> Assembly:
         """Return a scene with its relations as parameters, with their values at a state as it is."""
-        if self._options.solver != AUTO and not METHODS[self._options.solver].looks_for_events:
+        if not self._options.looks_for_events:
             return assembly
         handed = self._handed.get(assembly.shared, {})
         found = in_pieces(assembly, frozenset(handed), self._layered)
