@@ -8,6 +8,7 @@ import pytest
 
 from atwood import expr as ex
 from atwood.codegen import cache as disk, compile_native
+from atwood.codegen.llvm.own import own_functions
 
 
 def small(name="demo"):
@@ -20,6 +21,7 @@ def small(name="demo"):
 
 @pytest.fixture
 def directory(tmp_path, monkeypatch):
+    own_functions()  # an entry of its own in another place
     monkeypatch.setenv("ATWOOD_CACHE_DIR", str(tmp_path / "kernels"))
     monkeypatch.delenv("ATWOOD_CACHE", raising=False)
     return tmp_path / "kernels"

@@ -10,7 +10,6 @@ from hypothesis import given, settings, strategies as st
 
 from atwood import expr as ex
 from atwood.codegen import compile_native, compile_program
-from atwood.codegen.llvm.engine import sincos_name
 from atwood.codegen.llvm.module import CodeOptions, Part, write_module
 from atwood.errors import KernelEvaluationError, UnsupportedError, UsageError
 from atwood.pipeline import assemble
@@ -67,7 +66,7 @@ def build(recipe):
 def test_values_agree_with_the_python_back_end(recipe, numbers, longest):
     program = build(recipe)
     t, x, y, p, q = numbers
-    native = compile_native(program, cache=False, options=CodeOptions(longest_chunk=longest, sincos=sincos_name()))
+    native = compile_native(program, cache=False, options=CodeOptions(longest_chunk=longest))
     expected = ex.evaluate(program.results, {"t": t, "x": x, "y": y, "p": p, "q": q})
     if not np.all(np.isfinite(expected)):
         with pytest.raises(KernelEvaluationError):
@@ -294,7 +293,7 @@ def test_results_that_are_inputs_or_constants_are_stored_in_pieces():
     x = tuple(graph.symbol(f"x{i}") for i in range(700))
     out = (*x, ex.sin(x[0]), *(graph.one for _ in range(900)), x[3] * x[4], *reversed(x))
     program = ex.Program("passed on", (ex.InputGroup("x", x),), (), (ex.OutputGroup("out", out),))
-    text = write_module([Part("kernel", program)], CodeOptions(sincos=sincos_name())).text
+    text = write_module([Part("kernel", program)], CodeOptions()).text
     assert max(function.count("store double") for function in text.split("define ")) <= 300
     numbers = np.linspace(0.5, 1.5, len(x))
     found = compile_native(program, cache=False).bind([])(numbers)[0]

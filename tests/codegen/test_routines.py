@@ -19,7 +19,8 @@ from atwood.codegen.routines import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER, Kin
 
 C_TYPES = {NUMBER: c_double, INTEGER: c_int64, CODE: c_int, ADDRESS: c_void_p}
 INTRINSICS = (
-    "\ndeclare double @llvm.sqrt.f64(double)\ndeclare double @llvm.fabs.f64(double)\nattributes #0 = { nounwind }\n"
+    "\ndeclare double @llvm.sqrt.f64(double)\ndeclare double @llvm.fabs.f64(double)\n"
+    "declare double @llvm.floor.f64(double)\nattributes #0 = { nounwind }\n"
 )
 
 

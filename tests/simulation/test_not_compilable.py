@@ -97,8 +97,8 @@ def test_the_part_that_is_named_is_the_one_that_calls() -> None:
 
 
 def test_an_operation_without_code_names_component_and_law(monkeypatch: pytest.MonkeyPatch) -> None:
-    library = {name: call for name, call in llvm_text.LIBRARY_FUNCTIONS.items() if name != "tanh"}
-    monkeypatch.setattr(llvm_text, "LIBRARY_FUNCTIONS", library)
+    library = {name: call for name, call in llvm_text.OWN_FUNCTIONS.items() if name != "tanh"}
+    monkeypatch.setattr(llvm_text, "OWN_FUNCTIONS", library)
 
     class Soft(Component):
         a: Point = connector(Point, "One end.")

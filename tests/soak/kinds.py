@@ -18,6 +18,7 @@ KINDS = {
     "contacts": "contacts",
     "control": "control",
     "files": "files",
+    "functions": "functions",
     "hostile": "hostile",
     "interrupts": "interrupts",
     "levels": "levels",

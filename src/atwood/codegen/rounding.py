@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from atwood.arrays import FloatArray
+from atwood.expr.core import elementary
 from atwood.expr.core.analysis import live
 from atwood.expr.core.graph import Expression
 
@@ -54,20 +55,8 @@ _ROUNDED: dict[str, Callable[..., Any]] = {
     "sub": np.subtract,
     "mul": np.multiply,
     "div": np.divide,
-    "pow": np.power,
-    "atan2": np.arctan2,
     "sqrt": np.sqrt,
-    "sin": np.sin,
-    "cos": np.cos,
-    "tan": np.tan,
-    "asin": np.arcsin,
-    "acos": np.arccos,
-    "atan": np.arctan,
-    "exp": np.exp,
-    "log": np.log,
-    "sinh": np.sinh,
-    "cosh": np.cosh,
-    "tanh": np.tanh,
+    **elementary.ON_ARRAYS,
 }
 
 ON_ARRAYS = {**_EXACT, **_ROUNDED}

@@ -13,7 +13,7 @@ Calls of a program's functions from a routine (`atwood.codegen.llvm.module` says
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, NamedTuple, TypeAlias
 
@@ -44,16 +44,19 @@ class Lanes:
     count
         Their number.
     is_float
-        False for conditions, one for each lane.
+        False for conditions, one for each lane, and for words.
+    is_word
+        Whether they are words.
     """
 
     count: int
     is_float: bool = True
+    is_word: bool = False
 
     @property
     def name(self) -> str:
         """What messages call them."""
-        return f"{self.count} lanes of {'numbers' if self.is_float else 'conditions'}"
+        return f"{self.count} lanes of {'numbers' if self.is_float else 'words' if self.is_word else 'conditions'}"
 
 
 Kind: TypeAlias = Scalar | Lanes
@@ -66,6 +69,9 @@ INTEGER = Scalar("integer")
 
 CODE = Scalar("code")
 """An integer of 32 bits: what a function returns, zero where all went well, or an element of a list of such."""
+
+WORD = Scalar("word")
+"""Half the bits of a number, as an integer from 0 on, with room for sums: it lies where a number would."""
 
 BOOLEAN = Scalar("condition")
 """True or false."""
@@ -432,6 +438,8 @@ class Routine:
     def choose(self, condition: Value, a: Operand, b: Operand, kind: Kind = NUMBER) -> Value:
         """Return the first value where a condition holds, and else the second; constants are of a kind."""
         kind = next((one.kind for one in (a, b) if isinstance(one, Value)), kind)
+        if isinstance(condition.kind, Lanes) and kind is NUMBER:
+            kind = Lanes(condition.kind.count)
         first, second = self.value(a, kind), self.value(b, kind)
         return self.put("choose", first.kind, condition, first, second)
 
@@ -457,13 +465,78 @@ class Routine:
         """Return the largest whole number that is not larger."""
         return self.put("floor", a.kind, a)
 
+    def high(self, a: Value) -> Value:
+        """Return the first 32 bits of a number as a word."""
+        return self.put("high", _words(a.kind), a)
+
+    def low(self, a: Value) -> Value:
+        """Return the last 32 bits of a number as a word."""
+        return self.put("low", _words(a.kind), a)
+
+    def of_words(self, high: Value, low: Operand) -> Value:
+        """Return the number of two words."""
+        kind = Lanes(high.kind.count) if isinstance(high.kind, Lanes) else NUMBER
+        return self.put("of words", kind, high, self.value(low, high.kind))
+
+    def as_number(self, word: Value) -> Value:
+        """Return a word as a number."""
+        return self.put("to number", Lanes(word.kind.count) if isinstance(word.kind, Lanes) else NUMBER, word)
+
+    def pick(self, word: Value, a: Operand, b: Operand) -> Value:
+        """Return the first value where a word is 1, and the second where it is 0, without a branch."""
+        kind = Lanes(word.kind.count) if isinstance(word.kind, Lanes) else NUMBER
+        return self.put("pick", kind, word, self.value(a, kind), self.value(b, kind))
+
+    def flip(self, word: Value, a: Operand) -> Value:
+        """Return a number, with the other sign where a word is 1 and not 0."""
+        kind = Lanes(word.kind.count) if isinstance(word.kind, Lanes) else NUMBER
+        return self.put("flip", kind, word, self.value(a, kind))
+
+    def look_up(self, table: tuple[float, ...], word: Value) -> Value:
+        """Return an element of a table of constants."""
+        return self.put("look up", NUMBER, word, table)
+
+    def unless(
+        self, usual: Value, values: Callable[[], Sequence[Value]], otherwise: Callable[..., object], *given: Value
+    ) -> tuple[Value, ...]:
+        """Return values where a condition holds, and else those that a function gives, lane by lane.
+
+        It is called by its name, with the addresses of what it is given and of its results.
+        """
+        lanes = usual.kind.count if isinstance(usual.kind, Lanes) else 0
+        found = [self.variable(one, one.kind) for one in values()]
+        name, rare = own_name(otherwise.__name__), ~usual
+        with self.when(self.any_lane(rare) if lanes else rare):
+            taken, filled = self.array(len(given)), self.array(len(found))
+            if not lanes:
+                for k, one in enumerate(given):
+                    taken[k] = one
+                self.call(name, taken, filled, result=None)
+                for k, variable in enumerate(found):
+                    variable.now = filled[k]
+            else:
+                self._one_by_one(rare, name, [place_of(self, one) for one in given], found, taken, filled)
+        return tuple(one.now for one in found)
+
+    def _one_by_one(
+        self, rare: Value, name: str, given: list[Value], found: list[Variable], taken: Value, filled: Value
+    ) -> None:
+        """Call a function for each lane in which a condition holds."""
+        assert isinstance(rare.kind, Lanes)
+        marks = place_of(self, self.choose(rare, 1.0, 0.0))
+        results = [place_of(self, one.now) for one in found]
+        with self.count(rare.kind.count) as lane, self.when(marks[lane] == 1.0):
+            for k, place in enumerate(given):
+                taken[k] = place[lane]
+            self.call(name, taken, filled, result=None)
+            for k, place in enumerate(results):
+                place[lane] = filled[k]
+        for variable, place in zip(found, results, strict=True):
+            variable.now = place.read(0, Lanes(rare.kind.count))
+
     def truncated(self, a: Value) -> Value:
         """Return a number as an integer, without its fraction."""
         return self.put("truncated", INTEGER, a)
-
-    def fused(self, a: Value, b: Value, c: Value) -> Value:
-        """Return ``a b + c``, rounded once where the processor can do that at the same cost."""
-        return self.put("fused", a.kind, a, b, c)
 
     def any_lane(self, a: Value) -> Value:
         """Tell whether a condition holds in one of the lanes."""
@@ -508,10 +581,19 @@ def addresses(r: Routine, places: Sequence[Value]) -> Value:
 
 
 def place_of(r: Routine, number: Value) -> Value:
-    """Return an array of this call's own that holds a number."""
-    place = r.array(1)
+    """Return an array of this call's own that holds a number, or lanes of them."""
+    place = r.array(number.kind.count if isinstance(number.kind, Lanes) else 1)
     place[0] = number
     return place
+
+
+def own_name(function: str) -> str:
+    """Return what a function of `atwood.expr.core.elementary` is called in a module."""
+    return f"own_{function}"
+
+
+def _words(kind: Kind) -> Kind:
+    return Lanes(kind.count, is_float=False, is_word=True) if isinstance(kind, Lanes) else WORD
 
 
 def call_kernel(

@@ -12,12 +12,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from atwood.codegen.routines import (
     BOOLEAN,
     INTEGER,
     NUMBER,
+    WORD,
     Block,
     Branch,
     Call,
@@ -43,6 +44,8 @@ _INFIX = {
 }
 _LOGICAL = {"and": "&&", "or": "||"}
 _BITS = {"and": "&", "or": "|", "shift right": ">>", "shift left": "<<"}
+_WORDS = {"and": "&", "or": "|", "shift right": ">>>", "shift left": "<<"}
+_OF_WORDS = {"high": "high", "low": "low", "of words": "ofWords", "flip": "flip"}
 _MATH = {"sqrt": "Math.sqrt", "size": "Math.abs", "floor": "Math.floor"}
 _RESERVED = frozenset(
     {"case", "default", "delete", "do", "function", "if", "in", "let", "new", "of", "this", "var", "with"}
@@ -53,6 +56,11 @@ _LONGEST = 400
 BITS = """const word = new DataView(new ArrayBuffer(8));
 const toBits = a => { word.setFloat64(0, a); return word.getBigInt64(0); };
 const fromBits = a => { word.setBigInt64(0, BigInt(a)); return word.getFloat64(0); };
+const whole = new Float64Array(1), words = new Uint32Array(whole.buffer);
+const high = a => { whole[0] = a; return words[1]; };
+const low = a => { whole[0] = a; return words[0]; };
+const ofWords = (a, b) => { words[1] = a; words[0] = b; return whole[0]; };
+const flip = (a, b) => a ? -b : b;
 """
 """What routines call that ask for the bits of a number."""
 
@@ -67,8 +75,11 @@ def literal(value: float) -> str:
 
 
 def print_routines(routines: Sequence[Routine]) -> str:
-    """Return the functions of some routines."""
-    return "\n".join(_Printer(one).text() for one in routines)
+    """Return the functions of some routines, and the tables that they read."""
+    tables: dict[tuple[float, ...], str] = {}
+    parts = [_Printer(one, tables).text() for one in routines]
+    heads = [f"const {name} = [{', '.join(map(literal, table))}];" for table, name in tables.items()]
+    return "\n".join([*heads, *parts])
 
 
 class _Text(NamedTuple):
@@ -82,8 +93,8 @@ class _Text(NamedTuple):
 class _Printer:
     """The lines of one function."""
 
-    def __init__(self, routine: Routine) -> None:
-        self.routine = routine
+    def __init__(self, routine: Routine, tables: dict[tuple[float, ...], str]) -> None:
+        self.routine, self.tables = routine, tables
         self.lines: list[str] = []
         self.known: dict[str | int | float, _Text] = {}
         self.waiting: dict[str, Value] = {}
@@ -253,6 +264,10 @@ class _Printer:
             return _Text(_names(values[0].name, result.kind), frozenset({str(values[0].name)}))
         if operation == "spread":
             return _Text((self._simple(values[0]),) * count, self.known[values[0].name].reads)
+        if operation == "look up":
+            numbers: Any = values[1]
+            table = self.tables.setdefault(numbers, f"{self.routine.name}_table{len(self.tables)}")
+            return _Text((f"{table}[{self._one(values[0])}]",))
         given = [self._of(one) for one in values]
         reads = frozenset().union(*(one.reads for one in given))
         if (
@@ -292,6 +307,10 @@ def _scalar(operation: str, result: Value, values: tuple[Value, ...], parts: Seq
         return f"Math.trunc({a} / {parts[1]})"
     if operation in _INFIX:
         return f"({a} {_INFIX[operation]} {parts[1]})"
+    if operation in _OF_WORDS:
+        return f"{_OF_WORDS[operation]}({', '.join(parts)})"
+    if operation in _WORDS and (kind is WORD or (isinstance(kind, Lanes) and kind.is_word)):
+        return f"({a} {_WORDS[operation]} {parts[1]})"
     if operation in _LOGICAL:
         return (
             f"({a} {_LOGICAL[operation]} {parts[1]})"
@@ -301,7 +320,7 @@ def _scalar(operation: str, result: Value, values: tuple[Value, ...], parts: Seq
     match operation:
         case "offset" | "offset of codes":
             return a if parts[1] == "0" else f"({a} + {parts[1]})"
-        case "choose":
+        case "choose" | "pick":
             return f"({a} ? {parts[1]} : {parts[2]})"
         case "not":
             return f"(!{a})" if _is_truth(values[0]) else f"({a} ^ 1)"
@@ -311,8 +330,6 @@ def _scalar(operation: str, result: Value, values: tuple[Value, ...], parts: Seq
             return f"({a} === 0)"
         case "to integer" | "to code" | "to number":
             return f"({a} ? 1 : 0)" if kind is BOOLEAN else a
-        case "fused":
-            return f"({a} * {parts[1]} + {parts[2]})"
         case _:
             return f"{_MATH[operation]}({a})"
 
@@ -325,7 +342,9 @@ _REDUCED: dict[str, Callable[[Sequence[str]], str]] = {
 
 
 def _is_truth(value: Value) -> bool:
-    return value.kind is BOOLEAN or (isinstance(value.kind, Lanes) and not value.kind.is_float)
+    return value.kind is BOOLEAN or (
+        isinstance(value.kind, Lanes) and not value.kind.is_float and not value.kind.is_word
+    )
 
 
 def _names(name: str | int | float, kind: object) -> tuple[str, ...]:
@@ -337,7 +356,7 @@ def _used(block: Block) -> Iterator[Value]:
     for one in block:
         match one:
             case Instruction():
-                yield from one.arguments
+                yield from (value for value in one.arguments if isinstance(value, Value))
             case Call():
                 yield from (*one.arguments, *(() if isinstance(one.function, str) else (one.function,)))
             case Branch():

@@ -7,11 +7,13 @@ function well. What is used once stands where it is used.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
-from atwood.codegen.javascript.printer import literal
+from atwood.codegen.functions import write_routines
+from atwood.codegen.javascript.printer import literal, print_routines
 from atwood.codegen.llvm.layout import Body, Layout, Unit, lay_out, main_body, matrix_key, prologue_body
-from atwood.codegen.llvm.text import LIBRARY_FUNCTIONS
+from atwood.codegen.llvm.text import OWN_FUNCTIONS
+from atwood.codegen.routines import own_name
 from atwood.errors import UnsupportedError
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.program import Program
@@ -27,13 +29,22 @@ _COMPARED = {"less": "<", "less_equal": "<="}
 _LOGICAL = {"logical_and": "&&", "logical_or": "||"}
 _CHOICES = {"minimum": "<=", "maximum": ">="}
 _CONDITIONS = frozenset({*_COMPARED, *_LOGICAL, "logical_not"})
-_FUNCTIONS = {one: f"Math.{one}" for one in (*LIBRARY_FUNCTIONS, "sqrt")} | {"absolute": "Math.abs", "pow": "power"}
+_FUNCTIONS = {one: own_name(one) for one in OWN_FUNCTIONS}
+_FUNCTIONS |= {"sqrt": "Math.sqrt", "floor": "Math.floor", "absolute": "Math.abs"}
 _TWICE = frozenset({"minimum", "maximum", "sign"})
 """What mentions its arguments more than once."""
 
-FUNCTIONS = """const power = (a, b) => a === 1 || (a === -1 && Math.abs(b) === Infinity) ? 1 : Math.pow(a, b);
+_WAVES = """const own_sin = x => { own_sin_cos(x, M[0], M[0] + 1); return M[M[0]]; };
+const own_cos = x => { own_sin_cos(x, M[0], M[0] + 1); return M[M[0] + 1]; };
 """
-"""What programs call: powers as in C, where 1 to any power is 1, also where that is no number."""
+
+
+def print_functions(programs: Iterable[Program]) -> str:
+    """Return the elementary functions that programs call."""
+    used = {node.operation for program in programs for node in program.nodes} & set(OWN_FUNCTIONS)
+    has_waves = not used.isdisjoint(("sin", "cos"))
+    names = sorted(used - {"sin", "cos"} | ({"sin_cos"} if has_waves else set()))
+    return f"{print_routines(write_routines(names, each=False))}\n{_WAVES if has_waves else ''}"
 
 
 def print_program(name: str, program: Program) -> tuple[str, int]:
@@ -125,8 +136,15 @@ class _Writer:
         """Write operations that stay together, and store what others need of them."""
         if unit[0].operation == "solve":
             self._solve(unit[0], unit[1:])
+        is_wave = len(unit) == 2 and unit[1].operation != "component"
+        if is_wave:
+            self.lines.append(f"own_sin_cos({self._text(unit[0].arguments[0])[0]}, M[0], M[0] + 1);")
         for node in unit:
-            if node.operation not in ("solve", "component"):
+            if is_wave:
+                place = "M[M[0]]" if node.operation == "sin" else "M[M[0] + 1]"
+                self.lines.append(f"const v{node.index} = {place};")
+                self.texts[node.index] = f"v{node.index}", 0
+            elif node.operation not in ("solve", "component"):
                 self._node(node)
             if node.index in self.slots:
                 self.lines.append(f"M[scratch + {self.slots[node.index]}] = {self._name(node)};")

@@ -28,11 +28,10 @@ from atwood.codegen.llvm.engine import (
     LoadedCode,
     compile_text,
     load_code,
-    require_symbols,
-    sincos_name,
     target_description,
 )
 from atwood.codegen.llvm.module import CodeOptions, ModuleText, Part, write_module
+from atwood.codegen.routines import own_name
 from atwood.errors import KernelEvaluationError, UnsupportedError
 from atwood.expr.core.operations import ExternalFunction
 from atwood.expr.core.program import Program
@@ -46,13 +45,36 @@ _GENERATOR = 1
 """Counts changes to the generated code that do not show in `GENERATORS`."""
 
 GENERATORS = (
-    *(f"llvm/{name}.py" for name in ("build", "engine", "layout", "linear_systems", "module", "printer", "text")),
+    *(f"llvm/{one}.py" for one in ("build", "engine", "layout", "linear_systems", "module", "own", "printer", "text")),
     "routines.py",
 )
 """The files, by their place in the room of the code generators, on which the machine code of a program depends.
 
 What other modules write is part of the key by itself; see `RoutineSource`.
 """
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def once(make: Callable[P, T]) -> Callable[P, T]:
+    """Return a function that makes something at its first call, and returns the same ever after.
+
+    Unlike `functools.cache` it makes it once even if several threads ask at the same time: code of which there are two,
+    one of them forgotten, would be taken out of memory while it runs.
+    """
+    lock, made = threading.RLock(), dict[tuple[object, ...], T]()
+
+    @functools.wraps(make)
+    def found(*given: P.args, **named: P.kwargs) -> T:
+        if given not in made:
+            with lock:
+                if given not in made:
+                    made[given] = make(*given, **named)
+        return made[given]
+
+    return found
+
 
 _PROLOGUE = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)
 
@@ -135,7 +157,7 @@ class Built:
 def default_options(parts: Sequence[Part], is_brief: bool = False) -> CodeOptions:
     """Return how to compile programs of this size on this machine; brief ones are run for short stretches at a time."""
     size = sum(part.program.size for part in parts)
-    return CodeOptions(level=1 if size <= (_BRIEF if is_brief else _SMALL) else 0, sincos=sincos_name())
+    return CodeOptions(level=1 if size <= (_BRIEF if is_brief else _SMALL) else 0)
 
 
 def build_code(
@@ -148,16 +170,17 @@ def build_code(
 ) -> Built:
     """Compile programs, or take them from the cache."""
     with stage("code"):
-        return within_time(lambda: _build(parts, options, exports, routines, cached))
+        return within_time(lambda: build_now(parts, options, exports, routines, cached))
 
 
-def _build(
+def build_now(
     parts: Sequence[Part],
     options: CodeOptions,
     exports: Sequence[str],
     routines: RoutineSource | None,
     cached: bool,
 ) -> Built:
+    """Do the same without looking at the clock."""
     names = [*exports, *(name for part in parts for name in (part.name, f"{part.name}_prologue"))]
     has_externals = any(node.operation == "external" for part in parts for node in part.program.nodes)
     store = default_cache() if cached and not has_externals else None
@@ -181,11 +204,20 @@ def _build(
     failures = Failures() if module.externals else None
     callbacks = _callbacks(module, failures) if failures is not None else {}
     addresses = {name: ctypes.cast(call, ctypes.c_void_p).value or 0 for name, call in callbacks.items()}
-    loaded = load_code(code, names, require_symbols(module.library) | addresses, tuple(callbacks.values()))
+    loaded = load_code(code, names, _own_addresses(module.functions) | addresses, tuple(callbacks.values()))
     if store is not None:
-        about = {"scratch": module.scratch, "library": module.library}
+        about = {"scratch": module.scratch, "functions": module.functions}
         store.write(key, json.dumps(about).encode() + b"\n" + code)
     return Built(loaded, module.scratch, False, failures)
+
+
+def _own_addresses(names: Sequence[str]) -> dict[str, int]:
+    """Return where elementary functions are, by what they are called in a module."""
+    if not names:
+        return {}
+    from atwood.codegen.llvm.own import own_functions
+
+    return {own_name(one): own_functions().addresses[own_name(one)] for one in names}
 
 
 def _from_cache(store: Cache, key: str, names: Sequence[str]) -> Built | None:
@@ -196,7 +228,7 @@ def _from_cache(store: Cache, key: str, names: Sequence[str]) -> Built | None:
     line, _, code = content.partition(b"\n")
     try:
         about = json.loads(line)
-        loaded = load_code(code, names, require_symbols(about["library"]), ())
+        loaded = load_code(code, names, _own_addresses(about["functions"]), ())
         return Built(loaded, int(about["scratch"]), True, None)
     except (ValueError, KeyError, TypeError, RuntimeError, UnsupportedError):
         return None
@@ -245,29 +277,6 @@ def _guard(function: ExternalFunction, failures: Failures) -> Callable[..., floa
             return float("nan")
 
     return guarded
-
-
-P = ParamSpec("P")
-T = TypeVar("T")
-
-
-def once(make: Callable[P, T]) -> Callable[P, T]:
-    """Return a function that makes something at its first call, and returns the same ever after.
-
-    Unlike `functools.cache` it makes it once even if several threads ask at the same time: code of which there are two,
-    one of them forgotten, would be taken out of memory while it runs.
-    """
-    lock, made = threading.RLock(), dict[tuple[object, ...], T]()
-
-    @functools.wraps(make)
-    def found(*given: P.args, **named: P.kwargs) -> T:
-        if given not in made:
-            with lock:
-                if given not in made:
-                    made[given] = make(*given, **named)
-        return made[given]
-
-    return found
 
 
 _PACKAGE = Path(__file__).parents[2]

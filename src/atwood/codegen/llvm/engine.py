@@ -1,7 +1,7 @@
 """LLVM itself: from a module's text to object code, and from object code to functions that can be called.
 
-Object code is what the cache keeps; loading it needs none of LLVM's work on code.  Names of the C library are bound
-to addresses when code is loaded, so that object code holds nothing of the process that made it.
+Object code is what the cache keeps; loading it needs none of LLVM's work on code.  Functions that it calls are
+bound to addresses when it is loaded, so that object code holds nothing of the process that made it.
 
 LLVM's objects are closed by name, not by their finalizers: whatever a finalizer raises is lost, Ctrl-C too, and LLVM
 works long enough on some of them for that to happen.
@@ -9,10 +9,8 @@ works long enough on some of them for that to happen.
 
 from __future__ import annotations
 
-import ctypes
 import itertools
 import os
-import sys
 import threading
 import weakref
 from collections import deque
@@ -21,8 +19,6 @@ from functools import cache, lru_cache
 
 import llvmlite
 from llvmlite import binding
-
-from atwood.errors import UnsupportedError
 
 _lock = threading.Lock()
 _numbers = itertools.count()
@@ -112,38 +108,6 @@ def load_code(
 
 
 @cache
-def find_symbol(name: str) -> int | None:
-    """Return the address of a function of the C library, or None if there is none of that name."""
-    found = binding.address_of_symbol(name)
-    if found:
-        return int(found)
-    for library in _libraries():
-        try:
-            return ctypes.cast(getattr(library, name), ctypes.c_void_p).value
-        except AttributeError:
-            continue
-    return None
-
-
-def require_symbols(names: Iterable[str]) -> dict[str, int]:
-    """Return the addresses of functions of the C library."""
-    addresses: dict[str, int] = {}
-    for name in names:
-        address = find_symbol(name)
-        if address is None:
-            raise UnsupportedError(f"the C library of this system has no function {name}")
-        addresses[name] = address
-    return addresses
-
-
-@cache
-def sincos_name() -> str:
-    """Return the C library's function for sine and cosine together, or an empty text if it has none."""
-    name = "__sincos" if sys.platform == "darwin" else "sincos"
-    return name if find_symbol(name) else ""
-
-
-@cache
 def target_description() -> tuple[str, ...]:
     """Return everything about this machine and LLVM that changes object code.
 
@@ -171,19 +135,3 @@ def _linker(_: int) -> binding.LLJIT:
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
     return binding.create_lljit_compiler()
-
-
-@cache
-def _libraries() -> tuple[ctypes.CDLL, ...]:
-    """Return the libraries in which the C library's functions can be, where LLVM does not find them in the process."""
-    if sys.platform == "win32":
-        names: list[str | None] = ["ucrtbase", "msvcrt"]
-    else:
-        names = [None, "libm.so.6"]  # the process itself, by the dynamic linker
-    found: list[ctypes.CDLL] = []
-    for name in names:
-        try:
-            found.append(ctypes.CDLL(name))
-        except OSError:
-            continue
-    return tuple(found)

@@ -20,7 +20,8 @@ from collections.abc import Sequence
 
 from atwood.codegen.llvm.layout import Body, Layout, Unit, lay_out, main_body, prologue_body
 from atwood.codegen.llvm.linear_systems import Solver
-from atwood.codegen.llvm.text import LIBRARY_FUNCTIONS, Needs, Writer
+from atwood.codegen.llvm.text import OWN_FUNCTIONS, Needs, Writer
+from atwood.codegen.routines import own_name
 from atwood.errors import UnsupportedError
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.operations import ExternalFunction
@@ -46,17 +47,10 @@ class CodeOptions:
         The number of operations in one function.
     level
         How hard LLVM works on the machine code, from 0 to 3.
-    sincos
-        The C library's function for sine and cosine together, empty where it has none.
-    contract
-        Whether a product and a sum may become one operation, which rounds once: faster, but the last digits are then
-        not those of every other machine.
     """
 
     longest_chunk: int = 150
     level: int = 1
-    sincos: str = ""
-    contract: bool = False
 
 
 @dataclass(frozen=True)
@@ -69,8 +63,8 @@ class ModuleText:
         The module.
     scratch
         The length of the scratch array that suits all its functions.
-    library
-        The functions of the C library that it calls.
+    functions
+        The elementary functions that it calls, by their names as operations.
     externals
         The functions in Python that it calls, as ``external.0`` and so on, each with its number of arguments.
     eliminates
@@ -79,7 +73,7 @@ class ModuleText:
 
     text: str
     scratch: int
-    library: tuple[str, ...]
+    functions: tuple[str, ...]
     externals: tuple[tuple[ExternalFunction, int], ...]
     eliminates: bool
 
@@ -127,19 +121,10 @@ def write_module(programs: Sequence[Part], options: CodeOptions) -> ModuleText:
             except UnsupportedError as error:
                 raise UnsupportedError(error.message, where=program.name) from None
         parts.append(_write_prologue(name))
-    if options.contract:
-        parts = [_contracted(text) for text in parts]
-    parts.extend(_declarations(needs, options.sincos))
+    parts.extend(_declarations(needs))
     return ModuleText(
-        "\n".join(parts), scratch, tuple(sorted(needs.library)), tuple(needs.externals), needs.elimination
+        "\n".join(parts), scratch, tuple(sorted(needs.functions)), tuple(needs.externals), needs.elimination
     )
-
-
-def _contracted(text: str) -> str:
-    """Return code in which products and sums may become one operation."""
-    for operation in ("fadd", "fsub", "fmul", "fneg"):
-        text = text.replace(f"= {operation} double", f"= {operation} contract double")
-    return text
 
 
 def _write_function(
@@ -164,7 +149,7 @@ def _write_function(
     pieces = [passed_on[k : k + _STORES] for k in cuts]
     alone = len(layout.chunks) == 1 and not pieces
     for number, chunk in enumerate(layout.chunks):
-        writer = Writer(places, options.sincos, needs, held if alone else frozenset())
+        writer = Writer(places, needs, held if alone else frozenset())
         solver.start_chunk()
         for unit in chunk:
             _write_unit(writer, solver, unit)
@@ -182,7 +167,7 @@ def _write_function(
             return [_as_function(name, writer)]
         parts.append(_as_chunk(f"{name}.{number}", writer))
     for piece in pieces:
-        writer = Writer(places, options.sincos, needs, frozenset())
+        writer = Writer(places, needs, frozenset())
         for node, target in piece:
             _write_result(writer, node, [target])
         parts.append(_as_chunk(f"{name}.{len(parts)}", writer))
@@ -283,14 +268,13 @@ def _write_prologue(name: str) -> str:
 }}"""
 
 
-def _declarations(needs: Needs, sincos: str) -> list[str]:
+def _declarations(needs: Needs) -> list[str]:
     """Return the declarations of what the module calls."""
-    lines = ["declare double @llvm.sqrt.f64(double)", "declare double @llvm.fabs.f64(double)"]
-    for name in sorted(needs.library):
-        if name == sincos:
-            lines.append(f"declare void @{name}(double, ptr, ptr) #0")
-        else:
-            lines.append(f"declare double @{name}({', '.join(['double'] * LIBRARY_FUNCTIONS[name])}) #0")
+    lines = [f"declare double @llvm.{name}.f64(double)" for name in ("sqrt", "fabs", "floor")]
+    for name in sorted(needs.functions):
+        kind, given = ("void", "double, ptr, ptr") if name == "sin_cos" else ("double", "")
+        given = given or ", ".join(["double"] * OWN_FUNCTIONS[name])
+        lines.append(f"declare {kind} @{own_name(name)}({given}) #0")
     for position, (_, count) in enumerate(needs.externals):
         lines.append(f"declare double @external.{position}({', '.join(['double'] * count)}) #0")
     return [*lines, "attributes #0 = { nounwind }", "!0 = !{}"]

@@ -7,6 +7,7 @@ written by hand.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from atwood.codegen.llvm.text import literal
 from atwood.codegen.routines import (
@@ -15,6 +16,7 @@ from atwood.codegen.routines import (
     CODE,
     INTEGER,
     NUMBER,
+    WORD,
     Block,
     Branch,
     Call,
@@ -27,7 +29,7 @@ from atwood.codegen.routines import (
     Value,
 )
 
-_TYPES: dict[Kind, str] = {NUMBER: "double", INTEGER: "i64", CODE: "i32", BOOLEAN: "i1", ADDRESS: "ptr"}
+_TYPES: dict[Kind, str] = {NUMBER: "double", INTEGER: "i64", WORD: "i64", CODE: "i32", BOOLEAN: "i1", ADDRESS: "ptr"}
 _CONVERTED: dict[Kind, str] = {CODE: "sext", INTEGER: "trunc"}
 _FLOATING = {"add": "fadd", "subtract": "fsub", "multiply": "fmul", "divide": "fdiv"}
 _WHOLE = {"add": "add", "subtract": "sub", "multiply": "mul", "divide": "sdiv", "and": "and", "or": "or"} | {
@@ -42,7 +44,7 @@ _COMPARED = {
     "equal": ("oeq", "eq"),
     "unequal": ("une", "ne"),
 }
-_MATH = {"sqrt": "sqrt", "size": "fabs", "floor": "floor", "fused": "fmuladd"}
+_MATH = {"sqrt": "sqrt", "size": "fabs", "floor": "floor"}
 _REDUCED = {  # the function of LLVM, what it returns, and what it takes first
     "sum of lanes": ("fadd", "double", "double -0.0, "),
     "largest lane": ("fmax", "nnan double", ""),
@@ -62,6 +64,7 @@ class _Printer:
 
     def __init__(self) -> None:
         self.declared: set[str] = set()
+        self.tables: dict[tuple[float, ...], str] = {}
         self.lines: list[str] = []
         self._labels = 0
         self._loops: dict[Loop, int] = {}
@@ -171,8 +174,12 @@ class _Printer:
                 return f"fptosi {_typed(a)} to i64"
             case "is null":
                 return f"icmp eq ptr {_name(a)}, null"
-            case "to number":
-                return f"sitofp i64 {_name(a)} to double"
+            case "to number" if a.kind is INTEGER or a.kind is CODE:
+                return f"sitofp {kind} {_name(a)} to double"
+            case "high" | "low" | "of words" | "pick" | "flip" | "to number":
+                return self._words(operation, result, values)
+            case "look up":
+                return self._look_up(result, a, values[1])
             case "to code" | "to integer":
                 word = _CONVERTED.get(a.kind, "zext")
                 return f"{word} {_typed(a)} to {_type(result.kind)}"
@@ -188,7 +195,7 @@ class _Printer:
             case _:
                 lanes = f"v{a.kind.count}" if isinstance(a.kind, Lanes) else ""
                 name = f"llvm.{_MATH[operation]}.{lanes}f64"
-                if lanes or operation == "floor":  # others of plain numbers every module declares
+                if lanes:  # those of plain numbers every module declares
                     self.declared.add(f"declare {kind} @{name}({', '.join([kind] * len(values))})")
                 return f"call {kind} @{name}({', '.join(map(_typed, values))})"
 
@@ -198,6 +205,54 @@ class _Printer:
         first = f"{_name(result)}.first"
         self.lines.append(f"  {first} = insertelement {kind} poison, {_typed(a)}, i32 0")
         return f"shufflevector {kind} {first}, {kind} poison, <{count} x i32> zeroinitializer"
+
+    def _words(self, operation: str, result: Value, values: tuple[Value, ...]) -> str:
+        """Return the last instruction of what is done with the bits of numbers."""
+        number = result if result.kind.is_float else values[0]
+        word = values[0] if result.kind.is_float else result
+        bits, kind, name = _type(word.kind), _type(number.kind), _name(result)
+
+        def constant(one: int) -> str:
+            return _name(Value(word.routine, word.kind, one))
+
+        def put(end: str, text: str) -> str:
+            self.lines.append(f"  {name}.{end} = {text}")
+            return f"{name}.{end}"
+
+        def bits_of(one: Value, end: str) -> str:
+            return put(end, f"bitcast {_typed(one)} to {bits}")
+
+        if operation == "high":
+            return f"lshr {bits} {bits_of(number, 'a')}, {constant(32)}"
+        if operation == "low":
+            return f"and {bits} {bits_of(number, 'a')}, {constant(2**32 - 1)}"
+        if operation == "to number":  # the word is the end of the bits of a number from 2^52 on
+            found = put("a", f"or {bits} {_name(word)}, {constant(0x433 << 52)}")
+            shifted = put("b", f"bitcast {bits} {found} to {kind}")
+            return f"fsub {kind} {shifted}, {_name(Value(word.routine, number.kind, 2.0**52))}"
+        if operation == "of words":
+            above = put("a", f"shl {bits} {_name(word)}, {constant(32)}")
+            found = put("b", f"or {bits} {above}, {_name(values[1])}")
+        elif operation == "flip":
+            sign = put("a", f"shl {bits} {_name(word)}, {constant(63)}")
+            found = put("b", f"xor {bits} {sign}, {bits_of(values[1], 'c')}")
+        else:
+            mask = put("a", f"sub {bits} {constant(0)}, {_name(word)}")
+            first, second = (bits_of(one, end) for one, end in zip(values[1:], "bc", strict=True))
+            changed = put("d", f"xor {bits} {first}, {second}")
+            kept = put("e", f"and {bits} {changed}, {mask}")
+            found = put("f", f"xor {bits} {kept}, {second}")
+        return f"bitcast {bits} {found} to {kind}"
+
+    def _look_up(self, result: Value, word: Value, table: Any) -> str:
+        kind = f"[{len(table)} x double]"
+        if table not in self.tables:
+            self.tables[table] = f"@table.{len(self.tables)}"
+            numbers = ", ".join(f"double {literal(one)}" for one in table)
+            self.declared.add(f"{self.tables[table]} = internal constant {kind} [{numbers}]")
+        place = f"{_name(result)}.place"
+        self.lines.append(f"  {place} = getelementptr {kind}, ptr {self.tables[table]}, i64 0, {_typed(word)}")
+        return f"load double, ptr {place}"
 
     def _copy(self, width: int, target: Value, source: Value, count: Value) -> None:
         self._labels += 1
@@ -220,7 +275,7 @@ class _Printer:
 
 def _type(kind: Kind) -> str:
     if isinstance(kind, Lanes):
-        return f"<{kind.count} x {'double' if kind.is_float else 'i1'}>"
+        return f"<{kind.count} x {'double' if kind.is_float else 'i64' if kind.is_word else 'i1'}>"
     return _TYPES[kind]
 
 
@@ -229,7 +284,9 @@ def _name(value: Value) -> str:
     if isinstance(name, str):
         return f"%{name}"
     if isinstance(value.kind, Lanes):
-        one = f"double {literal(name)}" if isinstance(name, float) else f"i1 {name}"
+        one = (
+            f"double {literal(name)}" if isinstance(name, float) else f"{'i64' if value.kind.is_word else 'i1'} {name}"
+        )
         return f"<{', '.join([one] * value.kind.count)}>"
     return literal(name) if isinstance(name, float) else str(name)
 

@@ -2,7 +2,7 @@
 
 The text is written directly, without objects for instructions: for tens of thousands of operations that is a
 good part of the time to compile.  No instruction carries a fast-math flag, so that nothing is reassociated or
-contracted, and every machine gives the same values except for what its C library returns.
+contracted, and functions are Atwood's own (`atwood.codegen.llvm.own`): every machine gives the same values.
 """
 
 from __future__ import annotations
@@ -11,17 +11,18 @@ import struct
 from collections.abc import Callable, Mapping
 from dataclasses import field
 
+from atwood.codegen.routines import own_name
 from atwood.errors import UnsupportedError
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.operations import ExternalFunction
 from atwood.lazy_dataclasses import dataclass
 
-LIBRARY_FUNCTIONS: Mapping[str, int] = dict.fromkeys(
-    ("sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh", "floor"), 1
+OWN_FUNCTIONS: Mapping[str, int] = dict.fromkeys(
+    ("sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh"), 1
 ) | {"atan2": 2, "pow": 2}
-"""Operations that the C library computes, where they have the same names, with the number of arguments."""
+"""Operations that functions of their own compute, with the number of arguments."""
 
-_INTRINSICS = {"sqrt": "@llvm.sqrt.f64", "absolute": "@llvm.fabs.f64"}
+_INTRINSICS = {"sqrt": "@llvm.sqrt.f64", "absolute": "@llvm.fabs.f64", "floor": "@llvm.floor.f64"}
 _ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 _COMPARISONS = {"less": "olt", "less_equal": "ole"}
 _LOGICAL = {"logical_and": "and", "logical_or": "or"}
@@ -42,15 +43,15 @@ class Needs:
 
     Attributes
     ----------
-    library
-        The functions of the C library.
+    functions
+        The elementary functions, by their names as operations.
     externals
         The functions in Python, each with its number of arguments and its position among them.
     elimination
         Whether there is a linear system that is not eliminated in registers.
     """
 
-    library: set[str] = field(default_factory=set)
+    functions: set[str] = field(default_factory=set)
     externals: dict[tuple[ExternalFunction, int], int] = field(default_factory=dict)
     elimination: bool = False
 
@@ -63,8 +64,6 @@ class Writer:
     ----------
     places
         Where known values and values of earlier chunks lie: the name of a pointer and a position.
-    sincos
-        The C library's function for sine and cosine together, empty where it has none.
     needs
         What is called.
     held
@@ -84,7 +83,6 @@ class Writer:
     """
 
     places: Mapping[int, tuple[str, int]]
-    sincos: str
     needs: Needs
     held: frozenset[str] = frozenset()
     lines: list[str] = field(default_factory=list)
@@ -154,8 +152,8 @@ class Writer:
             self.values[node.index] = self.put(f"{infix} double {self.value(a)}, {self.value(b)}")
         elif operation in _CONDITIONS:
             self.conditions[node.index] = self._truth(node)
-        elif operation in LIBRARY_FUNCTIONS:
-            self.values[node.index] = self._call_library(node)
+        elif operation in OWN_FUNCTIONS:
+            self.values[node.index] = self._call_own(node)
         elif operation == "external":
             self.values[node.index] = self._call_external(node)
         elif operation in _OTHER:
@@ -165,14 +163,11 @@ class Writer:
 
     def write_wave(self, sine: Expression, cosine: Expression) -> None:
         """Write the sine and the cosine of one argument."""
-        if not self.sincos:
-            self.write(sine)
-            self.write(cosine)
-            return
         argument = self.value(sine.arguments[0])
-        self.needs.library.add(self.sincos)
+        self.needs.functions.add("sin_cos")
         self.waves = True
-        self.lines.append(f"  call void @{self.sincos}(double {argument}, ptr %sine, ptr %cosine)")
+        name = own_name("sin_cos")
+        self.lines.append(f"  call void @{name}(double {argument}, ptr %sine, ptr %cosine)")
         self.values[sine.index] = self.put("load double, ptr %sine")
         self.values[cosine.index] = self.put("load double, ptr %cosine")
 
@@ -202,11 +197,11 @@ class Writer:
             return self.put(f"xor i1 {conditions[0]}, true")
         return self.put(f"{_LOGICAL[operation]} i1 {conditions[0]}, {conditions[1]}")
 
-    def _call_library(self, node: Expression) -> str:
+    def _call_own(self, node: Expression) -> str:
         name = node.operation
-        self.needs.library.add(name)
+        self.needs.functions.add(name)
         arguments = ", ".join(f"double {self.value(argument)}" for argument in node.arguments)
-        return self.put(f"call double @{name}({arguments})")
+        return self.put(f"call double @{own_name(name)}({arguments})")
 
     def _call_external(self, node: Expression) -> str:
         key = (node.payload, len(node.arguments))
@@ -249,6 +244,7 @@ _OTHER: dict[str, Callable[[Writer, Expression], str]] = {
     "neg": _negate,
     "sqrt": _intrinsic,
     "absolute": _intrinsic,
+    "floor": _intrinsic,
     "sign": _sign,
     "minimum": _choose,
     "maximum": _choose,
@@ -262,5 +258,5 @@ _ELSEWHERE = frozenset({"constant", "symbol", "solve", "component", "external"})
 def has_code(operation: str) -> bool:
     """Return whether there is machine code for an operation."""
     return operation in _OTHER or any(
-        operation in known for known in (_ARITHMETIC, _CONDITIONS, LIBRARY_FUNCTIONS, _ELSEWHERE)
+        operation in known for known in (_ARITHMETIC, _CONDITIONS, OWN_FUNCTIONS, _ELSEWHERE)
     )

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from atwood.clock import check_time
 from atwood.codegen.python.source import Flavour, write_function
 from atwood.errors import KernelEvaluationError
+from atwood.expr.core import elementary
 from atwood.expr.core.analysis import evaluate, live
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.operations import BINARY, UNARY, ExternalFunction, solve_floats, solve_or_nan
@@ -282,30 +283,14 @@ def _solve_samples(size: int, entries: Sequence[Any], right: Sequence[Any]) -> S
 
 
 _LIMITS = {"inf": math.inf, "nan": math.nan}
-_MATH = ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh", "atan2", "pow")
-_SAME_IN_NUMPY = (
-    "sqrt",
-    "sin",
-    "cos",
-    "tan",
-    "exp",
-    "log",
-    "sinh",
-    "cosh",
-    "tanh",
-    "absolute",
-    "sign",
-    "floor",
-    "where",
-)
-_LOGICAL = ("logical_and", "logical_or", "logical_not")
-_NUMPY = {name: name for name in (*_SAME_IN_NUMPY, *_LOGICAL)}
-_NUMPY |= {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2", "pow": "power"}
+_SAME_IN_NUMPY = ("sqrt", "absolute", "sign", "floor", "where", "logical_and", "logical_or", "logical_not")
 _NAMESPACES: dict[Flavour, dict[str, Any]] = {
     "fast": _LIMITS
-    | {name: getattr(math, name) for name in _MATH}
-    | {"absolute": abs, "sign": UNARY["sign"], "floor": UNARY["floor"], "solve": _solve},
+    | {**elementary.STRICT, "sqrt": math.sqrt, "absolute": abs, "sign": UNARY["sign"], "floor": UNARY["floor"]}
+    | {"solve": _solve},
     "careful": {**_LIMITS, **UNARY, **BINARY, "solve": solve_or_nan},
-    "vectorized": _LIMITS | {name: getattr(np, found) for name, found in _NUMPY.items()} | {"solve": _solve_samples},
+    "vectorized": _LIMITS
+    | {name: getattr(np, name) for name in _SAME_IN_NUMPY}
+    | {**elementary.ON_ARRAYS, "solve": _solve_samples},
 }
 """What the names in generated code mean."""

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from atwood.errors import AtwoodError
+from atwood.expr.core.elementary import ON_FLOATS
 
 if TYPE_CHECKING:
     from atwood.expr.core.graph import Expression
@@ -187,7 +188,9 @@ def multiply(a: Expression, b: Expression) -> Expression:
         return a.arguments[0]
     if a.operation == b.operation == "exp" and a is not b and not a.is_parametric and not b.is_parametric:
         power = add(a.arguments[0], b.arguments[0])  # one factor may be too large for a number where the product is not
-        return graph.constant(math.exp(power.payload)) if power.operation == "constant" else graph.node("exp", (power,))
+        if power.operation == "constant":
+            return graph.constant(ON_FLOATS["exp"](power.payload))
+        return graph.node("exp", (power,))
     if a.is_parametric != b.is_parametric:
         known, other = (a, b) if a.is_parametric else (b, a)
         inner, rest = _parametric_factor(other)

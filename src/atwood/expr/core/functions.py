@@ -17,6 +17,7 @@ import numpy as np
 from atwood.arguments import Kind, Refused, check, each, show, takes
 from atwood.errors import AtwoodError, KernelEvaluationError, UsageError
 from atwood.expr.core import algebra
+from atwood.expr.core.elementary import ON_ARRAYS, ON_FLOATS, STRICT
 from atwood.expr.core.graph import Expression, Graph
 from atwood.expr.core.operations import ExternalFunction, floor as _floor_of_float, sign as _sign_of_float, solve_floats
 from atwood.lazy_modules import sympy
@@ -63,7 +64,7 @@ def graph_of(*values: object) -> Graph | None:
     return None
 
 
-def _unary(operation: str, x: Scalar, on_float: Callable[[float], float], numpy_name: str, sympy_name: str) -> Scalar:
+def _unary(operation: str, x: Scalar, on_float: Callable[[float], float], sympy_name: str = "") -> Scalar:
     if isinstance(x, Expression):
         return algebra.unary(operation, x)
     if isinstance(x, (float, int)):
@@ -75,11 +76,12 @@ def _unary(operation: str, x: Scalar, on_float: Callable[[float], float], numpy_
             ) from None
     _checked(operation, x=x)
     if _is_sympy(x):
-        return getattr(sympy, sympy_name)(x)
+        return getattr(sympy, sympy_name or operation)(x)
     array = np.asarray(x)
     if array.dtype == object:
-        return _elementwise(lambda item: _unary(operation, item, on_float, numpy_name, sympy_name), array)
-    return getattr(np, numpy_name)(x)
+        return _elementwise(lambda item: _unary(operation, item, on_float, sympy_name), array)
+    on_arrays: Callable[[Any], Any] = ON_ARRAYS.get(operation) or getattr(np, operation)
+    return on_arrays(x)
 
 
 def _elementwise(function: Callable[..., Scalar], *arrays: Any) -> Scalar:
@@ -98,77 +100,77 @@ def is_zero(x: Scalar) -> bool:
 
 def sin(x: Scalar) -> Scalar:
     """Return the sine of an angle in radians."""
-    return _unary("sin", x, math.sin, "sin", "sin")
+    return _unary("sin", x, STRICT["sin"])
 
 
 def cos(x: Scalar) -> Scalar:
     """Return the cosine of an angle in radians."""
-    return _unary("cos", x, math.cos, "cos", "cos")
+    return _unary("cos", x, STRICT["cos"])
 
 
 def tan(x: Scalar) -> Scalar:
     """Return the tangent of an angle in radians."""
-    return _unary("tan", x, math.tan, "tan", "tan")
+    return _unary("tan", x, STRICT["tan"])
 
 
 def asin(x: Scalar) -> Scalar:
     """Return the angle in [-pi/2, pi/2] with the given sine."""
-    return _unary("asin", x, math.asin, "arcsin", "asin")
+    return _unary("asin", x, STRICT["asin"])
 
 
 def acos(x: Scalar) -> Scalar:
     """Return the angle in [0, pi] with the given cosine."""
-    return _unary("acos", x, math.acos, "arccos", "acos")
+    return _unary("acos", x, STRICT["acos"])
 
 
 def atan(x: Scalar) -> Scalar:
     """Return the angle in (-pi/2, pi/2) with the given tangent."""
-    return _unary("atan", x, math.atan, "arctan", "atan")
+    return _unary("atan", x, STRICT["atan"])
 
 
 def sqrt(x: Scalar) -> Scalar:
     """Return the square root."""
-    return _unary("sqrt", x, math.sqrt, "sqrt", "sqrt")
+    return _unary("sqrt", x, math.sqrt)
 
 
 def exp(x: Scalar) -> Scalar:
     """Return e to the power x."""
-    return _unary("exp", x, math.exp, "exp", "exp")
+    return _unary("exp", x, STRICT["exp"])
 
 
 def log(x: Scalar) -> Scalar:
     """Return the natural logarithm."""
-    return _unary("log", x, math.log, "log", "log")
+    return _unary("log", x, STRICT["log"])
 
 
 def sinh(x: Scalar) -> Scalar:
     """Return the hyperbolic sine."""
-    return _unary("sinh", x, math.sinh, "sinh", "sinh")
+    return _unary("sinh", x, STRICT["sinh"])
 
 
 def cosh(x: Scalar) -> Scalar:
     """Return the hyperbolic cosine."""
-    return _unary("cosh", x, math.cosh, "cosh", "cosh")
+    return _unary("cosh", x, STRICT["cosh"])
 
 
 def tanh(x: Scalar) -> Scalar:
     """Return the hyperbolic tangent."""
-    return _unary("tanh", x, math.tanh, "tanh", "tanh")
+    return _unary("tanh", x, STRICT["tanh"])
 
 
 def absolute(x: Scalar) -> Scalar:
     """Return the absolute value."""
-    return _unary("absolute", x, abs, "absolute", "Abs")
+    return _unary("absolute", x, abs, "Abs")
 
 
 def sign(x: Scalar) -> Scalar:
     """Return -1, 0 or 1."""
-    return _unary("sign", x, _sign_of_float, "sign", "sign")
+    return _unary("sign", x, _sign_of_float)
 
 
 def floor(x: Scalar) -> Scalar:
     """Return the largest whole number that is not above a value; ``x // y`` and ``x % y`` are written with it."""
-    return _unary("floor", x, _floor_of_float, "floor", "floor")
+    return _unary("floor", x, _floor_of_float)
 
 
 def atan2(y: Scalar, x: Scalar) -> Scalar:
@@ -179,9 +181,9 @@ def atan2(y: Scalar, x: Scalar) -> Scalar:
     if _is_sympy(y) or _is_sympy(x):
         return sympy.atan2(y, x)
     if isinstance(y, (float, int)) and isinstance(x, (float, int)):
-        return math.atan2(y, x)
+        return ON_FLOATS["atan2"](y, x)
     _checked("atan2", y=y, x=x)
-    return _elementwise(atan2, y, x) if _holds_objects(y, x) else np.arctan2(y, x)
+    return _elementwise(atan2, y, x) if _holds_objects(y, x) else ON_ARRAYS["atan2"](y, x)
 
 
 def minimum(a: Scalar, b: Scalar) -> Scalar:

@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 from atwood.arguments import CALLBACK, NAME, check_fields, each, instance, optional, takes_names
+from atwood.expr.core.elementary import FLOATS, ON_FLOATS
 from atwood.lazy_dataclasses import dataclass
 
 INF = math.inf
@@ -56,25 +57,6 @@ def divide(a: float, b: float) -> float:
         return math.copysign(INF, a) * math.copysign(1.0, b)
 
 
-def power(a: float, b: float) -> float:
-    """Return ``a ** b`` for real results, ``nan`` where there is none."""
-    try:
-        return math.pow(a, b)
-    except OverflowError:
-        return -INF if a < 0.0 and b % 2.0 == 1.0 else INF
-    except ValueError:
-        if a == 0.0 and b < 0.0:
-            return math.copysign(INF, a) if b % 2.0 == 1.0 else INF
-        return NAN
-
-
-def logarithm(a: float) -> float:
-    """Return the natural logarithm, minus infinity at zero and ``nan`` below."""
-    if a > 0.0:
-        return math.log(a)
-    return -INF if a == 0.0 else NAN
-
-
 def sign(a: float) -> float:
     """Return -1, 0 or 1 (``nan`` for ``nan``)."""
     return 1.0 if a > 0.0 else -1.0 if a < 0.0 else a * 0.0
@@ -95,40 +77,14 @@ def maximum(a: float, b: float) -> float:
     return a if a >= b else b
 
 
-def _guarded(function: Callable[[float], float], overflow: Callable[[float], float]) -> Callable[[float], float]:
-    def value(a: float) -> float:
-        try:
-            return function(a)
-        except ValueError:
-            return NAN
-        except OverflowError:
-            return overflow(a)
-
-    return value
-
-
-def _plain(function: Callable[[float], float]) -> Callable[[float], float]:
-    return _guarded(function, lambda a: INF)
-
-
 UNARY: Mapping[str, Callable[[float], float]] = {
     "neg": lambda a: -a,
-    "sqrt": _plain(math.sqrt),
-    "sin": _plain(math.sin),
-    "cos": _plain(math.cos),
-    "tan": _plain(math.tan),
-    "asin": _plain(math.asin),
-    "acos": _plain(math.acos),
-    "atan": math.atan,
-    "exp": _plain(math.exp),
-    "log": logarithm,
-    "sinh": _guarded(math.sinh, lambda a: math.copysign(INF, a)),
-    "cosh": _plain(math.cosh),
-    "tanh": math.tanh,
+    "sqrt": FLOATS.sqrt,
     "absolute": abs,
     "sign": sign,
     "floor": floor,
     "logical_not": lambda a: 1.0 if a == 0.0 else 0.0,
+    **{name: call for name, call in ON_FLOATS.items() if name not in ("atan2", "pow")},
 }
 """Operations of one argument."""
 
@@ -137,8 +93,8 @@ BINARY: Mapping[str, Callable[[float, float], float]] = {
     "sub": lambda a, b: a - b,
     "mul": lambda a, b: a * b,
     "div": divide,
-    "pow": power,
-    "atan2": math.atan2,
+    "pow": ON_FLOATS["pow"],
+    "atan2": ON_FLOATS["atan2"],
     "minimum": minimum,
     "maximum": maximum,
     "less": lambda a, b: 1.0 if a < b else 0.0,

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.codegen.llvm.build import RoutineSource, build_code, default_options
+from atwood.codegen.llvm.build import RoutineSource, build_code
 from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.codegen.routines import ADDRESS, NUMBER, Routine, Value, call_kernel, place_of
 from atwood.expr import Program
@@ -187,7 +187,7 @@ class CompiledComposition:
         n = len(forces.inputs[1].symbols)
         self.order, self.layout = order, Layout(n, n, 1, False, False)
         parts = [Part("kernel", forces), Part("flow", velocities)]
-        options = CodeOptions(level=2, sincos=default_options(parts).sincos)
+        options = CodeOptions(level=2)
         routines = composition_source(self.layout, order)
         self._built = build_code(parts, options, exports=FUNCTIONS, routines=routines)
         self.functions = bind_steps(self._built)

@@ -55,7 +55,7 @@ class CompiledGauss:
         self.layout = Layout(n, speeds, order // 2, len(equations.outputs) > 2, len(equations.inputs) > 3)
         part = Part("kernel", equations)
         level = max(2, default_options([part]).level) if equations.size < _LARGE else default_options([part]).level
-        options = CodeOptions(level=level, sincos=default_options([part]).sincos)
+        options = CodeOptions(level=level)
         self._built = build_code([part], options, exports=FUNCTIONS, routines=gauss_source(self.layout, order))
         self.functions = bind_steps(self._built)
         self._equations = equations

@@ -48,7 +48,7 @@ from atwood.integrators.stepper import (
     open_routine as session_routine,
     routines_of,
 )
-from atwood.lazy_dataclasses import dataclass, replace
+from atwood.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from atwood.expr.series.taylor import TaylorPrograms
@@ -202,7 +202,7 @@ class CompiledRecurrences:
         self.size = len(programs.start.inputs[1].symbols)
         order = Part("order", programs.order, positions(programs.pairs, programs.squares, self.size), LANES, _PACKED)
         parts = [Part("start", programs.start), order]
-        self.built = build_code(parts, replace(default_options(parts), contract=True))
+        self.built = build_code(parts, default_options(parts))
         self.addresses = self.built.code.addresses
         self.layout = _Layout(self)
 

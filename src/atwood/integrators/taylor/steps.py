@@ -178,12 +178,12 @@ def _horner(r: Routine, m: Memory, j: Value, share: Value) -> tuple[Value, Value
     value, turn, k = r.variable(m.lanes(m.row(order), j), _PART), r.variable(0.0, _PART), r.variable(order - 1, INTEGER)
     with r.forever() as terms:
         now = value.now
-        turn.now = r.fused(turn.now, share, now)
-        value.now = r.fused(now, share, m.lanes(m.row(k.now), j))
+        turn.now = turn.now * share + now
+        value.now = now * share + m.lanes(m.row(k.now), j)
         k.now = k.now - 1
         with r.when(k.now <= 0):
             r.leave(terms)
-    return value.now * share, r.fused(turn.now, share, value.now)
+    return value.now * share, turn.now * share + value.now
 
 
 def _move() -> Routine:
@@ -345,7 +345,7 @@ def _row(block: Value, order: int) -> Value:
 
 def _with(r: Routine, total: Value | None, a: Value, b: Value) -> Value:
     """Return a sum with one product more."""
-    return a * b if total is None else r.fused(a, b, total)
+    return a * b if total is None else a * b + total
 
 
 def _total(r: Routine, products: Products) -> Value | None:
@@ -355,7 +355,7 @@ def _total(r: Routine, products: Products) -> Value | None:
         if i < _CHAINS:
             chains.append(a * b)
         else:
-            chains[i % _CHAINS] = r.fused(a, b, chains[i % _CHAINS])
+            chains[i % _CHAINS] = a * b + chains[i % _CHAINS]
     while len(chains) > 1:
         pairs = [chains[i : i + 2] for i in range(0, len(chains), 2)]
         chains = [one[0] + one[1] if len(one) == 2 else one[0] for one in pairs]

@@ -9,7 +9,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.codegen.javascript.printer import BITS, print_routines
-from atwood.codegen.javascript.program import FUNCTIONS, print_program
+from atwood.codegen.javascript.program import print_functions, print_program
 from atwood.codegen.llvm.linear_systems import write_elimination
 from atwood.errors import AtwoodError
 from atwood.expr import (
@@ -133,7 +133,7 @@ class ModeText:
         judges = write_guard("judge") if "judge" in self.programs else []
         contact = write_sets() if "contacts" in self.programs else []
         routines = [*write_elimination(), *write_rates(n, m, given, projects), *judges, *contact]
-        texts = [FUNCTIONS, BITS, print_routines(routines)]
+        texts = [BITS, print_functions(self.programs.values()), print_routines(routines)]
         words = self.data["words"] = {}
         for name, program in self.programs.items():
             text, scratch = print_program(name, program)
