@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Lanes, Routine, own_name
-from atwood.expr.core.elementary import FUNCTIONS, atan2_far, power_far, sin_cos, sin_cos_far, tan_far
+from atwood.expr.core.elementary import FUNCTIONS, atan2_far, cos_far, power_far, sin_cos, sin_cos_far, sin_far, tan_far
 
 _FAR: Mapping[str, Callable[..., tuple[Any, ...]]] = {
-    "sin": sin_cos_far,
-    "cos": sin_cos_far,
+    "sin": sin_far,
+    "cos": cos_far,
     "sin_cos": sin_cos_far,
     "tan": tan_far,
     "atan": atan2_far,

@@ -487,6 +487,17 @@ class Routine:
         kind = Lanes(word.kind.count) if isinstance(word.kind, Lanes) else NUMBER
         return self.put("pick", kind, word, self.value(a, kind), self.value(b, kind))
 
+    def either(self, word: Value, a: Callable[[], Value], b: Callable[[], Value]) -> Value:
+        """Return what the first function gives where a word is 1, else of the second; lanes take both."""
+        if isinstance(word.kind, Lanes):
+            return self.pick(word, a(), b())
+        found = self.variable(0.0)
+        with self.when(word == 1):
+            found.now = a()
+        with self.otherwise():
+            found.now = b()
+        return found.now
+
     def flip(self, word: Value, a: Operand) -> Value:
         """Return a number, with the other sign where a word is 1 and not 0."""
         kind = Lanes(word.kind.count) if isinstance(word.kind, Lanes) else NUMBER

@@ -134,6 +134,11 @@ class Floats:
         """Return an element of a table."""
         return table[position]
 
+    @staticmethod
+    def either(word: int, a: Callable[[], float], b: Callable[[], float]) -> float:
+        """Return what the first function gives where a word is 1, and the second where it is 0."""
+        return a() if word else b()
+
     def unless(
         self,
         usual: bool,
@@ -236,25 +241,38 @@ def _reduced_far(m: Arithmetic, x: Operand) -> tuple[Operand, Operand, Operand]:
     return quarters, m.flip(sign, found) + none, m.flip(sign, rest)
 
 
-def _waves(
-    m: Arithmetic, reduced: tuple[Operand, Operand, Operand]
-) -> tuple[Operand, Operand, tuple[Operand, Operand], tuple[Operand, Operand]]:
-    """Return two bits of the quarter turns, and sine and cosine of the rest, each as a number less a small one."""
-    quarters, r, rest = reduced
+def _sine(r: Operand, rest: Operand) -> tuple[Operand, Operand]:
+    """Return the sine of what is left of an angle, as a number less a small one."""
     z = r * r
     w, v = z * z, z * r
     s = (_SINE[1] + z * (_SINE[2] + z * _SINE[3])) + z * w * (_SINE[4] + z * _SINE[5])
-    sine = (z * (0.5 * rest - v * s) - rest) - v * _SINE[0]
+    return r, (z * (0.5 * rest - v * s) - rest) - v * _SINE[0]
+
+
+def _cosine(r: Operand, rest: Operand) -> tuple[Operand, Operand]:
+    """Return the cosine of what is left of an angle, as a number less a small one."""
+    z = r * r
+    w = z * z
     c = z * (_COSINE[0] + z * (_COSINE[1] + z * _COSINE[2])) + w * w * (_COSINE[3] + z * (_COSINE[4] + z * _COSINE[5]))
     half = 0.5 * z
     one = 1.0 - half
-    return quarters & 1, (quarters >> 1) & 1, (r, sine), (one, (half - (1.0 - one)) - (z * c - r * rest))
+    return one, (half - (1.0 - one)) - (z * c - r * rest)
+
+
+def _wave_of(m: Arithmetic, reduced: tuple[Operand, Operand, Operand], turned: int) -> tuple[Operand]:
+    """Return the sine of an angle, or of one so many quarter turns on: alone, it needs one of two polynomials."""
+    quarters, *r = reduced
+    quarters = quarters + turned
+    found = m.either(quarters & 1, *(lambda wave=wave: (lambda a, b: a - b)(*wave(*r)) for wave in (_cosine, _sine)))
+    return (m.flip((quarters >> 1) & 1, found),)
 
 
 def _sin_cos_of(m: Arithmetic, reduced: tuple[Operand, Operand, Operand]) -> tuple[Operand, Operand]:
-    odd, half, (r, sine), (one, cosine) = _waves(m, reduced)
-    s, c = r - sine, one - cosine
-    return m.flip(half, m.pick(odd, c, s)), m.flip((half + odd) & 1, m.pick(odd, s, c))
+    quarters, *r = reduced
+    (s, s_less), (c, c_less) = _sine(*r), _cosine(*r)
+    s, c, odd = s - s_less, c - c_less, quarters & 1
+    turned = (quarters >> 1) & 1, ((quarters + 1) >> 1) & 1
+    return m.flip(turned[0], m.pick(odd, c, s)), m.flip(turned[1], m.pick(odd, s, c))
 
 
 def sin_cos_far(m: Arithmetic, x: Operand) -> tuple[Operand, Operand]:
@@ -268,8 +286,34 @@ def sin_cos(m: Arithmetic, x: Operand) -> tuple[Operand, Operand]:
     return found
 
 
+def _wave(m: Arithmetic, x: Operand, turned: int, far: Callable[..., tuple[Operand]]) -> tuple[Operand]:
+    found: tuple[Operand] = m.unless(m.size(x) <= _FAR, lambda: _wave_of(m, _reduced(m, x), turned), far, x)
+    return found
+
+
+def sin_far(m: Arithmetic, x: Operand) -> tuple[Operand]:
+    """Return the sine of a large angle, or of what is none."""
+    return _wave_of(m, _reduced_far(m, x), 0)
+
+
+def cos_far(m: Arithmetic, x: Operand) -> tuple[Operand]:
+    """Return the cosine of a large angle, or of what is none."""
+    return _wave_of(m, _reduced_far(m, x), 1)
+
+
+def sin(m: Arithmetic, x: Operand) -> tuple[Operand]:
+    """Return the sine of an angle."""
+    return _wave(m, x, 0, sin_far)
+
+
+def cos(m: Arithmetic, x: Operand) -> tuple[Operand]:
+    """Return the cosine of an angle."""
+    return _wave(m, x, 1, cos_far)
+
+
 def _tan_of(m: Arithmetic, reduced: tuple[Operand, Operand, Operand]) -> tuple[Operand]:
-    odd, _, sine, cosine = _waves(m, reduced)
+    quarters, *r = reduced
+    odd, sine, cosine = quarters & 1, _sine(*r), _cosine(*r)
     top, top_rest = (m.pick(odd, b, a) for a, b in zip(sine, cosine, strict=True))
     bottom, bottom_rest = (m.pick(odd, a, b) for a, b in zip(sine, cosine, strict=True))
     n, d = top - top_rest, bottom - bottom_rest
@@ -554,16 +598,6 @@ def power(m: Arithmetic, a: Operand, b: Operand) -> tuple[Operand]:
     usual = (a > 0.0) & (a < math.inf) & (m.size(b) < math.inf)
     found: tuple[Operand] = m.unless(usual, lambda: (_power_of(m, a, b),), power_far, a, b)
     return found
-
-
-def sin(m: Arithmetic, x: Operand) -> tuple[Operand]:
-    """Return the sine of an angle."""
-    return (sin_cos(m, x)[0],)
-
-
-def cos(m: Arithmetic, x: Operand) -> tuple[Operand]:
-    """Return the cosine of an angle."""
-    return (sin_cos(m, x)[1],)
 
 
 FUNCTIONS: Mapping[str, Callable[..., tuple[Operand, ...]]] = {
