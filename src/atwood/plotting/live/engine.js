@@ -8,6 +8,7 @@ const HELD = 1e-6;                              // what constraints may miss, in
 const MET = 1e-7;                               // the same of what a start is to fulfil
 const LOW = 0.3, NEARBY = 0.1, SINGULAR = 1e-3; // shares of the most that was left of constraints
 const ROUNDING = 2 ** -52;
+const norm = a => Math.sqrt(a.reduce((sum, one) => sum + one * one, 0));   // Math.hypot differs from browser to browser
 const RELATED = {less: x => +(x < 0), less_equal: x => +(x <= 0), nonzero: x => +(x !== 0), sign: Math.sign, floor: Math.floor};
 
 const status = (code, text = "") => ({code, text});
@@ -24,12 +25,12 @@ function near(word, known) {
 // The shortest x with rows x = right: rows are made square to each other, the largest first; what follows is left out.
 function leastNorm(rows, right) {
   const left = rows.map((row, i) => {
-    const size = Math.hypot(...row) || 1;
+    const size = norm(row) || 1;
     return {row: row.map(x => x / size), value: right[i] / size};
   });
   const found = new Float64Array(rows.length ? rows[0].length : 0);
   while (left.length) {
-    const sizes = left.map(one => Math.hypot(...one.row)), best = sizes.indexOf(Math.max(...sizes));
+    const sizes = left.map(one => norm(one.row)), best = sizes.indexOf(Math.max(...sizes));
     if (!(sizes[best] > 1e-10)) break;
     const [chosen] = left.splice(best, 1), q = chosen.row.map(x => x / sizes[best]), value = chosen.value / sizes[best];
     q.forEach((x, j) => { found[j] += value * x; });
@@ -202,7 +203,7 @@ function openMode(mode, options) {
 
   function normalize(state) {
     for (const turn of data.turns) {
-      const length = Math.hypot(...turn.map(i => state[i]));
+      const length = norm(turn.map(i => state[i]));
       for (const i of turn) state[i] /= length;
     }
     return state;
@@ -499,7 +500,7 @@ function findStart(mode, start, t) {
   const offset = (one, x) => (one.wrapped ? x - 2 * Math.PI * Math.round(x / (2 * Math.PI)) : x);
   const normalize = q => {
     for (const turn of start.turns) {
-      const length = Math.hypot(...turn.map(i => q[i]));
+      const length = norm(turn.map(i => q[i]));
       for (const i of turn) q[i] /= length;
     }
     return q;
@@ -578,7 +579,7 @@ function bodiesOf(mode, t, state) {
   if (!mode.call("maximal", t)) return null;
   const q = Float64Array.from(mode.output("maximal", 0));
   for (const turn of turns) {
-    const length = Math.hypot(...turn.map(i => q[i]));
+    const length = norm(turn.map(i => q[i]));
     for (const i of turn) q[i] /= length;
   }
   return [q, Float64Array.from(mode.output("maximal", 1))];
@@ -629,7 +630,7 @@ function stateOf(mode, t, guess, q, u) {
     if (!mode.call("maximal", t)) return null;
     const found = Float64Array.from(mode.output("maximal", 0)), drift = Float64Array.from(mode.output("maximal", 1));
     for (const turn of turns) {
-      const length = Math.hypot(...turn.map(i => found[i])), same = turn.reduce((sum, i) => sum + found[i] * q[i], 0);
+      const length = norm(turn.map(i => found[i])), same = turn.reduce((sum, i) => sum + found[i] * q[i], 0);
       for (const i of turn) [found[i], signs[i]] = [found[i] / length, same < 0 ? -1 : 1];
     }
     const rows = mode.matrix(mode.output("maximal", 2), slopes, sizes.length, own);
@@ -990,7 +991,7 @@ function createEngine(model, options = {}) {
       mode.M.fill(0, mode.y + n, mode.y + n + m);
       return mode.call("places", time) ? Array.from(mode.output("places", 1).slice(3 * at, 3 * at + 3)) : null;
     };
-    const apart = place => Math.hypot(...place.map((x, i) => x - target[i]));
+    const apart = place => norm(place.map((x, i) => x - target[i]));
     const held = mode.data.contacts?.places.flat() ?? [], kept = held.map(i => mode.values[i]);
     const hold = values => { held.forEach((i, k) => { mode.values[i] = values[k]; }); mode.fill(); };
     if (opens && held.length) hold(held.map(() => 0)); // first as if nothing touched, then along what does
