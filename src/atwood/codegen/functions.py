@@ -6,7 +6,18 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Lanes, Routine, own_name
-from atwood.expr.core.elementary import FUNCTIONS, atan2_far, cos_far, power_far, sin_cos, sin_cos_far, sin_far, tan_far
+from atwood.expr.core.elementary import (
+    FUNCTIONS,
+    atan2_far,
+    cos_far,
+    exp_far,
+    log_far,
+    power_far,
+    sin_cos,
+    sin_cos_far,
+    sin_far,
+    tan_far,
+)
 
 _FAR: Mapping[str, Callable[..., tuple[Any, ...]]] = {
     "sin": sin_far,
@@ -15,6 +26,8 @@ _FAR: Mapping[str, Callable[..., tuple[Any, ...]]] = {
     "tan": tan_far,
     "atan": atan2_far,
     "atan2": atan2_far,
+    "exp": exp_far,
+    "log": log_far,
     "pow": power_far,
 }
 """What functions call for arguments that are rare."""

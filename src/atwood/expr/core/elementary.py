@@ -26,7 +26,7 @@ Arithmetic: TypeAlias = Any
 _ROUNDER = 1.5 * 2.0**52
 """Added to a number below 2^51, it leaves the nearest whole number in the low bits."""
 
-_FAR = 1e6
+_FAR, _LARGE = 1e6, 700.0
 _HALF_PI = (1.5707963267341256, 6.077100506303966e-11, 2.0222662487111665e-21, 8.4784276603689e-32)
 """Half a turn over two: three parts of 33 bits, whose products with whole numbers to 2^20 are exact, and the rest."""
 
@@ -444,6 +444,11 @@ def _scaled(m: Arithmetic, a: Operand, k: Operand) -> Operand:
     return a * m.of_words((half - 1) << 20, 0) * m.of_words((power - half - 1) << 20, 0)
 
 
+def _power_of_two(m: Arithmetic, k: Operand) -> Operand:
+    """Return two to the power of a whole number, where that is a normal number."""
+    return m.of_words(m.low(k + (_ROUNDER + 1023.0)) << 20, 0)
+
+
 def _exponential(m: Arithmetic, x: Operand) -> tuple[Operand, Operand, Operand]:
     """Return the exponential as two terms and the power of two that they are to be multiplied by."""
     k = (x * 1.4426950408889634 + _ROUNDER) - _ROUNDER
@@ -454,26 +459,48 @@ def _exponential(m: Arithmetic, x: Operand) -> tuple[Operand, Operand, Operand]:
     return one, ((1.0 - one) + r) + (missed + r * r * _polynomial(r, _EXP)), k
 
 
-def exp(m: Arithmetic, x: Operand) -> tuple[Operand]:
-    """Return the exponential."""
+def exp_far(m: Arithmetic, x: Operand) -> tuple[Operand]:
+    """Return an exponential that may be no finite number, or a denormal one."""
     one, rest, k = _exponential(m, m.choose(x > 710.0, 710.0, m.choose(x < -746.0, -746.0, x)))
     return (_scaled(m, one + rest, k),)
 
 
-def log(m: Arithmetic, x: Operand) -> tuple[Operand]:
-    """Return the natural logarithm."""
-    is_tiny = x < 2.0**-1022
-    normal = m.choose(is_tiny, x * 2.0**54, x)
-    high = m.high(normal) + (0x3FF00000 - 0x3FE6A09E)
-    f = m.of_words((high & 0xFFFFF) + 0x3FE6A09E, m.low(normal)) - 1.0
-    k = m.as_number(high >> 20) - m.choose(is_tiny, 1077.0, 1023.0)
+def _exp_of(m: Arithmetic, x: Operand) -> tuple[Operand]:
+    one, rest, k = _exponential(m, x)
+    return ((one + rest) * _power_of_two(m, k),)
+
+
+def exp(m: Arithmetic, x: Operand) -> tuple[Operand]:
+    """Return the exponential."""
+    found: tuple[Operand] = m.unless(m.size(x) <= _LARGE, lambda: _exp_of(m, x), exp_far, x)
+    return found
+
+
+def _log_of(m: Arithmetic, x: Operand, shift: Operand) -> Operand:
+    """Return the natural logarithm of a normal number, less what the shift of its exponent stands for."""
+    high = m.high(x) + (0x3FF00000 - 0x3FE6A09E)
+    f = m.of_words((high & 0xFFFFF) + 0x3FE6A09E, m.low(x)) - 1.0
+    k = m.as_number(high >> 20) - shift
     half = 0.5 * f * f
     s = f / (2.0 + f)
     z = s * s
     r = z * _polynomial(z, _LOG)
-    found = k * _LN2 - ((half - (s * (half + r) + k * _LN2_REST)) - f)
+    return k * _LN2 - ((half - (s * (half + r) + k * _LN2_REST)) - f)
+
+
+def log_far(m: Arithmetic, x: Operand) -> tuple[Operand]:
+    """Return the natural logarithm of a denormal number, or of what has none that is finite."""
+    is_tiny = x < 2.0**-1022
+    found = _log_of(m, m.choose(is_tiny, x * 2.0**54, x), m.choose(is_tiny, 1077.0, 1023.0))
     outside = m.choose(x == 0.0, -math.inf, math.nan)
     return (m.choose(x > 0.0, m.choose(x < math.inf, found, x), outside),)
+
+
+def log(m: Arithmetic, x: Operand) -> tuple[Operand]:
+    """Return the natural logarithm."""
+    usual = (x >= 2.0**-1022) & (x < math.inf)
+    found: tuple[Operand] = m.unless(usual, lambda: (_log_of(m, x, 1023.0),), log_far, x)
+    return found
 
 
 def _hyperbolic(m: Arithmetic, size: Operand) -> tuple[Operand, Operand, Operand, Operand]:
@@ -504,7 +531,7 @@ def tanh(m: Arithmetic, x: Operand) -> tuple[Operand]:
     """Return the hyperbolic tangent."""
     size = m.size(x)
     one, rest, k = _exponential(m, 2.0 * m.choose(size > 20.0, 20.0, size))
-    power = m.of_words((m.low(k + (_ROUNDER + 1023.0))) << 20, 0)
+    power = _power_of_two(m, k)
     found = one + rest
     above = found * power
     d = above + 1.0
@@ -517,18 +544,15 @@ def tanh(m: Arithmetic, x: Operand) -> tuple[Operand]:
     return (m.flip(m.high(x) >> 31, m.choose(size < 0.625, small, large)),)
 
 
-def _logarithm_of_two(m: Arithmetic, x: Operand) -> tuple[Operand, Operand]:
-    """Return the logarithm to the base of 2 of a positive number, as its first bits and the rest."""
-    is_tiny = x < 2.0**-1022
-    normal = m.choose(is_tiny, x * 2.0**54, x)
-    high = m.high(normal)
-    mantissa = m.of_words((high & 0xFFFFF) + 0x3FF00000, m.low(normal))
-    exponent = m.as_number(high >> 20) - m.choose(is_tiny, 1077.0, 1023.0)
+def _logarithm_of_two(m: Arithmetic, x: Operand, shift: Operand) -> tuple[Operand, Operand]:
+    """Return the logarithm to the base of 2 of a normal number, as its first bits and the rest, less a shift."""
+    high = m.high(x)
+    mantissa = m.of_words((high & 0xFFFFF) + 0x3FF00000, m.low(x))
+    exponent = m.as_number(high >> 20) - shift
     is_large = mantissa > 1.7320508075688772
-    is_middle = mantissa > 1.2247448713915890
     a = m.choose(is_large, 0.5 * mantissa, mantissa)
     n = m.choose(is_large, exponent + 1.0, exponent)
-    is_above = m.choose(is_large, 0.0, m.choose(is_middle, 1.0, 0.0)) == 1.0
+    is_above = a > 1.2247448713915890
     base = m.choose(is_above, 1.5, 1.0)
     u, below = a - base, a + base
     inverse = 1.0 / below
@@ -553,14 +577,15 @@ def _logarithm_of_two(m: Arithmetic, x: Operand) -> tuple[Operand, Operand]:
     return found, z_rest - (((found - n) - middle) - z)
 
 
-def _power_of(m: Arithmetic, a: Operand, b: Operand) -> Operand:
-    """Return a positive number to a finite power."""
-    first, rest = _logarithm_of_two(m, a)
+def _exponent_of(m: Arithmetic, a: Operand, b: Operand, shift: Operand) -> tuple[Operand, Operand]:
+    """Return the logarithm of a power to the base of 2, as two terms."""
+    first, rest = _logarithm_of_two(m, a, shift)
     coarse = _coarse(m, b)
-    p_rest, p = (b - coarse) * first + b * rest, coarse * first
-    total = p + p_rest
-    p = m.choose(total > 1100.0, 1100.0, m.choose(total < -1100.0, -1100.0, p))
-    p_rest = m.choose(m.size(total) <= 1100.0, p_rest, 0.0)
+    return coarse * first, (b - coarse) * first + b * rest
+
+
+def _power_from(m: Arithmetic, p: Operand, p_rest: Operand) -> tuple[Operand, Operand]:
+    """Return a number and a whole one: the power of two with a sum as exponent is the first times two to the other."""
     k = ((p + p_rest) + _ROUNDER) - _ROUNDER
     p = p - k
     t = _coarse(m, p_rest + p)
@@ -569,7 +594,16 @@ def _power_of(m: Arithmetic, a: Operand, b: Operand) -> Operand:
     z = u + v
     w = v - (z - u)
     one = 1.0 + z
-    return _scaled(m, one + (((1.0 - one) + z) + ((w + w * z) + z * z * _polynomial(z, _EXP))), k)
+    return one + (((1.0 - one) + z) + ((w + w * z) + z * z * _polynomial(z, _EXP))), k
+
+
+def _power_of(m: Arithmetic, a: Operand, b: Operand) -> Operand:
+    """Return a positive number to a finite power, of any size."""
+    is_tiny = a < 2.0**-1022
+    p, p_rest = _exponent_of(m, m.choose(is_tiny, a * 2.0**54, a), b, m.choose(is_tiny, 1077.0, 1023.0))
+    total = p + p_rest
+    p = m.choose(total > 1100.0, 1100.0, m.choose(total < -1100.0, -1100.0, p))
+    return _scaled(m, *_power_from(m, p, m.choose(m.size(total) <= 1100.0, p_rest, 0.0)))
 
 
 def power_far(m: Arithmetic, a: Operand, b: Operand) -> tuple[Operand]:
@@ -595,8 +629,14 @@ def power_far(m: Arithmetic, a: Operand, b: Operand) -> tuple[Operand]:
 
 def power(m: Arithmetic, a: Operand, b: Operand) -> tuple[Operand]:
     """Return a number to a power."""
-    usual = (a > 0.0) & (a < math.inf) & (m.size(b) < math.inf)
-    found: tuple[Operand] = m.unless(usual, lambda: (_power_of(m, a, b),), power_far, a, b)
+    p, p_rest = _exponent_of(m, a, b, 1023.0)
+    usual = (a >= 2.0**-1022) & (a < math.inf) & (m.size(p + p_rest) <= 1000.0)
+
+    def values() -> tuple[Operand]:
+        found, k = _power_from(m, p, p_rest)
+        return (found * _power_of_two(m, k),)
+
+    found: tuple[Operand] = m.unless(usual, values, power_far, a, b)
     return found
 
 
