@@ -12,8 +12,9 @@ from atwood.arrays import FloatArray
 from atwood.codegen.llvm.build import RoutineSource, build_now, once
 from atwood.codegen.llvm.engine import LoadedCode
 from atwood.codegen.llvm.module import CodeOptions
+from atwood.codegen.llvm.text import OWN_FUNCTIONS
 from atwood.codegen.routines import own_name
-from atwood.expr.core.elementary import FUNCTIONS
+from atwood.expr.core.elementary import FUNCTIONS, compiled
 
 
 @once
@@ -22,19 +23,24 @@ def own_functions() -> LoadedCode:
     names = (*FUNCTIONS, "sin_cos")
     exports = [own_name(one) for one in (*names, *(f"{each}_each" for each in FUNCTIONS))]
     source = RoutineSource("codegen.functions", ("expr/core/elementary.py",), (names,))
-    return build_now((), CodeOptions(level=2), exports, source, True).code
+    code = build_now((), CodeOptions(level=2), exports, source, True).code
+    for name in FUNCTIONS:
+        kinds = [ctypes.c_double] * OWN_FUNCTIONS[name]
+        compiled[name] = ctypes.PYFUNCTYPE(ctypes.c_double, *kinds)(code.addresses[own_name(name)])
+    return code
 
 
 @cache
-def _each(name: str, count: int) -> Any:
-    kinds = [ctypes.c_void_p] * (count + 1)
-    return ctypes.CFUNCTYPE(None, *kinds, ctypes.c_int64)(own_functions().addresses[own_name(f"{name}_each")])
+def _each(name: str) -> Any:
+    kinds = [ctypes.c_void_p] * (OWN_FUNCTIONS[name] + 1)
+    address = own_functions().addresses[own_name(f"{name}_each")]
+    return ctypes.PYFUNCTYPE(None, *kinds, ctypes.c_int64)(address)
 
 
 def on_arrays(name: str, *given: Any) -> FloatArray:
     """Return the values of a function at the entries of arrays, which are spread over each other's shape."""
     spread = np.broadcast_arrays(*given) if len(given) > 1 else given
-    arrays = [np.ascontiguousarray(one, dtype=np.float64) for one in spread]
-    found = np.empty(np.shape(spread[0]))
-    _each(name, len(given))(*(one.ctypes.data for one in (*arrays, found)), found.size)
+    arrays = [np.asarray(one, dtype=np.float64, order="C") for one in spread]
+    found = np.empty(arrays[0].shape)
+    _each(name)(*(one.__array_interface__["data"][0] for one in (*arrays, found)), found.size)
     return found

