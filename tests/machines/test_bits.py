@@ -77,7 +77,8 @@ def test_nothing_is_fused(monkeypatch: pytest.MonkeyPatch) -> None:
     functions = own.own_functions.__wrapped__()
     simulate(Chain(links=7), solver="taylor", t_end=0.01)
     simulate(SCENES["four-bar"](), solver="ida", t_end=0.01)
-    assert functions.addresses and len(written) > 2
+    assert functions.addresses
+    assert len(written) > 2
     binding.initialize_all_targets()
     binding.initialize_all_asmprinters()
     for triple, processor in PROCESSORS:
