@@ -49,7 +49,7 @@ class Taken(Exception):
     """What a session would be opened with."""
 
 
-def task_of(name: str, kind: str) -> Task:
+def task_of(name: str, kind: str, span: float = SPAN, rtol: float = 1e-9) -> Task:
     """Return the task of a run, with the start that is found here."""
     form, settings = RUNS[kind]
     method = METHODS["explicit" if kind == "dae" else kind]
@@ -60,8 +60,8 @@ def task_of(name: str, kind: str) -> Task:
 
     object.__setattr__(method, "open", take)
     try:
-        end = min(SPAN, float(scene.t_end))
-        simulate(scene, form=form, solver=method.key, t_end=end, outputs=2, rtol=1e-9, **settings)
+        end = min(span, float(scene.t_end))
+        simulate(scene, form=form, solver=method.key, t_end=end, outputs=2, rtol=rtol, **settings)
     except Taken as taken:
         task: Task = taken.args[0]
         return task
