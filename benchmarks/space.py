@@ -115,7 +115,8 @@ def measure(links: int, flags: str, repeat: int, calls: int) -> dict[str, Any]:
         measures[f"{name}, from Python"] = called(lambda b=bound, o=out, s=states[0]: b.into(o, *s))  # type: ignore[misc]
         if by_hand.compiler() is not None:
             loop = by_hand.Loop(flags, states, len(out[0]))
-            measures[name] = lambda m=made, b=bound, one=loop: one.seconds(m.address, b.derived, m.scratch, calls)  # type: ignore[misc]
+            place = made.built.code.addresses["kernel"]
+            measures[name] = lambda at=place, m=made, b=bound, one=loop: one.seconds(at, b.derived, m.scratch, calls)  # type: ignore[misc]
         if pinocchio and name == "residual":
             bound.into(out, *states[0])
             check(pinocchio, assembly, out[0], states[0])

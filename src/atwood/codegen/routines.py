@@ -498,6 +498,19 @@ class Routine:
             found.now = b()
         return found.now
 
+    def shortcut(
+        self, condition: Value, quick: Callable[[], Sequence[Value]], usual: Callable[[], Sequence[Value]]
+    ) -> Sequence[Value]:
+        """Return what two functions give that are the same where a condition holds; lanes take the second."""
+        if isinstance(condition.kind, Lanes):
+            return usual()
+        with self.when(condition):
+            found = [self.variable(one) for one in quick()]
+        with self.otherwise():
+            for variable, one in zip(found, usual(), strict=True):
+                variable.now = one
+        return tuple(one.now for one in found)
+
     def flip(self, word: Value, a: Operand) -> Value:
         """Return a number, with the other sign where a word is 1 and not 0."""
         kind = Lanes(word.kind.count) if isinstance(word.kind, Lanes) else NUMBER

@@ -27,7 +27,7 @@ Arithmetic: TypeAlias = Any
 _ROUNDER = 1.5 * 2.0**52
 """Added to a number below 2^51, it leaves the nearest whole number in the low bits."""
 
-_FAR, _LARGE = 1e6, 700.0
+_NEAR, _FAR, _LARGE = 0.785, 1e6, 700.0
 _HALF_PI = (1.5707963267341256, 6.077100506303966e-11, 2.0222662487111665e-21, 8.4784276603689e-32)
 """Half a turn over two: three parts of 33 bits, whose products with whole numbers to 2^20 are exact, and the rest."""
 
@@ -140,6 +140,13 @@ class Floats:
         """Return what the first function gives where a word is 1, and the second where it is 0."""
         return a() if word else b()
 
+    @staticmethod
+    def shortcut(
+        condition: bool, quick: Callable[[], tuple[float, ...]], usual: Callable[[], tuple[float, ...]]
+    ) -> tuple[float, ...]:
+        """Return what either function gives: they give the same where the condition holds, the first one sooner."""
+        return quick() if condition else usual()
+
     def unless(
         self,
         usual: bool,
@@ -247,6 +254,8 @@ def _sine(r: Operand, rest: Operand) -> tuple[Operand, Operand]:
     z = r * r
     w, v = z * z, z * r
     s = (_SINE[1] + z * (_SINE[2] + z * _SINE[3])) + z * w * (_SINE[4] + z * _SINE[5])
+    if rest is None:
+        return r, z * (0.0 - v * s) - v * _SINE[0]
     return r, (z * (0.5 * rest - v * s) - rest) - v * _SINE[0]
 
 
@@ -257,7 +266,12 @@ def _cosine(r: Operand, rest: Operand) -> tuple[Operand, Operand]:
     c = z * (_COSINE[0] + z * (_COSINE[1] + z * _COSINE[2])) + w * w * (_COSINE[3] + z * (_COSINE[4] + z * _COSINE[5]))
     half = 0.5 * z
     one = 1.0 - half
-    return one, (half - (1.0 - one)) - (z * c - r * rest)
+    return one, (half - (1.0 - one)) - (z * c if rest is None else z * c - r * rest)
+
+
+def _near(m: Arithmetic, x: Operand) -> tuple[Operand, Operand]:
+    s, c = _sine(x, None), _cosine(x, None)
+    return s[0] - s[1], c[0] - c[1]
 
 
 def _wave_of(m: Arithmetic, reduced: tuple[Operand, Operand, Operand], turned: int) -> tuple[Operand]:
@@ -283,12 +297,24 @@ def sin_cos_far(m: Arithmetic, x: Operand) -> tuple[Operand, Operand]:
 
 def sin_cos(m: Arithmetic, x: Operand) -> tuple[Operand, Operand]:
     """Return sine and cosine of an angle."""
-    found: tuple[Operand, Operand] = m.unless(m.size(x) <= _FAR, lambda: _sin_cos_of(m, _reduced(m, x)), sin_cos_far, x)
+    found: tuple[Operand, Operand] = m.unless(
+        m.size(x) <= _FAR,
+        lambda: m.shortcut(m.size(x) < _NEAR, lambda: _near(m, x), lambda: _sin_cos_of(m, _reduced(m, x))),
+        sin_cos_far,
+        x,
+    )
     return found
 
 
 def _wave(m: Arithmetic, x: Operand, turned: int, far: Callable[..., tuple[Operand]]) -> tuple[Operand]:
-    found: tuple[Operand] = m.unless(m.size(x) <= _FAR, lambda: _wave_of(m, _reduced(m, x), turned), far, x)
+    found: tuple[Operand] = m.unless(
+        m.size(x) <= _FAR,
+        lambda: m.shortcut(
+            m.size(x) < _NEAR, lambda: _near(m, x)[turned : turned + 1], lambda: _wave_of(m, _reduced(m, x), turned)
+        ),
+        far,
+        x,
+    )
     return found
 
 
