@@ -132,10 +132,11 @@ def measure(case: Case, flags: str, repeat: int, calls: int) -> dict[str, Any]:
     loop = by_hand.Loop(flags, states, len(group.expressions))
     library, address = by_hand_address(case, flags)
     own = parameters_by_hand(case, values)
-    ours, theirs = loop.at_first(native.built.code.addresses["kernel"], bound.derived, native.scratch), loop.at_first(address, own)
+    place = native.built.code.addresses["kernel"]
+    ours, theirs = loop.at_first(place, bound.derived, native.scratch), loop.at_first(address, own)
     if not np.allclose(ours, theirs, rtol=1e-9, atol=1e-11):
         raise SystemExit(f"{case.name}: {case.what} by hand differs by {np.max(np.abs(ours - theirs)):.1e}")
-    measures["atwood"] = lambda: loop.seconds(native.built.code.addresses["kernel"], bound.derived, native.scratch, calls)
+    measures["atwood"] = lambda: loop.seconds(place, bound.derived, native.scratch, calls)
     measures["hand"] = lambda: loop.seconds(address, own, calls=calls)
     measures["empty"] = lambda: loop.seconds(loop.empty, own, calls=calls)
     del library
