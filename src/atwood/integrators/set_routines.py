@@ -100,6 +100,9 @@ ALIKE = 100.0
 SEEN = 2.0
 """Times what is slow: what has come to rest may go by that still, or again, where its event is seen."""
 
+BEGINS = 0.5
+"""Times what is slow: what begins to slip in two directions goes by that, so that rounding does not turn it."""
+
 NEAR_REST = 100.0
 """Times what is small and slow, where impacts have accumulated."""
 
@@ -684,18 +687,18 @@ def _collide() -> Routine:
 
 
 def _hold() -> Routine:
-    """Take away the rates of the chosen units."""
+    """Take away the rates of the chosen units; what begins to slip in two directions has a small one."""
     r, m, () = _open("hold")
     acting, right, forces, rates, size = m.row("acting"), m.row("right"), m.row("forces"), m.row("rates"), m.size
     response, matrix, solution, n = m.result("response"), m.matrix, m.row("solution"), r.variable(0, INTEGER)
-    with _each(r, m, "chosen") as (k, _, _), _rows(r, m, k) as (_, row):
-        acting[n.now] = row.number()
+    with _each(r, m, "chosen") as (k, _, _), _rows(r, m, k) as (number, row):
+        way = r.choose(number == 0, m.unit("next_x")[k], m.unit("next_y")[k])
+        acting[n.now], right[n.now] = row.number(), way * (BEGINS * m.unit("slow")[k] * m.pace) - rates[row]
         n.now = n.now + 1
     with r.when(n.now == 0):
         r.give(0)
     with r.count(n.now) as i:
         row = r.truncated(acting[i])
-        right[i] = 0.0 - rates[row]
         with r.count(n.now) as j:
             matrix[i * size + j] = response[row * size + r.truncated(acting[j])]
     r.call("solve_forces", r.arguments[0], n.now)
@@ -822,7 +825,10 @@ def _settle() -> Routine:
     with r.count(m.count) as k, r.when(_is_loose(r, m, k)):
         state[k], x[k], y[k] = float(OPEN), 0.0, 0.0
     with r.count(m.count) as k:
-        chosen[k] = r.choose(state[k] == float(STICKS), 1.0, 0.0)
+        is_pair = m.unit("width")[k] == 2.0
+        size = _size_of_slip(r, r.truncated(m.unit("first")[k]), is_pair, m.row("rates"))[2]
+        begins = (state[k] == float(GOES_ON)) & is_pair & _is_still(r, m, k, size)
+        chosen[k] = r.choose((state[k] == float(STICKS)) | begins, 1.0, 0.0)
     r.give(r.call("hold", r.arguments[0]))
     return r
 

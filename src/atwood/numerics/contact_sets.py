@@ -37,6 +37,9 @@ CLEAR = 1e-8
 NOTHING = 1e-14
 """What moves by so small a share of what others do is held by joints but for rounding."""
 
+_SIDES = 48
+"""A cone of friction is taken for a pyramid with so many sides within it, where forces are shared so that all rests."""
+
 _SWEEPS = 5000
 """So often all forces are projected; each time takes some ten microseconds for each."""
 
@@ -157,10 +160,71 @@ def is_back(direction: Direction) -> bool:
     return len(direction) == 1 and direction[0] < 0.0
 
 
-def find_states(contacts: Contacts, states: Sequence[State]) -> Found | None:
-    """Return states that contradict nothing, near to those given; None where there are none."""
+def find_states(contacts: Contacts, states: Sequence[State], rests: bool = False) -> Found | None:
+    """Return states that contradict nothing, near to those given, or of rest if asked for; None where none are."""
     found = _found(contacts, states)
+    if rests and found is not None and not _is_at_rest(contacts, found):
+        found = _at_rest(contacts) or found
     return None if found is None else _judged(contacts, found)
+
+
+def _is_at_rest(contacts: Contacts, found: Found) -> bool:
+    """Return whether everything sticks that may."""
+    return all(unit.is_given or one[0] == STICKS for unit, one in zip(contacts.units, found.states, strict=True))
+
+
+def _at_rest(contacts: Contacts) -> Found | None:
+    """Return the states of rest where rows depend on each other and some share of forces holds everything.
+
+    Least forces may contradict a law that others meet. Whether any do is a linear program, with a cone of friction cut
+    down to a pyramid within it (S. Boyd and L. Vandenberghe, *Convex Optimization*, 2004, section 11.4).
+    """
+    listed = _listed(contacts)
+    rest = tuple(_allowed(unit, STICKS, (0.0,) * len(unit.rows)) for unit in contacts.units)
+    acting, rows, right = _equations(listed, rest)
+    matrix, wanted = np.array(rows), np.array(right)
+    size = np.max(np.abs(matrix), axis=1, initial=0.0)
+    size[size == 0.0] = 1.0
+    matrix, wanted = matrix / size[:, None], wanted / size
+    if not null_space(matrix, CLEAR).size:
+        return None
+    forces = np.zeros(len(contacts.free))
+    unit = float(np.max(np.abs(least_norm(matrix, wanted)), initial=0.0)) or 1.0
+    sides, most = _pyramids(contacts)
+    solved = _programmed(sides[:, acting], most / unit, matrix, wanted / unit)
+    if solved is None:
+        return None
+    forces[acting] = unit * solved
+    motions = contacts.free + contacts.response @ forces
+    if _contradiction(listed, rest, forces.tolist(), motions.tolist())[0] >= 0:
+        return None
+    return Found(rest, forces, motions)
+
+
+def _pyramids(contacts: Contacts) -> tuple[FloatArray, FloatArray]:
+    """Return what forces must meet that hold everything: ``sides f <= most``."""
+    sides: list[FloatArray] = []
+    most: list[float] = []
+    limits, every = contacts.limits, np.eye(len(contacts.free))
+    for k, unit in enumerate(contacts.units):
+        own = every[list(unit.rows)]
+        turns = 2.0 * math.pi / _SIDES * np.arange(_SIDES)
+        ways = np.column_stack((np.cos(turns), np.sin(turns))) if len(unit.rows) == 2 else np.array([[1.0], [-1.0]])
+        within = math.cos(math.pi / _SIDES) if len(unit.rows) == 2 else 1.0
+        for way in ways if unit.is_slip and not unit.is_given else () if unit.is_slip else ways[1:]:
+            of = limits if contacts.backwards is None or not is_back(tuple(-way)) else contacts.backwards
+            sides.append(way @ own - within * of.static_shares[k])
+            most.append(within * float(of.static_free[k]))
+    return np.array(sides).reshape(len(sides), len(contacts.free)), np.array(most)
+
+
+def _programmed(sides: FloatArray, most: FloatArray, rows: FloatArray, right: FloatArray) -> FloatArray | None:
+    """Return forces with ``sides f <= most`` and ``rows f = right``; None where there are none."""
+    from scipy.optimize import linprog
+
+    zero = np.zeros(rows.shape[1])
+    solved = linprog(zero, A_ub=sides, b_ub=most, A_eq=rows, b_eq=right, bounds=(None, None), method="highs")
+    return np.asarray(solved.x) if solved.status == 0 else None
 
 
 def _judged(contacts: Contacts, found: Found) -> Found:

@@ -15,7 +15,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError, StartError
 from atwood.forms.assembly import Assembly
-from atwood.integrators.set_routines import ALIKE, EVEN, GAIN, NEAR_REST, SEEN, SPANS
+from atwood.integrators.set_routines import ALIKE, BEGINS, EVEN, GAIN, NEAR_REST, SEEN, SPANS
 from atwood.lazy_dataclasses import dataclass, made_of, replace
 from atwood.mechanics.dynamics.equations import ContactRow
 from atwood.mechanics.outputs.event_functions import CLOSES, OPENS, RESTS, STOPS, YIELDS
@@ -330,9 +330,8 @@ class _Moment:
         if found.is_redundant:
             found = self._shared(chosen, found)
         self._take(chosen, found)
-        held = [row for k, one in zip(chosen, found.states, strict=True) if one[0] == STICKS for row in self.units[k]]
-        if held:  # what holds from now on holds to rounding
-            self._hold(held)
+        going = self._going(slips, self.rates())
+        self._hold({k: one for k, one in zip(chosen, found.states, strict=True) if k not in going})
         return None
 
     def _check_determined(self, chosen: list[int], found: Found) -> None:
@@ -395,11 +394,19 @@ class _Moment:
         size = np.sqrt(np.where(own > NOTHING * np.max(own, initial=0.0), own, np.inf))
         return rank(response / size / size[:, None], CLEAR) if held else 0
 
-    def _hold(self, rows: list[int]) -> None:
-        """Take away the rates of some rows."""
-        push = np.zeros(len(self.contacts))
-        push[rows] = least_norm(self.values.response[np.ix_(rows, rows)], -self.rates()[rows])
-        self.u = self.u + self.values.speeds_by(push)
+    def _hold(self, states: dict[int, State]) -> None:
+        """Take away the rates of what holds from now on; what begins to slip in two directions has a small one."""
+        wanted = {
+            row: BEGINS * self.slow[k] * part
+            for k, (state, way) in states.items()
+            if state == STICKS or (state == GOES_ON and len(way) == 2)
+            for row, part in zip(self.units[k], way, strict=True)
+        }
+        if rows := list(wanted):
+            push = np.zeros(len(self.contacts))
+            right = np.array(list(wanted.values())) - self.rates()[rows]
+            push[rows] = least_norm(self.values.response[np.ix_(rows, rows)], right)
+            self.u = self.u + self.values.speeds_by(push)
 
     def _going(self, slips: list[int], rates: FloatArray) -> dict[int, tuple[float, ...]]:
         """Return the directions of the slips that go on already; what has come to rest is as slow as its event sees."""
@@ -417,8 +424,9 @@ class _Moment:
         """Return states that contradict nothing at accelerations; limits may be curved in the forces."""
         values, free = self.values, self.values.accelerations()
         forces, found = np.zeros(len(self.contacts)), None
+        rests = all(target == CLOSES for target in self.triggers.values())  # it starts, or has just come to touch
         for _ in range(MOST_TURNS):
-            found = find_states(values.chosen(chosen, free, given, values.limits_at(forces)), states)
+            found = find_states(values.chosen(chosen, free, given, values.limits_at(forces)), states, rests)
             if found is None:
                 return None
             last, forces = forces, self._on_all(chosen, found)
