@@ -96,9 +96,9 @@ def test_laws_of_contact_hold(seed: int) -> None:
 
 
 @pytest.mark.sample(1)
-@pytest.mark.parametrize("seed", [3, 52, 5, 11])
+@pytest.mark.parametrize("seed", [3, 52, 5, 11, 81])
 def test_accuracies_of_contacts_are_reached(seed: int) -> None:
-    """The first two end at an impact but for rounding: no step is left behind it."""
+    """The first two end at an impact but for rounding; the last has an output among impacts that are summed."""
     trial, _ = run_trial("contact_accuracies", seed)
     assert "met" in trial.tried
     assert not trial.findings, trial.findings[0].detail

@@ -169,6 +169,9 @@ def estimate_accuracy(first: Run, second: Run, time: FloatArray, error: Callable
             worst, path = largest, one
         beyond = np.flatnonzero(~(found <= limit))
         late = min(late, int(beyond[0]) if len(beyond) else late)
+    summed, where = _summed(second, time, length)
+    if summed > worst:
+        worst, path = summed, where
     until = float(time[late - 1]) if late else float(time[0])
     form, solver = second.assembly.form, METHODS[second.solver].title
     how = f"a second solution, {form} form, {solver}, rtol {rtol:.1g}"
@@ -182,6 +185,28 @@ def estimate_accuracy(first: Run, second: Run, time: FloatArray, error: Callable
     ]
     missed += [np.nan] * (len(first.events) - len(missed))
     return Accuracy(asked, worst, path, until, np.array(missed, dtype=float), how)
+
+
+def _summed(second: Run, time: FloatArray, length: float) -> tuple[float, str]:
+    """Return how far bounces rise at most that the second solution has summed where there are outputs, and of which gap.
+
+    Both solutions have the part at rest there. With the ratio r of the last impact, at speed v, a series that ends in
+    T goes on for r T, and its next bounce, of r (1 - r) T, begins with r v.
+    """
+    found, path = 0.0, ""
+    for number, one in enumerate(second.events):
+        own = [x for x in second.events[:number] if x.struck is not None and (x.part, x.law) == (one.part, one.law)]
+        if one.kind != "rests" or not own or own[-1].struck is None:
+            continue
+        last, gap = own[-1].struck, f"{one.part}.{one.law}"
+        ratio, left = abs(last.after / last.before) if last.before else 0.0, one.time - last.time
+        if not np.any((time > one.time - ratio * left) & (time < one.time)):
+            continue
+        height = 0.25 * ratio**2 * abs(1.0 - ratio) * abs(last.after) * left
+        size = height / (length if second.assembly.observables[gap].unit == "m" else 1.0)
+        if size > found:
+            found, path = size, gap
+    return found, path
 
 
 TIGHTER = 30.0
