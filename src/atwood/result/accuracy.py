@@ -188,7 +188,7 @@ def estimate_accuracy(first: Run, second: Run, time: FloatArray, error: Callable
 
 
 def _summed(second: Run, time: FloatArray, length: float) -> tuple[float, str]:
-    """Return how far bounces rise at most that the second solution has summed where there are outputs, and of which gap.
+    """Return how far bounces rise that the second solution has summed where there are outputs, and of which gap.
 
     Both solutions have the part at rest there. With the ratio r of the last impact, at speed v, a series that ends in
     T goes on for r T, and its next bounce, of r (1 - r) T, begins with r v.
