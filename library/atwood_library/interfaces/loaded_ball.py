@@ -21,8 +21,16 @@ from atwood import (
     parameter,
     potential,
     signal,
+    unilateral,
 )
-from atwood_library.interfaces.loads import beyond_bend, damper_function, turn_apart
+from atwood_library.interfaces.loads import (
+    check_stops,
+    damper_function,
+    elastic_stop,
+    past_bend,
+    stop_restitution,
+    turn_apart,
+)
 
 
 class LoadedBall(Component):
@@ -52,9 +60,15 @@ class LoadedBall(Component):
         maximum=3.1,
         doc="Angle between the axes at which the stop acts; none if not given.",
     )
+    stop_restitution: Number | None = stop_restitution()
     motor_x: Number = signal(0.0, unit="N*m", doc="Torque on frame b along x of frame a, and against frame a.")
     motor_y: Number = signal(0.0, unit="N*m", doc="Torque on frame b along y of frame a, and against frame a.")
     motor_z: Number = signal(0.0, unit="N*m", doc="Torque on frame b along z of frame a, and against frame a.")
+
+    def check_values(self) -> None:
+        """Refuse a stop that is rigid and elastic, and one that is nowhere."""
+        super().check_values()
+        check_stops(self, self.stop_stiffness, self.stop_restitution, self.bend_stop)
 
     @potential
     def spring_energy(self) -> Scalar:
@@ -66,10 +80,27 @@ class LoadedBall(Component):
             # The trace of a turn by x is 1 + 2 cos x.
             turned = 0.5 * (sum(map(dot, a.axes, b.axes)) - 1.0) if self.in_space else cos(b.angle - a.angle)
             energy = energy + self.stiffness * (1.0 - turned)
+        if self.bend_stop is None or self.stop_restitution is not None:
+            return energy
+        return energy + elastic_stop(self._past_stop(), self.stop_stiffness)
+
+    @unilateral(
+        reaction="bend_stop_torque",
+        unit="N*m",
+        restitution="stop_restitution",
+        given=("bend_stop", "stop_restitution"),
+        doc="Torque of the cone, where it is rigid.",
+        spaces=("plane", "space"),
+    )
+    def within_bend_stop(self) -> Scalar:
+        """Return how far the axis is within the cone."""
+        return -self._past_stop()
+
+    def _past_stop(self) -> Scalar:
+        joint: Any = self
         axis = as_vector(self.stop_axis)
-        return energy + beyond_bend(
-            lambda: dot(a.to_world(axis), b.to_world(axis)), self.stop_stiffness, self.bend_stop
-        )
+        assert self.bend_stop is not None
+        return past_bend(dot(joint.a.to_world(axis), joint.b.to_world(axis)), self.bend_stop)
 
     @dissipation
     def damper_function(self) -> Scalar:

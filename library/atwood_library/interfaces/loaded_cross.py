@@ -6,7 +6,15 @@ from collections.abc import Iterable
 from typing import Any
 
 from atwood import Component, Load, Number, Scalar, as_vector, dissipation, force, is_zero, parameter, potential, signal
-from atwood_library.interfaces.loads import damper_function, elastic_energy, turn_apart
+from atwood_library.interfaces.loads import (
+    check_stops,
+    damper_function,
+    elastic_energy,
+    rigid_stops,
+    stop_restitution,
+    stops_of,
+    turn_apart,
+)
 
 
 class LoadedCross(Component):
@@ -68,14 +76,41 @@ class LoadedCross(Component):
         symbol="k_s",
     )
 
+    stop_restitution: Number | None = stop_restitution()
+
+    def check_values(self) -> None:
+        """Refuse stops that are rigid and elastic, and those that are nowhere."""
+        super().check_values()
+        bounds = self.lower_stop_a, self.upper_stop_a, self.lower_stop_b, self.upper_stop_b
+        check_stops(self, self.stop_stiffness, self.stop_restitution, *bounds)
+
     @potential
     def spring_energy(self) -> Scalar:
         """Return the energy in the springs and in the stops."""
         joint: Any = self
-        stops_a = self.stop_stiffness, self.lower_stop_a, self.upper_stop_a
-        stops_b = self.stop_stiffness, self.lower_stop_b, self.upper_stop_b
+        stops_a = stops_of(self.stop_stiffness, self.stop_restitution, self.lower_stop_a, self.upper_stop_a)
+        stops_b = stops_of(self.stop_stiffness, self.stop_restitution, self.lower_stop_b, self.upper_stop_b)
         first = elastic_energy(joint.angle_a, (self.stiffness_a, self.natural_angle_a), stops_a)
         return first + elastic_energy(joint.angle_b, (self.stiffness_b, self.natural_angle_b), stops_b)
+
+    above_lower_stop_a, below_upper_stop_a = rigid_stops(
+        lambda joint: joint.angle_a(),
+        ("lower_stop_a", "upper_stop_a"),
+        "stop_restitution",
+        unit="N*m",
+        doc="First angle {way} its {end} stop.",
+        reaction_doc="Torque of the {end} stop of the first angle, where it is rigid.",
+        spaces=("space",),
+    )
+    above_lower_stop_b, below_upper_stop_b = rigid_stops(
+        lambda joint: joint.angle_b(),
+        ("lower_stop_b", "upper_stop_b"),
+        "stop_restitution",
+        unit="N*m",
+        doc="Second angle {way} its {end} stop.",
+        reaction_doc="Torque of the {end} stop of the second angle, where it is rigid.",
+        spaces=("space",),
+    )
 
     @dissipation
     def damper_function(self) -> Scalar:

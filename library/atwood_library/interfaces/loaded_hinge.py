@@ -9,7 +9,14 @@ from typing import Any
 
 from atwood import Number, Scalar, dissipation, parameter, potential
 from atwood_library.interfaces.axis_motor import AxisMotor
-from atwood_library.interfaces.loads import check_stops, damper_function, elastic_energy, rigid_stops, stops_of
+from atwood_library.interfaces.loads import (
+    check_stops,
+    damper_function,
+    elastic_energy,
+    rigid_stops,
+    stop_restitution,
+    stops_of,
+)
 
 
 class LoadedHinge(AxisMotor):
@@ -31,13 +38,7 @@ class LoadedHinge(AxisMotor):
     upper_stop: Number | None = parameter(
         None, unit="rad", doc="Angle above which a stop acts; none if not given.", symbol="theta_max"
     )
-    stop_restitution: Number | None = parameter(
-        None,
-        minimum=0.0,
-        maximum=1.0,
-        doc="Share of the speed that a stop leaves, which is rigid then; stops are elastic if not given.",
-        symbol="e_s",
-    )
+    stop_restitution: Number | None = stop_restitution()
 
     def check_values(self) -> None:
         """Refuse stops that are rigid and elastic, and those that are nowhere."""

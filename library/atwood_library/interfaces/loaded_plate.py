@@ -21,9 +21,17 @@ from atwood import (
     parameter,
     potential,
     signal,
+    unilateral,
 )
 from atwood_library.interfaces.bearings import rate_along
-from atwood_library.interfaces.loads import beyond_rim, damper_function, push_apart
+from atwood_library.interfaces.loads import (
+    check_stops,
+    damper_function,
+    elastic_stop,
+    past_rim,
+    push_apart,
+    stop_restitution,
+)
 
 
 class LoadedPlate(Component):
@@ -40,18 +48,41 @@ class LoadedPlate(Component):
     rim: Number | None = parameter(
         None, unit="m", above=0.0, doc="Distance from the origin at which the stop acts; none if not given."
     )
+    stop_restitution: Number | None = stop_restitution()
     actuator_1: Number = signal(0.0, unit="N", doc="Force on b along the first direction of the plane, and against a.")
     actuator_2: Number = signal(0.0, unit="N", doc="Force on b along the second direction of the plane, and against a.")
+
+    def check_values(self) -> None:
+        """Refuse a rim that is rigid and elastic, and one that is nowhere."""
+        super().check_values()
+        check_stops(self, self.stop_stiffness, self.stop_restitution, self.rim)
 
     @potential
     def spring_energy(self) -> Scalar:
         """Return the energy in the spring and in the rim."""
-        joint: Any = self
-        if is_zero(self.stiffness) and self.rim is None:
-            return 0.0
-        arm = Vector(joint.displacement_1(), joint.displacement_2(), 0.0)
-        spring: Scalar = 0.5 * self.stiffness * dot(arm, arm)
-        return spring + beyond_rim(arm, self.stop_stiffness, self.rim)
+        energy: Scalar = 0.0
+        if not is_zero(self.stiffness):
+            arm = self._arm()
+            energy = 0.5 * self.stiffness * dot(arm, arm)
+        if self.rim is not None and self.stop_restitution is None:
+            energy = energy + elastic_stop(past_rim(self._arm(), self.rim), self.stop_stiffness)
+        return energy
+
+    @unilateral(
+        reaction="rim_force",
+        unit="N",
+        restitution="stop_restitution",
+        given=("rim", "stop_restitution"),
+        doc="Force of the rim, where it is rigid.",
+        spaces=("space",),
+    )
+    def within_rim(self) -> Scalar:
+        """Return how far it is within the rim."""
+        assert self.rim is not None
+        return -past_rim(self._arm(), self.rim)
+
+    def _arm(self) -> Vector:
+        return Vector(self.displacement_1(), self.displacement_2(), 0.0)
 
     @dissipation
     def damper_function(self) -> Scalar:

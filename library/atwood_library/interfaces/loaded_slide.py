@@ -26,6 +26,7 @@ from atwood_library.interfaces.loads import (
     elastic_energy,
     push_apart,
     rigid_stops,
+    stop_restitution,
     stops_of,
 )
 
@@ -51,13 +52,7 @@ class LoadedSlide(Component):
         doc="Displacement above which a stop acts; none if not given.",
         symbol="x_max",
     )
-    stop_restitution: Number | None = parameter(
-        None,
-        minimum=0.0,
-        maximum=1.0,
-        doc="Share of the speed that a stop leaves, which is rigid then; stops are elastic if not given.",
-        symbol="e_s",
-    )
+    stop_restitution: Number | None = stop_restitution()
     actuator: Number = signal(0.0, unit="N", doc="Force of the actuator on frame b, and against frame a.")
 
     def check_values(self) -> None:

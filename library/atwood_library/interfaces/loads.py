@@ -18,19 +18,21 @@ from atwood import (
     dot,
     is_zero,
     maximum,
-    minimum,
+    parameter,
     sin,
     unilateral,
 )
 
 __all__ = [
-    "beyond_bend",
-    "beyond_rim",
     "check_stops",
     "damper_function",
     "elastic_energy",
+    "elastic_stop",
+    "past_bend",
+    "past_rim",
     "push_apart",
     "rigid_stops",
+    "stop_restitution",
     "stops_of",
     "turn_apart",
 ]
@@ -62,12 +64,16 @@ def elastic_energy(
         stretch = coordinate() - natural
         energy = energy + 0.5 * stiffness * stretch * stretch
     if lower is not None:
-        below = minimum(coordinate() - lower, 0.0)
-        energy = energy + 0.5 * stop_stiffness * below * below
+        energy = energy + elastic_stop(lower - coordinate(), stop_stiffness)
     if upper is not None:
-        above = maximum(coordinate() - upper, 0.0)
-        energy = energy + 0.5 * stop_stiffness * above * above
+        energy = energy + elastic_stop(coordinate() - upper, stop_stiffness)
     return energy
+
+
+def stop_restitution() -> Any:
+    """Return the parameter of a joint with which its stops are rigid."""
+    doc = "Share of the speed that a stop leaves, which is rigid then; stops are elastic if not given."
+    return parameter(None, minimum=0.0, maximum=1.0, doc=doc, symbol="e_s")
 
 
 def stops_of(stiffness: float, restitution: float | None, *bounds: float | None) -> Stops:
@@ -155,46 +161,43 @@ def damper_function(rates: Callable[[], Sequence[Scalar]], damping: float) -> Sc
     return 0.5 * damping * total
 
 
-def beyond_rim(arm: Vector, stiffness: float, rim: float | None) -> Scalar:
-    """Return the energy in an elastic rim, J, that a point pushes against from within.
-
-    What counts is ``(r^2 - R^2)/(2 R)``, which is the distance beyond the rim while that is small, and has no corner
-    at the centre.
+def past_rim(arm: Vector, rim: float) -> Scalar:
+    """Return ``(r^2 - R^2)/(2 R)``, m: how far a point is beyond a rim, while that is small, without a corner at r = 0.
 
     Parameters
     ----------
     arm
-        From the centre to the point, m.
-    stiffness
-        Force for one metre beyond the rim, N/m.
+        From the centre to the point, of length r, m.
     rim
-        Radius of the rim, m; none if not given.
+        Radius R of the rim, m.
     """
-    if rim is None:
-        return 0.0
-    beyond = maximum((dot(arm, arm) - rim * rim) / (2.0 * rim), 0.0)
-    energy: Scalar = 0.5 * stiffness * beyond * beyond
-    return energy
+    return (dot(arm, arm) - rim * rim) / (2.0 * rim)
 
 
-def beyond_bend(cosine: Callable[[], Scalar], stiffness: float, limit: float | None) -> Scalar:
-    """Return the energy in an elastic cone, J, that an axis pushes against from within.
-
-    What counts is ``(cos L - cos x)/sin L``, which is the angle beyond the cone while that is small, and has no corner
-    where the axes are parallel.
+def past_bend(cosine: Scalar, limit: float) -> Scalar:
+    """Return ``(cos L - cos x)/sin L``, rad: how far an axis is beyond a cone, while that is small, smooth at x = 0.
 
     Parameters
     ----------
     cosine
-        Gives the cosine of the angle x between the axes; asked only where there is a limit.
-    stiffness
-        Torque for one radian beyond the cone, N m/rad.
+        Of the angle x between the axes.
     limit
-        Half the opening L of the cone, rad, between 0 and pi; none if not given.
+        Half the opening L of the cone, rad, between 0 and pi.
     """
-    if limit is None:
-        return 0.0
-    beyond = maximum((cos(limit) - cosine()) / sin(limit), 0.0)
+    return (cos(limit) - cosine) / sin(limit)
+
+
+def elastic_stop(past: Scalar, stiffness: float) -> Scalar:
+    """Return the energy in an elastic stop, J.
+
+    Parameters
+    ----------
+    past
+        How far something is beyond it, m or rad; nothing where negative.
+    stiffness
+        Force or torque for one unit beyond it.
+    """
+    beyond = maximum(past, 0.0)
     energy: Scalar = 0.5 * stiffness * beyond * beyond
     return energy
 

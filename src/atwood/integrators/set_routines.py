@@ -100,7 +100,7 @@ ALIKE = 100.0
 SEEN = 2.0
 """Times what is slow: what has come to rest may go by that still, or again, where its event is seen."""
 
-BEGINS = 0.5
+BEGINS = 0.05
 """Times what is slow: what begins to slip in two directions goes by that, so that rounding does not turn it."""
 
 NEAR_REST = 100.0

@@ -163,21 +163,21 @@ def is_back(direction: Direction) -> bool:
 def find_states(contacts: Contacts, states: Sequence[State], rests: bool = False) -> Found | None:
     """Return states that contradict nothing, near to those given, or of rest if asked for; None where none are."""
     found = _found(contacts, states)
-    if rests and found is not None and not _is_at_rest(contacts, found):
+    if found is None:
+        return None
+    if rests and any(
+        one[0] != STICKS for unit, one in zip(contacts.units, found.states, strict=True) if not unit.is_given
+    ):
         found = _at_rest(contacts) or found
-    return None if found is None else _judged(contacts, found)
-
-
-def _is_at_rest(contacts: Contacts, found: Found) -> bool:
-    """Return whether everything sticks that may."""
-    return all(unit.is_given or one[0] == STICKS for unit, one in zip(contacts.units, found.states, strict=True))
+    return _judged(contacts, found)
 
 
 def _at_rest(contacts: Contacts) -> Found | None:
     """Return the states of rest where rows depend on each other and some share of forces holds everything.
 
-    Least forces may contradict a law that others meet. Whether any do is a linear program, with a cone of friction cut
-    down to a pyramid within it (S. Boyd and L. Vandenberghe, *Convex Optimization*, 2004, section 11.4).
+    What goes on already has to go on alike with any share. Least forces may contradict a law that others meet. Whether
+    any do is a linear program, with a cone of friction cut down to a pyramid within it (S. Boyd and L. Vandenberghe,
+    *Convex Optimization*, 2004, section 11.4).
     """
     listed = _listed(contacts)
     rest = tuple(_allowed(unit, STICKS, (0.0,) * len(unit.rows)) for unit in contacts.units)
@@ -186,7 +186,8 @@ def _at_rest(contacts: Contacts) -> Found | None:
     size = np.max(np.abs(matrix), axis=1, initial=0.0)
     size[size == 0.0] = 1.0
     matrix, wanted = matrix / size[:, None], wanted / size
-    if not null_space(matrix, CLEAR).size:
+    null, response = null_space(matrix, CLEAR), contacts.response[:, acting]
+    if not null.size or np.max(np.abs(response @ null)) > math.sqrt(CLEAR) * np.max(np.abs(response)):
         return None
     forces = np.zeros(len(contacts.free))
     unit = float(np.max(np.abs(least_norm(matrix, wanted)), initial=0.0)) or 1.0
@@ -211,7 +212,7 @@ def _pyramids(contacts: Contacts) -> tuple[FloatArray, FloatArray]:
         turns = 2.0 * math.pi / _SIDES * np.arange(_SIDES)
         ways = np.column_stack((np.cos(turns), np.sin(turns))) if len(unit.rows) == 2 else np.array([[1.0], [-1.0]])
         within = math.cos(math.pi / _SIDES) if len(unit.rows) == 2 else 1.0
-        for way in ways if unit.is_slip and not unit.is_given else () if unit.is_slip else ways[1:]:
+        for way in () if unit.is_given else ways if unit.is_slip else ways[1:]:
             of = limits if contacts.backwards is None or not is_back(tuple(-way)) else contacts.backwards
             sides.append(way @ own - within * of.static_shares[k])
             most.append(within * float(of.static_free[k]))

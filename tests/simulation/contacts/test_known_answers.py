@@ -24,13 +24,16 @@ from atwood_library import (
     Pivot,
     PointContact,
     PointMass,
+    PointOnPlane,
     RotationalFriction,
     RotationalSource,
     RotationalStop,
     Slider,
     Sphere,
+    Spherical,
     Spring,
     SurfaceContact,
+    Universal,
     VertexContact,
 )
 
@@ -441,6 +444,33 @@ def test_stops_count_turns_and_hold_slides(form: str) -> None:
     slide.connect(rail.b, m.point)
     slide.start.update({"rail.displacement": 0.0, "rail.speed": -2.0})
     assert run(slide, form, 2.0)["rail.displacement"][-1] == pytest.approx(0.5, abs=1e-9)
+
+
+@FORMS
+def test_cones_crosses_and_rims_are_rigid_stops(form: str) -> None:
+    """What turns or flies freely between stops that leave a share e of its speed."""
+
+    def jointed(joint: aw.Component, body: aw.Component, start: dict[str, float]) -> Scene:
+        scene = Scene(space="space", gravity=0.0)
+        ground, held = scene.add("ground", Ground()), scene.add("body", body)
+        made = scene.add("joint", joint)
+        scene.connect(ground.frame, made.a)
+        scene.connect(made.b, held.point if isinstance(held, PointMass) else held.frame)
+        scene.start.update(start)
+        return scene
+
+    still = {f"body.angular_velocity.{axis}": 2.0 if axis == "x" else 0.0 for axis in "xyz"}
+    result = run(jointed(Spherical(bend_stop=1.0, stop_restitution=0.5), Sphere(radius=0.1), still), form, 7.0)
+    assert times(result, "impact") == pytest.approx([0.5, 2.5, 6.5], abs=1e-9)
+    assert [one.impulse for one in result.impacts] == pytest.approx([0.012, 0.006, 0.003], rel=1e-9)
+    cross = Universal(lower_stop_a=-0.5, upper_stop_a=1.0, lower_stop_b=-1.0, upper_stop_b=1.0, stop_restitution=0.5)
+    turning = dict.fromkeys(("joint.angle_a", "joint.angle_b", "joint.rate_b"), 0.0) | {"joint.rate_a": 2.0}
+    result = run(jointed(cross, Sphere(radius=0.1), turning), form, 6.0)
+    assert times(result, "impact") == pytest.approx([0.5, 2.0, 5.0], abs=1e-9)
+    flying = {"body.position.x": 0.3, "body.position.y": 0.0, "body.velocity.x": 0.0, "body.velocity.y": 1.0}
+    result = run(jointed(PointOnPlane(rim=0.5, stop_restitution=0.9), PointMass(mass=2.0), flying), form, 0.6)
+    assert times(result, "impact") == pytest.approx([0.4], abs=1e-9)
+    assert result.impacts[0].impulse == pytest.approx(3.04, rel=1e-9)
 
 
 @pytest.mark.parametrize(
