@@ -101,3 +101,25 @@ def test_a_body_that_rests_on_many_places_is_always_solved(count: int) -> None:
         found = find_states(contacts, [(STICKS, (0.0,) * len(unit.rows)) for unit in contacts.units])
         assert found is not None, seed
         laws_hold(contacts, found.states, found.forces, found.motions)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3, 2.0])
+def test_an_edge_rests_where_one_end_bears_what_the_other_cannot(turn: float) -> None:
+    """A rod lands with both ends: one end's friction is used up across, so the other must bear the push along it."""
+    ends = np.array([[4.0, -2.0], [-2.0, 4.0]])  # of a rod of mass 1 and length 2, across and up
+    response = np.zeros((6, 6))
+    response[:2, :2] = response[np.ix_([2, 4], [2, 4])] = ends
+    response[np.ix_([3, 5], [3, 5])] = 1.0
+    free = -response @ np.array([0.5, 0.5, -0.49999, 0.3, 0.01, 0.19])
+    turned = np.eye(6)
+    turned[2:4, 2:4] = turned[4:, 4:] = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
+    units = tuple(Unit((k,), False, (0.0,), -1) for k in (0, 1))
+    units += tuple(Unit((2 + 2 * k, 3 + 2 * k), True, (0.0, 0.0), k) for k in (0, 1))
+    shares, none = np.zeros((4, 6)), np.zeros(4)
+    shares[2, 0] = shares[3, 1] = 1.0
+    contacts = Contacts(turned @ response @ turned.T, turned @ free, units, Limits(none, shares, none, shares))
+    found = find_states(contacts, [(STICKS, (0.0,) * len(unit.rows)) for unit in units], rests=True)
+    assert found is not None
+    assert [state for state, _ in found.states] == [STICKS] * 4
+    assert found.is_redundant
+    laws_hold(contacts, found.states, found.forces, found.motions)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import product
+from itertools import compress, product
 
 import numpy as np
 
@@ -36,9 +36,6 @@ CLEAR = 1e-8
 
 NOTHING = 1e-14
 """What moves by so small a share of what others do is held by joints but for rounding."""
-
-_SIDES = 48
-"""A cone of friction is taken for a pyramid with so many sides within it, where forces are shared so that all rests."""
 
 _SWEEPS = 5000
 """So often all forces are projected; each time takes some ten microseconds for each."""
@@ -163,69 +160,82 @@ def is_back(direction: Direction) -> bool:
 def find_states(contacts: Contacts, states: Sequence[State], rests: bool = False) -> Found | None:
     """Return states that contradict nothing, near to those given, or of rest if asked for; None where none are."""
     found = _found(contacts, states)
-    if found is None:
-        return None
-    if rests and any(
-        one[0] != STICKS for unit, one in zip(contacts.units, found.states, strict=True) if not unit.is_given
-    ):
+    is_free = [not unit.is_given for unit in contacts.units]
+    if found is None or (rests and any(one[0] != STICKS for one in compress(found.states, is_free))):
         found = _at_rest(contacts) or found
-    return _judged(contacts, found)
+    return None if found is None else _judged(contacts, found)
 
 
 def _at_rest(contacts: Contacts) -> Found | None:
     """Return the states of rest where rows depend on each other and some share of forces holds everything.
 
     What goes on already has to go on alike with any share. Least forces may contradict a law that others meet. Whether
-    any do is a linear program, with a cone of friction cut down to a pyramid within it (S. Boyd and L. Vandenberghe,
-    *Convex Optimization*, 2004, section 11.4).
+    any do is a linear program: the share is looked for that is furthest within all cones, whose sides are tangents, and
+    more of these are added where it is beyond (J. E. Kelley, *The Cutting-Plane Method for Solving Convex Programs*,
+    J. SIAM 8, 1960).
     """
     listed = _listed(contacts)
     rest = tuple(_allowed(unit, STICKS, (0.0,) * len(unit.rows)) for unit in contacts.units)
     acting, rows, right = _equations(listed, rest)
     matrix, wanted = np.array(rows), np.array(right)
-    size = np.max(np.abs(matrix), axis=1, initial=0.0)
-    size[size == 0.0] = 1.0
+    size = or_one(np.max(np.abs(matrix), axis=1, initial=0.0))
     matrix, wanted = matrix / size[:, None], wanted / size
     null, response = null_space(matrix, CLEAR), contacts.response[:, acting]
     if not null.size or np.max(np.abs(response @ null)) > math.sqrt(CLEAR) * np.max(np.abs(response)):
         return None
     forces = np.zeros(len(contacts.free))
-    unit = float(np.max(np.abs(least_norm(matrix, wanted)), initial=0.0)) or 1.0
-    sides, most = _pyramids(contacts)
-    solved = _programmed(sides[:, acting], most / unit, matrix, wanted / unit)
-    if solved is None:
-        return None
-    forces[acting] = unit * solved
-    motions = contacts.free + contacts.response @ forces
-    if _contradiction(listed, rest, forces.tolist(), motions.tolist())[0] >= 0:
-        return None
-    return Found(rest, forces, motions)
+    unit = float(or_one(np.max(np.abs(least_norm(matrix, wanted)), initial=0.0)))
+    sides = [(k, way) for k, one in enumerate(contacts.units) if not one.is_given for way in _first_sides(one)]
+    for _ in range(TURNS):
+        tangents = [_side_of(contacts, k, way) for k, way in sides]
+        most = np.array([limit for _, limit in tangents])
+        solved = _furthest_within(np.array([one[acting] for one, _ in tangents]), most / unit, matrix, wanted / unit)
+        if solved is None:
+            return None
+        forces[acting] = unit * solved
+        motions = contacts.free + contacts.response @ forces
+        number, (_, way) = _contradiction(listed, rest, forces.tolist(), motions.tolist())
+        if number < 0:
+            return Found(rest, forces, motions)
+        if not contacts.units[number].is_free_cone:
+            return None
+        sides.append((number, tuple(-x for x in way)))
+    return None
 
 
-def _pyramids(contacts: Contacts) -> tuple[FloatArray, FloatArray]:
-    """Return what forces must meet that hold everything: ``sides f <= most``."""
-    sides: list[FloatArray] = []
-    most: list[float] = []
-    limits, every = contacts.limits, np.eye(len(contacts.free))
-    for k, unit in enumerate(contacts.units):
-        own = every[list(unit.rows)]
-        turns = 2.0 * math.pi / _SIDES * np.arange(_SIDES)
-        ways = np.column_stack((np.cos(turns), np.sin(turns))) if len(unit.rows) == 2 else np.array([[1.0], [-1.0]])
-        within = math.cos(math.pi / _SIDES) if len(unit.rows) == 2 else 1.0
-        for way in () if unit.is_given else ways if unit.is_slip else ways[1:]:
-            of = limits if contacts.backwards is None or not is_back(tuple(-way)) else contacts.backwards
-            sides.append(way @ own - within * of.static_shares[k])
-            most.append(within * float(of.static_free[k]))
-    return np.array(sides).reshape(len(sides), len(contacts.free)), np.array(most)
+def _first_sides(unit: Unit) -> list[Direction]:
+    """Return the directions in which the forces of what sticks have a limit."""
+    if len(unit.rows) == 2:
+        return [(math.cos(x), math.sin(x)) for x in (0.25 * math.pi * i for i in range(8))]
+    return [(1.0,), (-1.0,)] if unit.is_slip else [(-1.0,)]
 
 
-def _programmed(sides: FloatArray, most: FloatArray, rows: FloatArray, right: FloatArray) -> FloatArray | None:
-    """Return forces with ``sides f <= most`` and ``rows f = right``; None where there are none."""
+def _side_of(contacts: Contacts, k: int, way: Direction) -> tuple[FloatArray, float]:
+    """Return a row and a number: the product of the row and the forces is no larger, as far as a unit has a limit."""
+    limits = contacts.limits
+    if contacts.backwards is not None and is_back(tuple(-x for x in way)):
+        limits = contacts.backwards
+    row = -limits.static_shares[k]
+    row[list(contacts.units[k].rows)] += way
+    return row, float(limits.static_free[k])
+
+
+def _furthest_within(sides: FloatArray, most: FloatArray, rows: FloatArray, right: FloatArray) -> FloatArray | None:
+    """Return the forces with ``rows f = right`` and ``sides f <= most`` by the largest margin; None where none are."""
     from scipy.optimize import linprog
 
-    zero = np.zeros(rows.shape[1])
-    solved = linprog(zero, A_ub=sides, b_ub=most, A_eq=rows, b_eq=right, bounds=(None, None), method="highs")
-    return np.asarray(solved.x) if solved.status == 0 else None
+    count = rows.shape[1]
+    margin, none = np.ones((len(sides), 1)), np.zeros((len(rows), 1))
+    solved = linprog(
+        np.append(np.zeros(count), -1.0),
+        A_ub=np.hstack([sides, margin]),
+        b_ub=most,
+        A_eq=np.hstack([rows, none]),
+        b_eq=right,
+        bounds=[(None, None)] * count + [(-SLACK, 1.0)],
+        method="highs",
+    )
+    return None if solved.x is None else np.asarray(solved.x)[:count]
 
 
 def _judged(contacts: Contacts, found: Found) -> Found:
