@@ -101,7 +101,7 @@ SEEN = 2.0
 """Times what is slow: what has come to rest may go by that still, or again, where its event is seen."""
 
 BEGINS = 0.05
-"""Times what is slow: what begins to slip in two directions goes by that, so that rounding does not turn it."""
+"""Times what is slow: the fastest of what begins to slip in two directions goes by that, lest rounding turn it."""
 
 NEAR_REST = 100.0
 """Times what is small and slow, where impacts have accumulated."""
@@ -687,13 +687,19 @@ def _collide() -> Routine:
 
 
 def _hold() -> Routine:
-    """Take away the rates of the chosen units; what begins to slip in two directions has a small one."""
+    """Take away the rates of the chosen units; what begins to slip in two directions has those of a moment later."""
     r, m, () = _open("hold")
     acting, right, forces, rates, size = m.row("acting"), m.row("right"), m.row("forces"), m.row("rates"), m.size
     response, matrix, solution, n = m.result("response"), m.matrix, m.row("solution"), r.variable(0, INTEGER)
-    with _each(r, m, "chosen") as (k, _, _), _rows(r, m, k) as (number, row):
-        way = r.choose(number == 0, m.unit("next_x")[k], m.unit("next_y")[k])
-        acting[n.now], right[n.now] = row.number(), way * (BEGINS * m.unit("slow")[k] * m.pace) - rates[row]
+    moment, falls = r.variable(0.0), m.row("motions")
+    with _each(r, m, "chosen") as (k, row, is_pair), r.when(m.unit("next")[k] == float(GOES_ON)):
+        fall = _size_of_slip(r, row, is_pair, falls)[2]
+        with r.when(fall > 0.0):
+            soon = BEGINS * m.unit("slow")[k] * m.pace / fall
+            moment.now = r.choose(moment.now > 0.0, r.least(moment.now, soon), soon)
+    with _each(r, m, "chosen") as (k, _, _), _rows(r, m, k) as (_, row):
+        share = r.choose(m.unit("next")[k] == float(GOES_ON), moment.now, 0.0)
+        acting[n.now], right[n.now] = row.number(), falls[row] * share - rates[row]
         n.now = n.now + 1
     with r.when(n.now == 0):
         r.give(0)

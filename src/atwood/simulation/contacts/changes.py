@@ -7,7 +7,7 @@ gap closes with a speed, and the states are found anew such that no inequality i
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from itertools import combinations, islice, pairwise
 
 import numpy as np
@@ -330,8 +330,7 @@ class _Moment:
         if found.is_redundant:
             found = self._shared(chosen, found)
         self._take(chosen, found)
-        going = self._going(slips, self.rates())
-        self._hold({k: one for k, one in zip(chosen, found.states, strict=True) if k not in going})
+        self._hold(self._on_every(chosen, found), self._going(slips, self.rates()))
         return None
 
     def _check_determined(self, chosen: list[int], found: Found) -> None:
@@ -394,18 +393,20 @@ class _Moment:
         size = np.sqrt(np.where(own > NOTHING * np.max(own, initial=0.0), own, np.inf))
         return rank(response / size / size[:, None], CLEAR) if held else 0
 
-    def _hold(self, states: dict[int, State]) -> None:
-        """Take away the rates of what holds from now on; what begins to slip in two directions has a small one."""
-        wanted = {
-            row: BEGINS * self.slow[k] * part
-            for k, (state, way) in states.items()
-            if state == STICKS or (state == GOES_ON and len(way) == 2)
-            for row, part in zip(self.units[k], way, strict=True)
-        }
-        if rows := list(wanted):
-            push = np.zeros(len(self.contacts))
-            right = np.array(list(wanted.values())) - self.rates()[rows]
-            push[rows] = least_norm(self.values.response[np.ix_(rows, rows)], right)
+    def _hold(self, states: list[State], going: Collection[int]) -> None:
+        """Take away the rates of what holds from now on; what begins to slip in two directions has those of soon."""
+        begins = [k for k, one in enumerate(states) if one[0] == GOES_ON and len(one[1]) == 2 and k not in going]
+        holds = [k for k, one in enumerate(states) if one[0] == STICKS]
+        rows, wanted = [row for k in (*holds, *begins) for row in self.units[k]], np.zeros(len(self.contacts))
+        if begins:
+            falls = self.values.accelerations() + self.values.response @ forces_in(self.values, states)
+            sizes = [(self.slow[k], math.hypot(*falls[list(self.units[k])])) for k in begins]
+            moment = min((BEGINS * slow / size for slow, size in sizes if size > 0.0), default=0.0)
+            soon = [row for k in begins for row in self.units[k]]
+            wanted[soon] = moment * falls[soon]
+        if rows:
+            push, response = np.zeros(len(self.contacts)), self.values.response
+            push[rows] = least_norm(response[np.ix_(rows, rows)], (wanted - self.rates())[rows])
             self.u = self.u + self.values.speeds_by(push)
 
     def _going(self, slips: list[int], rates: FloatArray) -> dict[int, tuple[float, ...]]:
