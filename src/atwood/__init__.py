@@ -156,6 +156,10 @@ if TYPE_CHECKING:
         LongComparison as LongComparison,
         compare_long as compare_long,
     )
+    from atwood.study.sensitivities.sensitivities import (
+        Sensitivities as Sensitivities,
+        sensitivities as sensitivities,
+    )
     from atwood.study.sweeps.files import load_sweep as load_sweep
     from atwood.study.sweeps.result import Sweep as Sweep
     from atwood.study.sweeps.sweep import sweep as sweep
@@ -298,6 +302,7 @@ _ROOMS = {
     "atwood.result.files": ("SavedResult", "load_result", "save_result"),
     "atwood.result.result": ("Result",),
     "atwood.study": ("Comparison", "ComparisonRow", "Sweep", "compare", "load_sweep", "sweep"),
+    "atwood.study.sensitivities.sensitivities": ("Sensitivities", "sensitivities"),
     "atwood.study.comparison.long_runs": ("LongComparison", "compare_long"),
     "atwood.theory.action": (
         "Action", "ActionAngle", "AdiabaticInvariant", "JoiningMotion", "PrincipalFunction", "SecondVariation",

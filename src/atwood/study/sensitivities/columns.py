@@ -1,0 +1,204 @@
+"""What a run is differentiated by: parameters and start values, each with the scene a little to both sides of it.
+
+What Python works out from a value - the parameters of leaves below a model, and a consistent start - has no graph. Its
+derivatives are central differences of three lengths, extrapolated (L. F. Richardson, Phil. Trans. R. Soc. A 226, 1927,
+section 1); they are of numbers known to rounding, and not of a run. What is then known of a start is made exact by the
+derivatives of the constraints; see `atwood.study.sensitivities.augmented`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.errors import AtwoodError, UsageError
+from atwood.forms.assembly import Assembly
+from atwood.forms.quantities import observer
+from atwood.lazy_dataclasses import dataclass
+from atwood.simulation.dynamics.scales import scene_length
+from atwood.simulation.initialization.start import Start, find_start, own_state
+
+SHARES: tuple[float, ...] = (2.0**-7, 2.0**-8, 2.0**-9)
+"""Lengths of the differences, in units of a column."""
+
+
+def extrapolated(function: Callable[[float], FloatArray]) -> FloatArray:
+    """Return the derivative of a smooth function at zero, with an error of the sixth power of the lengths."""
+    slopes = [(function(h) - function(-h)) / (2.0 * h) for h in SHARES]
+    for power in (4.0, 16.0):
+        slopes = [(power * finer - one) / (power - 1.0) for one, finer in zip(slopes, slopes[1:], strict=False)]
+    return slopes[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """One thing that a run is differentiated by.
+
+    Attributes
+    ----------
+    path, unit
+        Of the parameter or start value.
+    is_start
+        Whether it is a start value.
+    value
+        In SI units.
+    scale
+        What a change of it is measured by: the parameter itself, or for starts a size of the scene.
+    near
+        Gives the scene with the value moved by a share of the scale.
+    """
+
+    path: str
+    unit: str
+    is_start: bool
+    value: float
+    scale: float
+    near: Callable[[float], Assembly]
+
+    def parameters(self, at: Callable[[Assembly], Assembly] = lambda one: one) -> FloatArray:
+        """Return by how much each parameter of the equations changes with a change by the scale."""
+        return extrapolated(lambda share: at(self.near(share)).parameter_values)
+
+    def start(self, state: tuple[FloatArray, FloatArray], length: float) -> FloatArray:
+        """Return by how much coordinates and speeds at the start do."""
+        here, farthest = np.concatenate(state), 0.3 * max(1.0, length)
+
+        def there(share: float) -> FloatArray:
+            assembly = self.near(share)
+            found = np.concatenate(own_state(assembly, find_start(assembly)))
+            if found.shape != here.shape or not np.max(np.abs(found - here), initial=0.0) < farthest + np.max(
+                np.abs(here), initial=0.0
+            ):
+                raise UsageError(
+                    "the start goes over to another place with a small change of it",
+                    where=self.path,
+                    advice="Give more start values, so that they say where the scene is.",
+                )
+            return found
+
+        return extrapolated(there)
+
+
+def find_columns(
+    assembly: Assembly, start: Start, parameters: Iterable[str], starts: Iterable[str]
+) -> tuple[Column, ...]:
+    """Return what a run is differentiated by; what it cannot be is refused by name."""
+    found = [_parameter(assembly, path) for path in parameters]
+    found += [_start_value(assembly, start, path) for path in starts]
+    if not found:
+        raise UsageError(
+            "nothing is said that it is to be differentiated by",
+            where=assembly.flat.name,
+            advice="Give paths, such as parameters=['bob.mass'] or start=['rod1.angle'].",
+        )
+    paths = [(one.path, one.is_start) for one in found]
+    twice = next((path for path, _ in paths if paths.count((path, _)) > 1), None)
+    if twice is not None:
+        raise UsageError("it is given twice", where=twice, advice="Name each parameter and start value once.")
+    return tuple(found)
+
+
+def value_of(assembly: Assembly, path: str) -> tuple[Any, str]:
+    """Return the value of a parameter in SI units, and its unit."""
+    assert assembly.source is not None
+    scene = assembly.source.scene
+    if scene is None:
+        raise UsageError("it was assembled from leaves, so that its scene is not known", where=assembly.flat.name)
+    owner, _, name = path.rpartition(".")
+    part = scene[owner] if owner else scene
+    try:
+        value = part._value(name)
+    except (KeyError, AttributeError):
+        scene.copy().set(path, 1.0)  # says what there is instead
+        raise
+    unit = getattr(getattr(part._field(name), "unit", None), "text", "")
+    return value, unit
+
+
+def _parameter(assembly: Assembly, path: str) -> Column:
+    value, unit = value_of(assembly, path)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or isinstance(value, int):
+        is_count = isinstance(value, int) and not isinstance(value, bool)
+        if not is_count or unit in ("", "count"):
+            raise UsageError(
+                f"it is {value!r}, which shapes the equations, so that nothing has a derivative by it",
+                where=path,
+                advice="Name parameters that are numbers with a continuous meaning, as masses and lengths are.",
+            )
+    number = float(value)
+    if number == 0.0:
+        raise UsageError(
+            "it is exactly zero, and the equations are made without it",
+            where=path,
+            advice="Give it a small value other than zero, such as a thousandth of what it could be.",
+        )
+
+    @cache
+    def near(share: float) -> Assembly:
+        other = _other(assembly, path, {path: number * (1.0 + share)}, {})
+        if other.why_new:
+            raise UsageError(
+                f"it shapes the equations: {other.why_new}",
+                where=path,
+                advice="Leave it out; a sweep runs the scene with other values of it.",
+            )
+        return other
+
+    if near(SHARES[0]).shared is not assembly.shared:
+        raise UsageError("it shapes the equations", where=path, advice="Leave it out; a sweep can vary it.")
+    return Column(path, unit, False, number, abs(number), _signed(near, number))
+
+
+def _signed(near: Callable[[float], Assembly], number: float) -> Callable[[float], Assembly]:
+    return near if number > 0.0 else (lambda share: near(-share))
+
+
+def _other(assembly: Assembly, path: str, values: dict[str, float], start: dict[str, float]) -> Assembly:
+    try:
+        return assembly.with_values(values, start=start)
+    except AtwoodError as error:
+        raise UsageError(
+            f"the scene is not sound a little beside its value: {error.message}",
+            where=path,
+            advice="Move it away from the bound, or leave it out.",
+        ) from error
+
+
+def _start_value(assembly: Assembly, start: Start, path: str) -> Column:
+    given = {**assembly.flat.guess, **assembly.flat.start}
+    if path not in assembly.start_observables and path not in given:
+        assembly.with_values(start={path: 0.0})  # says what there is instead
+    observable = assembly.start_observables.get(path)
+    unit = "" if observable is None else observable.unit
+    value = given[path] if path in given else _observed(assembly, start, path)
+    scale = _start_scale(assembly, unit)
+    near = cache(lambda share: _other(assembly, path, {}, {path: value + share * scale}))
+    if near(SHARES[0]).shared is not assembly.shared:
+        raise UsageError("it shapes the equations", where=path, advice="Leave it out; a sweep can vary it.")
+    return Column(path, unit, True, value, scale, near)
+
+
+def _observed(assembly: Assembly, start: Start, path: str) -> float:
+    """Return the value that a quantity has at the start of itself."""
+    program = observer(assembly, (path,))
+    q, u = own_state(assembly, start)
+    idle = [0.0] * len(assembly.reactions)
+    return float(assembly.kernel(program)([start.time], q, u, np.zeros_like(u), idle)[0][0])
+
+
+def _start_scale(assembly: Assembly, unit: str) -> float:
+    """Return the size by which changes of a start value are measured."""
+    length = scene_length(assembly)
+    fall = math.sqrt(length / assembly.flat.gravity) if assembly.flat.gravity else 1.0
+    sizes = {"m": length, "rad": 1.0, "m/s": length / fall, "rad/s": 1.0 / fall}
+    return sizes.get(unit, 1.0)
+
+
+def seeds_of(columns: Sequence[Column], at: Callable[[Assembly], Assembly] = lambda one: one) -> FloatArray:
+    """Return the change of each parameter of the equations by each column, shape (columns, parameters)."""
+    return np.array([one.parameters(at) for one in columns])

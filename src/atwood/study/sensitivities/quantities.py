@@ -1,0 +1,109 @@
+"""Derivatives of quantities along a motion whose states have derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.errors import UnsupportedError
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, jvp, substitute
+from atwood.forms.assembly import Assembly
+from atwood.forms.caches import Key
+from atwood.forms.event_program import event_program
+from atwood.forms.program import state_groups
+from atwood.forms.quantities import find_observables
+from atwood.simulation.dynamics.balance import balance_of
+from atwood.simulation.dynamics.redundancy import find_rank
+from atwood.simulation.dynamics.scales import motion_scales, scene_length
+from atwood.simulation.problem.problem import SceneProblem
+
+_WRITTEN: Key[tuple[Expression, ...]] = Key("quantities as functions of the state")
+_DERIVED: Key[Program] = Key("quantities with their derivatives along a direction")
+
+
+def written(plan: SceneProblem, paths: tuple[str, ...], t: float, y: FloatArray) -> tuple[Expression, ...]:
+    """Return quantities as expressions of time, coordinates and speeds, with forces and accelerations solved for."""
+    assembly = plan.assembly
+    kept, maximal = tuple(plan.finding.kept), _kept_in_maximal(assembly, plan, t, y)
+
+    def make() -> tuple[Expression, ...]:
+        wanted = [one.value for one in find_observables(assembly, paths)]
+        program = event_program(assembly, wanted, kept, maximal)
+        if program is None:
+            raise UnsupportedError(
+                "a reaction among the quantities is not determined by the state alone, or would take too many formulas",
+                where=", ".join(paths),
+                advice="Leave reactions out, or free the scene of redundant constraints.",
+            )
+        shifts = dict.fromkeys(program.inputs[-1].symbols, 0.0)
+        return tuple(map(assembly.own_equations.graph.convert, substitute(list(program.results), shifts)))
+
+    return assembly.shared.get(_WRITTEN, make, paths, kept, maximal)
+
+
+def _kept_in_maximal(assembly: Assembly, plan: SceneProblem, t: float, y: FloatArray) -> tuple[int, ...]:
+    """Return the constraints in maximal coordinates that are independent."""
+    if assembly.form == "dae":
+        return tuple(plan.finding.kept)
+    from atwood.simulation.dynamics.reactions import maximal_state
+
+    q, u = plan.program.split(y)
+    big, _ = maximal_state(assembly, np.array([t]), q[:, None], u[:, None])
+    sizes = motion_scales(assembly.maximal, scene_length(assembly))
+    return tuple(find_rank(balance_of(assembly, "dae"), t, big[:, 0], sizes).kept)
+
+
+def derived(assembly: Assembly, expressions: tuple[Expression, ...]) -> Program:
+    """Return the program of (t, q, u, dq, du, dp) with expressions and their derivatives along a direction."""
+
+    def make() -> Program:
+        groups = state_groups(assembly.own_equations)
+        graph = assembly.own_equations.graph
+        symbols = (groups[1].symbols, groups[2].symbols, assembly.parameters)
+        along = [tuple(graph.symbol(f"along {s.name}") for s in some) for some in symbols]
+        tangents: dict[Expression, Expression | float] = {}
+        for some, moved in zip(symbols, along, strict=True):
+            tangents.update(zip(some, moved, strict=True))
+        outputs = OutputGroup("values", expressions), OutputGroup("derivatives", tuple(jvp(expressions, tangents)))
+        more = [InputGroup(name, one) for name, one in zip(("dq", "du", "dp"), along, strict=True)]
+        return Program(f"{assembly.flat.name} derivatives of quantities", (*groups, *more), assembly.parameters, outputs)
+
+    return assembly.shared.get(_DERIVED, make, expressions)
+
+
+def derivatives(
+    assembly: Assembly,
+    expressions: Sequence[Expression],
+    times: FloatArray,
+    states: FloatArray,
+    columns: FloatArray,
+    seeds: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return values and derivatives of expressions at many states.
+
+    Parameters
+    ----------
+    assembly, expressions
+        The scene in its mode, and expressions of its state.
+    times, states, columns
+        Shapes (times,), (times, n) and (times, columns, n).
+    seeds
+        The change of each parameter by each column, shape (columns, parameters).
+
+    Returns
+    -------
+    values, derivatives
+        Shapes (expressions, times) and (expressions, columns, times).
+    """
+    kernel = assembly.kernel(derived(assembly, tuple(expressions)), vectorized=True)
+    n, count = len(assembly.own_equations.coordinates), columns.shape[1]
+    q, u = states[:, :n].T, states[:, n:].T
+    values = np.empty((len(expressions), len(times)))
+    found = np.empty((len(expressions), count, len(times)))
+    for j in range(count):
+        dp = np.repeat(seeds[j][:, None], len(times), axis=1)
+        own = columns[:, j]
+        values[:], found[:, j] = kernel(times[None, :], q, u, own[:, :n].T, own[:, n:].T, dp)
+    return values, found
