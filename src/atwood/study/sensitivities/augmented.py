@@ -9,7 +9,6 @@ constraints, and what these say of the parameters is met.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -71,7 +70,8 @@ def _augmented(plain: Programs, pattern: Pattern) -> Programs:
     graph, (time, q, u) = program.graph, program.inputs
     state = (*q.symbols, *u.symbols)
     columns = [tuple(graph.symbol(f"column {j} of {s.name}") for s in state) for j in range(len(pattern))]
-    seeds = [[graph.parameter(f"seed {j} of {program.parameters[k].name}") for k in own] for j, own in enumerate(pattern)]
+    names = [one.name for one in program.parameters]
+    seeds = [[graph.parameter(f"seed {j} of {names[k]}") for k in own] for j, own in enumerate(pattern)]
     tangents: list[dict[Expression, Expression | float]] = [
         {
             **dict(zip(state, column, strict=True)),
@@ -219,7 +219,8 @@ class Augmented:
         kernel = self.plan.assembly.compiled(program, vectorized=True).bind(values)
         cut = len(program.inputs[1].symbols)
         for _ in range(2):
-            q, u, _ = (np.broadcast_to(one, (len(one), len(times))) for one in kernel(times[None, :], z[:, :cut].T, z[:, cut:].T))
+            made = kernel(times[None, :], z[:, :cut].T, z[:, cut:].T)
+            q, u, _ = (np.broadcast_to(one, (len(one), len(times))) for one in made)
             z = np.concatenate([q, u]).T
         return z
 

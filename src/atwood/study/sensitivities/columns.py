@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -31,7 +32,7 @@ def extrapolated(function: Callable[[float], FloatArray]) -> FloatArray:
     """Return the derivative of a smooth function at zero, with an error of the sixth power of the lengths."""
     slopes = [(function(h) - function(-h)) / (2.0 * h) for h in SHARES]
     for power in (4.0, 16.0):
-        slopes = [(power * finer - one) / (power - 1.0) for one, finer in zip(slopes, slopes[1:], strict=False)]
+        slopes = [(power * finer - one) / (power - 1.0) for one, finer in pairwise(slopes)]
     return slopes[0]
 
 
@@ -122,50 +123,45 @@ def value_of(assembly: Assembly, path: str) -> tuple[Any, str]:
 
 def _parameter(assembly: Assembly, path: str) -> Column:
     value, unit = value_of(assembly, path)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or isinstance(value, int):
-        is_count = isinstance(value, int) and not isinstance(value, bool)
-        if not is_count or unit in ("", "count"):
-            raise UsageError(
-                f"it is {value!r}, which shapes the equations, so that nothing has a derivative by it",
-                where=path,
-                advice="Name parameters that are numbers with a continuous meaning, as masses and lengths are.",
-            )
-    number = float(value)
-    if number == 0.0:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise UsageError(
-            "it is exactly zero, and the equations are made without it",
+            f"it is {value!r}, and there are derivatives by single numbers only",
             where=path,
-            advice="Give it a small value other than zero, such as a thousandth of what it could be.",
+            advice="Name parameters that are numbers, as masses and lengths are.",
         )
+    number = float(value)
+    scale = abs(number) or 1.0
+    whole = f"it is the whole number {value}, which shapes the equations" if isinstance(value, int) else ""
 
     @cache
     def near(share: float) -> Assembly:
-        other = _other(assembly, path, {path: number * (1.0 + share)}, {})
-        if other.why_new:
-            raise UsageError(
-                f"it shapes the equations: {other.why_new}",
-                where=path,
-                advice="Leave it out; a sweep runs the scene with other values of it.",
-            )
-        return other
+        return _other(assembly, path, {path: number + share * scale}, {}, whole)
 
-    if near(SHARES[0]).shared is not assembly.shared:
-        raise UsageError("it shapes the equations", where=path, advice="Leave it out; a sweep can vary it.")
-    return Column(path, unit, False, number, abs(number), _signed(near, number))
-
-
-def _signed(near: Callable[[float], Assembly], number: float) -> Callable[[float], Assembly]:
-    return near if number > 0.0 else (lambda share: near(-share))
+    found = near(SHARES[0])
+    if found.shared is not assembly.shared or found.why_new:
+        zero = "it is exactly zero, and the equations are made without it"
+        raise UsageError(
+            zero if number == 0.0 else f"it shapes the equations: {found.why_new}",
+            where=path,
+            advice="Give it a small value other than zero, such as a thousandth of what it could be."
+            if number == 0.0
+            else "Leave it out; a sweep runs the scene with other values of it.",
+        )
+    return Column(path, unit, False, number, scale, near)
 
 
-def _other(assembly: Assembly, path: str, values: dict[str, float], start: dict[str, float]) -> Assembly:
+def _other(
+    assembly: Assembly, path: str, values: dict[str, float], start: dict[str, float], whole: str = ""
+) -> Assembly:
     try:
         return assembly.with_values(values, start=start)
     except AtwoodError as error:
         raise UsageError(
-            f"the scene is not sound a little beside its value: {error.message}",
+            whole or f"the scene is not sound a little beside its value: {error.message}",
             where=path,
-            advice="Move it away from the bound, or leave it out.",
+            advice="Leave it out; a sweep runs the scene with other values of it."
+            if whole
+            else "Move it away from the bound, or leave it out.",
         ) from error
 
 

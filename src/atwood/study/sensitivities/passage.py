@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from atwood.arrays import FloatArray
+from atwood.arrays import FloatArray, IndexArray
 from atwood.errors import SolveError, UnsupportedError
 from atwood.forms.assembly import Assembly
 from atwood.result.result import Result
@@ -110,7 +108,7 @@ class Passage:
         self._check(segment, states[wanted], columns[wanted], wanted)
         return Stretch(states, columns, part.steps)
 
-    def _check(self, segment: SegmentRecord, states: FloatArray, columns: FloatArray, wanted: FloatArray) -> None:
+    def _check(self, segment: SegmentRecord, states: FloatArray, columns: FloatArray, wanted: IndexArray) -> None:
         """Refuse a motion that comes out otherwise than in the run, by more than errors can have grown."""
         plan = segment.plan
         sizes = plan.tolerances(1.0, {})[: states.shape[1]]

@@ -68,7 +68,8 @@ def derived(assembly: Assembly, expressions: tuple[Expression, ...]) -> Program:
             tangents.update(zip(some, moved, strict=True))
         outputs = OutputGroup("values", expressions), OutputGroup("derivatives", tuple(jvp(expressions, tangents)))
         more = [InputGroup(name, one) for name, one in zip(("dq", "du", "dp"), along, strict=True)]
-        return Program(f"{assembly.flat.name} derivatives of quantities", (*groups, *more), assembly.parameters, outputs)
+        name = f"{assembly.flat.name} derivatives of quantities"
+        return Program(name, (*groups, *more), assembly.parameters, outputs)
 
     return assembly.shared.get(_DERIVED, make, expressions)
 

@@ -57,10 +57,9 @@ class Sensitivities(Shown):
     scales: FloatArray = field(repr=False)
 
     def __getitem__(self, pair: tuple[str, str]) -> FloatArray:
-        if not isinstance(pair, tuple) or len(pair) != 2:
-            raise UsageError(
-                "a derivative is of a quantity by a parameter", advice="Give both: found['bob.position.x', 'rod.length']."
-            )
+        if len(pair) != 2:
+            advice = "Give both: found['bob.position.x', 'rod.length']."
+            raise UsageError("a derivative is of a quantity by a parameter", advice=advice)
         places = []
         for path, known, what in zip(pair, (self.quantities, self.by), ("of", "by"), strict=True):
             if path not in known:
