@@ -103,7 +103,7 @@ def test_sine_and_cosine_together_are_those_alone() -> None:
 @pytest.mark.parametrize("lanes", [2, 4, 8])
 def test_lanes_have_the_bits_of_a_number_alone(lanes: int) -> None:
     names = (*FUNCTIONS, "sin_cos")
-    alone, wide = write_routines(names, each=False), write_routines(names, lanes)
+    alone, wide = write_routines(names, each=False), write_routines(names, lanes, each=False)
     loaded = load_code(
         compile_text(print_routines([*alone, *wide]) + INTRINSICS, 2, has_variables=True),
         [one.name for one in wide],

@@ -46,12 +46,13 @@ def write_routines(names: Sequence[str], lanes: int = 0, each: bool = True) -> l
     lanes
         On how many numbers at once they work, if not on one.
     each
-        Whether those that return one number have another for the entries of arrays, with ``_each`` in its name.
+        Whether those that return one number have another for the entries of arrays, with ``_each`` in its name; with
+        lanes, whether what they call is written, too.
     """
     far = dict.fromkeys(_FAR[one] for one in names if one in _FAR)
     found = [_function(one, lanes) for one in names]
     if lanes:
-        return found
+        return [*(_far(one) for one in far if each), *found]
     return [*(_far(one) for one in far), *found, *(_each(one) for one in found if each and one.result is NUMBER)]
 
 

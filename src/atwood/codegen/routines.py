@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import accumulate
 from typing import Any, NamedTuple, TypeAlias
 
 from atwood.lazy_dataclasses import dataclass
@@ -201,10 +202,10 @@ class Value:
     def __invert__(self) -> Value:
         return self.routine.put("not", self.kind, self)
 
-    def __rshift__(self, count: int) -> Value:
+    def __rshift__(self, count: Operand) -> Value:
         return self._two("shift right", count)
 
-    def __lshift__(self, count: int) -> Value:
+    def __lshift__(self, count: Operand) -> Value:
         return self._two("shift left", count)
 
     def __bool__(self) -> bool:
@@ -236,8 +237,12 @@ class Value:
         return self.routine.put("to number", NUMBER, self)
 
     def integer(self) -> Value:
-        """Return a condition or a code as an integer."""
+        """Return a condition or a code as an integer; of conditions of lanes, a bit each, from the lowest on."""
         return self.routine.put("to integer", INTEGER, self)
+
+    def conditions(self, count: int) -> Value:
+        """Return the lowest bits of an integer as conditions of lanes."""
+        return self.routine.put("conditions", Lanes(count, is_float=False), self)
 
     def bits(self) -> Value:
         """Return the integer with the bits of this number."""
@@ -275,7 +280,7 @@ class Variable:
 
 
 class Record:
-    """Named fields of 8 bytes each that follow each other in memory, read and set as attributes.
+    """Named fields of 8 bytes, or lanes of them, that follow each other in memory, read and set as attributes.
 
     Parameters
     ----------
@@ -286,7 +291,7 @@ class Record:
     """
 
     def __init__(self, base: Value, fields: Mapping[str, Kind]) -> None:
-        self.__dict__.update(_base=base, _fields=fields, _places={name: k for k, name in enumerate(fields)})
+        self.__dict__.update(_base=base, _fields=fields, _places=places_of(fields))
 
     def __getattr__(self, name: str) -> Value:
         inside = self.__dict__
@@ -296,6 +301,19 @@ class Record:
     def __setattr__(self, name: str, value: Operand) -> None:
         inside = self.__dict__
         inside["_base"].write(inside["_places"][name], value, inside["_fields"][name])
+
+
+def places_of(fields: Mapping[str, Kind]) -> dict[str, int]:
+    """Return where the fields of a record begin, in units of 8 bytes."""
+    ends = accumulate((kind.count if isinstance(kind, Lanes) else 1 for kind in fields.values()), initial=0)
+    return dict(zip(fields, ends, strict=False))
+
+
+def place_in(record: Record, name: str) -> Value:
+    """Return the address of a field."""
+    inside = record.__dict__
+    found: Value = inside["_base"].at(inside["_places"][name])
+    return found
 
 
 class Routine:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import time
+from collections.abc import Mapping
 from ctypes import c_int, c_void_p
 from typing import Any
 
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.codegen.llvm.build import Built, RoutineSource, build_code, once
 from atwood.codegen.llvm.module import CodeOptions
-from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Record, Routine, Value, Variable
+from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Kind, Record, Routine, Value, Variable
 from atwood.lazy_dataclasses import dataclass
 
 ENDS = {0: "reached", 1: "step limit", 2: "too small", 3: "no value between", 4: "no rates"}
@@ -27,10 +28,10 @@ ENDS = {0: "reached", 1: "step limit", 2: "too small", 3: "no value between", 4:
 _FIRST_BUDGET, _MOMENT = 2_000, 0.03
 """Steps of the first call, and for about how long a call should last, in seconds, so that Ctrl-C is heard."""
 
-_NO_LIMIT = 2**62
+NO_LIMIT = 2**62
 
 
-FIELDS = (
+_NAMES = (
     "begin",  # int begin(session, double t, const double *start); 0 unless there are no finite rates
     "sample",  # int sample(session, const double *times, long wanted, double *values, double *rates)
     "session",
@@ -38,7 +39,7 @@ FIELDS = (
     "steps",  # where it counts its steps; further counts follow
     "filled",  # where it says how many samples it has filled
     "counts",  # how many counts there are
-    "t",  # bits of the time of the start
+    "t",  # the time of the start
     "times",
     "wanted",
     "size",
@@ -61,12 +62,16 @@ FIELDS = (
     "tolerances",
     "tolerance",  # where the session reads its absolute tolerances
 )
-"""What a job holds, 8 bytes each: addresses and integers."""
-
 _ADDRESSES = {
     "begin", "sample", "session", "limit", "steps", "filled", "times", "starts", "values", "rates", "codes",
     "counted", "prologue", "parameters", "derived", "scratch", "tolerances", "tolerance",
 }  # fmt: skip
+
+
+FIELDS: dict[str, Kind] = {
+    name: ADDRESS if name in _ADDRESSES else NUMBER if name == "t" else INTEGER for name in _NAMES
+}
+"""What a job holds, 8 bytes each."""
 
 
 @dataclass(frozen=True)
@@ -105,25 +110,17 @@ class BatchPlaces:
     keep: object = None
 
 
-class Batch:
-    """Runs that differ in their start, and maybe in their parameters.
+class Job:
+    """Runs that one compiled function makes, a moment at a time.
 
     Parameters
     ----------
-    places
-        The session that takes the steps.
-    t
-        Time of the start, s.
     times
         Output times, rising, none before the start.
-    starts
-        Start values, shape (runs, size).
-    tolerances
-        Absolute tolerances, shape (runs, size).
-    max_steps
-        The steps that each run may take; None for no limit.
-    parameters
-        Where they change from run to run, shape (runs, parameters).
+    starts, tolerances
+        Start values and absolute tolerances, shape (runs, size).
+    factor
+        By what absolute tolerances are multiplied where the session keeps them.
 
     Attributes
     ----------
@@ -131,10 +128,69 @@ class Batch:
         Shape (runs, times, size); nan where a run did not come.
     codes
         How each run ended, a key of `ENDS`; -1 for what has not been run.
-    counts
-        What each run has counted, shape (runs, counts).
     seconds
         Time spent in the method.
+    """
+
+    def __init__(self, times: FloatArray, starts: FloatArray, tolerances: FloatArray, factor: float) -> None:
+        runs, size = starts.shape
+        self._starts, self._times = np.ascontiguousarray(starts), np.ascontiguousarray(times)
+        self._tolerances = np.ascontiguousarray(factor * np.maximum(tolerances, np.finfo(float).tiny))
+        self.values = np.full((runs, len(times), size), np.nan)
+        self.codes = np.full(runs, -1, dtype=np.int64)
+        self.seconds = 0.0
+        self._allowed = _FIRST_BUDGET
+
+    def _fill(self, function: int, fields: Mapping[str, Kind], **given: float) -> None:
+        """Take a function, which lets other threads run, and write what it is told."""
+        given |= {
+            "times": self._times.ctypes.data,
+            "wanted": len(self._times),
+            "runs": len(self._starts),
+            "size": self._starts.shape[1],
+            "starts": self._starts.ctypes.data,
+            "values": self.values.ctypes.data,
+            "codes": self.codes.ctypes.data,
+            "tolerances": self._tolerances.ctypes.data,
+        }
+        self._job = np.zeros(len(fields), dtype=np.int64)
+        for place, (name, kind) in enumerate(fields.items()):
+            table: NDArray[Any] = self._job.view(np.float64) if kind is NUMBER else self._job
+            table[place] = given.get(name, 0)
+        self._budget = list(fields).index("budget")
+        self._call = ctypes.CFUNCTYPE(c_int, c_void_p)(function)
+
+    def advance(self) -> bool:
+        """Go on for a moment; return whether all runs are done."""
+        began = time.perf_counter()
+        self._job[self._budget] = self._allowed
+        is_done: bool = self._call(self._job.ctypes.data) == 0
+        taken = time.perf_counter() - began
+        self.seconds += taken
+        if taken > 2.0 * _MOMENT:
+            self._allowed = max(1, int(self._allowed * _MOMENT / taken))
+        elif not is_done and taken < 0.5 * _MOMENT:
+            self._allowed *= 2
+        if is_done:  # what a run that ended early did not reach may have been half written
+            self.values[self.codes != 0] = np.nan
+        return is_done
+
+
+class Batch(Job):
+    """Runs that differ in their start, and maybe in their parameters, one after another.
+
+    Parameters
+    ----------
+    places
+        The session that takes the steps.
+    t
+        Time of the start, s.
+    times, starts, tolerances
+        See `Job`.
+    max_steps
+        The steps that each run may take; None for no limit.
+    parameters
+        Where they change from run to run, shape (runs, parameters).
     """
 
     def __init__(
@@ -147,46 +203,28 @@ class Batch:
         max_steps: int | None = None,
         parameters: FloatArray | None = None,
     ) -> None:
-        runs, size = starts.shape
-        self._starts, self._times = np.ascontiguousarray(starts), np.ascontiguousarray(times)
-        at_least = np.maximum(tolerances, np.finfo(float).tiny)
-        self._tolerances = np.ascontiguousarray(places.tolerance_factor * at_least)
-        self.values = np.full((runs, len(times), size), np.nan)
-        self.codes = np.full(runs, -1, dtype=np.int64)
-        self._counted = np.zeros((runs, places.counts), dtype=np.int64)
+        super().__init__(times, starts, tolerances, places.tolerance_factor)
+        self._counted = np.zeros((len(starts), places.counts), dtype=np.int64)
         self._first_counts = np.ctypeslib.as_array(
             ctypes.cast(places.steps, ctypes.POINTER(ctypes.c_int64)), (places.counts,)
         ).copy()
-        self._rates = np.empty((len(times), size))
-        self.seconds = 0.0
-        self._budget = _FIRST_BUDGET
-        given: dict[str, Any] = {
+        self._rates = np.empty((len(times), starts.shape[1]))
+        given: dict[str, float] = {
             **{name: getattr(places, name) for name in ("begin", "sample", "session", "limit", "steps", "filled")},
             "tolerance": places.tolerance,
             "counts": places.counts,
-            "t": int(np.array(t, dtype=np.float64).view(np.int64)),
-            "times": self._times.ctypes.data,
-            "wanted": len(times),
-            "size": size,
-            "runs": runs,
+            "t": t,
             "done": -1,
-            "most": _NO_LIMIT if max_steps is None else max_steps,
-            "starts": self._starts.ctypes.data,
-            "values": self.values.ctypes.data,
+            "most": NO_LIMIT if max_steps is None else max_steps,
             "rates": self._rates.ctypes.data,
-            "codes": self.codes.ctypes.data,
             "counted": self._counted.ctypes.data,
-            "tolerances": self._tolerances.ctypes.data,
         }
-        if parameters is not None:
-            rows = np.ascontiguousarray(parameters)
+        rows = None if parameters is None else np.ascontiguousarray(parameters)
+        if rows is not None:
             given |= dict(zip(("prologue", "derived", "scratch"), places.parameters, strict=True))
             given |= {"parameters": rows.ctypes.data, "width": rows.shape[1]}
-            self._kept: object = (places, rows)
-        else:
-            self._kept = places
-        self._job = np.array([given.get(name, 0) for name in FIELDS], dtype=np.int64)
-        self._call = _function()
+        self._kept = places, rows
+        self._fill(_code().code.addresses["batch"], FIELDS, **given)
 
     @property
     def done(self) -> int:
@@ -201,27 +239,18 @@ class Batch:
         found[: self.done] = np.diff(counted, axis=0, prepend=self._first_counts[None, :])
         return found
 
-    def advance(self) -> bool:
-        """Go on for a moment; return whether all runs are done."""
-        began = time.perf_counter()
-        self._job[_BUDGET] = self._budget
-        is_done: bool = self._call(self._job.ctypes.data) == 0
-        taken = time.perf_counter() - began
-        self.seconds += taken
-        if taken > 2.0 * _MOMENT:
-            self._budget = max(1, int(self._budget * _MOMENT / taken))
-        elif not is_done and taken < 0.5 * _MOMENT:
-            self._budget *= 2
-        if is_done:
-            self._clear()
-        return is_done
+    @property
+    def steps(self) -> NDArray[np.int64]:
+        """The steps of each run."""
+        return self.counts[:, 0]
 
-    def _clear(self) -> None:
-        """Make nan what a run that ended early did not reach; it may have been half written."""
-        self.values[self.codes != 0] = np.nan
+    @property
+    def stiff(self) -> NDArray[np.int64]:
+        """How often each run has turned out stiff."""
+        return self.counts[:, -1]
 
 
-_RUN, _BUDGET = FIELDS.index("run"), FIELDS.index("budget")
+_RUN = list(FIELDS).index("run")
 
 
 _ROUTINES = RoutineSource("integrators.batch")
@@ -232,12 +261,6 @@ def _code() -> Built:
     return build_code([], CodeOptions(), exports=["batch"], routines=_ROUTINES)
 
 
-@once
-def _function() -> Any:
-    """Return the function; a call lets other threads run."""
-    return ctypes.CFUNCTYPE(c_int, c_void_p)(_code().code.addresses["batch"])
-
-
 def write_routines() -> list[Routine]:
     """Write ``int batch(void *job)``: 0 when all runs are done, 1 when its budget of steps is used up.
 
@@ -245,8 +268,7 @@ def write_routines() -> list[Routine]:
     where there is no value between two steps), or 4 where it could not begin.
     """
     r = Routine("batch", {"job": ADDRESS}, exported=True)
-    kinds = {name: ADDRESS if name in _ADDRESSES else NUMBER if name == "t" else INTEGER for name in FIELDS}
-    job = Record(r.arguments[0], kinds)
+    job = Record(r.arguments[0], FIELDS)
     steps = job.steps
     call_limit = steps.read(0, INTEGER) + job.budget
     with r.forever():

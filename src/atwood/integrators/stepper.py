@@ -8,6 +8,7 @@ from __future__ import annotations
 import ctypes
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager
 from ctypes import c_double, c_int, c_int64, c_void_p
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -181,6 +182,23 @@ def fields_of(pointers: Iterable[str], numbers: Iterable[str], counts: Iterable[
     }
 
 
+LANE_FIELDS: dict[str, Kind] = {"taken": NUMBER, "edges": NUMBER, "active": INTEGER}
+"""What a session of runs side by side has besides: steps and turns to stiffness of each, and which lanes have a run.
+
+The last, as whatever says something of lanes, has a bit for each, from the lowest on.
+"""
+
+
+def in_lanes(fields: Mapping[str, Kind], runs: int) -> dict[str, Kind]:
+    """Return the fields of a session that takes several runs side by side: numbers are lanes of them."""
+    return {name: number_kind(runs) if kind is NUMBER else kind for name, kind in fields.items()}
+
+
+def number_kind(runs: int) -> Kind:
+    """Return what a number is in a session that takes so many runs side by side."""
+    return NUMBER if runs == 1 else Lanes(runs)
+
+
 class Memory(Record):
     """The memory of a session within a routine: its fields, and rows of a table of arrays.
 
@@ -193,18 +211,28 @@ class Memory(Record):
         The rows by name.
     session
         Its address.
+    runs
+        How many runs it takes side by side, each with a number of its own in every place of a number.
+
+    Attributes
+    ----------
+    part
+        What a loop over a row works on at a time: some unknowns, or one of each run.
     """
 
     session: Value
     rows: Mapping[str, int]
+    runs: int
+    part: Lanes
     arrays: Value
     size: Value
     padded: Value
 
-    def __init__(self, fields: Mapping[str, Kind], rows: Mapping[str, int], session: Value) -> None:
-        super().__init__(session, fields)
+    def __init__(self, fields: Mapping[str, Kind], rows: Mapping[str, int], session: Value, runs: int = 1) -> None:
+        super().__init__(session, fields if runs == 1 else in_lanes(fields, runs))
         known = {name: self.__getattr__(name) for name in ("arrays", "size", "padded")}
-        self.__dict__.update(session=session, rows=rows, **known)
+        part = Lanes(WIDTH if runs == 1 else runs)
+        self.__dict__.update(session=session, rows=rows, runs=runs, part=part, **known)
 
     def row(self, row: Operand | str) -> Value:
         """Return the address of a row of the table of arrays, by its name or number."""
@@ -212,7 +240,11 @@ class Memory(Record):
 
     def lanes(self, row: Value, j: Value) -> Value:
         """Return the lanes of a row from an unknown on."""
-        return row.read(j, Lanes(WIDTH))
+        return row.read(j, self.part)
+
+    def parts(self) -> AbstractContextManager[Value]:
+        """Do what follows for all parts of a row; the value is where each begins."""
+        return self.session.routine.count(self.padded, step=self.part.count)
 
 
 _M = TypeVar("_M", bound=Record)

@@ -215,9 +215,9 @@ def _own_addresses(names: Sequence[str]) -> dict[str, int]:
     """Return where elementary functions are, by what they are called in a module."""
     if not names:
         return {}
-    from atwood.codegen.llvm.own import own_functions
+    from atwood.codegen.llvm.own import address_of
 
-    return {own_name(one): own_functions().addresses[own_name(one)] for one in names}
+    return {own_name(one): address_of(one) for one in names}
 
 
 def _from_cache(store: Cache, key: str, names: Sequence[str]) -> Built | None:

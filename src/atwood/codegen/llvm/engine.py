@@ -120,6 +120,12 @@ def target_description() -> tuple[str, ...]:
     return (llvmlite.__version__, version, binding.get_process_triple(), cpu, features)
 
 
+def lane_count() -> int:
+    """Return how many numbers the vectors of this machine hold; each run of a sweep has one of them for itself."""
+    features = target_description()[-1].split(",")
+    return 8 if "+avx512f" in features else 4 if "+avx2" in features else 2
+
+
 @cache
 def _machine(level: int) -> binding.TargetMachine:
     binding.initialize_native_target()

@@ -14,8 +14,9 @@ from collections.abc import Sequence
 from math import nan
 
 from atwood.codegen.llvm.layout import LARGEST_UNROLLED, MatrixKey, matrix_key
-from atwood.codegen.llvm.text import Writer, literal
+from atwood.codegen.llvm.text import Writer
 from atwood.codegen.routines import ADDRESS, INTEGER, Lanes, Routine, Value
+from atwood.errors import UnsupportedError
 from atwood.expr.core.graph import Expression
 from atwood.lazy_dataclasses import dataclass
 
@@ -70,6 +71,8 @@ class Solver:
             for unknown in unknowns:
                 writer.values[unknown.index] = found[unknown.payload]
             return
+        if writer.runs > 1:
+            raise UnsupportedError(f"there is no machine code in lanes for a linear system of {size} unknowns")
         start = self._regions[key]
         pivots, side = start + size * size, start + size * (size + 1)
         writer.needs.elimination = True
@@ -89,21 +92,21 @@ class Solver:
 
 def _eliminate(writer: Writer, size: int, entries: Sequence[str]) -> _Factors:
     """Write the elimination of a small matrix."""
-    put = writer.put
+    put, kind = writer.put, writer.kind
     rows = [list(entries[i * size : (i + 1) * size]) for i in range(size)]
     factors = _Factors(rows, {}, {})
     for k in range(size):
         for i in range(k + 1, size):
-            held = put(f"call double @llvm.fabs.f64(double {rows[k][k]})")
-            other = put(f"call double @llvm.fabs.f64(double {rows[i][k]})")
-            swap = put(f"fcmp ogt double {other}, {held}")
+            held = writer.intrinsic("absolute", rows[k][k])
+            other = writer.intrinsic("absolute", rows[i][k])
+            swap = put(f"fcmp ogt {kind} {other}, {held}")
             factors.exchanges[k, i] = swap
             for j in range(k, size):
                 rows[k][j], rows[i][j] = _exchange(writer, swap, rows[k][j], rows[i][j])
-        zero = put(f"fcmp oeq double {rows[k][k]}, 0.0")
-        rows[k][k] = put(f"select i1 {zero}, double {literal(math.nan)}, double {rows[k][k]}")
+        zero = put(f"fcmp oeq {kind} {rows[k][k]}, {writer.constant(0.0)}")
+        rows[k][k] = writer.choose(zero, writer.constant(math.nan), rows[k][k])
         for i in range(k + 1, size):
-            factor = put(f"fdiv double {rows[i][k]}, {rows[k][k]}")
+            factor = put(f"fdiv {kind} {rows[i][k]}, {rows[k][k]}")
             factors.multipliers[k, i] = factor
             for j in range(k + 1, size):
                 rows[i][j] = _reduce(writer, rows[i][j], factor, rows[k][j])
@@ -123,18 +126,17 @@ def _substitute(writer: Writer, size: int, factors: _Factors, right: Sequence[st
     for i in reversed(range(size)):
         for j in range(i + 1, size):
             side[i] = _reduce(writer, side[i], factors.rows[i][j], side[j])
-        side[i] = writer.put(f"fdiv double {side[i]}, {factors.rows[i][i]}")
+        side[i] = writer.put(f"fdiv {writer.kind} {side[i]}, {factors.rows[i][i]}")
     return side
 
 
 def _exchange(writer: Writer, swap: str, a: str, b: str) -> tuple[str, str]:
-    first = writer.put(f"select i1 {swap}, double {b}, double {a}")
-    return first, writer.put(f"select i1 {swap}, double {a}, double {b}")
+    return writer.choose(swap, b, a), writer.choose(swap, a, b)
 
 
 def _reduce(writer: Writer, a: str, factor: str, b: str) -> str:
-    product = writer.put(f"fmul double {factor}, {b}")
-    return writer.put(f"fsub double {a}, {product}")
+    product = writer.put(f"fmul {writer.kind} {factor}, {b}")
+    return writer.put(f"fsub {writer.kind} {a}, {product}")
 
 
 _WIDTH = 4

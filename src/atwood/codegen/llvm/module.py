@@ -20,7 +20,7 @@ from collections.abc import Sequence
 
 from atwood.codegen.llvm.layout import Body, Layout, Unit, lay_out, main_body, prologue_body
 from atwood.codegen.llvm.linear_systems import Solver
-from atwood.codegen.llvm.text import OWN_FUNCTIONS, Needs, Writer
+from atwood.codegen.llvm.text import INTRINSICS, OWN_FUNCTIONS, Needs, Writer, number_type, spread
 from atwood.codegen.routines import own_name
 from atwood.errors import UnsupportedError
 from atwood.expr.core.graph import Expression
@@ -47,10 +47,14 @@ class CodeOptions:
         The number of operations in one function.
     level
         How hard LLVM works on the machine code, from 0 to 3.
+    runs
+        How many runs are computed side by side: every number of every array is so many neighbouring numbers, one of
+        each run, and what a function returns has a bit for each, from the lowest on.
     """
 
     longest_chunk: int = 150
     level: int = 1
+    runs: int = 1
 
 
 @dataclass(frozen=True)
@@ -121,9 +125,13 @@ def write_module(programs: Sequence[Part], options: CodeOptions) -> ModuleText:
             except UnsupportedError as error:
                 raise UnsupportedError(error.message, where=program.name) from None
         parts.append(_write_prologue(name))
-    parts.extend(_declarations(needs))
+    parts.extend(_declarations(needs, options.runs))
     return ModuleText(
-        "\n".join(parts), scratch, tuple(sorted(needs.functions)), tuple(needs.externals), needs.elimination
+        "\n".join(parts),
+        scratch * options.runs,
+        tuple(sorted(needs.functions)),
+        tuple(needs.externals),
+        needs.elimination,
     )
 
 
@@ -149,7 +157,7 @@ def _write_function(
     pieces = [passed_on[k : k + _STORES] for k in cuts]
     alone = len(layout.chunks) == 1 and not pieces
     for number, chunk in enumerate(layout.chunks):
-        writer = Writer(places, needs, held if alone else frozenset())
+        writer = Writer(places, needs, held if alone else frozenset(), options.runs)
         solver.start_chunk()
         for unit in chunk:
             _write_unit(writer, solver, unit)
@@ -167,11 +175,11 @@ def _write_function(
             return [_as_function(name, writer)]
         parts.append(_as_chunk(f"{name}.{number}", writer))
     for piece in pieces:
-        writer = Writer(places, needs, frozenset())
+        writer = Writer(places, needs, frozenset(), options.runs)
         for node, target in piece:
             _write_result(writer, node, [target])
         parts.append(_as_chunk(f"{name}.{len(parts)}", writer))
-    parts.append(_write_calls(name, len(parts)))
+    parts.append(_write_calls(name, len(parts), options.runs))
     return parts
 
 
@@ -189,7 +197,9 @@ def _write_unit(writer: Writer, solver: Solver, unit: Unit) -> None:
 
 def _pointers(writer: Writer) -> list[str]:
     """Return the instructions that fetch the pointers that a chunk uses."""
-    lines = ["  %sine = alloca double", "  %cosine = alloca double"] if writer.waves else []
+    rooms = ["sine", "cosine"] if writer.waves else []
+    rooms += ["given0", "given1"] if writer.calls else []
+    lines = [f"  %{room} = alloca {writer.kind}" for room in rooms]
     for pointer in sorted(writer.pointers):
         for prefix, table in (("in", "inputs"), ("out", "outputs")):
             if pointer.startswith(prefix):
@@ -223,37 +233,39 @@ def _pack(writer: Writer, lanes: int) -> None:
 def _as_chunk(name: str, writer: Writer) -> str:
     """Return a chunk as a function of its own, which returns the sum of its results."""
     checked = writer.checked()
-    start = [f"define internal double @{name}({_ARGUMENTS}) #0 {{", *_pointers(writer)]
-    return "\n".join([*start, *writer.lines, f"  ret double {checked}", "}"])
+    start = [f"define internal {writer.kind} @{name}({_ARGUMENTS}) #0 {{", *_pointers(writer)]
+    return "\n".join([*start, *writer.lines, f"  ret {writer.kind} {checked}", "}"])
 
 
 def _as_function(name: str, writer: Writer) -> str:
     """Return the only chunk of a body as the whole function."""
     checked = writer.checked()
     start = [f"define i32 @{name}({_ARGUMENTS}) #0 {{", *_pointers(writer)]
-    return "\n".join([*start, *writer.lines, *_ending(checked)])
+    return "\n".join([*start, *writer.lines, *_ending(checked, writer.runs)])
 
 
-def _ending(checked: str) -> list[str]:
-    """Return the end of a function: 1 if the sum of all results is not finite."""
+def _ending(checked: str, runs: int) -> list[str]:
+    """Return the end of a function: 1 if the sum of all results is not finite, a bit for each run."""
+    kind, bits = number_type(runs), f"i{runs}"
     return [
-        f"  %nothing = fsub double {checked}, {checked}",
-        "  %undefined = fcmp une double %nothing, 0.0",
-        "  %code = zext i1 %undefined to i32",
+        f"  %nothing = fsub {kind} {checked}, {checked}",
+        f"  %undefined = fcmp une {kind} %nothing, {spread(0.0, runs)}",
+        *([f"  %bits = bitcast <{runs} x i1> %undefined to {bits}"] if runs > 1 else []),
+        f"  %code = zext {bits} %{'bits' if runs > 1 else 'undefined'} to i32",
         "  ret i32 %code",
         "}",
     ]
 
 
-def _write_calls(name: str, count: int) -> str:
+def _write_calls(name: str, count: int, runs: int) -> str:
     """Write the function that calls all chunks of a body."""
     lines = [f"define i32 @{name}({_ARGUMENTS}) #0 {{"]
-    total = "0.0"
+    kind, total = number_type(runs), spread(0.0, runs)
     for k in range(count):
-        lines.append(f"  %c{k} = call double @{name}.{k}({_PASSED})")
-        lines.append(f"  %s{k} = fadd double {total}, %c{k}")
+        lines.append(f"  %c{k} = call {kind} @{name}.{k}({_PASSED})")
+        lines.append(f"  %s{k} = fadd {kind} {total}, %c{k}")
         total = f"%s{k}"
-    return "\n".join([*lines, *_ending(total)])
+    return "\n".join([*lines, *_ending(total, runs)])
 
 
 def _write_prologue(name: str) -> str:
@@ -268,10 +280,18 @@ def _write_prologue(name: str) -> str:
 }}"""
 
 
-def _declarations(needs: Needs) -> list[str]:
+def _declarations(needs: Needs, runs: int) -> list[str]:
     """Return the declarations of what the module calls."""
-    lines = [f"declare double @llvm.{name}.f64(double)" for name in ("sqrt", "fabs", "floor")]
+    lines = [f"declare double @llvm.{name}.f64(double)" for name in INTRINSICS.values()]
+    if runs > 1:
+        kind = number_type(runs)
+        lines += [f"declare {kind} @llvm.{name}.v{runs}f64({kind})" for name in INTRINSICS.values()]
     for name in sorted(needs.functions):
+        if runs > 1:
+            plain = name.removesuffix(f"_{runs}")
+            places = 3 if plain == "sin_cos" else OWN_FUNCTIONS[plain] + 1
+            lines.append(f"declare void @{own_name(name)}({', '.join(['ptr'] * places)}) #0")
+            continue
         kind, given = ("void", "double, ptr, ptr") if name == "sin_cos" else ("double", "")
         given = given or ", ".join(["double"] * OWN_FUNCTIONS[name])
         lines.append(f"declare {kind} @{own_name(name)}({given}) #0")

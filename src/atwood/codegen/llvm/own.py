@@ -30,6 +30,21 @@ def own_functions() -> LoadedCode:
     return code
 
 
+@once
+def _functions_of_lanes(lanes: int) -> LoadedCode:
+    """Return the functions of so many numbers at once, by their names as operations with that count."""
+    names = (*FUNCTIONS, "sin_cos")
+    source = RoutineSource("codegen.functions", ("expr/core/elementary.py",), (names, lanes))
+    return build_now((), CodeOptions(level=2), [own_name(f"{one}_{lanes}") for one in names], source, True).code
+
+
+def address_of(name: str) -> int:
+    """Return where a function is; those of lanes end with their count."""
+    lanes = name.rpartition("_")[2]
+    code = _functions_of_lanes(int(lanes)) if lanes.isdigit() else own_functions()
+    return code.addresses[own_name(name)]
+
+
 @cache
 def _each(name: str) -> Any:
     kinds = [ctypes.c_void_p] * (OWN_FUNCTIONS[name] + 1)

@@ -180,6 +180,13 @@ class _Printer:
                 return self._words(operation, result, values)
             case "look up":
                 return self._look_up(result, a, values[1])
+            case "to integer" if isinstance(a.kind, Lanes):
+                self.lines.append(f"  {_name(result)}.bits = bitcast {_typed(a)} to i{a.kind.count}")
+                return f"zext i{a.kind.count} {_name(result)}.bits to i64"
+            case "conditions":
+                assert isinstance(result.kind, Lanes)
+                self.lines.append(f"  {_name(result)}.bits = trunc {_typed(a)} to i{result.kind.count}")
+                return f"bitcast i{result.kind.count} {_name(result)}.bits to {_type(result.kind)}"
             case "to code" | "to integer":
                 word = _CONVERTED.get(a.kind, "zext")
                 return f"{word} {_typed(a)} to {_type(result.kind)}"

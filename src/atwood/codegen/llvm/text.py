@@ -8,7 +8,7 @@ contracted, and functions are Atwood's own (`atwood.codegen.llvm.own`): every ma
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 
 from atwood.codegen.routines import own_name
@@ -22,7 +22,7 @@ OWN_FUNCTIONS: Mapping[str, int] = dict.fromkeys(
 ) | {"atan2": 2, "pow": 2}
 """Operations that functions of their own compute, with the number of arguments."""
 
-_INTRINSICS = {"sqrt": "@llvm.sqrt.f64", "absolute": "@llvm.fabs.f64", "floor": "@llvm.floor.f64"}
+INTRINSICS = {"sqrt": "sqrt", "absolute": "fabs", "floor": "floor"}
 _ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 _COMPARISONS = {"less": "olt", "less_equal": "ole"}
 _LOGICAL = {"logical_and": "and", "logical_or": "or"}
@@ -35,6 +35,17 @@ _CHECKS = 4
 def literal(value: float) -> str:
     """Return a number as LLVM writes it, to the last bit."""
     return f"0x{struct.pack('>d', value).hex()}"
+
+
+def number_type(runs: int) -> str:
+    """Return the type of a number of each of several runs."""
+    return "double" if runs == 1 else f"<{runs} x double>"
+
+
+def spread(value: float, runs: int) -> str:
+    """Return a number that all of several runs share, without its type."""
+    one = literal(value)
+    return one if runs == 1 else f"<{', '.join([f'double {one}'] * runs)}>"
 
 
 @dataclass
@@ -68,6 +79,8 @@ class Writer:
         What is called.
     held
         Arrays whose numbers are not written one by one.
+    runs
+        How many runs are computed side by side: each value has so many lanes, and so many places in every array.
     lines
         The instructions so far.
     values
@@ -78,6 +91,8 @@ class Writer:
         The arrays that the chunk needs.
     waves
         Whether it calls for a sine and cosine together.
+    calls
+        Whether it calls functions of lanes.
     kept
         What goes to the arrays that are held: a value, the name of the pointer and the position.
     """
@@ -85,14 +100,35 @@ class Writer:
     places: Mapping[int, tuple[str, int]]
     needs: Needs
     held: frozenset[str] = frozenset()
+    runs: int = 1
     lines: list[str] = field(default_factory=list)
     values: dict[int, str] = field(default_factory=dict)
     conditions: dict[int, str] = field(default_factory=dict)
     pointers: set[str] = field(default_factory=set)
     waves: bool = False
+    calls: bool = False
     kept: list[tuple[str, str, int]] = field(default_factory=list)
     _checks: list[str] = field(default_factory=list)
     _count: int = 0
+
+    @property
+    def kind(self) -> str:
+        """The type of values."""
+        return number_type(self.runs)
+
+    @property
+    def truth(self) -> str:
+        """The type of conditions."""
+        return "i1" if self.runs == 1 else f"<{self.runs} x i1>"
+
+    def constant(self, value: float) -> str:
+        """Return a number as a value."""
+        return spread(value, self.runs)
+
+    def intrinsic(self, operation: str, value: str) -> str:
+        """Write a call of a function of LLVM's own."""
+        lanes = "" if self.runs == 1 else f"v{self.runs}"
+        return self.put(f"call {self.kind} @llvm.{INTRINSICS[operation]}.{lanes}f64({self.kind} {value})")
 
     def put(self, instruction: str) -> str:
         """Write an instruction, and return the name of its value."""
@@ -106,12 +142,12 @@ class Writer:
         self.pointers.add(pointer)
         if position == 0:
             return f"%{pointer}"
-        return self.put(f"getelementptr double, ptr %{pointer}, i64 {position}")
+        return self.put(f"getelementptr double, ptr %{pointer}, i64 {position * self.runs}")
 
     def load(self, pointer: str, position: int) -> str:
         """Read one number of an array."""
         fixed = ", !invariant.load !0" if pointer != "scratch" else ""
-        return self.put(f"load double, ptr {self.address(pointer, position)}{fixed}")
+        return self.put(f"load {self.kind}, ptr {self.address(pointer, position)}, align 8{fixed}")
 
     def store(self, value: str, pointer: str, position: int) -> None:
         """Write one number of an array."""
@@ -119,7 +155,7 @@ class Writer:
             self.kept.append((value, pointer, position))
             return
         address = self.address(pointer, position)
-        self.lines.append(f"  store double {value}, ptr {address}")
+        self.lines.append(f"  store {self.kind} {value}, ptr {address}, align 8")
 
     def value(self, node: Expression) -> str:
         """Return what stands for the value of a node."""
@@ -127,9 +163,9 @@ class Writer:
         if found is not None:
             return found
         if node.operation == "constant":
-            found = literal(node.payload)
+            found = self.constant(node.payload)
         elif node.index in self.conditions:
-            found = self.put(f"uitofp i1 {self.conditions[node.index]} to double")
+            found = self.put(f"uitofp {self.truth} {self.conditions[node.index]} to {self.kind}")
         else:
             found = self.load(*self.places[node.index])
         self.values[node.index] = found
@@ -139,7 +175,7 @@ class Writer:
         """Return what stands for the truth of a node."""
         found = self.conditions.get(node.index)
         if found is None:
-            found = self.put(f"fcmp une double {self.value(node)}, 0.0")
+            found = self.put(f"fcmp une {self.kind} {self.value(node)}, {self.constant(0.0)}")
             self.conditions[node.index] = found
         return found
 
@@ -149,7 +185,7 @@ class Writer:
         infix = _ARITHMETIC.get(operation)
         if infix is not None:
             a, b = node.arguments
-            self.values[node.index] = self.put(f"{infix} double {self.value(a)}, {self.value(b)}")
+            self.values[node.index] = self.put(f"{infix} {self.kind} {self.value(a)}, {self.value(b)}")
         elif operation in _CONDITIONS:
             self.conditions[node.index] = self._truth(node)
         elif operation in OWN_FUNCTIONS:
@@ -161,49 +197,70 @@ class Writer:
         else:
             raise UnsupportedError(f"there is no machine code for the operation {operation} in {node!r}")
 
+    def choose(self, condition: str, a: str, b: str) -> str:
+        """Write a choice by a condition."""
+        return self.put(f"select {self.truth} {condition}, {self.kind} {a}, {self.kind} {b}")
+
     def write_wave(self, sine: Expression, cosine: Expression) -> None:
         """Write the sine and the cosine of one argument."""
         argument = self.value(sine.arguments[0])
-        self.needs.functions.add("sin_cos")
         self.waves = True
-        name = own_name("sin_cos")
-        self.lines.append(f"  call void @{name}(double {argument}, ptr %sine, ptr %cosine)")
-        self.values[sine.index] = self.put("load double, ptr %sine")
-        self.values[cosine.index] = self.put("load double, ptr %cosine")
+        name, (given,) = self._own("sin_cos", [argument])
+        self.lines.append(f"  call void @{name}({given}, ptr %sine, ptr %cosine)")
+        self.values[sine.index] = self.put(f"load {self.kind}, ptr %sine")
+        self.values[cosine.index] = self.put(f"load {self.kind}, ptr %cosine")
+
+    def _own(self, function: str, arguments: Sequence[str]) -> tuple[str, list[str]]:
+        """Return the name of an elementary function, and what it is given: lanes lie in memory."""
+        if self.runs == 1:
+            self.needs.functions.add(function)
+            return own_name(function), [f"double {one}" for one in arguments]
+        name = f"{function}_{self.runs}"
+        self.needs.functions.add(name)
+        self.calls = True
+        places = [f"ptr %given{k}" for k in range(len(arguments))]
+        for place, one in zip(places, arguments, strict=True):
+            self.lines.append(f"  store {self.kind} {one}, {place}")
+        return own_name(name), places
 
     def check(self, value: str) -> None:
         """Take a result into the sums that show whether all are finite: one that is not makes its sum so too."""
         if len(self._checks) < _CHECKS:
             self._checks.append(value)
         else:
-            self._checks.append(self.put(f"fadd double {self._checks.pop(0)}, {value}"))
+            self._checks.append(self.put(f"fadd {self.kind} {self._checks.pop(0)}, {value}"))
 
     def checked(self) -> str:
         """Return the sum of all results so far, which is finite only if they are."""
         if not self._checks:
-            return "0.0"
+            return self.constant(0.0)
         total = self._checks[0]
         for term in self._checks[1:]:
-            total = self.put(f"fadd double {total}, {term}")
+            total = self.put(f"fadd {self.kind} {total}, {term}")
         return total
 
     def _truth(self, node: Expression) -> str:
         operation = node.operation
         if operation in _COMPARISONS:
             a, b = (self.value(argument) for argument in node.arguments)
-            return self.put(f"fcmp {_COMPARISONS[operation]} double {a}, {b}")
+            return self.put(f"fcmp {_COMPARISONS[operation]} {self.kind} {a}, {b}")
         conditions = [self.condition(argument) for argument in node.arguments]
         if operation == "logical_not":
-            return self.put(f"xor i1 {conditions[0]}, true")
-        return self.put(f"{_LOGICAL[operation]} i1 {conditions[0]}, {conditions[1]}")
+            true = "true" if self.runs == 1 else f"<{', '.join(['i1 true'] * self.runs)}>"
+            return self.put(f"xor {self.truth} {conditions[0]}, {true}")
+        return self.put(f"{_LOGICAL[operation]} {self.truth} {conditions[0]}, {conditions[1]}")
 
     def _call_own(self, node: Expression) -> str:
-        name = node.operation
-        self.needs.functions.add(name)
-        arguments = ", ".join(f"double {self.value(argument)}" for argument in node.arguments)
-        return self.put(f"call double @{own_name(name)}({arguments})")
+        name, given = self._own(node.operation, [self.value(argument) for argument in node.arguments])
+        if self.runs == 1:
+            return self.put(f"call double @{name}({', '.join(given)})")
+        self.waves = True
+        self.lines.append(f"  call void @{name}({', '.join(given)}, ptr %sine)")
+        return self.put(f"load {self.kind}, ptr %sine")
 
     def _call_external(self, node: Expression) -> str:
+        if self.runs > 1:
+            raise UnsupportedError(f"there is no machine code in lanes for a function in Python in {node!r}")
         key = (node.payload, len(node.arguments))
         position = self.needs.externals.setdefault(key, len(self.needs.externals))
         arguments = ", ".join(f"double {self.value(argument)}" for argument in node.arguments)
@@ -211,33 +268,33 @@ class Writer:
 
 
 def _negate(writer: Writer, node: Expression) -> str:
-    return writer.put(f"fneg double {writer.value(node.arguments[0])}")
+    return writer.put(f"fneg {writer.kind} {writer.value(node.arguments[0])}")
 
 
 def _intrinsic(writer: Writer, node: Expression) -> str:
-    return writer.put(f"call double {_INTRINSICS[node.operation]}(double {writer.value(node.arguments[0])})")
+    return writer.intrinsic(node.operation, writer.value(node.arguments[0]))
 
 
 def _sign(writer: Writer, node: Expression) -> str:
     """Return -1, 0 or 1, and not a number for what is none: 0 a, unless a is above or below zero."""
-    a = writer.value(node.arguments[0])
-    above = writer.put(f"fcmp ogt double {a}, 0.0")
-    below = writer.put(f"fcmp olt double {a}, 0.0")
-    neither = writer.put(f"fmul double {a}, 0.0")
-    rest = writer.put(f"select i1 {below}, double {literal(-1.0)}, double {neither}")
-    return writer.put(f"select i1 {above}, double {literal(1.0)}, double {rest}")
+    a, kind, zero = writer.value(node.arguments[0]), writer.kind, writer.constant(0.0)
+    above = writer.put(f"fcmp ogt {kind} {a}, {zero}")
+    below = writer.put(f"fcmp olt {kind} {a}, {zero}")
+    neither = writer.put(f"fmul {kind} {a}, {zero}")
+    rest = writer.choose(below, writer.constant(-1.0), neither)
+    return writer.choose(above, writer.constant(1.0), rest)
 
 
 def _choose(writer: Writer, node: Expression) -> str:
     a, b = (writer.value(argument) for argument in node.arguments)
-    first = writer.put(f"fcmp {_CHOICES[node.operation]} double {a}, {b}")
-    return writer.put(f"select i1 {first}, double {a}, double {b}")
+    first = writer.put(f"fcmp {_CHOICES[node.operation]} {writer.kind} {a}, {b}")
+    return writer.choose(first, a, b)
 
 
 def _select(writer: Writer, node: Expression) -> str:
     condition, a, b = node.arguments
     truth = writer.condition(condition)
-    return writer.put(f"select i1 {truth}, double {writer.value(a)}, double {writer.value(b)}")
+    return writer.choose(truth, writer.value(a), writer.value(b))
 
 
 _OTHER: dict[str, Callable[[Writer, Expression], str]] = {

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from atwood.integrators.batch import BatchPlaces
     from atwood.integrators.embedded.tableau import Tableau
     from atwood.integrators.explicit_session import ExplicitSession, OnStiff
+    from atwood.integrators.lanes import LanePlaces
     from atwood.integrators.session import Session
     from atwood.integrators.symplectic.stepper import Hamiltonian
     from atwood.integrators.taylor.stepper import TaylorProblem
@@ -108,6 +109,8 @@ class Method:
         Its coefficients, where it is an embedded pair.
     batch
         Returns the addresses with which many runs are made in one call; None where each is made by itself.
+    lanes
+        Returns what so many runs side by side need; None where they are made one after another.
     least_tolerance
         A relative tolerance below this it cannot be asked for.
     loosest_tolerance
@@ -137,6 +140,7 @@ class Method:
     word: str = ""
     tableau: Tableau | None = None
     batch: Callable[[Task], BatchPlaces] | None = None
+    lanes: Callable[[Task, int], LanePlaces] | None = None
     least_tolerance: float = LEAST
     loosest_tolerance: float = LOOSEST
     first_share: float = 0.3

@@ -9,6 +9,7 @@ from atwood.integrators.methods.record import Method, Task
 if TYPE_CHECKING:
     from atwood.integrators.batch import BatchPlaces
     from atwood.integrators.explicit_session import ExplicitSession
+    from atwood.integrators.lanes import LanePlaces
     from atwood.integrators.taylor.stepper import CompiledStepper
 
 
@@ -29,6 +30,13 @@ def _batch(task: Task) -> BatchPlaces:
     return _stepper(task).batch_places()
 
 
+def _lanes(task: Task, lanes: int) -> LanePlaces:
+    from atwood.integrators.taylor.lanes import open_lanes
+
+    assert task.series is not None
+    return open_lanes(task.series(), task.settings, lanes)
+
+
 TAYLOR = Method(
     key="taylor",
     title="Taylor series",
@@ -38,6 +46,7 @@ TAYLOR = Method(
     orders=tuple(range(5, 29)),
     open=_open,
     batch=_batch,
+    lanes=_lanes,
     word="Taylor series",
     nodes_in_step=12,
     reach=2.0,

@@ -24,7 +24,7 @@ its recurrences, as two compiled programs.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from itertools import accumulate
 from math import ceil, exp, frexp, inf, log, log2
@@ -36,19 +36,21 @@ from numpy.typing import ArrayLike
 from atwood.arrays import FloatArray
 from atwood.codegen.llvm.build import RoutineSource, build_code, default_options, once
 from atwood.codegen.llvm.module import Part
-from atwood.codegen.routines import ADDRESS
+from atwood.codegen.routines import ADDRESS, CODE, Kind, Lanes, Routine, Value, places_of
 from atwood.expr.series.taylor import TaylorPrograms
 from atwood.integrators.protocol import SolverOptions, StepGuard, absolute_tolerances
 from atwood.integrators.stepper import (
+    LANE_FIELDS,
     WIDTH,
     Memory,
     NativeStepper,
     Routines,
     fields_of,
+    in_lanes,
     open_routine as session_routine,
     routines_of,
 )
-from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
     from atwood.expr.series.taylor import TaylorPrograms
@@ -101,6 +103,8 @@ class TaylorProblem:
         The values of the parameters of the program of order zero.
     compiled
         ``compiled()``: the recurrences as machine code, and what depends on their parameters alone.
+    wide
+        ``wide(runs)``: the recurrences as machine code for several runs side by side.
     stop_time
         No step goes beyond this time: what acts may change there.
     reach
@@ -111,6 +115,7 @@ class TaylorProblem:
     programs: TaylorPrograms
     parameters: FloatArray
     compiled: Callable[[], tuple[CompiledRecurrences, FloatArray]]
+    wide: Callable[[int], CompiledRecurrences] | None = None
     stop_time: float = inf
     reach: float = inf
 
@@ -140,9 +145,6 @@ def logarithm(value: float) -> float:
 LANES = 8
 """How many convolutions are worked out at a time."""
 
-STRIDE = LANES * (HIGHEST + 1)
-"""How far one block is from the next: an odd number of rows, so that the rows of one order do not share cache sets."""
-
 _NAMES = (
     *("y", "y_low", "new", "new_low", "rates", "new_rates", "slope", "floors", "sizes"),
     *("trial", "trial_rates", "kept", "kept_rates"),
@@ -166,20 +168,36 @@ FIELDS = fields_of(
 )
 
 
-def positions(pairs: int, squares: int, size: int) -> tuple[int, ...]:
+def lanes_of(runs: int) -> int:
+    """Return how many convolutions are worked out at a time: several of one run, or one of each of several."""
+    return LANES if runs == 1 else runs
+
+
+def stride_of(lanes: int) -> int:
+    """Return how far one block is from the next: an odd number of rows, which so do not share cache sets."""
+    return lanes * (HIGHEST + 1)
+
+
+def positions(pairs: int, squares: int, size: int, lanes: int = LANES) -> tuple[int, ...]:
     """Return where the results of the program of an order go, from the row of that order in the first block.
 
     The blocks of left and right factors take turns, and those of squares follow; the coefficients of the unknowns have
     an array of their own.
     """
-    left = [2 * (i // LANES) * STRIDE + i % LANES for i in range(pairs)]
-    first = 2 * (-(-pairs // LANES))
-    last = [(first + i // LANES) * STRIDE + i % LANES for i in range(squares)]
-    return (*left, *(at + STRIDE for at in left), *last, *range(size))
+    stride = stride_of(lanes)
+    left = [2 * (i // lanes) * stride + i % lanes for i in range(pairs)]
+    first = 2 * (-(-pairs // lanes))
+    last = [(first + i // lanes) * stride + i % lanes for i in range(squares)]
+    return (*left, *(at + stride for at in left), *last, *range(size))
 
 
-open_routine = partial(session_routine, partial(Memory, FIELDS, ROWS))
-"""Returns a new routine of a session, its memory, and its further arguments."""
+def open_routine(
+    runs: int, name: str, more: Mapping[str, Kind] | None = None, result: Kind | None = CODE, exported: bool = False
+) -> tuple[Routine, Memory, list[Value]]:
+    """Return a new routine of a session of so many runs, its memory, and its further arguments."""
+    fields = FIELDS if runs == 1 else FIELDS | LANE_FIELDS
+    return session_routine(partial(Memory, fields, ROWS, runs=runs), name, more, result, exported)
+
 
 _PACKED = (0, 1, 2)
 """The groups of results of the program of an order whose rows lie in blocks: left, right and squares."""
@@ -195,20 +213,31 @@ class CompiledRecurrences:
     ----------
     programs
         The recurrences, made for `~atwood.integrators.taylor.stepper.LANES`.
+    runs
+        How many runs are taken side by side; see `atwood.codegen.llvm.module.CodeOptions`.
     """
 
-    def __init__(self, programs: TaylorPrograms) -> None:
-        self.programs = programs
+    def __init__(self, programs: TaylorPrograms, runs: int = 1) -> None:
+        self.programs, self.runs = programs, runs
         self.size = len(programs.start.inputs[1].symbols)
-        order = Part("order", programs.order, positions(programs.pairs, programs.squares, self.size), LANES, _PACKED)
+        lanes, packed = (LANES, _PACKED) if runs == 1 else (1, ())
+        order = Part(
+            "order", programs.order, positions(programs.pairs, programs.squares, self.size, lanes), lanes, packed
+        )
         parts = [Part("start", programs.start), order]
-        self.built = build_code(parts, default_options(parts))
+        self.built = build_code(parts, replace(default_options(parts), runs=runs))
         self.addresses = self.built.code.addresses
         self.layout = _Layout(self)
 
     def bind(self, parameter_values: ArrayLike) -> FloatArray:
         """Return what depends on parameters alone."""
         return self.built.derive("start", self.programs.start, parameter_values)[0]
+
+
+def blocks_of(programs: TaylorPrograms, runs: int) -> tuple[int, int]:
+    """Return the number of blocks of pairs and of squares."""
+    each = LANES if runs == 1 else 1
+    return -(-programs.pairs // each), -(-programs.squares // each)
 
 
 class _Layout:
@@ -230,22 +259,25 @@ class _Layout:
     """
 
     def __init__(self, recurrences: CompiledRecurrences) -> None:
-        programs, n = recurrences.programs, recurrences.size
-        self.padded = -(-n // WIDTH) * WIDTH
-        known = len(programs.order.parameters)
-        pairs, squares = -(-programs.pairs // LANES), -(-programs.squares // LANES)
+        programs, n, runs = recurrences.programs, recurrences.size, recurrences.runs
+        self.padded = -(-n // WIDTH) * WIDTH if runs == 1 else n * runs
+        known = len(programs.order.parameters) * runs
+        self.lanes = lanes = lanes_of(runs)
+        self.blocks = pairs, squares = blocks_of(programs, runs)
+        self.fields = FIELDS if runs == 1 else in_lanes(FIELDS | LANE_FIELDS, runs)
+        self.numbers = places_of(self.fields)
         lengths = {
-            "fields": len(FIELDS),
+            "fields": sum(kind.count if isinstance(kind, Lanes) else 1 for kind in self.fields.values()),
             "tables": 16,
-            "values": 2 * n,
+            "values": 2 * n * runs,
             "known": known,
             "spare": known,
-            "derived": len(programs.order.prologue),
+            "derived": len(programs.order.prologue) * runs,
             "scratch": recurrences.built.scratch,
             "arrays": ROWS["all"] * self.padded,
-            "pair_sums": pairs * LANES,
-            "square_sums": squares * LANES,
-            "table": (2 * pairs + squares) * STRIDE,
+            "pair_sums": pairs * lanes,
+            "square_sums": squares * lanes,
+            "table": (2 * pairs + squares) * stride_of(lanes),
         }
         ends = [0, *accumulate(-(-length // _LINE) * _LINE for length in lengths.values())]
         self.places, self.size = dict(zip(lengths, ends, strict=False)), ends[-1]
@@ -255,7 +287,7 @@ class _Layout:
             return far["arrays"] + 8 * self.padded * ROWS[name]
 
         def number(name: str) -> int:
-            return far["fields"] + 8 * list(FIELDS).index(name)
+            return far["fields"] + 8 * self.numbers[name]
 
         pairs_of_tables = (
             *(number("t_new"), row("new"), row("new_rates"), far["known"]),
@@ -271,6 +303,17 @@ class _Layout:
         pointers = [name for name, kind in FIELDS.items() if kind is ADDRESS]
         self.pointers = np.array([{**far, **given}[name] for name in pointers], dtype=np.int64)
         self.is_own = np.array([name not in given for name in pointers], dtype=np.int64)
+
+    def allocate(self) -> tuple[FloatArray, int]:
+        """Return memory in one piece that begins with a cache line, with all pointers, and its address."""
+        memory = np.zeros(self.size + _LINE)
+        begins: int = memory.ctypes.data
+        skipped = -(begins // 8) % _LINE
+        memory, base = memory[skipped:], begins + 8 * skipped
+        at, whole = self.places, memory.view(np.int64)
+        whole[at["tables"] : at["tables"] + len(self.tables)] = self.tables + base
+        whole[at["fields"] : at["fields"] + len(self.pointers)] = self.pointers + base * self.is_own
+        return memory, base
 
 
 class CompiledStepper(NativeStepper):
@@ -305,8 +348,7 @@ class CompiledStepper(NativeStepper):
         n = self._size
         self._arrays[ROWS["floors"]] = 1.0
         self._arrays[ROWS["floors"], :n] = absolute_tolerances(options, n) / options.relative_tolerance
-        programs = recurrences.programs
-        pairs, squares = -(-programs.pairs // LANES), -(-programs.squares // LANES)
+        pairs, squares = recurrences.layout.blocks
         self._set(size=n, padded=self._arrays.shape[1], order=chosen, pair_blocks=pairs, square_blocks=squares)
         self._set(first=options.first_step or 0.0, longest=options.max_step or inf, horizon=options.horizon)
         self._set(stop_time=problem.stop_time, reach=problem.reach)
@@ -317,17 +359,11 @@ class CompiledStepper(NativeStepper):
     def _lay_out(self, recurrences: CompiledRecurrences, derived: FloatArray, guard: StepGuard | None) -> None:
         """Find a place for everything, in one piece of memory that begins with a cache line."""
         layout, n = recurrences.layout, self._size
-        memory = np.zeros(layout.size + _LINE)
-        begins: int = memory.ctypes.data
-        skipped = -(begins // 8) % _LINE
-        memory, base = memory[skipped:], begins + 8 * skipped
+        memory, base = layout.allocate()
         at = layout.places
-        whole = memory.view(np.int64)
         self._arrays = memory[at["arrays"] : at["arrays"] + ROWS["all"] * layout.padded].reshape(-1, layout.padded)
         self._ends = self._arrays[ROWS["y"], :n], self._arrays[ROWS["rates"], :n]
         self._values = memory[at["values"] : at["values"] + 2 * n].reshape(2, n)
-        whole[at["tables"] : at["tables"] + len(layout.tables)] = layout.tables + base
-        whole[at["fields"] : at["fields"] + len(layout.pointers)] = layout.pointers + base * layout.is_own
         self._begin_at(memory[at["fields"] :], start_derived=derived.ctypes.data)
         if guard is not None:
             self._guard = guard

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from math import inf
 
 from atwood.codegen.routines import ADDRESS, BOOLEAN, INTEGER, NUMBER, Lanes, Routine, Value
-from atwood.integrators.stepper import SAMPLE_ARGUMENTS, WIDTH, Memory, write_sample
+from atwood.integrators.stepper import SAMPLE_ARGUMENTS, Memory, number_kind, write_sample
 from atwood.integrators.taylor.stepper import (
     HIGHEST,
     LANES,
@@ -21,26 +21,30 @@ from atwood.integrators.taylor.stepper import (
     RETREAT,
     RETRIES,
     SMALLER,
-    STRIDE,
     WATCHED,
+    lanes_of,
     open_routine,
+    stride_of,
 )
 
 _REACHED, _USED_UP, _TOO_SMALL, _NO_VALUE, _NO_RATES = range(5)
 """How a routine ends."""
 
-_PART = Lanes(WIDTH)
-
 
 def write_routines() -> list[Routine]:
     """Write the routines; ``run``, ``interpolate``, ``sample`` and ``begin`` are called from outside."""
     ends = [_begin(), _run(), _interpolate(), _sample()]
-    return [*ends, _evaluate(), _expand(), _choose(), _largest(), _move(), _misses(), _guarded(), *write_convolutions()]
+    return [*ends, _evaluate(), _expand(), _misses(), _guarded(), *write_inner(1)]
+
+
+def write_inner(runs: int) -> list[Routine]:
+    """Write what runs that are taken side by side do as one alone: coefficients, the choice of steps, and steps."""
+    return [_choose(runs), _largest(runs), _move(runs), *write_convolutions(runs)]
 
 
 def _evaluate() -> Routine:
     """Find rates and what recurrences need, by tables of addresses, and count: 1 where one is not finite."""
-    r, m, (source, target) = open_routine("evaluate", {"source": ADDRESS, "target": ADDRESS})
+    r, m, (source, target) = open_routine(1, "evaluate", {"source": ADDRESS, "target": ADDRESS})
     code = r.call(m.start, source, m.start_derived, m.scratch, target)
     m.evaluations = m.evaluations + 1
     m.undefined = m.undefined + code.integer()
@@ -50,12 +54,12 @@ def _evaluate() -> Routine:
 
 def _begin() -> Routine:
     """Start anew from a state, with a unit of time in which the fastest unknown changes by its size."""
-    r, m, (t, state) = open_routine("begin", {"t": NUMBER, "state": ADDRESS}, exported=True)
+    r, m, (t, state) = open_routine(1, "begin", {"t": NUMBER, "state": ADDRESS}, exported=True)
     m.t, m.t_old, m.t_new, m.last = t, t, t, 0.0
     # Nothing that is not finite must be left among the coefficients.
     r.clear(m.arrays, m.row("y"))
     blocks = m.pair_blocks * 2 + m.square_blocks
-    r.clear(m.table, m.table.at(blocks * STRIDE))
+    r.clear(m.table, m.table.at(blocks * stride_of(LANES)))
     r.clear(m.row("y_low"), m.row("new"))
     for row in ("y", "new", "x"):
         r.copy(m.row(row), state, m.size)
@@ -74,7 +78,7 @@ def _begin() -> Routine:
 
 def _expand() -> Routine:
     """Find the coefficients at the state: 0, or 1 where one is not finite."""
-    r, m, _ = open_routine("expand")
+    r, m, _ = open_routine(1, "expand")
     last, tries = m.last, r.variable(0, INTEGER)
     unit = r.variable(r.choose(last > 0.0, last, m.unit))
     r.call(m.prologue, m.known, m.derived, m.scratch, result=None)
@@ -82,13 +86,13 @@ def _expand() -> Routine:
     with r.forever() as attempts:
         now = unit.now
         m.unit = now
-        with r.count(m.padded, step=WIDTH) as j:
+        with m.parts() as j:
             values[j] = m.lanes(y, j)
             slopes[j] = m.lanes(rates, j) * now
         failed = r.variable(False, BOOLEAN)
         with r.forever() as orders:
             for k in range(1, HIGHEST):
-                with r.when(_order(r, m, k, now) != 0):
+                with r.when(order(r, m, k, now) != 0):
                     failed.now = True
                     r.leave(orders)
                 if k + 1 >= LOWEST:
@@ -106,76 +110,84 @@ def _expand() -> Routine:
     return r
 
 
-def _order(r: Routine, m: Memory, k: int, unit: Value) -> Value:
+def order(r: Routine, m: Memory, k: int, unit: Value) -> Value:
     """Find the coefficients of one order, and those of the unknowns of the next; return 1 where one is not finite."""
-    pairs, squares, table = m.pair_blocks, m.square_blocks, m.table
+    pairs, squares, table, lanes = m.pair_blocks, m.square_blocks, m.table, lanes_of(m.runs)
     r.call(f"pairs{k}", table, m.pair_sums, pairs, result=None)
     with r.when(squares > 0):
-        r.call(f"squares{k}", table.at(pairs * (2 * STRIDE)), m.square_sums, squares, result=None)
+        r.call(f"squares{k}", table.at(pairs * (2 * stride_of(lanes))), m.square_sums, squares, result=None)
     m.order_number, m.order_inverse = float(k), 1.0 / k
     m.order_step, m.order_tick = unit * (1.0 / (k + 1)), unit if k == 1 else 0.0
-    row = table.at(LANES * (k - 1))
+    row = table.at(lanes * (k - 1))
     for place, target in enumerate((row, row, row, m.row(k + 1))):
         m.order_out.write(place, target, ADDRESS)
     m.order_in.write(3, m.row(k), ADDRESS)
     return r.call(m.recurrence, m.order_in, m.derived, m.scratch, m.order_out)
 
 
-def _largest() -> Routine:
+def _largest(runs: int) -> Routine:
     """Return the largest coefficient of an order, in units of the sizes."""
-    r, m, (order,) = open_routine("largest", {"order": INTEGER}, result=NUMBER)
-    row, sizes, largest = m.row(order), m.row("sizes"), r.variable(0.0, _PART)
-    with r.count(m.padded, step=WIDTH) as j:
+    r, m, (order,) = open_routine(runs, "largest", {"order": INTEGER}, result=number_kind(runs))
+    row, sizes, largest = m.row(order), m.row("sizes"), r.variable(0.0, m.part)
+    with m.parts() as j:
         largest.now = r.most(r.size(m.lanes(row, j)) * m.lanes(sizes, j), largest.now)
-    r.give(r.largest_lane(largest.now))
+    r.give(largest.now if runs > 1 else r.largest_lane(largest.now))
     return r
 
 
-def _choose() -> Routine:
+def _choose(runs: int) -> Routine:
     """Return the step that the last coefficients allow, if none is given.
 
     The rate at which coefficients grow is the logarithm to base 2 of one over its order, good enough for a step: linear
     between powers of two, and finite at zero.
     """
-    r, m, _ = open_routine("choose", result=NUMBER)
-    first = m.first
-    with r.when(first > 0.0):
-        m.first = 0.0
-        r.give(first)
+    kind = number_kind(runs)
+    r, m, _ = open_routine(runs, "choose", result=kind)
+    if runs == 1:
+        first = m.first
+        with r.when(first > 0.0):
+            m.first = 0.0
+            r.give(first)
     y, floors, sizes = m.row("y"), m.row("floors"), m.row("sizes")
-    with r.count(m.padded, step=WIDTH) as j:
+    with m.parts() as j:
         sizes[j] = 1.0 / (m.lanes(floors, j) + r.size(m.lanes(y, j)))
 
     def largest(order: Value) -> Value:
-        return r.call("largest", m.session, order, result=NUMBER)
+        return r.call("largest", m.session, order, result=kind)
 
-    growth = r.value(-1e9, NUMBER)
+    growth = r.value(-1e9, kind)
     for i in range(WATCHED):
         order = m.order - i
         top = largest(order)
-        bits = top.bits()
-        mantissa = ((bits & (2**52 - 1)) | (1023 << 52)).number_of_bits()
-        logarithm = mantissa + ((bits >> 52) - 1024).number()
+        high = r.high(top)
+        mantissa = r.of_words((high & (2**20 - 1)) | (1023 << 20), r.low(top))
+        logarithm = mantissa + (r.as_number(high >> 20) - 1024.0)
         rate = r.choose(top < 2.0**-1022, -1023.0, logarithm) / order.number()
         growth = r.most(rate, growth)
     power = m.share - growth
     floor = r.floor(power)
     part = power - floor
     factor = part * (part * 0.3398 + 0.6602) + 1.0
-    value = r.variable(factor * ((r.truncated(floor) + 1023) << 52).number_of_bits())
-    reach = m.reach
-    with r.when(reach < inf):  # no unknown changes too much for events to be seen
-        for number in (1, 2):
-            ratio = reach / largest(r.value(number, INTEGER))
-            value.now = r.least(ratio if number == 1 else r.sqrt(ratio), value.now)
+    exponent = r.low(floor + (1.5 * 2.0**52 + 1023.0))  # the last bits of such a number are those of the integer
+    value = r.variable(factor * r.of_words(exponent << 20, 0), kind)
+    if runs == 1:
+        reach = m.reach
+        with r.when(reach < inf):  # no unknown changes too much for events to be seen
+            for number in (1, 2):
+                ratio = reach / largest(r.value(number, INTEGER))
+                value.now = r.least(ratio if number == 1 else r.sqrt(ratio), value.now)
     r.give(m.unit * value.now)
     return r
 
 
-def _horner(r: Routine, m: Memory, j: Value, share: Value) -> tuple[Value, Value]:
+def horner(r: Routine, m: Memory, j: Value, share: Value) -> tuple[Value, Value]:
     """Return the polynomial less its first term at a share of its unit, and its slope, by Horner's scheme."""
     order = m.order
-    value, turn, k = r.variable(m.lanes(m.row(order), j), _PART), r.variable(0.0, _PART), r.variable(order - 1, INTEGER)
+    value, turn, k = (
+        r.variable(m.lanes(m.row(order), j), m.part),
+        r.variable(0.0, m.part),
+        r.variable(order - 1, INTEGER),
+    )
     with r.forever() as terms:
         now = value.now
         turn.now = turn.now * share + now
@@ -186,14 +198,14 @@ def _horner(r: Routine, m: Memory, j: Value, share: Value) -> tuple[Value, Value
     return value.now * share, turn.now * share + value.now
 
 
-def _move() -> Routine:
+def _move(runs: int) -> Routine:
     """Write the values at the end of a step, what they leave out, and the slope there."""
-    r, m, (share,) = open_routine("move", {"share": NUMBER}, result=None)
+    r, m, (share,) = open_routine(runs, "move", {"share": number_kind(runs)}, result=None)
     names = ("y", "y_low", "new", "new_low", "slope")
     y, y_low, new, new_low, slopes = (m.row(name) for name in names)
-    spread = r.value(share, _PART)
-    with r.count(m.padded, step=WIDTH) as j:
-        moved, slope = _horner(r, m, j, spread)
+    spread = r.value(share, m.part)
+    with m.parts() as j:
+        moved, slope = horner(r, m, j, spread)
         slopes[j] = slope
         high = m.lanes(y, j)
         total = high + moved
@@ -208,21 +220,26 @@ def _move() -> Routine:
 
 def _misses() -> Routine:
     """Tell whether rates at the end of a step are not the slope of the polynomial."""
-    r, m, (h,) = open_routine("misses", {"h": NUMBER}, result=BOOLEAN)
+    r, m, (h,) = open_routine(1, "misses", {"h": NUMBER}, result=BOOLEAN)
+    r.give(r.any_lane(misfit(r, m, h)))
+    return r
+
+
+def misfit(r: Routine, m: Memory, h: Value) -> Value:
+    """Return in which lanes rates at the end of a step are not the slope of the polynomial."""
     weight, allowed = h / m.order.number(), m.allowed
-    pace, missed = 1.0 / m.unit, r.variable(False, Lanes(WIDTH, is_float=False))
+    pace, missed = 1.0 / m.unit, r.variable(False, Lanes(m.part.count, is_float=False))
     y, new, slope, rates, floors = (m.row(name) for name in ("y", "new", "slope", "new_rates", "floors"))
-    with r.count(m.padded, step=WIDTH) as j:
+    with m.parts() as j:
         apart = r.size(m.lanes(slope, j) * pace - m.lanes(rates, j)) * weight
         size = m.lanes(floors, j) + r.most(r.size(m.lanes(y, j)), r.size(m.lanes(new, j)))
         missed.now = missed.now | ~(apart <= size * allowed)
-    r.give(r.any_lane(missed.now))
-    return r
+    return missed.now
 
 
 def _guarded() -> Routine:
     """Ask what judges steps about each part of one; 0 where all are good."""
-    r, m, (t, h) = open_routine("guarded", {"t": NUMBER, "h": NUMBER})
+    r, m, (t, h) = open_routine(1, "guarded", {"t": NUMBER, "h": NUMBER})
     guard, unit = m.guard, m.unit
     with r.when(r.is_null(guard)):
         r.give(0)
@@ -233,9 +250,9 @@ def _guarded() -> Routine:
     begin = r.variable(t)
     with r.count(PARTS + 1, start=1) as i:
         since = i.number() * (1.0 / PARTS) * h
-        end, share = t + since, r.value(since / unit, _PART)
-        with r.count(m.padded, step=WIDTH) as j:
-            moved, slope = _horner(r, m, j, share)
+        end, share = t + since, r.value(since / unit, m.part)
+        with m.parts() as j:
+            moved, slope = horner(r, m, j, share)
             trial[j] = m.lanes(first, j) + moved
             slopes[j] = slope * pace
         code = r.call(guard, begin.now, kept, kept_slopes, end, trial, slopes, m.guard_data)
@@ -250,7 +267,7 @@ def _guarded() -> Routine:
 
 def _run() -> Routine:
     """Take steps until one ends at or after the time to stop at."""
-    r, m, _ = open_routine("run", exported=True)
+    r, m, _ = open_routine(1, "run", exported=True)
     h, t_new = r.variable(0.0), r.variable(0.0)
     with r.forever():
         t = m.t
@@ -289,16 +306,16 @@ def _run() -> Routine:
 def _interpolate() -> Routine:
     """Write values and rates at a time within the last step."""
     arguments = {"time": NUMBER, "y_out": ADDRESS, "yp_out": ADDRESS}
-    r, m, (time, y_out, yp_out) = open_routine("interpolate", arguments, exported=True)
+    r, m, (time, y_out, yp_out) = open_routine(1, "interpolate", arguments, exported=True)
     with r.when(time == m.t):
         r.copy(y_out, m.row("y"), m.size)
         r.copy(yp_out, m.row("rates"), m.size)
         r.give(_REACHED)
     m.time = time
     first, trial = m.row(0), m.row("trial")
-    share = r.value((time - m.t_old) / m.unit, _PART)
-    with r.count(m.padded, step=WIDTH) as j:
-        trial[j] = m.lanes(first, j) + _horner(r, m, j, share)[0]
+    share = r.value((time - m.t_old) / m.unit, m.part)
+    with m.parts() as j:
+        trial[j] = m.lanes(first, j) + horner(r, m, j, share)[0]
     code = r.call("evaluate", m.session, m.trial_in, m.trial_out)
     r.copy(y_out, trial, m.size)
     r.copy(yp_out, m.row("trial_rates"), m.size)
@@ -310,37 +327,37 @@ def _interpolate() -> Routine:
 
 def _sample() -> Routine:
     """Go through output times and fill a table; it ends as `run` does."""
-    r, m, _ = open_routine("sample", SAMPLE_ARGUMENTS, exported=True)
+    r, m, _ = open_routine(1, "sample", SAMPLE_ARGUMENTS, exported=True)
     return write_sample(r, m, m.size)
 
 
 _CHAINS = 4
 """Sums that the terms of a convolution are spread over, so that additions do not wait for each other."""
 
-_BLOCK = Lanes(LANES)
-
 Products = Sequence[tuple[Value, Value]]
 
 
-def write_convolutions() -> list[Routine]:
+def write_convolutions(runs: int = 1) -> list[Routine]:
     """Write ``pairs1``, ``squares1`` and so on, which add up the products of an order in all blocks of a table."""
-    orders = range(1, HIGHEST)
-    pairs = [_blocks(f"pairs{order}", 2 * STRIDE, _pairs, order) for order in orders]
-    return [*pairs, *(_blocks(f"squares{order}", STRIDE, _squares, order) for order in orders)]
+    lanes, orders = lanes_of(runs), range(1, HIGHEST)
+    pairs = [_blocks(f"pairs{order}", lanes, 2, _pairs, order) for order in orders]
+    return [*pairs, *(_blocks(f"squares{order}", lanes, 1, _squares, order) for order in orders)]
 
 
-def _blocks(name: str, stride: int, write: Callable[[Routine, Value, int], Value | None], order: int) -> Routine:
+def _blocks(
+    name: str, lanes: int, tables: int, write: Callable[[Routine, Value, int, int], Value | None], order: int
+) -> Routine:
     r = Routine(name, {"table": ADDRESS, "sums": ADDRESS, "blocks": INTEGER}, result=None)
     table, sums, blocks = r.arguments
     with r.count(blocks) as b:
-        total = write(r, table.at(b * stride), order)
-        sums.write(b * LANES, 0.0 if total is None else total, _BLOCK)
+        total = write(r, table.at(b * (tables * stride_of(lanes))), lanes, order)
+        sums.write(b * lanes, 0.0 if total is None else total, Lanes(lanes))
     return r
 
 
-def _row(block: Value, order: int) -> Value:
+def _row(block: Value, lanes: int, order: int) -> Value:
     """Return the row of an order in a block."""
-    return block.read(LANES * (order - 1), _BLOCK)
+    return block.read(lanes * (order - 1), Lanes(lanes))
 
 
 def _with(r: Routine, total: Value | None, a: Value, b: Value) -> Value:
@@ -362,31 +379,31 @@ def _total(r: Routine, products: Products) -> Value | None:
     return chains[0] if chains else None
 
 
-def _pairs(r: Routine, left: Value, order: int) -> Value | None:
+def _pairs(r: Routine, left: Value, lanes: int, order: int) -> Value | None:
     """Return the convolutions of two values at an order.
 
     The rows of the order before have just been written by parts, and are the last that can be read: what they are in
     is added last.
     """
-    right = left.at(STRIDE)
-    products = [(_row(left, j), _row(right, order - j)) for j in range(1, order)]
+    right = left.at(stride_of(lanes))
+    products = [(_row(left, lanes, j), _row(right, lanes, order - j)) for j in range(1, order)]
     total = _total(r, products[1:-1])
     for a, b in products[:1] + products[1:][-1:]:
         total = _with(r, total, a, b)
     return total
 
 
-def _squares(r: Routine, left: Value, order: int) -> Value | None:
+def _squares(r: Routine, left: Value, lanes: int, order: int) -> Value | None:
     """Return the convolutions of values with themselves: each product occurs twice but the middle.
 
     What the rows of the order before are in is added last.
     """
-    half = _total(r, [(_row(left, j), _row(left, order - j)) for j in range(2, (order + 1) // 2)])
+    half = _total(r, [(_row(left, lanes, j), _row(left, lanes, order - j)) for j in range(2, (order + 1) // 2)])
     total = None if half is None else half + half
     if order % 2 == 0:
-        middle = _row(left, order // 2)
+        middle = _row(left, lanes, order // 2)
         total = _with(r, total, middle, middle)
     if order > 2:
-        first, last = _row(left, 1), _row(left, order - 1)
+        first, last = _row(left, lanes, 1), _row(left, lanes, order - 1)
         total = _with(r, total, first + first, last)
     return total

@@ -98,6 +98,7 @@ def taylor_problem(
         stop_time=stop_time,
         reach=REACH if has_events else inf,
         compiled=_compiled(assembly, programs, parameters),
+        wide=lambda runs: _code(assembly, programs, runs),
     )
 
 
@@ -108,9 +109,14 @@ def _compiled(
 
     @cache
     def bound() -> tuple[CompiledRecurrences, FloatArray]:
-        from atwood.integrators.taylor.stepper import CompiledRecurrences
-
-        code = assembly.shared.get(_COMPILED, lambda: CompiledRecurrences(programs), programs)
+        code = _code(assembly, programs, 1)
         return code, code.bind(values)
 
     return bound
+
+
+def _code(assembly: Assembly, programs: TaylorPrograms, runs: int) -> CompiledRecurrences:
+    """Return recurrences as machine code for so many runs side by side."""
+    from atwood.integrators.taylor.stepper import CompiledRecurrences
+
+    return assembly.shared.get(_COMPILED, lambda: CompiledRecurrences(programs, runs), programs, runs)

@@ -17,6 +17,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.forms.sides import has_sides
 from atwood.integrators.batch import Batch, BatchPlaces
+from atwood.integrators.lanes import LaneBatch, LanePlaces
 from atwood.integrators.methods import AUTO, METHODS
 from atwood.lazy_dataclasses import dataclass
 from atwood.result.segment_quantities import reads
@@ -29,6 +30,7 @@ from atwood.study.sweeps.motions import (
     Way,
     find_way,
     make_ready,
+    open_lanes,
     open_places,
 )
 from atwood.study.sweeps.readout import read_quantities
@@ -120,7 +122,8 @@ class _Batches:
         symbols = [one.symbol for one in request.assembly.reactions]
         self.needs_reactions = reads(request.assembly, request.paths, symbols)
         self._own = threading.local()
-        self._places()  # what threads share is made before they begin
+        if self._lanes() is None:  # what threads share is made before they begin
+            self._places()
 
     def work(self, runs: NDArray[np.intp], stop: threading.Event) -> int:
         """Make the runs of one piece; return how many are done."""
@@ -130,21 +133,33 @@ class _Batches:
         request, options = self.request, self.request.options
         begin = request.assembly.flat.t_start
         limits = ready.tolerances, options.max_steps
-        batch = Batch(self._places(), begin, request.times, ready.state, *limits, ready.parameters)
+        given = begin, request.times, ready.state, *limits, ready.parameters
+        wide = self._lanes()
+        if wide is not None and len(ready.runs) >= wide.lanes:
+            batch: Batch | LaneBatch = LaneBatch(wide, *given)
+        else:
+            batch = Batch(self._places(), *given)
         while not batch.advance():
             if stop.is_set():
                 return 0
-        counts = batch.counts
         good = (batch.codes == 0) & np.all(np.isfinite(batch.values), axis=(1, 2))
         if options.solver == AUTO:
-            good &= counts[:, 4] == 0  # what has turned out stiff is made by itself, and may change its solver
-        return self._record(ready, batch.values, counts[:, 0], good, batch.seconds)
+            good &= batch.stiff == 0  # what has turned out stiff is made by itself, and may change its solver
+        return self._record(ready, batch.values, batch.steps, good, batch.seconds)
 
     def _places(self) -> BatchPlaces:
         """Return where this thread's session is."""
         if not hasattr(self._own, "places"):
             self._own.places = open_places(self.motion, self.method, self.request.options, self.values)
         found: BatchPlaces = self._own.places
+        return found
+
+    def _lanes(self) -> LanePlaces | None:
+        """Return where this thread's session of runs side by side is, if there is one."""
+        if not hasattr(self._own, "lanes"):
+            own = self.motion, self.method, self.request.options, self.values
+            self._own.lanes = open_lanes(*own, self.request.cases.count)
+        found: LanePlaces | None = self._own.lanes
         return found
 
     # -- before the first step ------------------------------------------------------------------------------------

@@ -13,12 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
+from atwood.codegen.llvm.engine import lane_count
 from atwood.codegen.sundials.events import EventData
-from atwood.errors import AtwoodError
+from atwood.errors import AtwoodError, UnsupportedError
 from atwood.forms.accelerations import AccelerationProgram, accelerations_of
 from atwood.forms.assembly import Assembly
 from atwood.integrators.batch import BatchPlaces
 from atwood.integrators.embedded.rates import OwnRates
+from atwood.integrators.lanes import LanePlaces
 from atwood.integrators.methods import AUTO, Method, Task
 from atwood.integrators.protocol import LOOSEST, SolverOptions
 from atwood.lazy_dataclasses import dataclass, replace
@@ -205,6 +207,23 @@ def open_places(motion: Motion, method: Method, options: RunOptions, values: Flo
     assert method.batch is not None
     places = method.batch(task)
     return replace(places, parameters=(own.prologues[0], own.derived, own.scratch)) if method.tableau else places
+
+
+def open_lanes(
+    motion: Motion, method: Method, options: RunOptions, values: FloatArray, count: int
+) -> LanePlaces | None:
+    """Open a session that takes runs side by side; None where so many are made one after another.
+
+    That is where a method or an operation of the scene has no code in lanes, and where something judges each step.
+    """
+    lanes = lane_count()
+    if method.lanes is None or count < lanes:
+        return None
+    task = task_of(motion, method, options, values, compiled_rates(motion.assembly, motion.program).open())
+    try:
+        return None if task.problem.guard is not None else method.lanes(task, lanes)
+    except UnsupportedError:
+        return None
 
 
 def task_of(
