@@ -106,6 +106,9 @@ def test_point_to_point_is_as_fast_as_its_limits_allow(travel: float, peak: floa
     assert y[-1] == pytest.approx(travel, abs=1e-12)
     assert max(np.diff(y) / dt, key=abs) == pytest.approx(peak, abs=3e-3)
     assert np.max(np.abs(np.diff(y, 2))) / dt**2 == pytest.approx(2.0, rel=1e-4)
+    rate = result["drive.rate"]
+    assert rate[1:-1] == pytest.approx((y[2:] - y[:-2]) / (2.0 * dt), abs=2e-3)
+    assert max(rate, key=abs) == pytest.approx(peak, abs=1e-12)
     way, v, a = abs(travel), 1.5, 2.0
     arrives = 0.25 + (way / v + v / a if way * a > v * v else 2.0 * np.sqrt(way / a))
     assert np.all(y[result.time >= arrives] == pytest.approx(travel, abs=1e-12))

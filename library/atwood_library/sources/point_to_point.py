@@ -27,13 +27,23 @@ class PointToPoint(Component):
         up = select(reaches, v / a, sqrt(maximum(way, 0.0) / a))
         return up, select(reaches, way / v, up)
 
+    def phases(self) -> tuple[Scalar, Scalar, Scalar]:
+        """Return for how long it has sped up, gone on and slowed down."""
+        up, slow = self.times()
+        t = self.time - self.start_time
+        first, between = minimum(maximum(t, 0.0), up), minimum(maximum(t - up, 0.0), slow - up)
+        return first, between, minimum(maximum(t - slow, 0.0), up)
+
     @observable(unit="any", doc="Value of the function, in the unit of the input.")
     def value(self) -> Scalar:
         """Return the value: the integral of a rate that rises, stays and falls."""
-        up, slow = self.times()
-        t = self.time - self.start_time
-        first = minimum(maximum(t, 0.0), up)
-        last = minimum(maximum(t - slow, 0.0), up)
-        between = minimum(maximum(t - up, 0.0), slow - up)
+        up, _ = self.times()
+        first, between, last = self.phases()
         a = self.largest_acceleration * sign(self.travel)
         return self.offset + a * (0.5 * first * first + up * between + up * last - 0.5 * last * last)
+
+    @observable(unit="any", doc="Rate of the value.")
+    def rate(self) -> Scalar:
+        """Return the rate, which the last phase takes back."""
+        first, _, last = self.phases()
+        return self.largest_acceleration * sign(self.travel) * (first - last)
