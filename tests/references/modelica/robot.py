@@ -85,7 +85,7 @@ class ServoMotor(Component):
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis: where it goes, the ratio of its gear, its friction, its motor and, of the first three, its elasticity."""
+    """An axis: its way, the ratio of its gear, its friction, its motor and, of the first three, its elasticity."""
 
     way: tuple[float, float]
     ratio: float
