@@ -105,6 +105,7 @@ if TYPE_CHECKING:
     from atwood_library.joints.spherical import Spherical as Spherical
     from atwood_library.joints.universal import Universal as Universal
     from atwood_library.joints.weld import Weld as Weld
+    from atwood_library.parts.appearance import Appearance as Appearance
     from atwood_library.parts.bar import Bar as Bar
     from atwood_library.parts.box import Box as Box
     from atwood_library.parts.cone import Cone as Cone
@@ -148,6 +149,7 @@ if TYPE_CHECKING:
 _MODULES = {
     "Add": "blocks.add",
     "AngleSensor": "sensors.angle_sensor",
+    "Appearance": "parts.appearance",
     "BallContact": "contacts.ball_contact",
     "BallPairContact": "contacts.ball_pair_contact",
     "Bar": "parts.bar",

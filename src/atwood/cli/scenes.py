@@ -34,17 +34,22 @@ def bundled_scenes() -> dict[str, type[Model]]:
 
 def _scenes_of(libraries: Iterable[str]) -> Iterator[Mapping[str, type[Model]]]:
     """Yield the scenes of one library after another; a library may load each when it is asked for."""
+    for module in _modules_of(libraries, "scenes"):
+        yield getattr(module, "SCENES", {})
+
+
+def _modules_of(libraries: Iterable[str], module: str) -> Iterator[ModuleType]:
+    """Yield a module that libraries may have, of one after another: `scenes`, and `readers` of files."""
     for library in libraries:
-        name = f"{library}.scenes"
+        name = f"{library}.{module}"
         try:
-            module = importlib.import_module(name)
+            yield importlib.import_module(name)
         except ModuleNotFoundError as error:
             if error.name == name:
-                continue  # a library without scenes
+                continue  # a library without it
             raise UsageError(f"the library cannot be loaded ({error})", where=library) from error
         except ImportError as error:
             raise UsageError(f"the library cannot be loaded ({error})", where=library) from error
-        yield getattr(module, "SCENES", {})
 
 
 def find_scene(text: str) -> tuple[Model, str]:
@@ -54,6 +59,10 @@ def find_scene(text: str) -> tuple[Model, str]:
         return _scene_in_file(Path(file), name), name
     if text.endswith(".py"):
         return _only_scene(Path(text))
+    if suffix := Path(text).suffix.lower():  # names of scenes have no dot
+        for readers in _modules_of(all_libraries(), "readers"):
+            if suffix in getattr(readers, "READERS", {}):
+                return readers.READERS[suffix](text), Path(text).stem
     for libraries in (declared_libraries, all_libraries):
         for scenes in _scenes_of(libraries()):
             if text in scenes:

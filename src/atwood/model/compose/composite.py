@@ -255,6 +255,11 @@ class Model(_State, Component):
         """The parts by name, each element of an array on its own."""
         return MappingProxyType(self._parts)
 
+    @property
+    def connected(self) -> tuple[tuple[str, str], ...]:
+        """Pairs of paths of connectors, or of outputs and inputs, that are connected."""
+        return tuple(self._connections)
+
     def __getitem__(self, path: str) -> Any:
         """Return the part at a dotted path, such as ``"left.rod"`` or ``"rod[2]"``."""
         component: Component = self

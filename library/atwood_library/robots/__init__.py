@@ -1,0 +1,8 @@
+"""Robots' files: URDF and MJCF, read as scenes and written."""
+
+from __future__ import annotations
+
+from atwood_library.robots.inertias import nearest_inertia
+from atwood_library.robots.urdf import read_urdf
+
+__all__ = ["nearest_inertia", "read_urdf"]

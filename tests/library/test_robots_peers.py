@@ -1,0 +1,162 @@
+"""Robots' files beside Pinocchio and MuJoCo; `.ci/peers` installs them."""
+
+import re
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from atwood import Dynamics, dynamics
+from atwood_library.robots import nearest_inertia, read_urdf
+
+pytestmark = pytest.mark.filterwarnings("ignore")
+
+
+def robots() -> list[Path]:
+    """Return the URDF files of example-robot-data; ur3.urdf is a macro without links."""
+    pytest.importorskip("pinocchio", reason="Pinocchio (pin) is not installed")
+    try:
+        data = metadata.distribution("example-robot-data")
+    except metadata.PackageNotFoundError:
+        pytest.skip("example-robot-data is not installed", allow_module_level=True)
+    found = sorted(Path(str(data.locate_file("cmeel.prefix/share"))).rglob("*.urdf"))
+    return [one for one in found if one.name != "ur3.urdf"]
+
+
+def corrected(file: Path) -> str:
+    """Return a URDF with inertias that bodies can have, by the same rule, and masses where there are inertias."""
+    root = ElementTree.parse(file).getroot()
+    for inertial in root.iter("inertial"):
+        mass, tensor = inertial.find("mass"), inertial.find("inertia")
+        assert mass is not None
+        if tensor is None:
+            continue
+        xx, xy, xz, yy, yz, zz = (float(tensor.get(f"i{one}", 0.0)) for one in ("xx", "xy", "xz", "yy", "yz", "zz"))
+        given = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        moments = np.linalg.eigvalsh(given)
+        if moments[0] < 0.0 or moments[2] > moments[0] + moments[1]:
+            near = nearest_inertia(given) if float(mass.get("value", 0.0)) > 0.0 else np.zeros((3, 3))
+        elif float(mass.get("value", 0.0)) == 0.0:
+            near = np.zeros((3, 3))
+        else:
+            continue
+        for i, k in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)):
+            tensor.set(f"i{'xyz'[i]}{'xyz'[k]}", repr(float(near[i, k])))
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+class Beside:
+    """A scene and Pinocchio's model of the same file.
+
+    Joints that mimic others are tied: the speeds of Pinocchio are ``ties`` times those that are free, and its
+    coordinates the same times the free ones, plus ``offsets``.
+    """
+
+    def __init__(self, file: Path, base: str = "fixed") -> None:
+        import pinocchio
+
+        self.pin, text = pinocchio, corrected(file)
+        self.free = 6 if base == "free" else 0
+        self.model = pinocchio.buildModelFromXML(text, *([pinocchio.JointModelFreeFlyer()] if self.free else []))
+        self.data = self.model.createData()
+        self.scene = read_urdf(file, inertias="nearest", friction=False, base=base)
+        self.dynamics: Dynamics = dynamics(self.scene)
+        plain = {re.sub(r"\W", "_", name): j for name, j in zip(self.model.names, self.model.joints, strict=True)}
+        names = [one.rpartition(".")[0] for one in self.dynamics.coordinates[7 if self.free else 0 :]]
+        joints = [plain.get(name) or plain[name.rstrip("_")] for name in names]
+        self.rows = [*range(self.free), *(joint.idx_v for joint in joints)]
+        self.find_ties(ElementTree.fromstring(text))
+
+    def find_ties(self, robot: Any) -> None:
+        self.ties, self.offsets = np.eye(self.model.nv), np.zeros(self.model.nv)
+        given = {joint.get("name"): joint.find("mimic") for joint in robot.findall("joint")}
+        follows = {name: one for name, one in given.items() if one is not None and one.get("joint") in given}
+        for _ in follows:  # once more for each link of a chain
+            for name, mimic in follows.items():
+                i, master = self.row(name), self.row(mimic.get("joint"))
+                ratio, offset = float(mimic.get("multiplier", 1.0)), float(mimic.get("offset", 0.0))
+                self.ties[i] = 0.0 if master is None else ratio * self.ties[master]
+                self.offsets[i] = offset + (0.0 if master is None else ratio * self.offsets[master])
+        free = [i for i in range(self.model.nv) if i not in [self.row(name) for name in follows]]
+        self.ties = self.ties[:, free]
+
+    def row(self, name: str) -> int | None:
+        """Return where the speed of a joint is; None if it is fixed."""
+        return self.model.joints[self.model.getJointId(name)].idx_v if self.model.existJointName(name) else None
+
+    def state(self, generator: np.random.Generator) -> tuple[Any, Any, Any]:
+        """Return coordinates of Pinocchio and here, and the matrix and the rest of ``u' = S a + rest``.
+
+        The base has the speeds of its origin in its own axes there, and of its centre of mass in world axes here.
+        """
+        values = self.ties @ generator.uniform(-1.0, 1.0, self.ties.shape[1]) + self.offsets
+        q = np.zeros(self.model.nq)  # with cosine and sine where a joint turns without end
+        for joint in self.model.joints:
+            if joint.nv == 1:
+                value = values[joint.idx_v]
+                q[joint.idx_q : joint.idx_q + joint.nq] = value if joint.nq == 1 else (np.cos(value), np.sin(value))
+        ours, turn = values[self.rows], np.eye(len(self.rows))
+        if self.free:
+            place, quaternion = generator.normal(size=3), generator.normal(size=4)
+            quaternion /= np.linalg.norm(quaternion)
+            q[:7] = *place, *quaternion
+            body: Any = self.scene[self.dynamics.coordinates[0].partition(".")[0]]
+            rotation, self.centre = self.pin.Quaternion(quaternion).matrix(), np.array(body.center)
+            turn[:3, :3], turn[:3, 3:6] = rotation, -rotation @ self.pin.skew(self.centre)
+            ours = np.concatenate([place + rotation @ self.centre, quaternion[[3, 0, 1, 2]], values[self.rows[6:]]])
+        return q, ours, turn
+
+    def rest(self, turn: Any, v: Any) -> Any:
+        """Return what speeds add to the derivatives of the speeds of the base."""
+        rest = np.zeros(len(self.rows))
+        if self.free:
+            spin = v[3:6]
+            rest[:3] = turn[:3, :3] @ np.cross(spin, v[:3] + np.cross(spin, self.centre))
+        return rest
+
+    def errors(self, generator: np.random.Generator) -> list[float]:
+        """Return relative errors of the mass matrix, of inverse and of forward dynamics at a random state.
+
+        All are along the speeds that are free, as is what moves with them. Accelerations are as right as the condition
+        of the mass matrix lets them be: 1e-12 up to a condition of 1e4. Where something turns that has no inertia, as
+        in romeo.urdf, there are none.
+        """
+        pin, model, data, ties = self.pin, self.model, self.data, self.ties
+        q, ours, turn = self.state(generator)
+        kept = ties[self.rows]
+        v, a = (ties @ generator.normal(size=ties.shape[1]) for _ in "va")
+        mass = pin.crba(model, data, q).copy()
+        mass = ties.T @ (np.triu(mass) + np.triu(mass, 1).T) @ ties
+        damped = model.damping * v
+        inverse, bias = (ties.T @ (pin.rnea(model, data, q, v, one) + damped) for one in (a, 0.0 * a))
+        u, rest, onto = turn @ v[self.rows], self.rest(turn, v), turn @ kept
+        acceleration = turn @ a[self.rows] + rest
+        pairs = [
+            (onto.T @ self.dynamics.mass_matrix(ours) @ onto, mass),
+            (onto.T @ self.dynamics.inverse_dynamics(ours, u, acceleration), inverse),
+        ]
+        condition = np.linalg.cond(mass)
+        if condition < 1e13:
+            forward = onto @ np.linalg.solve(mass, -bias) + rest
+            pairs.append((self.dynamics.forward_dynamics(ours, u), forward))
+        found = [float(np.max(np.abs(x - y)) / max(np.max(np.abs(y)), 1e-30)) for x, y in pairs]
+        return [*found[:2], *(one / max(1.0, 1e-4 * condition) for one in found[2:])]
+
+
+@pytest.mark.parametrize("file", robots(), ids=lambda file: file.stem)
+@pytest.mark.sample(8)
+def test_urdf_beside_pinocchio(file: Path) -> None:
+    generator = np.random.default_rng(0)
+    beside = Beside(file)
+    if beside.rows:
+        assert max(max(beside.errors(generator)) for _ in range(20)) < 1e-12
+
+
+@pytest.mark.parametrize("name", ["solo12", "bolt", "quadrotor_base", "double_pendulum_simple"])
+def test_urdf_that_moves_freely_beside_pinocchio(name: str) -> None:
+    generator = np.random.default_rng(0)
+    beside = Beside(next(one for one in robots() if one.stem == name), "free")
+    assert max(max(beside.errors(generator)) for _ in range(20)) < 1e-12
