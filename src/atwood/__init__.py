@@ -85,6 +85,7 @@ if TYPE_CHECKING:
         CheckReport as CheckReport,
         check as check,
     )
+    from atwood.exchange.c.export import export_c as export_c
     from atwood.expr.sympy_bridge import (
         Formula as Formula,
         formula as formula,
@@ -285,6 +286,7 @@ if TYPE_CHECKING:
 
 _ROOMS = {
     "atwood.checking": ("CheckReport", "check"),
+    "atwood.exchange.c.export": ("export_c",),
     "atwood.expr.sympy_bridge": ("Formula", "formula"),
     "atwood.model.compose.serialization": ("from_data", "load_scene", "save_scene", "to_data"),
     "atwood.pipeline": ("Assembly", "assemble", "simulate"),

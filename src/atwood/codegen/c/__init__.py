@@ -1,1 +1,1 @@
-"""C99 of programs and routines."""
+"""Programs and routines as C99."""

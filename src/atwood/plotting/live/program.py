@@ -7,7 +7,7 @@ more than that is not live, and says why.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import field
 from importlib.resources import files
 from typing import Any
@@ -120,27 +120,51 @@ def live_program(
     """
     assembly, zeros = with_sliders(assembly_of(scene, form=form), sliders)
     try:
-        _refuse(assembly)
-        if drag:
-            assembly, idle = with_pulls(assembly)
-            zeros |= idle
-        assembly = with_zeros(assembly, zeros)
-        assembly, start = start_with_line_signs(assembly)
-        plan, y = _prepared(assembly, start)
-        mode = ModeText(plan, y, quantities)
-        data = _data(mode, start)
-        every = add_modes(mode, assembly, start, quantities)
-        for one in every:
-            add_updates(one)
-            for number, symbol in enumerate(one.assembly.parameters):
-                if symbol.name in zeros:
-                    one.data["values"][number] = 0.0
+        every, start = live_modes(assembly, zeros, quantities, drag)
+        data = _data(every[0], start)
         modes = [(one.text(), one.data) for one in every]
         texts = ", ".join(f"{{data: {_json(own)},\nopen: {text}}}" for text, own in modes)
         text = f"{{data: {_json(data)},\nmodes: [{texts}]}}"
         return LiveProgram(assembly.flat.name, assembly.form, "", text, data)
     except AtwoodError as error:
         return LiveProgram(assembly.flat.name, assembly.form, ": ".join(filter(None, (error.where, error.message))))
+
+
+def live_modes(
+    assembly: Assembly,
+    zeros: Collection[str] = (),
+    quantities: Sequence[str] | None = None,
+    drag: bool = False,
+) -> tuple[list[ModeText], Start]:
+    """Return the programs of a scene in each of its modes, that of its start first, and the start.
+
+    Parameters
+    ----------
+    assembly
+        The scene.
+    zeros
+        Names of symbols of parameters that stay in the equations, and are zero.
+    quantities, drag
+        See `live_program`.
+
+    Raises
+    ------
+    AtwoodError
+        If it is not live.
+    """
+    _refuse(assembly)
+    if drag:
+        assembly, idle = with_pulls(assembly)
+        zeros = {*zeros, *idle}
+    assembly, start = start_with_line_signs(with_zeros(assembly, zeros))
+    first = ModeText(*_prepared(assembly, start), quantities)
+    every = add_modes(first, assembly, start, quantities)
+    for one in every:
+        add_updates(one)
+        for number, symbol in enumerate(one.assembly.parameters):
+            if symbol.name in zeros:
+                one.data["values"][number] = 0.0
+    return every, start
 
 
 def _refuse(assembly: Assembly) -> None:

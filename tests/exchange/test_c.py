@@ -1,0 +1,120 @@
+"""Scenes as C: compiled without warnings, and beside `simulate`."""
+
+import json
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from atwood import assemble, export_c, simulate
+from atwood.cli import main
+from atwood.errors import ParameterError, UnsupportedError, UsageError
+from atwood.exchange.c.text import c_name, quoted
+from atwood_library.scenes import SCENES
+
+from ..exported_scenes import FLAGS, apart, built, compiler, printed
+
+needs_a_compiler = pytest.mark.skipif(compiler() is None, reason="there is no C compiler")
+SAMPLE = ("double-pendulum", "reduced"), ("four-bar", "dae"), ("rolling-disc", "reduced")
+QUICK = ["-O0", *FLAGS[1:]]
+
+
+@needs_a_compiler
+@pytest.mark.parametrize(("name", "form"), SAMPLE)
+def test_motions_are_those_of_simulate(name: str, form: str, tmp_path: Path) -> None:
+    found = printed(built(SCENES[name](), tmp_path, form, QUICK), 2.0, 1e-11, 5)
+    result = simulate(
+        SCENES[name](), form=form, rtol=1e-11, t_end=2.0, outputs=np.linspace(0.0, 2.0, 5), solver="explicit"
+    )
+    worst, where, equal = apart(found, result, assemble(SCENES[name](), form=form))
+    assert worst <= 1e-9, where
+    if name == "double-pendulum":
+        states = equal.split()
+        assert states[0] == states[2] != "0", equal
+
+
+@needs_a_compiler
+def test_steps_of_one_length_have_the_order_of_the_method(tmp_path: Path) -> None:
+    program = built(SCENES["double-pendulum"](), tmp_path, flags=QUICK)
+    known = simulate(SCENES["double-pendulum"](), rtol=1e-13, t_end=1.0, outputs=[0.0, 1.0], solver="explicit")
+    errors = []
+    for step in ("0.05", "0.025"):
+        found = printed(program, 1.0, 1e-9, 2, "--step", step, "--output", "rod1.angle")
+        assert list(found) == ["time", "rod1.angle"]
+        errors.append(abs(found["rod1.angle"][-1] - known["rod1.angle"][-1]))
+    assert errors[1] < errors[0] / 2**6
+    assert errors[0] > 1e-13
+
+
+@needs_a_compiler
+def test_an_instance_is_copied_and_takes_parameters(tmp_path: Path) -> None:
+    export_c(SCENES["double-pendulum"](), tmp_path, output=["rod1.angle"])
+    (tmp_path / "main.c").write_text(
+        """#include "double_pendulum.h"
+#include <stdio.h>
+#include <string.h>
+static double_pendulum s, other;
+int main(void)
+{
+    double a, b, c;
+    int k = 0;
+    double_pendulum_default(&s);
+    s.rtol = 1e-11;
+    while (strcmp(double_pendulum_parameters[k].path, "bob1.mass") != 0) k++;
+    if (double_pendulum_set_parameter(&s, k, -1.0) != double_pendulum_REFUSED) return 2;
+    double_pendulum_set_parameter(&s, k, 2.5);
+    double_pendulum_begin(&s);
+    double_pendulum_advance(&s, 0.5);
+    double_pendulum_copy(&other, &s);
+    double_pendulum_advance(&s, 1.0);
+    double_pendulum_evaluate(&s, &a);
+    memset(&s, 0, sizeof s);
+    double_pendulum_advance(&other, 1.0);
+    double_pendulum_evaluate(&other, &b);
+    c = double_pendulum_advance(&other, 0.5);
+    printf("[%.17g, %.17g, %g]", a, b, c);
+    return 0;
+}
+"""
+    )
+    command = f"{compiler()} -O1 -std=c99 -Wall -Wextra -Werror {tmp_path}/double_pendulum.c {tmp_path}/main.c -lm"
+    subprocess.run([*command.split(), "-o", str(tmp_path / "a")], check=True)
+    a, b, code = json.loads(subprocess.run([tmp_path / "a"], capture_output=True, text=True, check=True).stdout)
+    scene = SCENES["double-pendulum"]()
+    scene.set("bob1.mass", 2.5)
+    assert a == b
+    assert code == 2
+    assert a == pytest.approx(simulate(scene, rtol=1e-12, t_end=1.0, outputs=[0.0, 1.0])["rod1.angle"][-1], abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["bouncing-ball", "trebuchet"])
+def test_what_has_no_counterpart_is_refused_by_name(name: str, tmp_path: Path) -> None:
+    with pytest.raises(UnsupportedError, match="it is not exported"):
+        export_c(SCENES[name](), tmp_path)
+
+
+def test_wrong_paths_and_folders_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match=r"rod1\.angel"):
+        export_c(SCENES["double-pendulum"](), tmp_path, output=["rod1.angel"])
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UsageError, match="cannot be made"):
+        export_c(SCENES["double-pendulum"](), tmp_path / "file")
+
+
+def test_names_are_those_of_c() -> None:
+    assert [c_name(one) for one in ("DoublePendulum", "double", "3 bodies", "ü/-", "a.b")] == [
+        *("double_pendulum", "model_double", "model_3_bodies", "model", "a_b")
+    ]
+    assert quoted('a"\\?ü') == '"a\\042\\134\\077\\303\\274"'
+
+
+def test_the_command_says_what_it_wrote(tmp_path: Path) -> None:
+    from click.testing import CliRunner
+
+    done = CliRunner().invoke(main, ["export", "double-pendulum", "--c", str(tmp_path), "--json"])
+    assert done.exit_code == 0, done.output
+    assert len(json.loads(done.output)["files"]) == 3
+    done = CliRunner().invoke(main, ["export", "double-pendulum"])
+    assert done.exit_code == 1
+    assert "--c" in done.output
