@@ -289,10 +289,10 @@ class Routines:
     functions: Functions
 
 
-def routines_of(source: RoutineSource) -> Routines:
-    """Return the routines of a method, compiled; whoever asks keeps them."""
-    built = build_code([], CodeOptions(level=2), exports=tuple(_SHAPES), routines=source)
-    return Routines(built, bind_functions(built))
+def routines_of(source: RoutineSource, **others: tuple[Any, ...]) -> Routines:
+    """Return the routines of a method, compiled; whoever asks keeps them. `others`: as of `bind_functions`."""
+    built = build_code([], CodeOptions(level=2), exports=(*_SHAPES, *others), routines=source)
+    return Routines(built, bind_functions(built, **others))
 
 
 class NativeStepper(Stepper):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Mapping
-from ctypes import c_double, c_int, c_void_p
+from ctypes import c_double, c_int, c_int64, c_void_p
 from functools import partial
 from math import inf
 from typing import TYPE_CHECKING, Any
@@ -172,9 +172,10 @@ class CompiledStepper(NativeStepper):
         """Take states, one row each, onto the constraints as steps are; return which could be, None where none can."""
         if self._calls_python or not self._count("project"):
             return None
-        project, data = _PROJECTION(self._count("project")), self._count("project_data")
-        places = range(y.ctypes.data, y.ctypes.data + y.nbytes, y.nbytes // len(y))
-        return np.array([project(*one, data) == 0 for one in zip(t.tolist(), places, strict=True)], dtype=np.bool_)
+        left = np.empty(len(t), dtype=np.int64)
+        times = np.ascontiguousarray(t)
+        self._call("project_each", *(one.ctypes.data for one in (times, y, left)), len(t))
+        return left == 0
 
     def set_monitor(self, monitor: StepMonitor) -> bool:
         """Let the motion be looked at, and come back with `Outcome.NOTICED` where something is seen."""
@@ -275,4 +276,5 @@ _FILES = (
 @once
 def _routines(pair: Tableau) -> Routines:
     """Return the routines of a pair."""
-    return routines_of(RoutineSource("integrators.embedded.steps", _FILES, (pair,)))
+    source = RoutineSource("integrators.embedded.steps", _FILES, (pair,))
+    return routines_of(source, project_each=(c_void_p, c_void_p, c_void_p, c_int64))

@@ -416,12 +416,23 @@ def _sample(pair: Tableau) -> Routine:
     return write_sample(r, m, m.size)
 
 
+def _project_each(pair: Tableau) -> Routine:
+    """Take states, one row each, onto the constraints; where that fails, a number that is not zero is left."""
+    states = {"times": ADDRESS, "ys": ADDRESS, "left": ADDRESS, "count": INTEGER}
+    r, m, (times, ys, left, count) = open_routine(pair, "project_each", states, exported=True)
+    project, data, width = m.project, m.project_data, m.size
+    with r.count(count) as i:
+        left.write(i, r.call(project, times[i], ys.at(i * width), data).integer(), INTEGER)
+    r.give(0)
+    return r
+
+
 def write_routines(pair: Tableau) -> list[Routine]:
     """Return the routines of a pair.
 
     They take the address of a session; see `atwood.integrators.embedded.stepper`.
     """
-    ends = (_begin, _run, _sample)
+    ends = (_begin, _run, _sample, _project_each)
     inner = (_evaluate, _attempt, _error, _stability, _project, _guarded, _look, _watched, _settles, _seek, _leap)
     stages = [_stage(pair, stage) for stage in range(1, len(pair.nodes))]
     return [*(write(pair) for write in (*ends, *inner)), *stages, *write_dense_output(pair)]

@@ -248,13 +248,15 @@ def _project(
     sizes = plan.sizes[:, None]
     kinematic_map, holding = plan.balance.kinematic_map, plan.balance.holding(list(plan.finding.kept))
     q, speeds = kinematic_map.normalized(q.copy()), (u / sizes).T
-    now = constraints_at(plan, t, q, u)
-    held = _largest(now, speeds)
+    found = None if nearest is None else _taken(plan, t, q, u, nearest)
+    if found is None:
+        now = constraints_at(plan, t, q, u)
+        held = _largest(now, speeds)
+    else:
+        held, near, moving, done = found
     if np.all(held[0] <= _EXACT) and np.all(held[1] * plan.scales.time <= _EXACT):
         return Projected(q, u.copy(), held, np.zeros(len(t), dtype=bool))
-    found = None if nearest is None else _taken(plan, t, q, u, nearest)
     if found is not None:
-        near, moving, done = found
         doubtful = np.zeros(len(t), dtype=bool)
         if not done.all():
             rest = _project(plan, t[~done], q[:, ~done], u[:, ~done])
@@ -281,16 +283,22 @@ def _project(
 
 def _taken(
     plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray, nearest: Nearest
-) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]] | None:
-    """Return states that machine code has taken onto the constraints, and which of them meet all."""
-    rows = np.ascontiguousarray(np.concatenate([q, u]).T)
+) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]] | None:
+    """Return by how much states miss the constraints, where machine code takes them, and which then meet all.
+
+    All states are looked at in one call: most of its time does not depend on their number.
+    """
+    count, rows = len(t), np.ascontiguousarray(np.concatenate([q, u]).T)
     met = nearest(t, rows)
     if met is None:
         return None
-    q, u = (part.copy() for part in plan.program.split(rows.T))
-    q = plan.balance.kinematic_map.normalized(q)
-    left = _largest(constraints_at(plan, t, q, u), (u / plan.sizes[:, None]).T)
-    return q, u, met & np.all(left * np.array([[1.0], [plan.scales.time]]) <= tolerances.MET, axis=0)
+    near, moving = (part.copy() for part in plan.program.split(rows.T))
+    near = plan.balance.kinematic_map.normalized(near)
+    both = np.concatenate([u, moving], axis=1)
+    now = constraints_at(plan, np.concatenate([t, t]), np.concatenate([q, near], axis=1), both)
+    missed = _largest(now, (both / plan.sizes[:, None]).T)
+    left = missed[:, count:] * np.array([[1.0], [plan.scales.time]])
+    return missed[:, :count], near, moving, met & np.all(left <= tolerances.MET, axis=0)
 
 
 def _least_norm(jacobian: FloatArray) -> Callable[[FloatArray], FloatArray]:
