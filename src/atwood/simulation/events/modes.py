@@ -46,6 +46,8 @@ _EVENT_FUNCTIONS: Key[tuple[EventFunction, ...]] = Key("event functions")
 _NEEDS: Key[_Needs] = Key("what event functions read")
 _EVENTS: Key[Program] = Key("events")
 _EVENT_CODE: Key[EventCode | None] = Key("machine code of events")
+_REACTIONS: Key[ReactionSolver] = Key("reactions that events read")
+_AT_START: Key[FloatArray] = Key("values of events at the start of a mode")
 _RATES: Key[Program] = Key("rates of gaps")
 _IS_THERE: Key[Program] = Key("whether an event is there")
 
@@ -207,7 +209,12 @@ class EventProbe:
         self._about = conditions, is_loose(assembly)
         self.event_functions = (*condition_functions(assembly, conditions), *find_event_functions(assembly))
         self.needs = assembly.shared.get(_NEEDS, lambda: _find_needs(assembly, self.event_functions), self._about)
-        self.reactions = ReactionSolver(assembly, t, q, u) if self.needs.reactions else None
+        state = t, q.tobytes(), u.tobytes()
+        self.reactions = (
+            assembly.kept.get(_REACTIONS, lambda: ReactionSolver(assembly, t, q, u), *state)
+            if self.needs.reactions
+            else None
+        )
         self.kernel = (
             assembly.kernel(
                 known_program(assembly, _EVENTS, lambda: [one.value for one in self.event_functions], self._about)
@@ -217,7 +224,10 @@ class EventProbe:
         )
         small = np.array([MARGIN * tolerance * plan.scales.of(one.unit) for one in self.event_functions])
         self.shift = np.zeros(len(small))
-        values = np.asarray(self.values(t, q, u)) if self.event_functions else np.zeros(0)
+        about = *state, plan.finding.kept, self._about
+        values = (
+            assembly.kept.get(_AT_START, lambda: self.values(t, q, u), *about) if self.event_functions else np.zeros(0)
+        )
         happened, self.shift = margins_at_start(self.event_functions, values, small)
         self._sides = np.where(np.abs(values) > small, np.sign(values), 0.0)
         sided = np.array([one.target == SIDE for one in self.event_functions], dtype=np.bool_)

@@ -102,6 +102,7 @@ class Start:
 
 
 _START: Key[Start] = Key("start")
+_IN_MAXIMAL: Key[tuple[FloatArray, FloatArray]] = Key("start in maximal coordinates")
 _SIGNS_TRIED = 4
 """So many starts are found with signs of their own, one after the other: more than two are hardly ever needed."""
 _INTEGRAL_GRADIENTS: Key[list[SparseMatrix]] = Key("gradients of integrals")
@@ -116,8 +117,14 @@ def own_state(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatArray]
 
 def start_in_maximal(assembly: Assembly, start: Start) -> tuple[FloatArray, FloatArray]:
     """Return a start in maximal coordinates, whatever the form of an assembly."""
-    q, u = assembly.kernel(to_maximal(assembly, "regular"))([start.time], start.coordinates, start.speeds)
-    return kinematic_map_of(assembly, "dae").normalized(np.asarray(q, dtype=float)), np.asarray(u, dtype=float)
+
+    def placed() -> tuple[FloatArray, FloatArray]:
+        q, u = assembly.kernel(to_maximal(assembly, "regular"))([start.time], start.coordinates, start.speeds)
+        return kinematic_map_of(assembly, "dae").normalized(np.asarray(q, dtype=float)), np.asarray(u, dtype=float)
+
+    about = start.time, start.coordinates.tobytes(), start.speeds.tobytes()
+    q, u = assembly.kept.get(_IN_MAXIMAL, placed, *about)
+    return q.copy(), u.copy()
 
 
 def settle(assembly: Assembly, start: Start, reassemble: Reassemble) -> tuple[Assembly, FloatArray, FloatArray]:

@@ -53,7 +53,7 @@ _MOMENT = 16.0
 """Times that are so many units of rounding apart are one."""
 
 _PARTS = 5
-"""So often it is seen to that coordinates of orientations keep their size where formulas give all others."""
+"""So often it is seen to that coordinates of orientations keep their size."""
 
 
 def run_segment(segment: Segment, recorder: Recorder, t: float, q: FloatArray, u: FloatArray) -> Outcome:
@@ -341,10 +341,9 @@ class _Runner:
         """Let an explicit method fill tables; return how many samples are done, and why it stopped early."""
         segment, progress = self.segment, self.segment.options.progress
         kinematic_map = segment.plan.balance.kinematic_map
-        whole = progress is None and not kinematic_map.has_homogeneous
+        parts = _BLOCKS if progress is not None else _PARTS if kinematic_map.has_homogeneous else 1
         samples = segment.samples
-        parts = _BLOCKS if progress is not None or not segment.plan.balance.constraints else _PARTS
-        ends = samples.ends_of_blocks(1 if whole else parts)
+        ends = samples.ends_of_blocks(parts)
         while done < len(samples.times):
             times = samples.times[done : ends[np.searchsorted(ends, done, side="right")]]
             y, _, step_result = session.sample(times)
