@@ -143,6 +143,11 @@ class MonitorData:
         self._pointers = (ctypes.c_void_p * len(pointers))(*pointers)
         self.address = ctypes.addressof(self._pointers)
 
+    def copied(self) -> MonitorData:
+        """Return the same for another run, from what was noted on."""
+        own = {name: one if name in LISTS else one.copy() for name, one in self._arrays.items()}
+        return MonitorData(self.code, own)
+
     def restart(self) -> None:
         """Forget what was noted; not how much conditions have changed."""
         self._state[[AT["count"], AT["is_low"], AT["falls"], AT["later"]]] = 0.0

@@ -9,10 +9,12 @@ another way the run goes on from their end.
 from __future__ import annotations
 
 import time
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from atwood.arrays import FloatArray
+from atwood.forms.caches import Key
 from atwood.integrators.protocol import Status, StepMonitor, StepResult
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.singular.branches import (
@@ -25,6 +27,11 @@ from atwood.simulation.singular.branches import (
 )
 from atwood.simulation.singular.crossing import SingularCrossing, zero_ahead
 from atwood.tolerances import tolerances
+
+if TYPE_CHECKING:
+    from atwood.codegen.sundials.step_monitor import MonitorData
+
+_BEGUN: Key[MonitorData | None] = Key("first looks for singular positions")
 
 _REVIEW = 8
 """So many looks are judged together where they are not compiled."""
@@ -93,14 +100,30 @@ class SingularityMonitor(Branches):
         self.agreed: list[SingularCrossing] = []
         self._away: list[float] = []
         self._judged = -np.inf
-        self._compiled = compiled_monitor(plan, self._whole, len(step_result.y))
-        if self._compiled is not None:
-            errors = plan.balance.errors.near(step_result.t, step_result.y[: self._n], plan.sizes)
-            self._compiled.rows[:] = tolerances.TRUSTED * errors
-            self._measures.rows = self._compiled.rows
+        self._compiled: MonitorData | None = None
         self._start, self._is_behind = step_result, False
         self._starts_low = False
+        about = step_result.t, step_result.y.tobytes(), step_result.yp.tobytes(), self._whole, plan.finding.kept
+        begun = plan.assembly.kept.get(_BEGUN, self._first_looks, *about)
+        if begun is None:
+            self._begin_looks()
+        elif self._compiled is None:  # a run from the same state has looked around before
+            self._start_anew()
+            self._compiled = begun.copied()
+            self._measures.rows, self.next = self._compiled.rows, np.inf
+            self._starts_low = self._compiled.least_share < _AT_START
+
+    def _first_looks(self) -> MonitorData | None:
+        """Look at the start, and around it; return what came of it, None where nothing can be compiled."""
+        plan, start = self.plan, self._start
+        self._compiled = compiled_monitor(plan, self._whole, len(start.y))
+        if self._compiled is None:
+            return None
+        errors = plan.balance.errors.near(start.t, start.y[: self._n], plan.sizes)
+        self._compiled.rows[:] = tolerances.TRUSTED * errors
+        self._measures.rows = self._compiled.rows
         self._begin_looks()
+        return self._compiled.copied()
 
     @property
     def step_monitor(self) -> StepMonitor | None:
@@ -118,10 +141,13 @@ class SingularityMonitor(Branches):
         self._start, self._is_behind = step_result, is_behind
         self._begin_looks()
 
-    def _begin_looks(self) -> None:
+    def _start_anew(self) -> None:
         self._samples, self._away = [], []
         self._judged = -np.inf
         self.trouble = None
+
+    def _begin_looks(self) -> None:
+        self._start_anew()
         if self._compiled is None:
             self.note(self._start)
             return
