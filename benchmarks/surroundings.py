@@ -1,8 +1,8 @@
 """What surrounds a run: `simulate` again on an assembly, over its integration alone, for all scenes in both forms.
 
 The integration is what the session's compiled calls take in the same run: steps of explicit methods and IDA's, called
-without anything between them. Ratios are those of the whole call over these and 0.3 ms, medians of rounds in which scenes
-take turns; time of the processor, BLAS with its own number of threads.
+without anything between them. Ratios are those of the whole call over these and 0.3 ms, medians of rounds in which
+scenes take turns; time of the processor, BLAS with its own number of threads.
 """
 
 from __future__ import annotations
