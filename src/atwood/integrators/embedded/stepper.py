@@ -175,7 +175,7 @@ class CompiledStepper(NativeStepper):
         left = np.empty(len(t), dtype=np.int64)
         times = np.ascontiguousarray(t)
         self._call("project_each", *(one.ctypes.data for one in (times, y, left)), len(t))
-        return left == 0
+        return np.asarray(left == 0)
 
     def set_monitor(self, monitor: StepMonitor) -> bool:
         """Let the motion be looked at, and come back with `Outcome.NOTICED` where something is seen."""
