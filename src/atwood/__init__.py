@@ -116,6 +116,7 @@ if TYPE_CHECKING:
     )
     from atwood.plotting.pages.viewer import Viewer as Viewer
     from atwood.plotting.plots.energies import plot_energies as plot_energies
+    from atwood.plotting.plots.fit import plot_fit as plot_fit
     from atwood.plotting.plots.linear import (
         plot_bode as plot_bode,
         plot_branches as plot_branches,
@@ -157,6 +158,7 @@ if TYPE_CHECKING:
         LongComparison as LongComparison,
         compare_long as compare_long,
     )
+    from atwood.study.sensitivities.fit import Fit as Fit, fit as fit
     from atwood.study.sensitivities.sensitivities import (
         Sensitivities as Sensitivities,
         sensitivities as sensitivities,
@@ -295,6 +297,7 @@ _ROOMS = {
     "atwood.plotting.drawing": ("plot_mode",),
     "atwood.plotting.pages.page": ("Page", "page"),
     "atwood.plotting.pages.viewer": ("Viewer",),
+    "atwood.plotting.plots.fit": ("plot_fit",),
     "atwood.plotting.plots.energies": ("plot_energies",),
     "atwood.plotting.plots.linear": ("plot_bode", "plot_branches", "plot_nyquist", "plot_root_locus"),
     "atwood.plotting.plots.reduction": ("plot_effective_potential", "plot_top_path"),
@@ -304,6 +307,7 @@ _ROOMS = {
     "atwood.result.files": ("SavedResult", "load_result", "save_result"),
     "atwood.result.result": ("Result",),
     "atwood.study": ("Comparison", "ComparisonRow", "Sweep", "compare", "load_sweep", "sweep"),
+    "atwood.study.sensitivities.fit": ("Fit", "fit"),
     "atwood.study.sensitivities.sensitivities": ("Sensitivities", "sensitivities"),
     "atwood.study.comparison.long_runs": ("LongComparison", "compare_long"),
     "atwood.theory.action": (

@@ -20,6 +20,7 @@ _COMMANDS = {
     "compare": ("atwood.cli.comparing", "Compare what each form costs for which error."),
     "diagram": ("atwood.cli.pages", "Draw which parts of a scene are connected where."),
     "export": ("atwood.cli.exporting", "Write a scene for other tools, as C."),
+    "fit": ("atwood.cli.fitting", "Fit parameters and start values of a scene to measurements."),
     "info": ("atwood.cli.info", "Say what a scene is made of, before any run."),
     "list": ("atwood.cli.listing", "List the scenes of the installed libraries."),
     "page": ("atwood.cli.pages", "Write a page on which a scene moves."),
@@ -171,6 +172,7 @@ def main() -> None:
     atwood export double-pendulum --c folder    the scene as C
     atwood compare double-pendulum       what each form costs for which error
     atwood sweep double-pendulum --vary mass2=0.5:2:16
+    atwood fit double-pendulum data.csv --vary length1=0.5:2
     atwood equilibria pendulum-on-cart   where it can stay at rest, and whether it does
     atwood modes double-pendulum         frequencies and shapes of small oscillations
     atwood linearize pendulum-on-cart    its linear model, for control

@@ -194,7 +194,7 @@ def _singular(name: str) -> str:
 
 def _read(typed: Any, kind: Kind, option: str) -> Any:
     """Return what was typed as a function takes it; nothing of what can be repeated is what is usual."""
-    if kind.is_many and "=" in kind.word and "," not in kind.word:
+    if kind.is_many and "=" in kind.word and not any(sign in kind.word for sign in ",["):
         return {path: _typed_again(kind, text, f"{option} {path}") for path, text in pairs(typed, option)} or None
     if kind.is_many:
         return [_typed_again(kind, one, option) for one in typed] or None
