@@ -44,6 +44,10 @@ class Axis:
     given: tuple[Any, ...]
     values: NDArray[Any]
 
+    def at(self, places: NDArray[np.intp]) -> Axis:
+        """Return some of the values, in some order."""
+        return Axis(self.path, self.is_start, tuple(self.given[k] for k in places.tolist()), self.values[places])
+
 
 @dataclass(frozen=True, eq=False)
 class Cases:
@@ -84,6 +88,11 @@ class Cases:
         for axis, places in zip(self.axes, self.places, strict=True):
             found[axis.is_start][axis.path] = axis.given[places[run]]
         return found
+
+    def part(self, runs: NDArray[np.intp]) -> Cases:
+        """Return some of the runs, as a list."""
+        axes = zip(self.axes, self.places, strict=True)
+        return Cases(tuple(axis.at(places[runs]) for axis, places in axes), (len(runs),))
 
 
 def make_cases(scene: Model, vary: Mapping[str, Any] | None, start: Mapping[str, Any] | None, combine: str) -> Cases:

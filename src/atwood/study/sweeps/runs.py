@@ -1,11 +1,10 @@
-"""The runs of a sweep one by one, in threads or in processes, and what is recorded of each."""
+"""The runs of a sweep one by one, in threads, and what is recorded of each."""
 
 from __future__ import annotations
 
-import pickle
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, Future, ThreadPoolExecutor, as_completed
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import field
 from typing import Any
@@ -27,8 +26,8 @@ from atwood.study.sweeps.cases import Cases
 _STRUCTURES = 8
 """So many structures are kept at hand; sweeps over counts have several."""
 
-_CHUNKS = 16
-"""An executor is given so many pieces of work at least, if there are as many runs."""
+DIED = "the worker that had it died"
+"""What is said of a run that ended its worker, before what else is said."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +77,12 @@ class Records:
     seconds: float = 0.0
     lock: threading.Lock = field(default_factory=threading.Lock)
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "lock"}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        self.__dict__.update(state, lock=threading.Lock())
+
     @classmethod
     def empty(cls, request: SweepRequest) -> Records:
         """Return records of runs that have not been made."""
@@ -88,6 +93,21 @@ class Records:
     def fail(self, run: int, error: AtwoodError) -> None:
         """Record that a run failed, and why."""
         self.status[run], self.messages[run] = "failed", str(error)
+
+    def take(self, runs: NDArray[np.intp], part: Records) -> None:
+        """Record what runs gave that were recorded by themselves."""
+        self.values[:, runs] = part.values
+        self.note(runs, part)
+
+    def note(self, runs: NDArray[np.intp], part: Records) -> None:
+        """Record all but the values of such runs."""
+        self.end_time[runs], self.steps[runs] = part.end_time, part.steps
+        for run, status in zip(runs.tolist(), part.status, strict=True):
+            self.status[run] = status
+        self.messages |= {int(runs[k]): text for k, text in part.messages.items()}
+        self.reassembled |= {int(runs[k]): text for k, text in part.reassembled.items()}
+        self.batched += part.batched
+        self.seconds += part.seconds
 
     def interrupt(self) -> None:
         """Record that what has not been made will not be."""
@@ -233,74 +253,3 @@ def _take(request: SweepRequest, records: Records, run: int, result: Result) -> 
         places = np.searchsorted(result.time, request.times, side="right") - 1
         reached = (places >= 0) & (result.time[np.maximum(places, 0)] == request.times)
         records.values[k, run, reached] = table[path][places[reached]]
-
-
-# -- processes -----------------------------------------------------------------------------------------------------
-
-
-def run_in_processes(
-    request: SweepRequest, records: Records, executor: Executor, watch: Callable[[int], object]
-) -> None:
-    """Make runs where an executor puts them."""
-    pieces = np.array_split(np.arange(request.cases.count), min(request.cases.count, _CHUNKS))
-    waiting: dict[Future[Any], NDArray[np.intp]] = {}
-    try:
-        for runs in pieces:
-            waiting[executor.submit(_piece, *_packed(request, runs))] = runs
-        for done in as_completed(waiting):
-            _merge(records, waiting[done], done.result())
-            watch(len(waiting[done]))
-    except (pickle.PicklingError, TypeError, AttributeError) as error:
-        raise UsageError(
-            f"the scene cannot be sent to where it is to be run ({error})",
-            where=request.assembly.flat.name,
-            advice="Functions in it must have a name in a module; or use threads.",
-        ) from error
-    finally:
-        for future in waiting:
-            future.cancel()
-
-
-def _packed(request: SweepRequest, runs: NDArray[np.intp]) -> tuple[Any, ...]:
-    assembly, options = request.assembly, request.options
-    assert assembly.source is not None
-    axes = [
-        (axis.path, axis.is_start, [axis.given[k] for k in places[runs]])
-        for axis, places in zip(request.cases.axes, request.cases.places, strict=True)
-    ]
-    given = {
-        "quantities": request.paths,
-        "t_end": options.t_end,
-        "outputs": None if request.only_end else request.times,
-        "form": assembly.form,
-        "level": assembly.level or "ggl",
-        "rtol": options.relative_tolerance,
-        "solver": options.solver,
-        "max_steps": options.max_steps,
-        "max_seconds": options.max_seconds,
-        "accuracy": options.accuracy,
-        "name": assembly.flat.name,
-    }
-    return assembly.source.scene, axes, given
-
-
-def _piece(scene: Any, axes: Sequence[tuple[str, bool, list[Any]]], given: Mapping[str, Any]) -> Any:
-    """Make some of the runs of a sweep, somewhere else."""
-    from atwood.study.sweeps.sweep import sweep
-
-    values = [{path: column for path, is_start, column in axes if is_start is kind} for kind in (False, True)]
-    return sweep(scene, values[0], start=values[1], combine="list", threads=1, **given)
-
-
-def _merge(records: Records, runs: NDArray[np.intp], part: Any) -> None:
-    for k, path in enumerate(part.paths):
-        records.values[k, runs] = part.quantities[path]
-    records.end_time[runs], records.steps[runs] = part.end_time, part.steps
-    for k, run in enumerate(runs.tolist()):
-        records.status[run] = part.status[k]
-        if k in part.messages:
-            records.messages[run] = part.messages[k]
-        if k in part.statistics.reassembled:
-            records.reassembled[run] = part.statistics.reassembled[k]
-    records.batched += part.statistics.batched
-    records.seconds += part.statistics.solver_seconds

@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import Executor
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from atwood.arguments import BY_PATH, instance, one_of, optional, takes, whole
+from atwood.arguments import BY_PATH, FILE, one_of, optional, takes, whole
 from atwood.errors import AtwoodError, TopologyError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import find_observables
@@ -39,10 +40,13 @@ from atwood.simulation.problem.conditions import condition_functions, conditions
 from atwood.simulation.problem.options import RunOptions, sample_times
 from atwood.simulation.run.choice import check_solver
 from atwood.simulation.run.stall_diagnosis import allowed
-from atwood.study.sweeps.batch import run_batches, why_not_batched
+from atwood.study.sweeps.batch import why_not_batched
 from atwood.study.sweeps.cases import COMBINATIONS, Cases, make_cases
+from atwood.study.sweeps.executors import EXECUTOR, run_elsewhere
+from atwood.study.sweeps.pieces import make_pieces, make_runs
 from atwood.study.sweeps.result import Sweep, SweepStatistics
-from atwood.study.sweeps.runs import Records, SweepRequest, expand_paths, run_in_processes, run_one_by_one
+from atwood.study.sweeps.runs import Records, SweepRequest, expand_paths
+from atwood.study.sweeps.store import Store, open_store
 from atwood.tolerances import tolerances
 
 _TRIALS = 20
@@ -65,7 +69,8 @@ _VALUES = optional(replace(BY_PATH, word="PATH=VALUES", typed=values_of))
     rtol=RTOL,
     solver=SOLVER,
     threads=optional(whole("a whole number of threads, 1 to 1024", 1, 1024)),
-    executor=optional(instance("an executor of concurrent.futures", Executor)),
+    executor=optional(EXECUTOR),
+    store=optional(replace(FILE, what="the path of a folder, as text or a Path", word="FOLDER")),
     progress=PROGRESS,
     name=NAME,
     accuracy=ACCURACY,
@@ -88,7 +93,8 @@ def sweep(
     max_steps: int | None = None,
     max_seconds: float | None = None,
     threads: int | None = None,
-    executor: Executor | None = None,
+    executor: Any = None,
+    store: str | os.PathLike[str] | None = None,
     progress: Callable[[int, int], object] | bool | None = None,
     name: str | None = None,
     accuracy: float | None = None,
@@ -124,7 +130,13 @@ def sweep(
     threads
         How many threads share the work; as many as there are processors when not given.
     executor
-        Where to run instead, any of `concurrent.futures`; the scene must then be picklable.
+        Where to run instead: anything with ``submit(function, *arguments)`` that returns a future, such as those of
+        `concurrent.futures`, loky, ``dask.distributed.Client.get_executor()`` or mpi4py. The scene must then be
+        picklable. What a worker had that died is tried again; runs that end their worker again fail, by number.
+    store
+        A folder for the results, as they come. The same call goes on where it was cut off, and gives the same numbers
+        to the bit; of another scene, or with other values, it is refused. Quantities are then read from disk as they
+        are needed, so that there may be more than memory holds.
     progress
         Called with the number of runs done, and of how many; True for a line on standard error.
     name
@@ -167,21 +179,47 @@ def sweep(
         allowed(replace(options, conditions=stops)),
     )
     records = Records.empty(request)
-    count = _threads(threads)
-    reason = ""
+    opened = None if store is None else open_store(Path(store), request)
+    if opened is not None:
+        records.values = opened.values
+        opened.take_up(records)
+    count, reason = _threads(threads), ""
     with told(progress, first.flat.name, lambda done, of: (done / of, f"{done} of {of} runs")) as called:
-        watch = _Progress(called, cases.count)
         try:
-            if executor is not None:
-                reason = "they were given to an executor"
-                run_in_processes(request, records, executor, watch.count)
-            else:
-                reason = why_not_batched(request)
-                left = np.arange(cases.count) if reason else run_batches(request, records, count, watch.count)
-                run_one_by_one(request, records, left, count, watch.count)
+            reason = _made(request, records, count, executor, opened, called)
         except KeyboardInterrupt:
             records.interrupt()
     return _finished(request, records, reason, count if executor is None else 0, time.perf_counter() - began)
+
+
+def _made(
+    request: SweepRequest,
+    records: Records,
+    threads: int,
+    executor: Any,
+    store: Store | None,
+    progress: Callable[[int, int], object] | None,
+) -> str:
+    """Make all runs that are not recorded yet; return why they were made one by one, if that was so for all."""
+    left = np.flatnonzero([not status for status in records.status])
+    watch = _Progress(progress, request.cases.count, request.cases.count - len(left))
+
+    def take(runs: NDArray[np.intp], part: Records) -> None:
+        records.take(runs, part)
+        if store is not None:
+            store.keep(runs, part)
+
+    def take_and_tell(runs: NDArray[np.intp], part: Records) -> None:
+        take(runs, part)
+        watch.count(len(runs))
+
+    if executor is not None:
+        run_elsewhere(request, left, executor, take_and_tell)
+    elif store is not None:
+        make_pieces(request, left, threads, take, watch.count)
+    else:
+        return make_runs(request, records, threads, watch.count)
+    return why_not_batched(request)
 
 
 def _first(assembly: Assembly, cases: Cases) -> Assembly:
