@@ -33,7 +33,7 @@ from atwood_library.scenes import SCENES, Chain, DoublePendulum, FourBar, Slider
 def one_by_one(monkeypatch: pytest.MonkeyPatch, *arguments: Any, **options: Any) -> Any:
     """Return a sweep all of whose runs are made by themselves."""
     with monkeypatch.context() as patch:
-        patch.setattr(sys.modules["atwood.study.sweeps.sweep"], "why_not_batched", lambda order: "a test wants it so")
+        patch.setattr(sys.modules["atwood.study.sweeps.pieces"], "why_not_batched", lambda order: "a test wants it so")
         found = sweep(*arguments, **options)
     assert found.statistics.batched == 0
     return found
