@@ -21,6 +21,7 @@ from atwood.errors import UsageError
 from atwood.files import read_checked, write_atomically
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.serialization import to_data
+from atwood.result.about import versions
 from atwood.study.sweeps.runs import DIED, Records, SweepRequest
 
 _ABOUT, _VALUES, _PIECES = "sweep.json", "values.npy", "runs-*.npz"
@@ -110,8 +111,6 @@ def _mapped(file: Path, shape: tuple[int, ...]) -> FloatArray:
 
 def _identity(request: SweepRequest) -> dict[str, Any]:
     """Return what makes a sweep this one and no other, in the order in which differences are told."""
-    import atwood
-
     assembly, options = request.assembly, request.options
     assert assembly.source is not None
     assert assembly.source.scene is not None
@@ -123,7 +122,7 @@ def _identity(request: SweepRequest) -> dict[str, Any]:
             )
     kinds = {type(part.component) for part in assembly.flat.parts.values()}
     return {
-        "version of Atwood": atwood.__version__,
+        "version of Atwood": versions()["atwood"],
         "scene": _digest(json.dumps(to_data(assembly.source.scene)["scene"], sort_keys=True)),
         "class of a part": {f"{one.__module__}.{one.__qualname__}": _source(one) for one in sorted(kinds, key=str)},
         "form": f"{assembly.form} {assembly.level}".strip(),
