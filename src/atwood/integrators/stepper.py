@@ -182,10 +182,10 @@ def fields_of(pointers: Iterable[str], numbers: Iterable[str], counts: Iterable[
     }
 
 
-LANE_FIELDS: dict[str, Kind] = {"taken": NUMBER, "edges": NUMBER, "active": INTEGER}
-"""What a session of runs side by side has besides: steps and turns to stiffness of each, and which lanes have a run.
+LANE_FIELDS: dict[str, Kind] = {"taken": NUMBER, "edges": NUMBER, "active": INTEGER, "factors": ADDRESS}
+"""What a session of runs side by side has besides: steps and turns to stiffness of each, and which lanes have a run, and what Taylor series convolve.
 
-The last, as whatever says something of lanes, has a bit for each, from the lowest on.
+What says something of lanes has a bit for each, from the lowest on.
 """
 
 

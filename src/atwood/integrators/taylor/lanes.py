@@ -151,7 +151,9 @@ def open_lanes(problem: TaylorProblem, options: SolverOptions, runs: int) -> Lan
     derived = np.zeros(len(recurrences.programs.start.prologue) * runs)
     first, (pairs, squares) = layout.places["fields"], layout.blocks
     counts = {"start_derived": derived.ctypes.data, "size": recurrences.size, "padded": layout.padded}
-    counts |= {"order": chosen, "pair_blocks": pairs, "square_blocks": squares}
+    factors = layout.places["factors"]
+    memory.view(np.int64)[factors : factors + len(layout.factors)] = layout.factors
+    counts |= {"factors": base + 8 * factors, "order": chosen, "pair_blocks": pairs, "square_blocks": squares}
     for name, whole in counts.items():
         memory.view(np.int64)[first + layout.numbers[name]] = whole
     numbers = {"longest": options.max_step or inf, "horizon": options.horizon, "stop_time": problem.stop_time}

@@ -37,6 +37,8 @@ from atwood.arrays import FloatArray
 from atwood.codegen.llvm.build import RoutineSource, build_code, default_options, once
 from atwood.codegen.llvm.module import Part
 from atwood.codegen.routines import ADDRESS, CODE, Kind, Lanes, Routine, Value, places_of
+from atwood.expr.core.graph import Expression
+from atwood.expr.core.program import OutputGroup, Program
 from atwood.expr.series.taylor import TaylorPrograms
 from atwood.integrators.protocol import SolverOptions, StepGuard, absolute_tolerances
 from atwood.integrators.stepper import (
@@ -178,16 +180,16 @@ def stride_of(lanes: int) -> int:
     return lanes * (HIGHEST + 1)
 
 
-def positions(pairs: int, squares: int, size: int, lanes: int = LANES) -> tuple[int, ...]:
+def positions(pairs: int, squares: int, size: int) -> tuple[int, ...]:
     """Return where the results of the program of an order go, from the row of that order in the first block.
 
     The blocks of left and right factors take turns, and those of squares follow; the coefficients of the unknowns have
     an array of their own.
     """
-    stride = stride_of(lanes)
-    left = [2 * (i // lanes) * stride + i % lanes for i in range(pairs)]
-    first = 2 * (-(-pairs // lanes))
-    last = [(first + i // lanes) * stride + i % lanes for i in range(squares)]
+    stride = stride_of(LANES)
+    left = [2 * (i // LANES) * stride + i % LANES for i in range(pairs)]
+    first = 2 * (-(-pairs // LANES))
+    last = [(first + i // LANES) * stride + i % LANES for i in range(squares)]
     return (*left, *(at + stride for at in left), *last, *range(size))
 
 
@@ -220,11 +222,7 @@ class CompiledRecurrences:
     def __init__(self, programs: TaylorPrograms, runs: int = 1) -> None:
         self.programs, self.runs = programs, runs
         self.size = len(programs.start.inputs[1].symbols)
-        lanes, packed = (LANES, _PACKED) if runs == 1 else (1, ())
-        order = Part(
-            "order", programs.order, positions(programs.pairs, programs.squares, self.size, lanes), lanes, packed
-        )
-        parts = [Part("start", programs.start), order]
+        parts = [Part("start", programs.start), _order_alone(programs) if runs == 1 else _order_of_many(programs)]
         self.built = build_code(parts, replace(default_options(parts), runs=runs))
         self.addresses = self.built.code.addresses
         self.layout = _Layout(self)
@@ -234,10 +232,30 @@ class CompiledRecurrences:
         return self.built.derive("start", self.programs.start, parameter_values)[0]
 
 
-def blocks_of(programs: TaylorPrograms, runs: int) -> tuple[int, int]:
-    """Return the number of blocks of pairs and of squares."""
-    each = LANES if runs == 1 else 1
-    return -(-programs.pairs // each), -(-programs.squares // each)
+def _order_alone(programs: TaylorPrograms) -> Part:
+    """Return the program of an order whose results stand in the blocks in which they are convolved."""
+    size = len(programs.start.inputs[1].symbols)
+    return Part("order", programs.order, positions(programs.pairs, programs.squares, size), LANES, _PACKED)
+
+
+def _factors(programs: TaylorPrograms) -> tuple[dict[Expression, int], list[int]]:
+    """Return the series that are convolved, each once, and which of them are the two of each pair and of squares."""
+    left, right, squares, _ = (group.expressions for group in programs.order.outputs)
+    series = {one: k for k, one in enumerate(dict.fromkeys((*left, *right, *squares)))}
+    used = [one for pair in zip(left, right, strict=True) for one in pair]
+    return series, [series[one] for one in (*used, *squares)]
+
+
+def _order_of_many(programs: TaylorPrograms) -> Part:
+    """Return the program of an order for runs side by side: each has a row for itself, so every series stands once.
+
+    Results are in the order in which they are first met, so that they are computed and checked as those of one run.
+    """
+    series, order = list(_factors(programs)[0]), programs.order
+    outputs = OutputGroup("series", tuple(series)), order.outputs[-1]
+    positions = [k * stride_of(1) for k in range(len(series))]
+    program = Program(order.name, order.inputs, order.parameters, outputs)
+    return Part("order", program, (*positions, *range(len(order.outputs[-1].expressions))))
 
 
 class _Layout:
@@ -263,7 +281,10 @@ class _Layout:
         self.padded = -(-n // WIDTH) * WIDTH if runs == 1 else n * runs
         known = len(programs.order.parameters) * runs
         self.lanes = lanes = lanes_of(runs)
-        self.blocks = pairs, squares = blocks_of(programs, runs)
+        each = LANES if runs == 1 else 1
+        self.blocks = pairs, squares = -(-programs.pairs // each), -(-programs.squares // each)
+        series, factors = _factors(programs)
+        self.factors = stride_of(lanes) * np.array(factors, dtype=np.int64)
         self.fields = FIELDS if runs == 1 else in_lanes(FIELDS | LANE_FIELDS, runs)
         self.numbers = places_of(self.fields)
         lengths = {
@@ -277,7 +298,8 @@ class _Layout:
             "arrays": ROWS["all"] * self.padded,
             "pair_sums": pairs * lanes,
             "square_sums": squares * lanes,
-            "table": (2 * pairs + squares) * stride_of(lanes),
+            "factors": 0 if runs == 1 else len(factors),
+            "table": (2 * pairs + squares if runs == 1 else len(series)) * stride_of(lanes),
         }
         ends = [0, *accumulate(-(-length // _LINE) * _LINE for length in lengths.values())]
         self.places, self.size = dict(zip(lengths, ends, strict=False)), ends[-1]

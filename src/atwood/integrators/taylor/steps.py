@@ -113,13 +113,18 @@ def _expand() -> Routine:
 def order(r: Routine, m: Memory, k: int, unit: Value) -> Value:
     """Find the coefficients of one order, and those of the unknowns of the next; return 1 where one is not finite."""
     pairs, squares, table, lanes = m.pair_blocks, m.square_blocks, m.table, lanes_of(m.runs)
-    r.call(f"pairs{k}", table, m.pair_sums, pairs, result=None)
+    if m.runs == 1:
+        rest = [table.at(pairs * (2 * stride_of(lanes)))]
+        r.call(f"pairs{k}", m.pair_sums, pairs, table, result=None)
+    else:
+        rest = [table, m.factors.at(pairs * 2)]
+        r.call(f"pairs{k}", m.pair_sums, pairs, table, m.factors, result=None)
     with r.when(squares > 0):
-        r.call(f"squares{k}", table.at(pairs * (2 * stride_of(lanes))), m.square_sums, squares, result=None)
+        r.call(f"squares{k}", m.square_sums, squares, *rest, result=None)
     m.order_number, m.order_inverse = float(k), 1.0 / k
     m.order_step, m.order_tick = unit * (1.0 / (k + 1)), unit if k == 1 else 0.0
     row = table.at(lanes * (k - 1))
-    for place, target in enumerate((row, row, row, m.row(k + 1))):
+    for place, target in enumerate((*[row] * (3 if m.runs == 1 else 1), m.row(k + 1))):
         m.order_out.write(place, target, ADDRESS)
     m.order_in.write(3, m.row(k), ADDRESS)
     return r.call(m.recurrence, m.order_in, m.derived, m.scratch, m.order_out)
@@ -339,18 +344,21 @@ Products = Sequence[tuple[Value, Value]]
 
 def write_convolutions(runs: int = 1) -> list[Routine]:
     """Write ``pairs1``, ``squares1`` and so on, which add up the products of an order in all blocks of a table."""
-    lanes, orders = lanes_of(runs), range(1, HIGHEST)
-    pairs = [_blocks(f"pairs{order}", lanes, 2, _pairs, order) for order in orders]
-    return [*pairs, *(_blocks(f"squares{order}", lanes, 1, _squares, order) for order in orders)]
+    orders = range(1, HIGHEST)
+    pairs = [_blocks(f"pairs{order}", runs, 2, _pairs, order) for order in orders]
+    return [*pairs, *(_blocks(f"squares{order}", runs, 1, _squares, order) for order in orders)]
 
 
-def _blocks(
-    name: str, lanes: int, tables: int, write: Callable[[Routine, Value, int, int], Value | None], order: int
-) -> Routine:
-    r = Routine(name, {"table": ADDRESS, "sums": ADDRESS, "blocks": INTEGER}, result=None)
-    table, sums, blocks = r.arguments
+def _blocks(name: str, runs: int, tables: int, write: Callable[..., Value | None], order: int) -> Routine:
+    """Write a routine for all blocks: of one run they follow each other; else a list says where factors lie."""
+    lists = {} if runs == 1 else {"factors": ADDRESS}
+    r = Routine(name, {"sums": ADDRESS, "blocks": INTEGER, "table": ADDRESS, **lists}, result=None)
+    sums, blocks, table, *given = r.arguments
+    lanes = lanes_of(runs)
     with r.count(blocks) as b:
-        total = write(r, table.at(b * (tables * stride_of(lanes))), lanes, order)
+        first, turns = b * tables, range(tables)
+        at = [given[0].read(first + i, INTEGER) if given else (first + i) * stride_of(lanes) for i in turns]
+        total = write(r, *(table.at(one) for one in at), lanes, order)
         sums.write(b * lanes, 0.0 if total is None else total, Lanes(lanes))
     return r
 
@@ -379,13 +387,12 @@ def _total(r: Routine, products: Products) -> Value | None:
     return chains[0] if chains else None
 
 
-def _pairs(r: Routine, left: Value, lanes: int, order: int) -> Value | None:
+def _pairs(r: Routine, left: Value, right: Value, lanes: int, order: int) -> Value | None:
     """Return the convolutions of two values at an order.
 
     The rows of the order before have just been written by parts, and are the last that can be read: what they are in
     is added last.
     """
-    right = left.at(stride_of(lanes))
     products = [(_row(left, lanes, j), _row(right, lanes, order - j)) for j in range(1, order)]
     total = _total(r, products[1:-1])
     for a, b in products[:1] + products[1:][-1:]:
