@@ -296,7 +296,7 @@ class _Layout:
             "derived": len(programs.order.prologue) * runs,
             "scratch": recurrences.built.scratch,
             "arrays": ROWS["all"] * self.padded,
-            "pair_sums": pairs * lanes,
+            "pair_sums": 2 * pairs * lanes,
             "square_sums": squares * lanes,
             "factors": 0 if runs == 1 else len(factors),
             "table": (2 * pairs + squares if runs == 1 else len(series)) * stride_of(lanes),
