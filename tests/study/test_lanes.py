@@ -35,12 +35,18 @@ def numbers(found: Sweep) -> np.ndarray[Any, Any]:
     return np.array([*(found[path].tobytes() for path in found.paths), found.steps.tobytes()])
 
 
+@pytest.mark.parametrize("solver", ["taylor", "explicit", "tsitouras", "auto"])
 @pytest.mark.parametrize("name", VARIED)
-def test_lanes_of_every_width_have_the_bits_of_runs_alone(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_lanes_of_every_width_have_the_bits_of_runs_alone(
+    name: str, solver: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assembly = assemble(SCENES[name]())
     path, low, high = VARIED[name]
     column = {path: np.random.default_rng(1).uniform(low, high, RUNS)}
-    vary, more = (None, {"start": column}) if path in assembly.flat.start else (column, {})
+    vary: Any = column
+    more: dict[str, Any] = {"solver": solver}
+    if path in assembly.flat.start:
+        vary, more["start"] = None, column
     alone = made(assembly, 1, monkeypatch, vary, **more)
     assert not alone.failed
     assert alone.statistics.batched == RUNS
@@ -62,26 +68,29 @@ def test_neighbours_and_the_order_of_the_queue_change_no_bit(monkeypatch: pytest
     assert len(set(first.steps.tolist())) > 3
 
 
-@pytest.mark.parametrize("width", [4, 8])
-def test_a_run_that_ends_early_does_so_in_a_lane(width: int, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("solver", ["taylor", "explicit"])
+def test_a_run_that_ends_early_does_so_in_a_lane(solver: str, monkeypatch: pytest.MonkeyPatch) -> None:
     assembly = assemble(SCENES["double-pendulum"]())
     start = {"rod1.angle": np.linspace(0.1, 3.0, RUNS)}
-    steps = made(assembly, 1, monkeypatch, None, start=start).steps
+    steps = made(assembly, 1, monkeypatch, None, start=start, solver=solver).steps
     limit = int(np.median(steps))
-    alone, wide = (made(assembly, one, monkeypatch, None, start=start, max_steps=limit) for one in (1, width))
+    alone, wide = (
+        made(assembly, one, monkeypatch, None, start=start, solver=solver, max_steps=limit) for one in (1, 8)
+    )
     assert 0 < len(wide.failed) < RUNS
     assert wide.status == alone.status
     assert wide.messages == alone.messages
     assert np.array_equal(numbers(wide), numbers(alone))
 
 
-def test_a_run_that_fails_fails_as_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("solver", ["taylor", "explicit"])
+def test_a_run_that_fails_fails_as_alone(solver: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Bodies that fall into the centre, among others that do not."""
     assembly = assemble(SCENES["kepler"]())
     speeds = np.linspace(0.8, 1.7, RUNS)
     speeds[::6] = 0.0
     start = {"body.velocity.z": speeds}
-    alone, wide = (made(assembly, one, monkeypatch, None, start=start) for one in (1, 4))
+    alone, wide = (made(assembly, one, monkeypatch, None, start=start, solver=solver) for one in (1, 4))
     assert wide.failed == alone.failed == tuple(range(0, RUNS, 6))
     assert wide.messages == alone.messages
     assert np.array_equal(numbers(wide), numbers(alone))

@@ -182,9 +182,13 @@ def fields_of(pointers: Iterable[str], numbers: Iterable[str], counts: Iterable[
     }
 
 
-LANE_FIELDS: dict[str, Kind] = {"taken": NUMBER, "edges": NUMBER, "active": INTEGER, "factors": ADDRESS}
-"""What a session of runs side by side has besides: steps of each and how often it seemed stiff, which lanes have a run,
-and what Taylor series convolve.
+LANE_FIELDS: dict[str, Kind] = {
+    **dict.fromkeys(("time", "taken", "edges"), NUMBER),
+    "active": INTEGER,
+    "factors": ADDRESS,
+}
+"""What a session of runs side by side has: the time to read each at, its steps, how often it seemed stiff, which lanes
+have a run, and what Taylor series convolve.
 
 What says something of lanes has a bit for each, from the lowest on.
 """

@@ -10,12 +10,12 @@ from collections.abc import Callable, Iterable, Mapping
 from atwood.codegen.routines import ADDRESS, CODE, NUMBER, Routine, Value
 from atwood.integrators.embedded.stepper import open_routine
 from atwood.integrators.embedded.tableau import Tableau
-from atwood.integrators.stepper import WIDTH, Memory
+from atwood.integrators.stepper import Memory
 
 
 def write_dense_output(pair: Tableau) -> list[Routine]:
     """Write the routines that read a solution within the last step."""
-    return [_interpolate(pair), _densify(pair), _polynomial(pair), _slope(pair)]
+    return [_interpolate(pair), _densify(pair), write_polynomial(pair), _slope(pair)]
 
 
 def weighted(m: Memory, weights: Mapping[int, float], j: Value) -> Value:
@@ -43,27 +43,32 @@ def _densify(pair: Tableau) -> Routine:
     r, m, () = open_routine(pair, "densify")
     with r.when(m.is_dense != 0):
         r.give(0)
-    h, dense = m.h, m.row("dense")
+    h = m.h
     slopes(pair, r, m, range(pair.end + 1, len(pair.nodes)), m.t_old, h, lambda: r.give(1))
-    y, y_old, begin, end = m.row("y"), m.row("y_old"), m.row(0), m.row("end slope")
-    with r.count(m.padded, step=WIDTH) as j:
+    write_terms(pair, m, h)
+    m.is_dense = 1
+    r.give(0)
+    return r
+
+
+def write_terms(pair: Tableau, m: Memory, h: Value) -> None:
+    """Write the coefficients of the dense output."""
+    dense, y, y_old, begin, end = m.row("dense"), m.row("y"), m.row("y_old"), m.row(0), m.row("end slope")
+    with m.parts() as j:
         step = m.lanes(y, j) - m.lanes(y_old, j)
         rise, fall = m.lanes(begin, j) * h, m.lanes(end, j) * h
         rows = [step, rise - step, (step + step) - (rise + fall)]
         rows += [weighted(m, weights, j) * h for weights in pair.dense]
         for number, row in enumerate(rows):
             dense[j + m.padded * number] = row
-    m.is_dense = 1
-    r.give(0)
-    return r
 
 
-def _polynomial(pair: Tableau) -> Routine:
+def write_polynomial(pair: Tableau, runs: int = 1) -> Routine:
     """Write the dense output at a share of the last step to `trial`."""
-    r, m, (x,) = open_routine(pair, "polynomial", {"x": NUMBER})
+    r, m, (x,) = open_routine(pair, "polynomial", {"x": NUMBER}, runs=runs)
     rows = [m.row("dense").at(m.padded * k) for k in range(pair.terms)]
     below, trial, rest = [m.row("y_old"), *rows[:-1]], m.row("trial"), 1.0 - x
-    with r.count(m.padded, step=WIDTH) as j:
+    with m.parts() as j:
         value = m.lanes(rows[-1], j)
         for power in reversed(range(pair.terms)):
             value = value * (rest if power % 2 else x) + m.lanes(below[power], j)
@@ -78,7 +83,7 @@ def _slope(pair: Tableau) -> Routine:
     rest = 1.0 - x
     both, begin, end = x * rest * 6.0 / m.h, rest * (1.0 - x * 3.0), x * (x * 3.0 - 2.0)
     y, y_old, first, second, last = m.row("y"), m.row("y_old"), m.row(0), m.row("end slope"), m.row("last")
-    with r.count(m.padded, step=WIDTH) as j:
+    with m.parts() as j:
         step = m.lanes(y, j) - m.lanes(y_old, j)
         last[j] = step * both + m.lanes(first, j) * begin + m.lanes(second, j) * end
     r.give(0)

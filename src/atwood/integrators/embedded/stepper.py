@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.codegen.llvm.build import RoutineSource, once
-from atwood.codegen.routines import CODE, Kind, Routine, Value
+from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Kind, Routine, Value
 from atwood.errors import KernelEvaluationError
 from atwood.integrators.embedded.tableau import Tableau
 from atwood.integrators.protocol import (
@@ -32,12 +32,14 @@ from atwood.integrators.protocol import (
     absolute_tolerances,
 )
 from atwood.integrators.stepper import (
+    LANE_FIELDS,
     WIDTH,
     Counts,
     Memory,
     NativeStepper,
     Routines,
     fields_of,
+    number_kind,
     open_routine as session_routine,
     routines_of,
 )
@@ -66,11 +68,30 @@ FIELDS = fields_of(
 )
 
 
+MANY_FIELDS: dict[str, Kind] = {
+    **FIELDS,
+    **dict.fromkeys(("edgy", "calm"), NUMBER),
+    **LANE_FIELDS,
+    "shortened": NUMBER,
+    **dict.fromkeys(("derived", "scratch"), ADDRESS),
+    **dict.fromkeys(("arrived", "coordinates", "speeds", "given"), INTEGER),
+}
+"""The fields of runs side by side: which of them have arrived at the end of a step, and what their rates are."""
+
+
 def open_routine(
-    pair: Tableau, name: str, more: Mapping[str, Kind] | None = None, result: Kind = CODE, exported: bool = False
+    pair: Tableau,
+    name: str,
+    more: Mapping[str, Kind] | None = None,
+    result: Kind = CODE,
+    exported: bool = False,
+    runs: int = 1,
 ) -> tuple[Routine, Memory, list[Value]]:
-    """Return a new routine of a session, its memory, and its further arguments."""
-    return session_routine(partial(Memory, FIELDS, pair.rows), name, more, result, exported)
+    """Return a new routine of a session, its memory, and its further arguments: numbers of each of so many runs."""
+    fields = FIELDS if runs == 1 else MANY_FIELDS
+    given = {one: number_kind(runs) if kind is NUMBER else kind for one, kind in (more or {}).items()}
+    own = number_kind(runs) if result is NUMBER else result
+    return session_routine(partial(Memory, fields, pair.rows, runs=runs), name, given, own, exported)
 
 
 _PROJECTION = ctypes.CFUNCTYPE(c_int, c_double, c_void_p, c_void_p)

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from math import inf, prod
 
-from atwood.codegen.routines import ADDRESS, BOOLEAN, INTEGER, NUMBER, Lanes, Record, Routine, Value
+from atwood.codegen.routines import ADDRESS, BOOLEAN, INTEGER, NUMBER, Record, Routine, Value
 from atwood.integrators.compiled_location import FIELDS as LOCATOR, FOUND, NO_STATE
-from atwood.integrators.embedded.dense_output import slopes, weighted, write_dense_output
+from atwood.integrators.embedded.dense_output import slopes, weighted, write_dense_output, write_polynomial
 from atwood.integrators.embedded.stepper import open_routine
 from atwood.integrators.embedded.tableau import Tableau
 from atwood.integrators.event_location import ROUNDING
@@ -49,11 +49,11 @@ _REACHED, _USED_UP, _TOO_SMALL, _NO_VALUE, _NO_RATES, _NOTICED = range(6)
 and that is heeded, or in which something was seen by what watches the motion."""
 
 
-def _stage(pair: Tableau, stage: int) -> Routine:
+def _stage(pair: Tableau, stage: int, runs: int = 1) -> Routine:
     """Write the values at which a slope is taken, or the new values."""
-    r, m, (h,) = open_routine(pair, f"stage{stage}", {"h": NUMBER})
+    r, m, (h,) = open_routine(pair, f"stage{stage}", {"h": NUMBER}, runs=runs)
     base, trial, last = m.row("y_old" if stage > pair.end else "y"), m.row("trial"), m.row("last")
-    with r.count(m.padded, step=WIDTH) as j:
+    with m.parts() as j:
         value = m.lanes(base, j) + weighted(m, pair.stages[stage - 1], j) * h
         trial[j] = value
         if stage == pair.end - 1:
@@ -64,10 +64,16 @@ def _stage(pair: Tableau, stage: int) -> Routine:
 
 def _sum(r: Routine, m: Memory, square: Callable[[Value], Value]) -> Value:
     """Return the sum of squares over all unknowns."""
-    total = r.variable(0.0, Lanes(WIDTH))
-    with r.count(m.padded, step=WIDTH) as j:
-        total.now = total.now + square(j)
-    return r.sum_of_lanes(total.now)
+    if m.runs == 1:
+        total = r.variable(0.0, m.part)
+        with m.parts() as j:
+            total.now = total.now + square(j)
+        return r.sum_of_lanes(total.now)
+    totals = [r.variable(0.0, m.part) for _ in range(WIDTH)]  # of the unknowns that have one lane in a run alone
+    with r.count(m.padded, step=WIDTH * m.runs) as j:
+        for k, one in enumerate(totals):
+            one.now = one.now + square(j + k * m.runs)
+    return sum((one.now for one in totals[1:]), start=totals[0].now)
 
 
 def _squares(r: Routine, m: Memory, weights: Mapping[int, float]) -> Value:
@@ -82,20 +88,19 @@ def _squares(r: Routine, m: Memory, weights: Mapping[int, float]) -> Value:
     return _sum(r, m, square)
 
 
-def _size(r: Routine, m: Memory, row: int | str, less: int | str | None = None) -> Value:
+def _size(r: Routine, m: Memory, a: Value, less: Value | None = None) -> Value:
     """Return the root of the mean square of a row, or of a difference, in units of what is allowed at y."""
-    y, absolute, relative, a = m.row("y"), m.row("absolute"), m.relative, m.row(row)
-    b = None if less is None else m.row(less)
+    y, absolute, relative = m.row("y"), m.row("absolute"), m.relative
 
     def square(j: Value) -> Value:
-        value = m.lanes(a, j) if b is None else m.lanes(a, j) - m.lanes(b, j)
+        value = m.lanes(a, j) if less is None else m.lanes(a, j) - m.lanes(less, j)
         scaled = value / (r.size(m.lanes(y, j)) * relative + m.lanes(absolute, j))
         return scaled * scaled
 
     return r.sqrt(_sum(r, m, square) / m.size.number())
 
 
-def _distance(r: Routine, m: Memory, a: int | str, b: int | str) -> Value:
+def distance(r: Routine, m: Memory, a: int | str, b: int | str) -> Value:
     """Return the square of the distance between two rows."""
     first, second = m.row(a), m.row(b)
 
@@ -116,7 +121,7 @@ def _evaluate(pair: Tableau) -> Routine:
     return r
 
 
-def _root(r: Routine, a: Value, order: int) -> Value:
+def root_of(r: Routine, a: Value, order: int) -> Value:
     """Return the root of an order, by square roots: one for each binary digit of its inverse, eight at most."""
     share, found = 1.0 / order, list[Value]()
     for _ in range(_DIGITS):
@@ -129,28 +134,25 @@ def _root(r: Routine, a: Value, order: int) -> Value:
     return prod(found[1:], start=found[0])
 
 
-def _first_step(pair: Tableau, r: Routine, m: Memory, t: Value) -> None:
-    """Choose the first step by the size of the first two derivatives (Hairer, Norsett and Wanner, section II.4)."""
-    longest = m.longest
-    bound = r.least(m.horizon, longest)
-    given = m.first
-    with r.when(given > 0.0):
-        m.next = r.least(given, longest)
-        r.give(_REACHED)
-    y, trial, end, probe = m.row("y"), m.row("trial"), m.row("end slope"), m.row(1)
-    d0, d1 = _size(r, m, "y"), _size(r, m, "end slope")
+def first_step(pair: Tableau, r: Routine, m: Memory, t: Value, begin: Value) -> Value:
+    """Return the first step by the size of the first two derivatives (Hairer, Norsett and Wanner, section II.4).
+
+    `begin` is where the slope at the begin lies.
+    """
+    bound = r.least(m.horizon, m.longest)
+    y, trial, probe = m.row("y"), m.row("trial"), m.row("last")
+    d0, d1 = _size(r, m, y), _size(r, m, begin)
     usual = (d0 >= 1e-5) & (d1 >= 1e-5) & (d0 / d1 < inf)
     h0 = r.least(r.choose(usual, d0 * 0.01 / d1, 1e-6), bound)
-    m.next = h0
-    with r.count(m.padded, step=WIDTH) as j:
-        trial[j] = m.lanes(y, j) + m.lanes(end, j) * h0
+    with m.parts() as j:
+        trial[j] = m.lanes(y, j) + m.lanes(begin, j) * h0
     code = r.call("evaluate", m.session, t + h0, trial, probe)
-    d2 = _size(r, m, 1, "end slope") / h0
-    with r.when((code == 0) & (d2 < inf)):
-        steepest = r.most(d2, d1)
-        root = _root(r, 0.01 / steepest, pair.order)
-        h1 = r.choose(steepest <= 1e-15, r.most(h0 * 1e-3, 1e-6), root)
-        m.next = r.least(r.least(h0 * 100.0, h1), bound)
+    d2 = _size(r, m, probe, begin) / h0
+    steepest = r.most(d2, d1)
+    root = root_of(r, 0.01 / steepest, pair.order)
+    h1 = r.choose(steepest <= 1e-15, r.most(h0 * 1e-3, 1e-6), root)
+    failed = code != 0 if m.runs == 1 else code.integer().conditions(m.runs)
+    return r.choose(~failed & (d2 < inf), r.least(r.least(h0 * 100.0, h1), bound), h0)
 
 
 def _begin(pair: Tableau) -> Routine:
@@ -162,7 +164,11 @@ def _begin(pair: Tableau) -> Routine:
     r.copy(m.row("y_old"), start, m.size)
     with r.when(r.call("evaluate", m.session, t, m.row("y"), m.row("end slope")) != 0):
         r.give(_NO_RATES)
-    _first_step(pair, r, m, t)
+    given = m.first
+    with r.when(given > 0.0):
+        m.next = r.least(given, m.longest)
+        r.give(_REACHED)
+    m.next = first_step(pair, r, m, t, m.row("end slope"))
     r.give(_REACHED)
     return r
 
@@ -243,13 +249,13 @@ def _guarded(pair: Tableau) -> Routine:
     return r
 
 
-def _error(pair: Tableau) -> Routine:
+def _error(pair: Tableau, runs: int = 1) -> Routine:
     """Return the error of a step in units of what is allowed.
 
     Of two estimates it is made as in Hairer, Norsett and Wanner, section II.10. Where that of fifth order comes near to
     one of its zeros, the ratio of both in the step before tells how large it is; that of this step is kept as `tried`.
     """
-    r, m, (h,) = open_routine(pair, "error", {"h": NUMBER}, result=NUMBER)
+    r, m, (h,) = open_routine(pair, "error", {"h": NUMBER}, result=NUMBER, runs=runs)
     own = _squares(r, m, pair.errors[0])
     if len(pair.errors) == 1:
         r.give(h * r.sqrt(own / m.size.number()))
@@ -268,7 +274,7 @@ def _error(pair: Tableau) -> Routine:
 def _stability(pair: Tableau) -> Routine:
     """Count steps at the edge of stability; 1 where the problem has just turned out stiff."""
     r, m, (h,) = open_routine(pair, "stability", {"h": NUMBER})
-    turned, apart = _distance(r, m, "end slope", pair.end - 1), _distance(r, m, "trial", "last")
+    turned, apart = distance(r, m, "end slope", pair.end - 1), distance(r, m, "trial", "last")
     is_edgy = (h * r.sqrt(turned / apart) > pair.edge) & (apart > 0.0)
     edgy = r.choose(is_edgy, m.edgy + 1, m.edgy)
     calm = r.choose(is_edgy, 0, m.calm + 1, INTEGER)
@@ -308,7 +314,7 @@ def _attempt(pair: Tableau) -> Routine:
         if pair.judges_end:
             arrive()
         error = r.call("error", m.session, step, result=NUMBER)
-        factor = _root(r, error, pair.order) / SAFETY
+        factor = root_of(r, error, pair.order) / SAFETY
         with r.when(~(error <= 1.0)):
             with r.when(~(error < inf)):
                 retreat()
@@ -434,5 +440,11 @@ def write_routines(pair: Tableau) -> list[Routine]:
     """
     ends = (_begin, _run, _sample, _project_each)
     inner = (_evaluate, _attempt, _error, _stability, _project, _guarded, _look, _watched, _settles, _seek, _leap)
-    stages = [_stage(pair, stage) for stage in range(1, len(pair.nodes))]
-    return [*(write(pair) for write in (*ends, *inner)), *stages, *write_dense_output(pair)]
+    written = [write(pair) for write in (*ends, *inner)]
+    return [*written, *(_stage(pair, stage) for stage in range(1, len(pair.nodes))), *write_dense_output(pair)]
+
+
+def write_inner(pair: Tableau, runs: int) -> list[Routine]:
+    """Return what runs that are taken side by side do as one alone."""
+    stages = [_stage(pair, stage, runs) for stage in range(1, len(pair.nodes))]
+    return [_error(pair, runs), *stages, write_polynomial(pair, runs)]

@@ -12,6 +12,7 @@ from atwood.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from atwood.integrators.batch import BatchPlaces
+    from atwood.integrators.embedded.lanes import RatesOfMany
     from atwood.integrators.embedded.tableau import Tableau
     from atwood.integrators.explicit_session import ExplicitSession, OnStiff
     from atwood.integrators.lanes import LanePlaces
@@ -43,6 +44,8 @@ class Task:
         Asked whether to leave the rest to an implicit method; see `~atwood.integrators.explicit_session`.
     explicit
         The equations ``y' = f(t, y)``, with what is watched.
+    many
+        Their rates for so many runs side by side, and the values of the parameters.
     series, hamiltonian
         Their Taylor recurrences, and Hamilton's equations.
     implicit
@@ -62,6 +65,7 @@ class Task:
     on_stiff: OnStiff | None = None
     explicit: ExplicitProblem | None = None
     series: Callable[[], TaylorProblem] | None = None
+    many: Callable[[int], tuple[RatesOfMany, FloatArray]] | None = None
     hamiltonian: Callable[[], Hamiltonian] | None = None
     implicit: Callable[[bool], ImplicitProblem] | None = None
     impulsive: ImpulsiveProblem | None = None
@@ -183,6 +187,12 @@ def explicit_pair(key: str, title: str, citation: str, pair: Tableau, **more: An
 
         return CompiledStepper(task.problem, task.settings, pair).batch_places()
 
+    def lanes(task: Task, runs: int) -> LanePlaces:
+        from atwood.integrators.embedded.lanes import open_lanes
+
+        assert task.many is not None
+        return open_lanes(*task.many(runs), task.settings, pair)
+
     usual = {"nodes_in_step": pair.order // 2 + 3, "reach": 8.0, "steps_seen": 0.5, "steps_unseen": 10.0}
     return Method(
         key,
@@ -195,5 +205,6 @@ def explicit_pair(key: str, title: str, citation: str, pair: Tableau, **more: An
         keeps_constraints=True,
         tableau=pair,
         batch=places,
+        lanes=lanes,
         **{**usual, **more},
     )

@@ -28,11 +28,13 @@ from atwood.simulation.problem.problem import SceneProblem
 from atwood.topology.graph import connected_groups
 
 if TYPE_CHECKING:
+    from atwood.integrators.embedded.lanes import RatesOfMany
     from atwood.integrators.jumps import JumpCode
     from atwood.mechanics.dynamics.equations import ContactRow
 
 _EXTERNAL: Key[bool] = Key("whether accelerations call functions in Python")
 _COMPILED: Key[CompiledAccelerations] = Key("machine code of accelerations")
+_MANY: Key[RatesOfMany] = Key("machine code of accelerations of runs side by side")
 
 
 def explicit_problem(
@@ -95,6 +97,13 @@ def first_order_rows(kernel: BoundKernel, coordinates: int) -> Callable[[FloatAr
 def compiled_rates(assembly: Assembly, found: AccelerationProgram) -> CompiledAccelerations:
     """Return the accelerations of a scene as machine code, for any parameter values."""
     return assembly.shared.get(_COMPILED, lambda: CompiledAccelerations(found.program), found)
+
+
+def compiled_rates_of_many(assembly: Assembly, found: AccelerationProgram, runs: int) -> RatesOfMany:
+    """Return the same for so many runs side by side."""
+    from atwood.integrators.embedded.lanes import rates_of_many
+
+    return assembly.shared.get(_MANY, lambda: rates_of_many(found.program, runs), found, runs)
 
 
 def _once(bind: Callable[[], Callable[[], CompiledRates]]) -> Callable[[], CompiledRates]:

@@ -32,6 +32,7 @@ from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.closed_loops import ManyBranches, Solved, solve_at
 from atwood.simulation.problem.explicit_scene import (
     compiled_rates,
+    compiled_rates_of_many,
     explicit_problem,
     explicit_problem_of,
     first_order_rows,
@@ -247,7 +248,16 @@ def task_of(
     problem = explicit_problem_of(assembly, motion.program, values, events, directions)
     problem = replace(problem, compiled=lambda: own.rates, guard=guard, compiled_events=data)
     series = partial(taylor_problem, assembly, options.t_end, False, motion.program, values)
-    return Task(settings, begin, np.zeros(problem.size), end=options.t_end, explicit=problem, series=series)
+    start = np.zeros(problem.size)
+    return Task(
+        settings,
+        begin,
+        start,
+        end=options.t_end,
+        explicit=problem,
+        many=lambda runs: (compiled_rates_of_many(assembly, motion.program, runs), values),
+        series=series,
+    )
 
 
 def with_rows(assembly: Assembly, values: FloatArray | None) -> Assembly:
