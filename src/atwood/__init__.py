@@ -164,6 +164,7 @@ if TYPE_CHECKING:
         sensitivities as sensitivities,
     )
     from atwood.study.sweeps.files import load_sweep as load_sweep
+    from atwood.study.sweeps.indices import SobolIndices as SobolIndices
     from atwood.study.sweeps.result import Sweep as Sweep
     from atwood.study.sweeps.sweep import sweep as sweep
     from atwood.theory.action import (
@@ -306,7 +307,7 @@ _ROOMS = {
     "atwood.reporting": ("MechanismReport", "report"),
     "atwood.result.files": ("SavedResult", "load_result", "save_result"),
     "atwood.result.result": ("Result",),
-    "atwood.study": ("Comparison", "ComparisonRow", "Sweep", "compare", "load_sweep", "sweep"),
+    "atwood.study": ("Comparison", "ComparisonRow", "SobolIndices", "Sweep", "compare", "load_sweep", "sweep"),
     "atwood.study.sensitivities.fit": ("Fit", "fit"),
     "atwood.study.sensitivities.sensitivities": ("Sensitivities", "sensitivities"),
     "atwood.study.comparison.long_runs": ("LongComparison", "compare_long"),

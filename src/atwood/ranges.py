@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from typing import Any
 
 from atwood.errors import UsageError
@@ -10,11 +11,15 @@ from atwood.errors import UsageError
 __all__ = ["range_of", "values_of"]
 
 _RANGE = re.compile(r"([^:]+):([^:]+):\s*(\d+)\s*([^:]*)\Z")
+_DISTRIBUTION = re.compile(r"\s*([A-Za-z]+)\s*\((.*)\)(.*)\Z")
 _LARGEST = 10_000_000
 
 
-def values_of(text: str) -> list[Any]:
-    """Return the values that a text stands for."""
+def values_of(text: str) -> Any:
+    """Return the values that a text stands for: a list, or a distribution of `scipy.stats`."""
+    distribution = _DISTRIBUTION.match(text)
+    if distribution is not None:
+        return _distribution(*distribution.groups(), text)
     found = _RANGE.match(text)
     if found is not None:
         import numpy as np
@@ -35,6 +40,35 @@ def values_of(text: str) -> list[Any]:
     if tail is None:
         return [part if number is None else number for part, number in zip(parts, numbers, strict=True)]
     return [part if number is None else f"{part} {tail[1]}" for part, number in zip(parts, numbers, strict=True)]
+
+
+_DISTRIBUTIONS: dict[str, tuple[str, Callable[..., tuple[str, tuple[float, ...], float, float]]]] = {
+    "normal": ("MEAN,SD", lambda mean, sd: ("norm", (), mean, sd)),
+    "uniform": ("LOW,HIGH", lambda low, high: ("uniform", (), low, high - low)),
+    "triangular": (
+        "LOW,MODE,HIGH",
+        lambda low, mode, high: ("triang", ((mode - low) / (high - low),), low, high - low),
+    ),
+    "lognormal": ("MEDIAN,SIGMA", lambda median, sigma: ("lognorm", (sigma,), 0.0, median)),
+}
+"""Distributions as they are written: their arguments, and name, shape, place and scale in `scipy.stats`."""
+
+
+def _distribution(name: str, arguments: str, tail: str, text: str) -> Any:
+    if name not in _DISTRIBUTIONS:
+        advice = f"Write {', '.join(f'{one}({words})' for one, (words, _) in _DISTRIBUTIONS.items())}."
+        raise UsageError(f"{name!r} in {text!r} is no distribution", advice=advice)
+    words, made = _DISTRIBUTIONS[name]
+    numbers = [_maybe_number(one) for one in arguments.split(",")]
+    if len(numbers) != words.count(",") + 1 or None in numbers or tail.strip():
+        raise UsageError(f"{text!r} is not written as a distribution", advice=f"Write {name}({words}), in SI units.")
+    import scipy.stats
+
+    try:
+        kind, shape, place, scale = made(*numbers)
+    except ZeroDivisionError:
+        raise UsageError(f"{text!r} has no width", advice=f"Write {name}({words}).") from None
+    return getattr(scipy.stats, kind)(*shape, loc=place, scale=scale)
 
 
 def range_of(text: str) -> tuple[float | str, float | str]:

@@ -35,7 +35,8 @@ def sweep_scene(request: Request) -> None:
     for option, axes in varied.items():
         typed = dict(pairs(request.typed["start" if axes is request.start else "vary"], option))
         for path, values in axes.items():
-            warn_of_radians(scene, path, values, option, typed[path])
+            if isinstance(values, list):  # and no distribution
+                warn_of_radians(scene, path, values, option, typed[path])
     with progress_bar(request.progress, name, lambda done, of: (done / of, f"{done}/{of}")) as progress:
         found = sweep(scene, **request.of(sweep), progress=progress, name=name)
     if request.save is not None:

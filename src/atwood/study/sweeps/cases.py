@@ -122,6 +122,11 @@ def _axis(trial: Model, path: str, values: Any, is_start: bool) -> Axis:
         raise UsageError("it has no values", where=path, advice="Give a list of values, or an array.")
     if is_start and isinstance(values, np.ndarray) and values.dtype.kind == "f" and np.all(np.isfinite(values)):
         return Axis(path, True, given, values.astype(float))
+    if not is_start and isinstance(values, np.ndarray) and values.dtype.kind == "f" and np.all(np.isfinite(values)):
+        # What a number may be is a range: its ends are checked.
+        ends = [float(one) for one in (np.min(values), np.max(values))]
+        if all(type(found := _parameter_value(trial, path, one)) is float and found == one for one in ends):
+            return Axis(path, False, given, values.astype(float))
     read = [_start_value(trial, path, one) if is_start else _parameter_value(trial, path, one) for one in given]
     is_number = all(isinstance(one, (int, float)) for one in read)
     column = np.array(read, dtype=float) if is_number else np.array([str(one) for one in read])

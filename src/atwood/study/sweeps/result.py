@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,9 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.connectors import PATH
 from atwood.result.formats.dataset import Dataset, Variable, needed, to_xarray, unique_name
 from atwood.table import Shown, Table, facts
+
+if TYPE_CHECKING:
+    from atwood.study.sweeps.indices import SobolIndices
 
 
 @dataclass(frozen=True)
@@ -73,6 +76,8 @@ class Sweep(Shown):
         What was varied, in SI units: for each path one value a run.
     shape
         Of the grid: the number of values of each path that was varied, in order; one number for a list.
+    design
+        How distributions were sampled; empty where there were none.
     quantities
         By path, shape (runs, times).
     units, meanings
@@ -104,6 +109,7 @@ class Sweep(Shown):
     messages: Mapping[int, str]
     steps: NDArray[np.int64]
     statistics: SweepStatistics
+    design: str = ""
 
     def tables(self) -> tuple[Table, ...]:
         """Return a few facts about the sweep."""
@@ -176,9 +182,35 @@ class Sweep(Shown):
         )[:, 0]
         return found
 
+    def sobol_indices(self, path: str, samples: int = 200) -> SobolIndices:
+        """Return how much of the variance of a quantity at the end comes from each thing that was varied.
+
+        The sweep must have the design ``"saltelli"``. Points with a run that has no end are left out, and counted.
+
+        Parameters
+        ----------
+        path
+            The quantity.
+        samples
+            How many bootstrap samples the errors come from.
+
+        Returns
+        -------
+        SobolIndices
+            First-order and total indices with their errors.
+
+        Raises
+        ------
+        AtwoodError
+            If the sweep has another design, did not keep the quantity, or it does not vary.
+        """
+        from atwood.study.sweeps.indices import find_indices
+
+        return find_indices(self, path, samples)
+
     def to_dict(self) -> dict[str, Any]:
         """Return the sweep as plain data; what is nan becomes None."""
-        heads = data_of(self, "scene", "form", "level", "rtol", "time", "shape", "parameters", "start")
+        heads = data_of(self, "scene", "form", "level", "rtol", "time", "shape", "design", "parameters", "start")
         quantities = {path: [*map(_finite, values)] for path, values in self.quantities.items()}
         told = data_of(self, "units", "status", "messages")
         ends = {"end_time": _finite(self.end_time), **data_of(self, "steps", "statistics")}
@@ -313,7 +345,10 @@ def about_sweep(sweep: Sweep) -> dict[str, Any]:
     kinds = [[path, label, path in sweep.start, path in words] for path, label in labels(sweep).items()]
     whole = sweep.to_dict()
     return {
-        **{name: whole[name] for name in ("scene", "form", "level", "rtol", "shape", "messages", "statistics")},
+        **{
+            name: whole[name]
+            for name in ("scene", "form", "level", "rtol", "shape", "design", "messages", "statistics")
+        },
         "varied": kinds,
         "paths": list(sweep.paths),
     }
@@ -384,5 +419,6 @@ def from_parts(
         status=status,
         messages={int(run): text for run, text in about["messages"].items()},
         steps=np.asarray(steps, dtype=np.int64),
+        design=about.get("design", ""),
         statistics=SweepStatistics(**{name: value for name, value in statistics.items() if name in known}),
     )

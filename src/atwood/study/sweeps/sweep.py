@@ -42,6 +42,7 @@ from atwood.simulation.run.choice import check_solver
 from atwood.simulation.run.stall_diagnosis import allowed
 from atwood.study.sweeps.batch import why_not_batched
 from atwood.study.sweeps.cases import COMBINATIONS, Cases, make_cases
+from atwood.study.sweeps.designs import DESIGN, RUNS, SEED, sampled
 from atwood.study.sweeps.executors import EXECUTOR, run_elsewhere
 from atwood.study.sweeps.pieces import make_pieces, make_runs
 from atwood.study.sweeps.result import Sweep, SweepStatistics
@@ -61,6 +62,9 @@ _VALUES = optional(replace(BY_PATH, word="PATH=VALUES", typed=values_of))
     vary=_VALUES,
     start=_VALUES,
     combine=one_of(COMBINATIONS),
+    design=DESIGN,
+    runs=RUNS,
+    seed=SEED,
     quantities=PATHS,
     t_end=T_END,
     outputs=optional(OUTPUTS),
@@ -83,6 +87,9 @@ def sweep(
     *,
     start: Mapping[str, Any] | None = None,
     combine: str = "grid",
+    design: str | None = None,
+    runs: int | None = None,
+    seed: int = 0,
     quantities: Iterable[str] | None = None,
     t_end: float | str | None = None,
     outputs: Any = None,
@@ -112,11 +119,21 @@ def sweep(
         The scene, or an assembly of it; what contradicts that is refused.
     vary
         Values of parameters by path: lists of numbers in SI units or of text with units, or arrays of one dimension
-        (``numpy.linspace``, the columns of a sample of `scipy.stats.qmc`).
+        (``numpy.linspace``, the columns of a sample of `scipy.stats.qmc`). Or distributions of `scipy.stats`, in SI
+        units, such as ``scipy.stats.norm(1.0, 0.05)``: then `runs` says how often they are sampled. On a command line
+        these are ``normal(MEAN,SD)``, ``uniform(LOW,HIGH)``, ``triangular(LOW,MODE,HIGH)`` or
+        ``lognormal(MEDIAN,SIGMA)``.
     start
         The same for start values.
     combine
         ``"grid"``: every value with every other. ``"list"``: the first of each, the second of each, and so on.
+    design
+        How distributions are sampled: ``"sobol"`` (evenly, the usual one), ``"latin"`` (a Latin hypercube),
+        ``"random"``, or ``"saltelli"``, which `Sweep.sobol_indices` needs.
+    runs
+        How many runs there are of distributions; for ``"saltelli"`` a multiple of two more than what is varied.
+    seed
+        Of the samples: the same seed gives the same runs.
     quantities
         What to keep of each run, by path; a path of a component stands for all below it. The coordinates when not
         given.
@@ -164,7 +181,8 @@ def sweep(
     source = assembly.source.scene if assembly.source is not None else None
     if source is None:
         raise UsageError("it was assembled from leaves, so that its scene is not known", where=assembly.flat.name)
-    cases = make_cases(source, vary, start, combine)
+    vary, start, design_of = sampled(vary, start, design, runs, seed)
+    cases = make_cases(source, vary, start, "list" if design_of else combine)
     first = _first(assembly, cases)
     end = assembly.flat.t_end if t_end is None else float(t_end)
     stops = conditions_of(until, None)
@@ -189,7 +207,7 @@ def sweep(
             reason = _made(request, records, count, executor, opened, called)
         except KeyboardInterrupt:
             records.interrupt()
-    return _finished(request, records, reason, count if executor is None else 0, time.perf_counter() - began)
+    return _finished(request, records, reason, count if executor is None else 0, time.perf_counter() - began, design_of)
 
 
 def _made(
@@ -266,7 +284,7 @@ class _Progress:
             self.progress(self.done, self.of)
 
 
-def _finished(request: SweepRequest, records: Records, reason: str, threads: int, wall: float) -> Sweep:
+def _finished(request: SweepRequest, records: Records, reason: str, threads: int, wall: float, design: str) -> Sweep:
     first, cases = request.assembly, request.cases
     observables = {one.path: one for one in find_observables(first, request.paths)}
     columns = [(axis, cases.column(k)) for k, axis in enumerate(cases.axes)]
@@ -280,6 +298,7 @@ def _finished(request: SweepRequest, records: Records, reason: str, threads: int
         parameters={axis.path: column for axis, column in columns if not axis.is_start},
         start={axis.path: column for axis, column in columns if axis.is_start},
         shape=cases.shape,
+        design=design,
         quantities={path: records.values[k] for k, path in enumerate(request.paths)},
         units={
             **{axis.path: _unit(first, axis.path, axis.is_start) for axis in cases.axes},
