@@ -19,7 +19,7 @@ def values_of(text: str) -> Any:
     """Return the values that a text stands for: a list, or a distribution of `scipy.stats`."""
     distribution = _DISTRIBUTION.match(text)
     if distribution is not None:
-        return _distribution(*distribution.groups(), text)
+        return _distribution(distribution[1], distribution[2], distribution[3], text)
     found = _RANGE.match(text)
     if found is not None:
         import numpy as np
