@@ -6,8 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from atwood import AtwoodError, Scene, dynamics, plot_mechanism, simulate
+from atwood.cli import main
 from atwood.cli.scenes import find_scene
 from atwood_library import PointMass
 from atwood_library.robots import nearest_inertia, read_urdf
@@ -144,6 +146,9 @@ def test_the_command_line_takes_robots_files(tmp_path: Path) -> None:
     assert "hinge" in scene.parts
     with pytest.raises(AtwoodError, match="there is no such file"):
         find_scene(str(tmp_path / "none.urdf"))
+    shown = CliRunner().invoke(main, ["info", str(file)], catch_exceptions=False).output
+    assert "1 degree of freedom" in shown
+    assert "hinge (Pivot)" in shown
 
 
 BAD = {

@@ -6,7 +6,7 @@ from atwood.arguments import FLAG, NAME
 from atwood.cli.command import Request, command
 from atwood.cli.output import print_json, writer
 from atwood.cli.parts import is_a_part, mentioning, show_part
-from atwood.cli.scenes import bundled_scenes, prepare
+from atwood.cli.scenes import bundled_scenes, prepare, reader_of
 from atwood.errors import UsageError, near_matches
 from atwood.table import table
 
@@ -25,6 +25,7 @@ def show_info(request: Request) -> None:
         word not in bundled_scenes()
         and ":" not in word
         and not word.endswith(".py")
+        and reader_of(word) is None
         and not near_matches(word, bundled_scenes())
     ):
         _search(word, request.as_json)

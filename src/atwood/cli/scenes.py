@@ -9,7 +9,7 @@ import inspect
 import math
 import sys
 import traceback
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -52,6 +52,17 @@ def _modules_of(libraries: Iterable[str], module: str) -> Iterator[ModuleType]:
             raise UsageError(f"the library cannot be loaded ({error})", where=library) from error
 
 
+def reader_of(text: str) -> Callable[[str], Scene] | None:
+    """Return what reads a file as a scene, by how its name ends; None for any other text."""
+    suffix = Path(text).suffix.lower()
+    if suffix:  # names of scenes have no dot
+        for readers in _modules_of(all_libraries(), "readers"):
+            if suffix in getattr(readers, "READERS", {}):
+                found: Callable[[str], Scene] = readers.READERS[suffix]
+                return found
+    return None
+
+
 def find_scene(text: str) -> tuple[Model, str]:
     """Return a scene and what to call it."""
     file, colon, name = text.rpartition(":")
@@ -59,10 +70,8 @@ def find_scene(text: str) -> tuple[Model, str]:
         return _scene_in_file(Path(file), name), name
     if text.endswith(".py"):
         return _only_scene(Path(text))
-    if suffix := Path(text).suffix.lower():  # names of scenes have no dot
-        for readers in _modules_of(all_libraries(), "readers"):
-            if suffix in getattr(readers, "READERS", {}):
-                return readers.READERS[suffix](text), Path(text).stem
+    if read := reader_of(text):
+        return read(text), Path(text).stem
     for libraries in (declared_libraries, all_libraries):
         for scenes in _scenes_of(libraries()):
             if text in scenes:
