@@ -11,8 +11,8 @@ from click.testing import CliRunner
 from atwood import AtwoodError, Scene, dynamics, plot_mechanism, simulate
 from atwood.cli import main
 from atwood.cli.scenes import find_scene
-from atwood_library import PointMass
-from atwood_library.robots import nearest_inertia, read_urdf
+from atwood_library import Ground, Pivot, PointMass, RigidBody, Spherical, Weld
+from atwood_library.robots import nearest_inertia, read_urdf, write_urdf
 
 LINK = '<link name="{}"><inertial><origin xyz="{}"/><mass value="{}"/>{}</inertial></link>'
 
@@ -221,3 +221,93 @@ def test_bad_options(given: dict[str, Any], tmp_path: Path) -> None:
     file = written(tmp_path, link("base"), link("arm"), joint("hinge", "base", "arm", inner=limit))
     with pytest.raises(AtwoodError):
         read_urdf(**{"file": file, **given})
+
+
+def compared(a: Scene, b: Scene) -> float:
+    """Return by how much mass matrices and inverse dynamics of two scenes with the same coordinates differ."""
+    one, other = dynamics(a), dynamics(b)
+    q, u, acceleration = np.random.default_rng(1).normal(size=(3, len(one.coordinates)))
+    order = [one.coordinates.index(path) for path in other.coordinates]
+    pairs = (
+        (one.mass_matrix(q)[np.ix_(order, order)], other.mass_matrix(q[order])),
+        (
+            one.inverse_dynamics(q, u, acceleration)[order],
+            other.inverse_dynamics(q[order], u[order], acceleration[order]),
+        ),
+    )
+    return max(float(np.max(np.abs(x - y)) / np.max(np.abs(x))) for x, y in pairs)
+
+
+def test_written_and_read_again(tmp_path: Path) -> None:
+    inner = '<origin xyz="0 1 1" rpy="0.4 0.2 0.1"/><axis xyz="2 0 1"/><dynamics damping="0.3" friction="0.1"/>'
+    mimic = '<axis xyz="0 0 1"/><mimic joint="hinge" multiplier="0.5" offset="0.1"/>'
+    seen = '<visual><origin xyz="0 0 1" rpy="1 0 0"/><geometry><box size="1 2 3"/></geometry></visual></link>'
+    file = written(
+        tmp_path,
+        *(link("base"), link("arm", 2.0, "1 2 3").replace("</link>", seen), link("tip"), link("hand")),
+        joint("hinge", "base", "arm", inner=inner),
+        joint("slide", "arm", "tip", "prismatic", mimic),
+        joint("fix", "arm", "hand", "fixed", '<origin xyz="1 0 0" rpy="0.3 1.5707963267948966 0.2"/>'),
+        '<transmission name="t"><joint name="hinge"/><actuator name="m"><rotorInertia>0.02</rotorInertia></actuator>'
+        "</transmission>",
+    )
+    scene = read_urdf(file, stops=0.3)
+    again = read_urdf(write_urdf(scene, tmp_path / "again.urdf"), stops=0.3)
+    assert list(again.parts) == list(scene.parts)
+    assert again["hinge_friction"].sliding(1.0) == 0.1
+    smooth = read_urdf(file, friction=False), read_urdf(tmp_path / "again.urdf", friction=False)
+    assert compared(*smooth) < 1e-14
+
+
+def chain(reverse: bool = False) -> Scene:
+    """Return a pendulum whose hinge may be the other way round, with a turned weld below."""
+    scene = Scene(space="space")
+    ground = scene.add("ground", Ground())
+    hinge = scene.add("hinge", Pivot(axis=(0.0, 1.0, 0.5)))
+    weld = scene.add("weld", Weld(displacement=(0.1, 0.2, -0.5), angle=0.7, axis=(1.0, 1.0, 0.0)))
+    body = scene.add("body", RigidBody(mass=2.0, center=(0.0, 0.1, -0.3), moments=(0.1, 0.2, 0.15)))
+    ends = (hinge.b, hinge.a) if reverse else (hinge.a, hinge.b)
+    scene.connect(ground.frame, ends[0])
+    scene.connect(ends[1], weld.a)
+    scene.connect(weld.b, body.frame)
+    return scene
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+def test_scenes_of_ones_own_are_written(reverse: bool, tmp_path: Path) -> None:
+    scene = chain(reverse)
+    assert compared(scene, read_urdf(write_urdf(scene, tmp_path / "own.urdf"))) < 1e-14
+
+
+def test_what_urdf_has_not_is_refused_by_name(tmp_path: Path) -> None:
+    file = tmp_path / "own.urdf"
+    scene = chain()
+    load = scene.add("load", PointMass(mass=1.0))
+    scene.connect(scene["body"].frame, load.point)
+    with pytest.raises(AtwoodError, match=r"no counterpart in URDF: load \(PointMass\)"):
+        write_urdf(scene, file)
+    scene = chain()
+    closing = scene.add("closing", Pivot())
+    scene.connect(scene["body"].frame, closing.a)
+    scene.connect(closing.b, scene["ground"].frame)
+    with pytest.raises(AtwoodError, match="closes a loop"):
+        write_urdf(scene, file)
+    scene = chain()
+    scene["hinge"].stiffness = 3.0
+    with pytest.raises(AtwoodError, match=r"hinge: URDF has nothing like its stiffness"):
+        write_urdf(scene, file)
+    scene = chain()
+    scene.add("astray", RigidBody())
+    with pytest.raises(AtwoodError, match=r"astray: it hangs on nothing"):
+        write_urdf(scene, file)
+    scene = chain()
+    ball, other = scene.add("ball", Spherical()), scene.add("other", RigidBody())
+    scene.connect(scene["body"].frame, ball.a)
+    scene.connect(ball.b, other.frame)
+    with pytest.raises(AtwoodError, match=r"ball: URDF has no joint like a Spherical"):
+        write_urdf(scene, file)
+    with pytest.raises(AtwoodError, match="only scenes in space"):
+        write_urdf(Scene(), file)
+    with pytest.raises(AtwoodError, match="cannot be written"):
+        write_urdf(chain(), tmp_path / "none" / "own.urdf")
+    assert not file.exists()

@@ -4,5 +4,6 @@ from __future__ import annotations
 
 from atwood_library.robots.inertias import nearest_inertia
 from atwood_library.robots.urdf import read_urdf
+from atwood_library.robots.urdf_written import write_urdf
 
-__all__ = ["nearest_inertia", "read_urdf"]
+__all__ = ["nearest_inertia", "read_urdf", "write_urdf"]
