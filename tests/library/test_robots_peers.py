@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from atwood import Dynamics, dynamics
-from atwood_library.robots import nearest_inertia, read_urdf
+from atwood_library.robots import nearest_inertia, read_mjcf, read_urdf
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 
@@ -160,3 +160,105 @@ def test_urdf_that_moves_freely_beside_pinocchio(name: str) -> None:
     generator = np.random.default_rng(0)
     beside = Beside(next(one for one in robots() if one.stem == name), "free")
     assert max(max(beside.errors(generator)) for _ in range(20)) < 1e-12
+
+
+def models() -> list[Path]:
+    """Return the models of dm_control's suite and of gymnasium."""
+    found: list[Path] = []
+    for name in ("dm_control", "gymnasium"):
+        place = metadata.distribution(name).locate_file(name)
+        folder = Path(str(place)) / ("suite" if name == "dm_control" else "envs/mujoco/assets")
+        found += sorted(folder.glob("*.xml"))
+    return found
+
+
+class BesideMujoco:
+    """A scene and MuJoCo's model of the same file, without what the scene leaves out.
+
+    Contact, limits, friction, equalities, actuators, tendons and the resistance of fluids are off.
+    """
+
+    def __init__(self, file: Path) -> None:
+        import mujoco
+
+        self.mujoco = mujoco
+        self.model = model = mujoco.MjModel.from_xml_path(str(file))
+        flags = mujoco.mjtDisableBit
+        model.opt.disableflags |= int(flags.mjDSBL_CONSTRAINT) | int(flags.mjDSBL_ACTUATION)
+        model.opt.density = model.opt.viscosity = 0.0
+        for name in ("stiffness", "damping", "armature"):
+            getattr(model, f"tendon_{name}")[:] = 0.0
+        free = [j for j in range(model.njnt) if model.jnt_type[j] == 0]
+        for joint in free:  # named by the reader as left out
+            start = model.jnt_dofadr[joint]
+            model.dof_damping[start : start + 6] = model.dof_armature[start : start + 6] = 0.0
+            model.jnt_stiffness[joint] = 0.0
+        for joint in range(model.njnt):  # springdamper, left out: its values as they are without
+            if file.stem == "dog" and model.joint(joint).name.startswith("Ca_"):
+                model.jnt_stiffness[joint], model.dof_damping[model.jnt_dofadr[joint]] = 0.1, 0.01
+        self.data = mujoco.MjData(model)
+        self.dynamics: Dynamics = dynamics(read_mjcf(file, friction=False))
+        self.coordinates = self.places(self.dynamics.coordinates, "qposadr")
+        self.speeds = self.places(self.dynamics.speeds, "dofadr")
+
+    def places(self, paths: Any, where: str) -> list[int]:
+        """Return where coordinates or speeds are in MuJoCo's."""
+        model, found = self.model, []
+        starts = getattr(model, f"jnt_{where}")
+        plain: dict[str, int] = {}
+        bodies: dict[str, int] = {}
+        for joint in range(model.njnt):
+            body = re.sub(r"\W", "_", model.body(model.jnt_bodyid[joint]).name)
+            count, index = (
+                model.body_jntnum[model.jnt_bodyid[joint]],
+                joint - model.body_jntadr[model.jnt_bodyid[joint]],
+            )
+            unnamed = f"{body}_joint" if count == 1 else f"{body}_joint_{index + 1}"
+            plain[re.sub(r"\W", "_", model.joint(joint).name) or unnamed] = starts[joint]
+            if model.jnt_type[joint] == 0:
+                bodies[body] = starts[joint] + 3
+        for path in paths:
+            owner, *inner = path.rstrip("'").split(".")
+            letters = "wxyz" if inner[0] == "quaternion" else "xyz"
+            known = bodies if len(inner) > 1 else plain
+            while owner not in known:
+                assert owner.endswith("_"), path
+                owner = owner[:-1]
+            found.append(known[owner] + (letters.index(inner[-1]) if inner[-1] in letters else 0))
+        assert len(set(found)) == len(found)
+        return found
+
+    def errors(self, generator: np.random.Generator) -> Any:
+        """Return errors and sizes of the mass matrix, of the bias and of accelerations at a random state."""
+        mujoco, model, data = self.mujoco, self.model, self.data
+        data.qpos[:] = generator.uniform(-1.0, 1.0, model.nq)
+        mujoco.mj_normalizeQuat(model, data.qpos)
+        data.qvel[:] = generator.normal(size=model.nv)
+        mujoco.mj_forward(model, data)
+        mass = np.zeros((model.nv, model.nv))
+        for row, one in zip(mass, np.eye(model.nv), strict=True):
+            mujoco.mj_mulM(model, data, row, one)
+        q = (data.qpos - model.qpos0 * self.hinged())[self.coordinates]
+        u, rows = data.qvel[self.speeds], self.speeds
+        pairs = [
+            (self.dynamics.mass_matrix(q), mass[np.ix_(rows, rows)]),
+            (self.dynamics.bias(q, u), (data.qfrc_bias - data.qfrc_passive)[rows]),
+            (self.dynamics.forward_dynamics(q, u), data.qacc[rows]),
+        ]
+        return np.array([(np.max(np.abs(x - y)), np.max(np.abs(y))) for x, y in pairs])
+
+    def hinged(self) -> Any:
+        """Return 1 for coordinates of hinges and slides, which have a reference, else 0."""
+        found = np.zeros(self.model.nq)
+        found[[int(self.model.jnt_qposadr[j]) for j in range(self.model.njnt) if self.model.jnt_type[j] > 1]] = 1.0
+        return found
+
+
+@pytest.mark.parametrize("file", models(), ids=lambda file: f"{file.parent.name}-{file.stem}")
+@pytest.mark.sample(8)
+def test_mjcf_beside_mujoco(file: Path) -> None:
+    beside, generator = BesideMujoco(file), np.random.default_rng(0)
+    if beside.speeds:
+        errors, sizes = np.max([beside.errors(generator) for _ in range(20)], axis=0).T
+        bound = np.array([1e-10, 1e-10, 1e-8 if file.stem == "dog" else 1e-10])  # its bones are meshes: M to 7e-12
+        assert np.all(errors < bound * sizes)

@@ -36,15 +36,15 @@ class Node:
         return [one for one in self.inner if one.tag == tag]
 
 
-def read_xml(file: Path, root: str) -> Node:
+def read_xml(file: Path, *roots: str) -> Node:
     """Return the root element of a file.
 
     Parameters
     ----------
     file
         The file.
-    root
-        What its root element must be.
+    *roots
+        What its root element may be.
 
     Raises
     ------
@@ -86,8 +86,8 @@ def read_xml(file: Path, root: str) -> Node:
         ) from None
     except (ValueError, LookupError) as error:  # an encoding that Python does not know
         raise UsageError(f"it is no XML ({error})", where=str(file)) from None
-    if found[0].tag != root:
-        raise UsageError(f"its root element is <{found[0].tag}> and not <{root}>", where=found[0].place)
+    if found[0].tag not in roots:
+        raise UsageError(f"its root element is <{found[0].tag}> and not <{roots[0]}>", where=found[0].place)
     return found[0]
 
 
