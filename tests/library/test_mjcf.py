@@ -124,7 +124,10 @@ def test_several_joints_of_a_body_motors_and_equalities(tmp_path: Path) -> None:
     still = dynamics(read_mjcf(file))
     q, u = made.start()
     difference = made.bias(q, u) - still.bias(q, u)
-    assert difference[made.speeds.index("y.displacement'")] == pytest.approx(-6.0 / 2.0)
+    by_rate = {"x.displacement'": -6.0, "y.displacement'": -6.0 / 2.0}  # one of the two is left
+    found = {name: difference[made.speeds.index(name)] for name in by_rate if name in made.speeds}
+    assert len(found) == 1
+    assert all(value == pytest.approx(by_rate[name]) for name, value in found.items())
     result = simulate(scene, t_end=0.1)
     assert result.array("y.displacement") == pytest.approx(0.1 + 2 * result.array("x.displacement"), abs=1e-9)
 
