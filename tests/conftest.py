@@ -7,6 +7,7 @@ import gc
 import hashlib
 import os
 import shutil
+import sys
 import tempfile
 from collections import defaultdict
 
@@ -24,6 +25,13 @@ if os.environ.pop("PYTHONDONTWRITEBYTECODE", "") and "PYTHONPYCACHEPREFIX" not i
 
 # Expressions of all scenes so far are there: to look through them again and again for something to free takes time.
 gc.set_threshold(100_000, 20, 100)
+
+
+@pytest.fixture(autouse=True)
+def _no_structures() -> None:
+    """Let no test find equations that another one has left; `tests/forms/test_same_structure.py` is about these."""
+    if reassembly := sys.modules.get("atwood.forms.reassembly"):
+        reassembly.STRUCTURES.clear()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

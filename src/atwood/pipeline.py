@@ -29,7 +29,7 @@ from atwood.clock import GRACE, Clock, TimeIsUp
 from atwood.errors import UnsupportedError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.forms.other_values import Source
-from atwood.forms.reassembly import assembled
+from atwood.forms.reassembly import assembled, assembled_again
 from atwood.forms.residuals import check_level
 from atwood.lazy_dataclasses import replace
 from atwood.mechanics.read import LineSigns
@@ -37,7 +37,7 @@ from atwood.model.compose.composite import Model
 from atwood.model.local.flatten import FlatScene, flatten
 from atwood.progress import told
 from atwood.result.result import Result
-from atwood.simulation.initialization.start import find_places, start_with_line_signs
+from atwood.simulation.initialization.start import find_places, start_with_line_signs, take_start
 from atwood.simulation.problem.arguments import (
     ACCURACY,
     ATOL,
@@ -116,6 +116,17 @@ def assemble(
     with stage("flatten"):
         flat, own = flatten(scene, name), scene.copy()
     return assemble_flat(flat, own, form=form, level=level, orientation=orientation)
+
+
+def _to_run(scene: Model, form: str = "reduced", level: str = "ggl", orientation: str = "quaternion") -> Assembly:
+    """Assemble a scene to be run; the equations of one that had the same structure are used again."""
+    with stage("flatten"):
+        flat, own = flatten(scene, None), scene.copy()
+    new = partial(assemble_flat, flat, own, form=form, level=level, orientation=orientation)
+    made, before = assembled_again(new, flat, Source(find_places, own), form, level, orientation)
+    if before is not None:
+        take_start(made, before)
+    return made
 
 
 def assemble_flat(
@@ -308,7 +319,9 @@ def simulate(
     refuse_idle_settings(solver, order, step, first_step)
     refuse_two_accuracies(accuracy, rtol, atol, step)
     with watching() as stopwatch:
-        assembly = assembly_of(scene, form=form, level=level, orientation=orientation)
+        asked = {"form": form, "level": level, "orientation": orientation}
+        given = {key: value for key, value in asked.items() if value is not None}
+        assembly = assembly_of(scene, **given) if isinstance(scene, Assembly) else _to_run(scene, **given)
         end = assembly.flat.t_end if t_end is None else float(t_end)
         with told(progress, assembly.flat.name, partial(_share, assembly.flat.t_start, end)) as watch:
             options = RunOptions(

@@ -63,6 +63,11 @@ class Kept:
         self._made[key] = about, made
         return made
 
+    def known(self, key: Key[T]) -> T | None:
+        """Return what was last made under a key; None if nothing was."""
+        found: T | None = self._made.get(key, (None, None))[1]
+        return found
+
 
 class Shared:
     """What is made once for all assemblies of one structure, when it is first asked for; any thread may ask.

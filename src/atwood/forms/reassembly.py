@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from atwood.errors import UsageError
 from atwood.forms.caches import Key, Shared
+from atwood.forms.law_code import law_code
 from atwood.forms.other_values import Source, moved_to, with_constants_of_start
 from atwood.lazy_dataclasses import replace
 from atwood.mechanics.kinematics.mechanism import Connector
@@ -81,6 +82,47 @@ def follow(assembly: Assembly, flat: FlatScene, source: Source | None = None) ->
     if mechanism is None:
         return None, reason
     return replace(assembly, flat=flat, mechanism=mechanism, source=source, **_FRESH), ""
+
+
+STRUCTURES: dict[tuple[str, ...], tuple[list[Any], Assembly]] = {}
+"""What its laws are written with, and the newest assembly, of each of the last structures that were run; by name and
+form, the oldest first."""
+
+_REMEMBERED, _LARGEST = 4, 100
+"""So many are remembered, of scenes with no more parts: equations take memory."""
+
+_OWN = {"_parent", "_name", "_settings", "_token", "_declared"}
+"""What components keep of themselves. One that keeps more may have laws that depend on it."""
+
+
+def assembled_again(
+    assembly: Callable[[], Assembly], flat: FlatScene, source: Source, *form: str
+) -> tuple[Assembly, Assembly | None]:
+    """Return the assembly of a scene, and the one of the same structure that it follows, if one was assembled before.
+
+    Both scenes have the same classes of parts, with laws as they were, connections, letters and times, and the
+    structure stays as it does for other values (`follow`).
+    """
+    key = flat.name, *form
+    laws, known = STRUCTURES.pop(key, (None, None))
+    now = law_code(dict.fromkeys(type(part.component) for part in flat.parts.values()))
+    found = None
+    if known is not None and now is not None and laws == now and _is_alike(known.flat, flat):
+        found, _ = follow(known, flat, source)
+    made = assembly() if found is None else found
+    if now is not None and len(flat.parts) <= _LARGEST:
+        STRUCTURES[key] = now, made
+        for oldest in list(STRUCTURES)[:-_REMEMBERED]:
+            STRUCTURES.pop(oldest, None)
+    return made, None if found is None else known
+
+
+def _is_alike(flat: FlatScene, other: FlatScene) -> bool:
+    """Return whether two scenes are alike in what other values cannot change."""
+    if (flat.t_start, flat.t_end, flat.symbols) != (other.t_start, other.t_end, other.symbols):
+        return False
+    parts = (*flat.parts.values(), *other.parts.values())
+    return all(vars(part.component).keys() <= _OWN for part in parts)
 
 
 def other_mode(

@@ -139,6 +139,17 @@ def find_start(assembly: Assembly) -> Start:
     return assembly.kept.get(_START, lambda: _find(assembly))
 
 
+def take_start(assembly: Assembly, before: Assembly) -> None:
+    """Take up the start of an assembly of the same structure, if all values that it follows from are the same."""
+    start, flat, other = before.kept.known(_START), assembly.flat, before.flat
+    values = [
+        (one.gravity, one.start, one.guess, [(part.values, part.signals) for part in one.parts.values()])
+        for one in (flat, other)
+    ]
+    if start is not None and values[0] == values[1]:
+        assembly.kept.get(_START, lambda: start)
+
+
 def start_with_line_signs(assembly: Assembly) -> tuple[Assembly, Start]:
     """Return an assembly whose lengths on a line are signed as at the start, and the start.
 

@@ -1,0 +1,78 @@
+"""What the laws of classes are written with: their code, and what it reads by name from around it.
+
+Two scenes of the same classes have the same laws only as long as nobody has changed the classes, or a number in their
+modules, in between, as one does in a notebook.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
+from typing import Any
+
+_PLAIN = (int, float, complex, str, bytes, type(None))
+
+
+def law_code(classes: Iterable[type]) -> list[Any] | None:
+    """Return code and values that laws are written with, to be compared; None where one may change and stay the same.
+
+    Atwood's own classes and functions are taken to stay as they are.
+    """
+    found: list[Any] = []
+    seen: set[int] = set()
+    waiting: list[Any] = list(classes)
+    while waiting:
+        one = waiting.pop()
+        if id(one) in seen or _is_own(one):
+            continue
+        seen.add(id(one))
+        if isinstance(one, _PLAIN):
+            found.append((type(one), one))
+        elif isinstance(one, (tuple, list, dict)):
+            found.append((type(one), len(one)))
+            waiting += one
+            waiting += one.values() if isinstance(one, dict) else ()
+        elif hasattr(one, "cache_info"):
+            waiting.append(one.__wrapped__)
+        elif isinstance(one, FunctionType):
+            found.append(one.__code__)
+            waiting += _read_by(one)
+        elif isinstance(one, type):
+            found.append(one)
+            waiting += [part for base in one.__mro__ if not _is_own(base) for part in _functions_of(base)]
+        elif isinstance(one, BuiltinFunctionType):
+            found.append(one)
+        else:
+            return None
+    return found
+
+
+def _is_own(one: Any) -> bool:
+    """Return whether something belongs to Atwood itself, or is a module or a class of Python."""
+    if isinstance(one, ModuleType):
+        return True
+    module = getattr(one, "__module__", None) if isinstance(one, (type, FunctionType)) else type(one).__module__
+    return str(module).split(".")[0] == "atwood" or (isinstance(one, type) and module in ("builtins", "typing", "abc"))
+
+
+def _functions_of(one: type) -> Iterator[FunctionType]:
+    """Yield the functions in the body of a class, those of its laws and properties too."""
+    for value in vars(one).values():
+        for part in (value, *getattr(value, "__dict__", {}).values(), *(getattr(value, "fget", None),)):
+            function = getattr(part, "__func__", part)
+            if isinstance(function, FunctionType):
+                yield function
+
+
+def _read_by(function: FunctionType) -> Iterator[Any]:
+    """Yield what a function reads from around it."""
+    yield from function.__defaults__ or ()
+    yield from (function.__kwdefaults__ or {}).values()
+    for cell in function.__closure__ or ():
+        yield cell.cell_contents
+    codes = [function.__code__]
+    for code in codes:
+        codes += [one for one in code.co_consts if isinstance(one, CodeType)]
+        for name in code.co_names:
+            if name in function.__globals__:
+                yield function.__globals__[name]
