@@ -19,6 +19,7 @@ import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import field
+from importlib import import_module
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -40,6 +41,9 @@ from atwood.result.formats.netcdf import read_netcdf, write_netcdf
 from atwood.result.formats.npz import check_unpacked
 from atwood.result.result import Result
 from atwood.result.trajectories import Trajectories
+
+PICTURE = ".glb"
+"""Suffix of files that hold what a run looks like, and none of its numbers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +166,8 @@ def save_result(result: Result, file: str | os.PathLike[str], paths: Iterable[st
     result
         The run.
     file
-        Where to; its suffix says how: ``.nc`` (NetCDF-3), ``.npz`` (NumPy), ``.mat`` (MATLAB) or ``.csv``.
+        Where to; its suffix says how: ``.nc`` (NetCDF-3), ``.npz`` (NumPy), ``.mat`` (MATLAB) or ``.csv``; or
+        ``.glb``: shapes and motion of a scene in space as glTF 2.0.
     paths
         Which quantities; all when not given.
 
@@ -176,6 +181,10 @@ def save_result(result: Result, file: str | os.PathLike[str], paths: Iterable[st
     UsageError
         If the suffix is not known, or the file cannot be written.
     """
+    if Path(file).suffix.lower() == PICTURE:
+        if paths is not None:
+            raise UsageError("it holds shapes and motion, and no quantities by path", where=str(file))
+        return Path(import_module("atwood.exchange.gltf").write_gltf(result, Path(file)))
     _format_of(Path(file))  # refused before any work is done
     wanted = tuple(result.paths if paths is None else paths)
     saved = SavedResult(
@@ -230,7 +239,8 @@ def _sound(saved: SavedResult) -> SavedResult:
 
 def check_target(file: str | os.PathLike[str]) -> None:
     """Refuse a file that a result could not be saved to, before the work is done."""
-    _format_of(Path(file))
+    if Path(file).suffix.lower() != PICTURE:
+        _format_of(Path(file))
     check_directory(Path(file))
 
 
@@ -379,5 +389,9 @@ def _format_of(file: Path) -> tuple[_Write, _Read]:
     suffix = file.suffix.lower()
     if suffix not in _FORMATS:
         problem = f"the suffix {suffix!r} is not known" if suffix else "the name has no suffix"
-        raise UsageError(problem, where=str(file), advice="Use .nc (NetCDF-3), .npz (NumPy), .mat (MATLAB) or .csv.")
+        raise UsageError(
+            problem,
+            where=str(file),
+            advice="Use .nc (NetCDF-3), .npz (NumPy), .mat (MATLAB) or .csv; of a run .glb (glTF) too.",
+        )
     return _FORMATS[suffix]
