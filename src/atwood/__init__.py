@@ -86,6 +86,10 @@ if TYPE_CHECKING:
         check as check,
     )
     from atwood.exchange.c.export import export_c as export_c
+    from atwood.exchange.fmi.export import (
+        ExportedFMU as ExportedFMU,
+        export_fmu as export_fmu,
+    )
     from atwood.expr.sympy_bridge import (
         Formula as Formula,
         formula as formula,
@@ -290,6 +294,7 @@ if TYPE_CHECKING:
 _ROOMS = {
     "atwood.checking": ("CheckReport", "check"),
     "atwood.exchange.c.export": ("export_c",),
+    "atwood.exchange.fmi.export": ("ExportedFMU", "export_fmu"),
     "atwood.expr.sympy_bridge": ("Formula", "formula"),
     "atwood.model.compose.serialization": ("from_data", "load_scene", "save_scene", "to_data"),
     "atwood.pipeline": ("Assembly", "assemble", "simulate"),

@@ -19,7 +19,7 @@ _COMMANDS = {
     "check": ("atwood.cli.checking", "Check components of one's own."),
     "compare": ("atwood.cli.comparing", "Compare what each form costs for which error."),
     "diagram": ("atwood.cli.pages", "Draw which parts of a scene are connected where."),
-    "export": ("atwood.cli.exporting", "Write a scene for other tools, as C."),
+    "export": ("atwood.cli.exporting", "Write a scene for other tools, as C or as an FMU."),
     "fit": ("atwood.cli.fitting", "Fit parameters and start values of a scene to measurements."),
     "info": ("atwood.cli.info", "Say what a scene is made of, before any run."),
     "list": ("atwood.cli.listing", "List the scenes of the installed libraries."),
@@ -169,7 +169,7 @@ def main() -> None:
     atwood conserved pendulum-on-cart    what its motion conserves
     atwood run double-pendulum           its motion and its forces
     atwood page double-pendulum -o page.html    its motion in the browser, live
-    atwood export double-pendulum --c folder    the scene as C
+    atwood export double-pendulum --c folder    the scene as C; --fmu file.fmu as an FMU
     atwood compare double-pendulum       what each form costs for which error
     atwood sweep double-pendulum --vary mass2=0.5:2:16
     atwood fit double-pendulum data.csv --vary length1=0.5:2

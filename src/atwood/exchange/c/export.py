@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
 from atwood.arguments import FILE, PATHS, optional, takes
 from atwood.errors import UnsupportedError, UsageError
 from atwood.exchange.c.text import SceneText, scene_text
+from atwood.expr import Program
 from atwood.files import write_atomically
 from atwood.forms.assembly import Assembly
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of
-from atwood.plotting.live.mode import NotLiveError
+from atwood.plotting.live.mode import ModeText, NotLiveError
 from atwood.simulation.problem.arguments import FORM
 
 
@@ -73,11 +74,16 @@ def export_c(
     return [target / name for name in files]
 
 
-def exported(scene: Model | Assembly, form: str | None, output: Sequence[str] | None) -> SceneText:
+def exported(
+    scene: Model | Assembly,
+    form: str | None,
+    output: Sequence[str] | None,
+    more: Callable[[ModeText], dict[str, Program]] | None = None,
+) -> SceneText:
     """Return a scene as C; what is refused is not exported, and says so."""
     assembly = assembly_of(scene, form=form)
     try:
-        text = scene_text(assembly, output)
+        text = scene_text(assembly, output, more)
     except (NotLiveError, UnsupportedError) as error:
         raise UnsupportedError(
             f"it is not exported: {error.message}",

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import keyword
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib.resources import files
 from itertools import accumulate
 from typing import Any
@@ -70,7 +69,11 @@ class SceneText:
     end_time: float
 
 
-def scene_text(assembly: Assembly, quantities: Sequence[str] | None = None) -> SceneText:
+def scene_text(
+    assembly: Assembly,
+    quantities: Sequence[str] | None = None,
+    more: Callable[[ModeText], dict[str, Program]] | None = None,
+) -> SceneText:
     """Return a scene as C99.
 
     Parameters
@@ -79,6 +82,8 @@ def scene_text(assembly: Assembly, quantities: Sequence[str] | None = None) -> S
         The scene.
     quantities
         Paths of the quantities that can be asked for; all if not given.
+    more
+        Gives programs beside those of a motion, by their names in C.
 
     Raises
     ------
@@ -91,11 +96,12 @@ def scene_text(assembly: Assembly, quantities: Sequence[str] | None = None) -> S
     mode = modes[0]
     _refuse(mode, len(modes))
     name, parameters = c_name(assembly.flat.name), live_parameters(mode.assembly)
+    beside = more(mode) if more else {}
     return SceneText(
         name,
-        _named(_header(mode, parameters), name),
-        _named(_source(mode, parameters), name),
-        _named(_template("main.c"), name),
+        with_name(_header(mode, parameters, beside), name),
+        with_name(_source(mode, parameters, beside), name),
+        with_name(_template("main.c"), name),
         mode,
         parameters,
         mode.flat.t_start,
@@ -126,15 +132,11 @@ def c_name(name: str) -> str:
     """Return a name of a scene as C takes it."""
     words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name)
     text = re.sub(r"\W+", "_", words, flags=re.ASCII).strip("_").lower() or "model"
-    return f"model_{text}" if text[0].isdigit() or keyword.iskeyword(text) or text in _TAKEN else text
+    text = f"model_{text}" if text[0].isdigit() else text
+    return text if "_" in text else f"{text}_model"  # no word of C and no function of its library has a stroke
 
 
-_TAKEN = frozenset(
-    {"auto", "char", "const", "double", "float", "int", "long", "main", "scene", "word", "struct", "union"}
-)
-
-
-def _named(text: str, name: str) -> str:
+def with_name(text: str, name: str) -> str:
     """Return a text in which names of the header begin with that of the scene."""
     text = text.replace('"scene.h"', f'"{name}.h"')
     return re.sub(r"\bscene_(?=[A-Za-z])", f"{name}_", re.sub(r"\bscene\b(?=[ ;*)])", name, text))
@@ -186,15 +188,15 @@ def _sizes(mode: ModeText, programs: dict[str, Program]) -> dict[str, int]:
 # -- header ---------------------------------------------------------------------------------------------------------
 
 
-def _header(mode: ModeText, parameters: Sequence[dict[str, Any]]) -> str:
+def _header(mode: ModeText, parameters: Sequence[dict[str, Any]], beside: dict[str, Program]) -> str:
     programs = _programs(mode)
     sizes = _sizes(mode, programs)
-    lines = [_template("scene.h")]
+    text = _template("scene.h")
     counts = {"STATES": sizes["SIZE"], "PARAMETERS": len(parameters), "QUANTITIES": len(mode.known)}
     counts |= {"COORDINATES": sizes["COORDINATES"]}
-    lines[0] = lines[0].replace("/* counts */", "\n".join(f"#define scene_{key} {one}" for key, one in counts.items()))
-    lines[0] = lines[0].replace("/* word */", WORDS.replace("word", "scene_word"))
-    return lines[0].replace("    /* memory */", "\n".join(f"    {one};" for one in _memory(programs, sizes)))
+    lines = "\n".join(f"#define scene_{key} {one}" for key, one in counts.items())
+    text = text.replace("/* counts */", lines).replace("/* word */", WORDS.replace("word", "scene_word"))
+    return text.replace("    /* memory */", "\n".join(f"    {one};" for one in _memory(programs | beside, sizes)))
 
 
 def _memory(programs: dict[str, Program], sizes: dict[str, int]) -> list[str]:
@@ -226,11 +228,12 @@ def _memory(programs: dict[str, Program], sizes: dict[str, int]) -> list[str]:
 # -- source ---------------------------------------------------------------------------------------------------------
 
 
-def _source(mode: ModeText, parameters: Sequence[dict[str, Any]]) -> str:
+def _source(mode: ModeText, parameters: Sequence[dict[str, Any]], beside: dict[str, Program]) -> str:
     programs = _programs(mode)
     sizes = _sizes(mode, programs)
-    printed = [print_program(name, one)[0] for name, one in programs.items()]
-    routines = _routines(programs, sizes, printed)
+    every = programs | beside
+    printed = [print_program(name, one)[0] for name, one in every.items()]
+    routines = _routines(every, sizes, printed)
     body = print_routines(routines)
     bits = [line for line in BITS.splitlines() if _is_called(line, [body, *printed, *BITS.splitlines()])]
     parts = [
@@ -245,7 +248,7 @@ def _source(mode: ModeText, parameters: Sequence[dict[str, Any]]) -> str:
         *([_numbered("SOUGHT", SEARCH_FIELDS), _numbered("SEARCHED", SEARCH_ROWS)] if sizes["EVENTS"] else []),
         "",
         *bits,
-        *(_declared(name) for name in programs),
+        *(_declared(name) for name in every),
         body,
         *printed,
         *_tables(mode, parameters, sizes),
