@@ -12,7 +12,7 @@ orders that are multiples of four both are zero, and its first step is far too l
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -54,10 +54,11 @@ def start_of(assembly: Any) -> Any:
     return np.concatenate([first.coordinates[:, 0], first.speeds[:, 0]]), len(first.coordinates)
 
 
-def heyoka_system(heyoka: Any, assembly: Any) -> list[tuple[Any, Any]]:
-    """Return Atwood's accelerations as heyoka's expressions."""
+def heyoka_system(heyoka: Any, assembly: Any, own: Mapping[int, Any] | None = None) -> list[tuple[Any, Any]]:
+    """Return Atwood's accelerations as heyoka's expressions; some parameters, by their places, are its own."""
     program = acceleration_program(assembly).program
-    numbers = dict(zip(program.parameters, assembly.parameter_values, strict=True))
+    given = {k: float(value) for k, value in enumerate(assembly.parameter_values)} | dict(own or {})
+    numbers = dict(zip(program.parameters, given.values(), strict=True))
     _, q, u = (group.symbols for group in program.inputs)
     names = [f"x{i:03d}" for i in range(len(q) + len(u))]
     symbols = dict(zip((*q, *u), heyoka.make_vars(*names), strict=True))
@@ -70,7 +71,7 @@ def heyoka_system(heyoka: Any, assembly: Any) -> list[tuple[Any, Any]]:
     }
     for node in program.nodes:
         if node.is_symbol:
-            made[node.index] = symbols[node] if node in symbols else float(numbers[node])
+            made[node.index] = symbols[node] if node in symbols else numbers[node]
         elif node.is_constant:
             made[node.index] = float(node.payload)
         else:
@@ -80,8 +81,8 @@ def heyoka_system(heyoka: Any, assembly: Any) -> list[tuple[Any, Any]]:
             else:
                 one = {"neg": lambda a: -a, "sin": heyoka.sin, "cos": heyoka.cos}[node.operation]
                 made[node.index] = one(*arguments)
-    given = [made[result.index] for result in program.results]
-    rates = given if len(given) == len(q) + len(u) else [*(symbols[v] for v in u), *given]
+    results = [made[result.index] for result in program.results]
+    rates = results if len(results) == len(q) + len(u) else [*(symbols[v] for v in u), *results]
     return [
         (symbols[v], heyoka.expression(rate) if isinstance(rate, float) else rate)
         for v, rate in zip((*q, *u), rates, strict=True)
