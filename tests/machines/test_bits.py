@@ -10,12 +10,14 @@ import sys
 import pytest
 from llvmlite import binding
 
-from atwood import simulate
+from atwood import simulate, sweep
 from atwood.codegen.llvm import build, engine, own
+from atwood.codegen.llvm.engine import lane_count
 from atwood_library.scenes import SCENES, Chain
 
 from .bits import differences
 from .emulated import MACHINES
+from .lanes import SOLVERS, ends
 from .run import EMULATED, ROOT
 
 SAMPLE = (
@@ -55,6 +57,23 @@ def test_another_processor_gives_the_same_bits(name: str) -> None:
     assert done.stdout == "3 runs compared, 0 differ\n", done.stdout + done.stderr
 
 
+@pytest.mark.parametrize(("name", "width"), [("nehalem", 2), ("haswell", 4), ("skylakex", 8)])
+def test_lanes_of_another_processor_have_the_bits_of_runs_alone(name: str, width: int) -> None:
+    machine = MACHINES[name]
+    if not machine.possible:
+        pytest.skip("this machine cannot do what that one does")
+    inherited = {key: value for key, value in os.environ.items() if key not in EMULATED}
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.machines.lanes", str(width)],
+        cwd=ROOT,
+        env={**inherited, **machine.environment},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.split() == [ends(solver, 1) for solver in SOLVERS]
+
+
 def assembly_of(text: str, level: int, has_variables: bool, triple: str, processor: str) -> str:
     """Return a module in the language of a processor that has fused operations."""
     target = binding.Target.from_triple(triple or binding.get_process_triple())
@@ -77,6 +96,8 @@ def test_nothing_is_fused(monkeypatch: pytest.MonkeyPatch) -> None:
     functions = own.own_functions.__wrapped__()
     simulate(Chain(links=7), solver="taylor", t_end=0.01)
     simulate(SCENES["four-bar"](), solver="ida", t_end=0.01)
+    sweep(SCENES["double-pendulum"](), {"gravity": [*range(5, 13)]}, t_end=0.01, solver="explicit", threads=1)
+    assert any(f"@own_sin_cos_{lane_count()}" in text for text, _, _ in written)
     assert functions.addresses
     assert len(written) > 2
     binding.initialize_all_targets()
