@@ -121,9 +121,9 @@ def _read(runs: int) -> Routine:
     r, m, (lanes,) = open_routine(runs, "read", {"lanes": INTEGER}, result=INTEGER)
     y, trial, first, time = m.row("y"), m.row("trial"), m.row(0), m.time
     inside = time != m.t
-    r.copy(trial, y, m.padded)
     within = inside.integer() & lanes
     with r.when(within == 0):
+        r.copy(trial, y, m.padded)
         r.give(0)
     share = (time - m.t_old) / m.unit
     with m.parts() as j:
