@@ -87,7 +87,8 @@ def _prepared(
     options: RunOptions,
     between: FloatArray,
     known: Sequence[Updated] | None = None,
-) -> _Walk:
+    kind: type[Walk] | None = None,
+) -> Walk:
     """Return a run that is ready to go, with samples in between that change nothing.
 
     Where it is made again, it is known what updates have made of its states, and nobody is asked twice.
@@ -97,7 +98,7 @@ def _prepared(
     check_prescribed(schedule.rows(assembly, samples.times), samples.times)
     log: list[Updated] = []
     again = partial(_again, assembly, start, reassemble, log)
-    walk = _Walk(assembly, start, options, reassemble, samples.with_more(between), again, log, known)
+    walk = (kind or Walk)(assembly, start, options, reassemble, samples.with_more(between), again, log, known)
     with named(walk.assembly, walk.t, walk.q, walk.u):
         walk.prepare()
     return walk
@@ -114,11 +115,17 @@ def _again(
     return _prepared(assembly, start, reassemble, options, between, log).go()
 
 
+def walked(assembly: Assembly, start: Start, options: RunOptions, kind: type[Walk]) -> tuple[Walk, Run]:
+    """Make a run by a way that takes note of what happens; return both."""
+    walk = _prepared(assembly, start, assembly.other_mode, allowed(options), np.zeros(0), None, kind)
+    return walk, walk.go()
+
+
 _IMPACTS = 1000
 """So many impacts are remembered, to see whether they follow each other ever faster."""
 
 
-class _Walk:
+class Walk:
     """The way of a run through its modes."""
 
     def __init__(

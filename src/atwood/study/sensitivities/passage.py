@@ -5,17 +5,31 @@ from __future__ import annotations
 import numpy as np
 
 from atwood.arrays import FloatArray, IndexArray
-from atwood.errors import SolveError, UnsupportedError
+from atwood.errors import AtwoodError, SolveError, UnsupportedError
+from atwood.expr import Expression, substitute
 from atwood.forms.assembly import Assembly
+from atwood.forms.caches import Key
 from atwood.result.result import Result
+from atwood.simulation.events.sampling import find_sampler
+from atwood.simulation.events.time_events import find_schedule
 from atwood.simulation.initialization.start import own_state
 from atwood.simulation.run.recorder import SegmentRecord
+from atwood.simulation.run.run import walked
 from atwood.study.sensitivities.augmented import Augmented, Stretch
-from atwood.study.sensitivities.columns import Column, seeds_of
+from atwood.study.sensitivities.changes import Beside, Change, Leg, WatchedWalk
+from atwood.study.sensitivities.columns import Column, extrapolated
 from atwood.study.sensitivities.quantities import derivatives, written
 
 _AGREES = 1e3
 """So many tolerances may lie between a motion with derivatives and the run; its own errors grow like the columns."""
+
+_GRAZING = 1e-7
+"""In the scene's sizes and times: what passes zero more slowly touches it."""
+
+_MOVED = 1e-2
+"""In the scene's sizes: so far states are moved at most to see what an impact or an update makes of them."""
+
+_EVENTS: Key[tuple[Expression, ...]] = Key("events as functions of the state")
 
 
 class Passage:
@@ -36,74 +50,104 @@ class Passage:
     def __init__(
         self, result: Result, columns: tuple[Column, ...], paths: tuple[str, ...], rtol: float, max_steps: int | None
     ) -> None:
-        self.run, self.columns, self.paths = result.run, columns, paths
-        self.rtol, self.max_steps = rtol, max_steps
-        self.where = self.run.assembly.flat.name
-
-    def go(self) -> tuple[FloatArray, FloatArray]:
-        """Return values and derivatives of the quantities at the outputs, times the scales of the columns."""
-        segments = [one for one in self.run.segments if len(one.time)]
-        first, start = segments[0], self.run.start
-        assert start is not None
-        if first.assembly.shared is not self.run.assembly.shared:
+        self.columns, self.paths, self.rtol, self.max_steps = columns, paths, rtol, max_steps
+        run = result.run
+        self.where, self.first, self.end = run.assembly.flat.name, run.assembly, run.options.t_end
+        rests = next((one for one in run.events if one.kind == "rests"), None)
+        if rests is not None:
+            raise SolveError(
+                f"at t = {rests.time:.9g} s impacts have accumulated, and their sum has no derivatives",
+                where=rests.part,
+                advice="Let the run end before.",
+            )
+        assert run.start is not None
+        self.start = run.start
+        if run.segments[0].assembly.shared is not run.assembly.shared:
             raise UnsupportedError(
                 "the run begins in other coordinates than the scene was assembled in",
                 where=self.where,
                 advice="Ask with orientation='quaternion'.",
             )
-        state = own_state(self.run.assembly, start)
-        moved = np.array([one.start(state, start.length) for one in self.columns])
+        walk, self.run = walked(run.assembly, run.start, run.options, WatchedWalk)
+        assert isinstance(walk, WatchedWalk)
+        self.legs, self.segments = walk.legs, self.run.segments
+        shown = np.concatenate([one.time[one.shown] for one in self.segments])
+        if len(shown) != len(result.time):
+            raise SolveError("the run came out otherwise when it was made again", where=self.where)
+
+    def go(self) -> tuple[FloatArray, FloatArray]:
+        """Return values and derivatives of the quantities at the outputs, times the scales of the columns."""
+        moved = np.array([one.start(own_state(self.first, self.start), self.start.length) for one in self.columns])
+        held = np.zeros((len(self.columns), len(self.first.discrete_states)))
+        if held.size:
+            held = np.array([extrapolated(lambda x, one=one: _held(one.near(x))) for one in self.columns])
+        state, still = np.concatenate(own_state(self.first, self.start)), np.zeros(len(self.columns))
+        for change in self.legs[0].changes:
+            moved, held, state = self._changed(change, self.start.time, state, moved, held, still)
         values, found = [], []
-        for number, segment in enumerate(segments):
-            if segment.singular_crossings:
-                crossing = segment.singular_crossings[0]
-                raise SolveError(
-                    f"it passes a singular position at t = {crossing.time:.9g} s, where there are no derivatives",
-                    where=self.where,
-                    advice="Let the run end before.",
-                )
-            seeds = self._seeds(segment)
-            begin = self._state(segment, 0)
-            augmented = Augmented(segment.plan, float(segment.time[0]), begin, seeds)
-            moved = augmented.tangent(float(segment.time[0]), begin, moved)
-            stretch = self._along(segment, augmented, begin, moved)
+        for number, leg in enumerate(self.legs):
+            segment = self.segments[leg.number]
+            self._refuse_singular(segment)
+            seeds, begin = self._seeds(leg, held), np.concatenate(leg.begin[1:])
+            augmented = Augmented(leg.plan, leg.begin[0], begin, seeds)
+            moved = augmented.tangent(leg.begin[0], begin, moved)
+            stretch = self._along(leg, segment, augmented, begin, moved)
             shown = np.flatnonzero(segment.shown)
-            expressions = written(segment.plan, self.paths, float(segment.time[0]), begin)
-            now = derivatives(
-                segment.assembly, expressions, segment.time[shown], stretch.states[shown], stretch.columns[shown], seeds
-            )
-            values.append(now[0])
-            found.append(now[1])
-            if number + 1 < len(segments):
-                moved = self._over(segment, segments[number + 1], stretch)
+            if len(shown):
+                expressions = written(leg.plan, self.paths, leg.begin[0], begin)
+                states = segment.time[shown], stretch.states[shown], stretch.columns[shown]
+                now = derivatives(leg.plan.assembly, expressions, *states, seeds)
+                values.append(now[0])
+                found.append(now[1])
+            if number + 1 < len(self.legs):
+                moved, held = self._over(leg, self.legs[number + 1], stretch.columns[-1], held, seeds)
         return np.concatenate(values, axis=1), np.concatenate(found, axis=2)
 
-    def _state(self, segment: SegmentRecord, number: int) -> FloatArray:
-        return np.concatenate([segment.coordinates[:, number], segment.speeds[:, number]])
+    def _refuse_singular(self, segment: SegmentRecord) -> None:
+        for crossing in segment.singular_crossings:
+            raise SolveError(
+                f"it passes a singular position at t = {crossing.time:.9g} s, where there are no derivatives",
+                where=self.where,
+                advice="Let the run end before.",
+            )
 
-    def _seeds(self, segment: SegmentRecord) -> FloatArray:
+    def _beside(self, now: Assembly, column: Column, share: float) -> Assembly:
+        """Return a scene with a parameter moved, in the mode and the piece of the run that an assembly is in."""
+        if column.is_start:
+            return now
+        plain = self.first if now.shared is self.first.shared else now
+        made = plain.with_values({column.path: column.value + share * column.scale})
+        if made.why_new:
+            raise UnsupportedError(f"it shapes the equations in another mode: {made.why_new}", where=column.path)
+        made = made.with_relations(now.relation_values) if now.relations else made
+        return made.with_held(now.held_now) if now.discrete_states else made
+
+    def _seeds(self, leg: Leg, held: FloatArray) -> FloatArray:
         """Return the change of each parameter in a stretch by each column."""
-        now = segment.assembly
-        return seeds_of(self.columns, lambda other: self.beside(now, other))
+        plain, symbols = leg.assembly, leg.plan.assembly.parameters
+        places = {symbol: k for k, symbol in enumerate(symbols)}
+        own = [places[symbol] for symbol in plain.parameters if symbol in places]
+        kept = [k for k, symbol in enumerate(plain.parameters) if symbol in places]
+        seeds = np.zeros((len(self.columns), len(symbols)))
+        for j, column in enumerate(self.columns):
+            if not column.is_start:
+                values = extrapolated(lambda x, one=column: self._beside(plain, one, x).parameter_values)
+                seeds[j, own] = values[kept]
+        for k, one in enumerate(plain.discrete_states):
+            seeds[:, places[one.symbol]] = held[:, k]
+        return seeds
 
-    def beside(self, now: Assembly, other: Assembly) -> Assembly:
-        """Return a scene with other values in the mode and the piece that an assembly is in."""
-        if now.shared is other.shared:
-            made = other
-        else:
-            raise UnsupportedError("derivatives through changes of mode are not there yet", where=self.where)
-        return made.with_relations(now.relation_values) if now.relations else made
-
-    def _along(self, segment: SegmentRecord, augmented: Augmented, begin: FloatArray, moved: FloatArray) -> Stretch:
+    def _along(
+        self, leg: Leg, segment: SegmentRecord, augmented: Augmented, begin: FloatArray, moved: FloatArray
+    ) -> Stretch:
         """Return the motion with its derivatives at the samples of a stretch."""
         times = segment.time
-        if len(times) == 1:
-            return Stretch(begin[None, :], moved[None, :, :], 0)
-        wanted = np.flatnonzero(segment.shown | (np.arange(len(times)) == len(times) - 1))
-        wanted = wanted[wanted > 0]
-        part = augmented.run(float(times[0]), begin, moved, times[wanted], self.rtol, self.max_steps)
-        states, columns = np.zeros((len(times), len(begin))), np.zeros((len(times), *moved.shape))
-        states[0], columns[0] = begin, moved
+        states, columns = np.tile(begin, (len(times), 1)), np.tile(moved, (len(times), 1, 1))
+        last = np.arange(len(times)) == len(times) - 1
+        wanted = np.flatnonzero((segment.shown | last) & (times > leg.begin[0]))
+        if not len(wanted):
+            return Stretch(states, columns, 0)
+        part = augmented.run(leg.begin[0], begin, moved, times[wanted], self.rtol, self.max_steps)
         states[wanted], columns[wanted] = part.states, part.columns
         self._check(segment, states[wanted], columns[wanted], wanted)
         return Stretch(states, columns, part.steps)
@@ -113,8 +157,9 @@ class Passage:
         plan = segment.plan
         sizes = plan.tolerances(1.0, {})[: states.shape[1]]
         run = np.concatenate([segment.coordinates, segment.speeds])[:, wanted].T
-        apart = np.max(np.abs(states - run) / sizes, axis=1)
-        grown = 1.0 + np.max(np.abs(columns) / sizes, axis=(1, 2)) + np.max(np.abs(run) / sizes, axis=1)
+        apart = np.max(np.abs(states - run) / sizes, axis=1, initial=0.0)
+        size = np.max(np.abs(run) / sizes, axis=1, initial=0.0)
+        grown = 1.0 + np.max(np.abs(columns) / sizes, axis=(1, 2), initial=0.0) + size
         far = np.flatnonzero(~(apart <= _AGREES * max(self.rtol, 1e-13) * grown))
         if len(far):
             raise SolveError(
@@ -123,5 +168,123 @@ class Passage:
                 advice="Ask for a smaller rtol, or let the run end before.",
             )
 
-    def _over(self, before: SegmentRecord, after: SegmentRecord, stretch: Stretch) -> FloatArray:
-        raise UnsupportedError("derivatives over events are not there yet", where=self.where)
+    def _over(
+        self, leg: Leg, after: Leg, columns: FloatArray, held: FloatArray, seeds: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return derivatives of the state and of discrete states behind what ends a stretch."""
+        still = leg.end[0] <= leg.begin[0]
+        moments = np.zeros(len(self.columns)) if still else self._moments(leg, columns, seeds)
+        before, behind = (_rates(one, state) for one, state in ((leg, leg.end), (after, after.begin)))
+        columns = columns + before * moments[:, None]
+        state = np.concatenate(leg.end[1:])
+        for change in after.changes:
+            columns, held, state = self._changed(change, leg.end[0], state, columns, held, moments)
+        return columns - behind * moments[:, None], held
+
+    def _changed(
+        self,
+        change: Change,
+        t: float,
+        state: FloatArray,
+        columns: FloatArray,
+        held: FloatArray,
+        moments: FloatArray,
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return derivatives of the state and of discrete states behind a change, and the state there."""
+        n = len(change.assembly.own_equations.coordinates)
+        now = np.array(change.assembly.held_now)
+
+        def moved(column: Column, by: FloatArray, kept: FloatArray, later: float, share: float) -> FloatArray:
+            def beside(one: Assembly) -> Assembly:
+                made = self._beside(one, column, share)
+                return made.with_held(tuple(now + share * kept)) if len(kept) else made
+
+            there = state + share * by
+            q, u, values = change.apply(beside, (t + share * later, there[:n], there[n:]))
+            return np.concatenate([q, u, values])
+
+        found = []
+        plain: Beside = lambda one: one  # noqa: E731
+        base = np.concatenate(change.apply(plain, (t, state[:n], state[n:])))
+        for j, column in enumerate(self.columns):
+            own = columns[j], held[j], float(moments[j])
+            largest = max(1.0, float(np.max(np.abs(columns[j]), initial=0.0))) * 2.0**-7 / _MOVED
+            scale = 1.0 / largest
+            slope = extrapolated(lambda x, own=own, one=column, scale=scale: moved(one, *own, scale * x)) / scale
+            found.append(slope)
+        size = len(base) - len(now)
+        made = np.array(found)
+        return made[:, :size], made[:, size:], base[:size]
+
+    def _moments(self, leg: Leg, columns: FloatArray, seeds: FloatArray) -> FloatArray:
+        """Return by how much the time at which a stretch ends changes with each column, s."""
+        event, t = leg.outcome.event, leg.end[0]
+        if event is None:
+            return np.array([self._moment_of_time(leg, column, t) for column in self.columns])
+        program = leg.probe.program()
+        functions = leg.probe.event_functions
+        if program is None:
+            raise UnsupportedError(
+                f"at t = {t:.9g} s an event reads a reaction that the state alone does not determine", where=event.part
+            )
+        expressions = leg.plan.assembly.shared.get(
+            _EVENTS,
+            lambda: tuple(substitute(list(program.results), dict.fromkeys(program.inputs[-1].symbols, 0.0))),
+            program,
+        )
+        about = (event.part, event.law, event.target)
+        numbers = [i for i, one in enumerate(functions) if (one.part, one.law, one.target) == about]
+        if leg.outcome.sides:
+            numbers = [i for i, one in enumerate(functions) if one.target == "side" and int(one.law) in leg.outcome.sides]
+        rates = _rates(leg, leg.end)
+        every = np.concatenate([columns, rates[None, :]])[None, :, :]
+        state, times = np.concatenate(leg.end[1:])[None, :], np.array([t])
+        own = np.concatenate([seeds, np.zeros((1, seeds.shape[1]))])
+        passing = np.append(np.zeros(len(columns)), 1.0)
+        chosen = [expressions[i] for i in numbers]
+        values, slopes = derivatives(leg.plan.assembly, chosen, times, state, every, own, passing)
+        scales = np.array([leg.plan.scales.of(functions[i].unit) for i in numbers])
+        first = int(np.argmin(np.abs(values[:, 0]) / scales))
+        rate = float(slopes[first, -1, 0])
+        if not abs(rate) * leg.plan.scales.time > _GRAZING * scales[first]:
+            raise SolveError(
+                f"at t = {t:.9g} s it touches the place of an event ({event.message}) without passing it, and there are "
+                "no derivatives",
+                where=event.part or self.where,
+                advice="Change the scene or its start a little, or let the run end before.",
+            )
+        return np.asarray(-slopes[first, :-1, 0] / rate)
+
+    def _moment_of_time(self, leg: Leg, column: Column, t: float) -> float:
+        """Return by how much a time event, or a sample time, changes with a column."""
+        if column.is_start:
+            return 0.0
+
+        def times(assembly: Assembly) -> FloatArray:
+            begin = self.start.time
+            schedule = find_schedule(assembly, begin, self.end)
+            return np.sort(np.concatenate([schedule.times, find_sampler(assembly, begin, self.end, np.zeros(0)).times]))
+
+        here = times(self._beside(leg.assembly, column, 0.0))
+        number = int(np.argmin(np.abs(here - t)))
+
+        def at(share: float) -> FloatArray:
+            found = times(self._beside(leg.assembly, column, share))
+            near = found[np.argmin(np.abs(found - here[number]))] if len(found) != len(here) else found[number]
+            return np.array([near])
+
+        try:
+            return float(extrapolated(at)[0])
+        except AtwoodError as error:
+            raise UnsupportedError(f"its times do not follow it: {error.message}", where=column.path) from error
+
+
+def _held(assembly: Assembly) -> FloatArray:
+    return np.array(assembly.held_at_start)
+
+
+def _rates(leg: Leg, state: tuple[float, FloatArray, FloatArray]) -> FloatArray:
+    """Return the rates of coordinates and speeds in a stretch."""
+    plan, (t, q, u) = leg.plan, state
+    accelerations, _ = plan.balance.accelerate(t, q, u, plan.kept)
+    return np.concatenate([plan.balance.kinematic_map.rates(t, q, u), accelerations])

@@ -56,18 +56,18 @@ def _kept_in_maximal(assembly: Assembly, plan: SceneProblem, t: float, y: FloatA
 
 
 def derived(assembly: Assembly, expressions: tuple[Expression, ...]) -> Program:
-    """Return the program of (t, q, u, dq, du, dp) with expressions and their derivatives along a direction."""
+    """Return the program of (t, q, u, dt, dq, du, dp) with expressions and their derivatives along a direction."""
 
     def make() -> Program:
         groups = state_groups(assembly.own_equations)
         graph = assembly.own_equations.graph
-        symbols = (groups[1].symbols, groups[2].symbols, assembly.parameters)
+        symbols = (*(one.symbols for one in groups), assembly.parameters)
         along = [tuple(graph.symbol(f"along {s.name}") for s in some) for some in symbols]
         tangents: dict[Expression, Expression | float] = {}
         for some, moved in zip(symbols, along, strict=True):
             tangents.update(zip(some, moved, strict=True))
         outputs = OutputGroup("values", expressions), OutputGroup("derivatives", tuple(jvp(expressions, tangents)))
-        more = [InputGroup(name, one) for name, one in zip(("dq", "du", "dp"), along, strict=True)]
+        more = [InputGroup(name, one) for name, one in zip(("dt", "dq", "du", "dp"), along, strict=True)]
         name = f"{assembly.flat.name} derivatives of quantities"
         return Program(name, (*groups, *more), assembly.parameters, outputs)
 
@@ -81,6 +81,7 @@ def derivatives(
     states: FloatArray,
     columns: FloatArray,
     seeds: FloatArray,
+    passing: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return values and derivatives of expressions at many states.
 
@@ -92,6 +93,8 @@ def derivatives(
         Shapes (times,), (times, n) and (times, columns, n).
     seeds
         The change of each parameter by each column, shape (columns, parameters).
+    passing
+        The change of time by each column, s; none when not given.
 
     Returns
     -------
@@ -104,7 +107,8 @@ def derivatives(
     values = np.empty((len(expressions), len(times)))
     found = np.empty((len(expressions), count, len(times)))
     for j in range(count):
+        dt = np.full((1, len(times)), 0.0 if passing is None else passing[j])
         dp = np.repeat(seeds[j][:, None], len(times), axis=1)
         own = columns[:, j]
-        values[:], found[:, j] = kernel(times[None, :], q, u, own[:, :n].T, own[:, n:].T, dp)
+        values[:], found[:, j] = kernel(times[None, :], q, u, dt, own[:, :n].T, own[:, n:].T, dp)
     return values, found

@@ -1,0 +1,192 @@
+"""What happens to a state between two stretches of a run, and what that does to the derivatives of the state.
+
+Let an event happen at ``t1`` where ``g(t, y, p) = 0``, and let it make ``y+ = h(t, y, p)`` of the state *before* it. Then
+``dt1/dp = -(g_y s + g_p) / (g_t + g_y f-)``, and behind it ``s+ = dh - f+ dt1/dp``, where dh is the change of h along
+``(dt1/dp, s + f- dt1/dp, 1)`` (M. A. Aizerman, F. R. Gantmakher, Quart. J. Mech. Appl. Math. 11, 1958; R. I. Leine,
+H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, 2004, section 7.1). Times of events and the
+right-hand sides are derived on the graph; h, which impacts and updates work out in numbers, is by differences.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.errors import UnsupportedError
+from atwood.forms.assembly import Assembly
+from atwood.lazy_dataclasses import dataclass, replace
+from atwood.mechanics.outputs.event_functions import CONTACT, UPDATE
+from atwood.simulation.contacts.changes import resolve
+from atwood.simulation.events.impacts_in_time import jumped
+from atwood.simulation.events.mode_change import enter_mode
+from atwood.simulation.events.modes import EventProbe, EventRecord
+from atwood.simulation.events.sides import SIDE
+from atwood.simulation.problem.explicit_scene import nearest_place
+from atwood.simulation.problem.problem import SceneProblem
+from atwood.simulation.run.recorder import Recorder
+from atwood.simulation.run.run import Walk
+from atwood.simulation.run.run_record import Outcome
+from atwood.simulation.run.session import KeptSession
+
+State = tuple[float, FloatArray, FloatArray]
+Beside = Callable[[Assembly], Assembly]
+"""Gives a scene with a value moved a little, in the same mode and piece of the run."""
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """Something that happens to a state at a moment.
+
+    Attributes
+    ----------
+    assembly
+        The scene before it.
+    apply
+        Gives coordinates, speeds and discrete states behind it, from those before it in a scene.
+    """
+
+    assembly: Assembly
+    apply: Callable[[Beside, State], tuple[FloatArray, FloatArray, tuple[float, ...]]]
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """A stretch of a run as it was made.
+
+    Attributes
+    ----------
+    changes
+        What happened just before it.
+    plan, assembly
+        The scene in it; the second with its laws as they are.
+    probe
+        What was watched.
+    begin, end
+        The states at its ends.
+    outcome
+        How it ended.
+    number
+        Of its record among the segments of the run.
+    """
+
+    changes: tuple[Change, ...]
+    plan: SceneProblem
+    assembly: Assembly
+    probe: EventProbe
+    begin: State
+    end: State
+    outcome: Outcome
+    number: int
+
+
+class _Session(KeptSession):
+    """Sessions that stop at every event."""
+
+    @property
+    def has_impacts(self) -> bool:
+        return False
+
+
+class WatchedWalk(Walk):
+    """The way of a run that takes note of what happens to its state."""
+
+    def __init__(self, *given: Any) -> None:
+        super().__init__(*given)
+        self._kept, self.legs, self.changes = _Session(), list[Leg](), list[Change]()
+
+    def _segment(self) -> tuple[Recorder, Outcome]:
+        count = len(self.segments)
+        recorder, outcome = super()._segment()
+        if len(self.segments) > count:
+            assert self.plan is not None
+            assert self.probe is not None
+            begin, end = (self.t, self.q, self.u), recorder.last()[:3]
+            parts = self.plan, self.assembly, self.probe, begin, end, outcome, len(self.segments) - 1
+            self.legs.append(Leg(tuple(self.changes), *parts))
+            self.changes = []
+        return recorder, outcome
+
+    def _update(self, due: Sequence[int]) -> None:
+        chosen, sampler = tuple(due), self.sampler
+
+        def apply(beside: Beside, state: State) -> tuple[FloatArray, FloatArray, tuple[float, ...]]:
+            t, q, u = state
+            made = sampler.call(chosen, beside(assembly), t, q, u)
+            return made.coordinates, u, made.held
+
+        assembly = self.assembly
+        self.changes.append(Change(assembly, apply))
+        super()._update(due)
+
+    def _jump(self, before: Assembly, show_both: bool = False) -> None:
+        now, length, reassemble = self.assembly, self.start.length, self._reassemble
+
+        def apply(beside: Beside, state: State) -> tuple[FloatArray, FloatArray, tuple[float, ...]]:
+            there = beside(before)
+            after = there.with_relations(now.relation_values) if now.relations else there
+            _, q, u, _ = jumped(there, after, state, length, reassemble)
+            return q, u, there.held_now
+
+        q, u, shared = self.q, self.u, self.assembly.shared
+        super()._jump(before, show_both)
+        if self.assembly.shared is not shared:
+            raise UnsupportedError(
+                f"at t = {self.t:.9g} s a prescribed motion lets go, over which there are no derivatives",
+                where=self.assembly.flat.name,
+                advice="Let the run end before.",
+            )
+        if not (np.array_equal(q, self.q) and np.array_equal(u, self.u)):
+            self.changes.append(Change(before, apply))
+
+    def _settled(self, plan: SceneProblem) -> SceneProblem:
+        triggers, assembly, before = self._unsettled, self.assembly, (self.u, self.held)
+        made = super()._settled(plan)
+        if triggers and (self.u is not before[0] or self.held != before[1]):
+            self.changes.append(self._contact(plan, assembly, triggers))
+        return made
+
+    def _contact(self, plan: SceneProblem, assembly: Assembly, triggers: Sequence[EventRecord]) -> Change:
+        length, options, scales = self.start.length, self.options, plan.scales
+        impacts, one_by_one = list(self._impacts), options.impacts == "one_by_one"
+
+        def apply(beside: Beside, state: State) -> tuple[FloatArray, FloatArray, tuple[float, ...]]:
+            t, q, u = state
+            there, looser = beside(assembly), 1e3 * options.relative_tolerance
+            own = plan.in_piece(self._sides.like(there, plan))
+            touching = resolve(there, state, length, scales, looser, triggers, one_by_one, impacts).touching
+            if touching:
+                met = self._sides.like(there.with_held(touching), plan)
+                q = nearest_place(own.in_piece(met), t, q, u)
+            found = resolve(there, (t, q, u), length, scales, looser, triggers, one_by_one, impacts)
+            return q, found.speeds, found.held
+
+        return Change(assembly, apply)
+
+    def _enter(self, outcome: Outcome, recorder: Recorder) -> None:
+        event, assembly = outcome.event, self.assembly
+        length, other = self.start.length, self._other
+        assert event is not None
+        if event.target not in (*CONTACT, UPDATE, SIDE):
+
+            def apply(beside: Beside, state: State) -> tuple[FloatArray, FloatArray, tuple[float, ...]]:
+                there = beside(assembly)
+
+                def reassemble(*about: Any) -> Assembly:
+                    found = there.other_mode(*about)
+                    return found.with_held(there.held_now) if there.discrete_states else found
+
+                _, q, u = enter_mode(state, there, replace(event, time=state[0]), reassemble, length)
+                return q, u, there.held_now
+
+            self.changes.append(Change(assembly, apply))
+        super()._enter(outcome, recorder)
+
+    def _switch_coordinates(self, event: EventRecord, recorder: Recorder) -> None:
+        raise UnsupportedError(
+            "coordinates of an orientation are switched on the way",
+            where=event.part,
+            advice="Ask with orientation='quaternion'.",
+        )
