@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.errors import SolveError, UnsupportedError
+from atwood.errors import AtwoodError, SolveError, UnsupportedError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, jvp
 from atwood.forms.accelerations import accelerations_of
 from atwood.forms.caches import Key
@@ -188,7 +188,14 @@ class Augmented:
             horizon=max(float(times[-1]) - t, 1e-300),
         )
         task = Task(settings, t, z, budget=Budget(max_steps=max_steps), end=float(times[-1]), explicit=problem)
-        session = EXPLICIT.open(task)
+        try:
+            session = EXPLICIT.open(task)
+        except AtwoodError as error:
+            raise UnsupportedError(
+                f"at t = {t:.9g} s a derivative has no finite value, as that of the size of a slip that is zero",
+                where=plan.assembly.flat.name,
+                advice="Start a little beside that state, or let the run end before.",
+            ) from error
         session.limit_steps(longest_step(plan.assembly.own_equations, y[n:]))
         found, _, ended = session.sample(times)
         if ended.status is not Status.REACHED:

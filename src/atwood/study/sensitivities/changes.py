@@ -1,6 +1,6 @@
 """What happens to a state between two stretches of a run, and what that does to the derivatives of the state.
 
-Let an event happen at ``t1`` where ``g(t, y, p) = 0``, and let it make ``y+ = h(t, y, p)`` of the state *before* it. Then
+Let an event happen at ``t1`` where ``g(t, y, p) = 0``, and let it make ``y+ = h(t, y, p)`` of the state before it. Then
 ``dt1/dp = -(g_y s + g_p) / (g_t + g_y f-)``, and behind it ``s+ = dh - f+ dt1/dp``, where dh is the change of h along
 ``(dt1/dp, s + f- dt1/dp, 1)`` (M. A. Aizerman, F. R. Gantmakher, Quart. J. Mech. Appl. Math. 11, 1958; R. I. Leine,
 H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, 2004, section 7.1). Times of events and the
@@ -167,7 +167,7 @@ class WatchedWalk(Walk):
 
     def _enter(self, outcome: Outcome, recorder: Recorder) -> None:
         event, assembly = outcome.event, self.assembly
-        length, other = self.start.length, self._other
+        length = self.start.length
         assert event is not None
         if event.target not in (*CONTACT, UPDATE, SIDE):
 

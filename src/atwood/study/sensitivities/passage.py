@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from atwood.arrays import FloatArray, IndexArray
@@ -10,6 +12,7 @@ from atwood.expr import Expression, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.result.result import Result
+from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales
 from atwood.simulation.events.sampling import find_sampler
 from atwood.simulation.events.time_events import find_schedule
 from atwood.simulation.initialization.start import own_state
@@ -17,7 +20,7 @@ from atwood.simulation.run.recorder import SegmentRecord
 from atwood.simulation.run.run import walked
 from atwood.study.sensitivities.augmented import Augmented, Stretch
 from atwood.study.sensitivities.changes import Beside, Change, Leg, WatchedWalk
-from atwood.study.sensitivities.columns import Column, extrapolated
+from atwood.study.sensitivities.columns import SHARES, Column, extrapolated
 from atwood.study.sensitivities.quantities import derivatives, written
 
 _AGREES = 1e3
@@ -26,7 +29,10 @@ _AGREES = 1e3
 _GRAZING = 1e-7
 """In the scene's sizes and times: what passes zero more slowly touches it."""
 
-_MOVED = 1e-2
+_TANGENT = 1e-5
+"""In the scene's sizes: columns that miss constraints by more do not belong to motions on them."""
+
+_MOVED = 1e-3
 """In the scene's sizes: so far states are moved at most to see what an impact or an update makes of them."""
 
 _EVENTS: Key[tuple[Expression, ...]] = Key("events as functions of the state")
@@ -80,7 +86,7 @@ class Passage:
         moved = np.array([one.start(own_state(self.first, self.start), self.start.length) for one in self.columns])
         held = np.zeros((len(self.columns), len(self.first.discrete_states)))
         if held.size:
-            held = np.array([extrapolated(lambda x, one=one: _held(one.near(x))) for one in self.columns])
+            held = np.array([extrapolated(partial(_held_near, one)) for one in self.columns])
         state, still = np.concatenate(own_state(self.first, self.start)), np.zeros(len(self.columns))
         for change in self.legs[0].changes:
             moved, held, state = self._changed(change, self.start.time, state, moved, held, still)
@@ -90,7 +96,7 @@ class Passage:
             self._refuse_singular(segment)
             seeds, begin = self._seeds(leg, held), np.concatenate(leg.begin[1:])
             augmented = Augmented(leg.plan, leg.begin[0], begin, seeds)
-            moved = augmented.tangent(leg.begin[0], begin, moved)
+            moved = self._tangent(leg, augmented, begin, moved, seeds)
             stretch = self._along(leg, segment, augmented, begin, moved)
             shown = np.flatnonzero(segment.shown)
             if len(shown):
@@ -102,6 +108,26 @@ class Passage:
             if number + 1 < len(self.legs):
                 moved, held = self._over(leg, self.legs[number + 1], stretch.columns[-1], held, seeds)
         return np.concatenate(values, axis=1), np.concatenate(found, axis=2)
+
+    def _tangent(
+        self, leg: Leg, augmented: Augmented, begin: FloatArray, moved: FloatArray, seeds: FloatArray
+    ) -> FloatArray:
+        """Return columns on the constraints; refuse those that would open or close what is closed to rounding."""
+        found, sizes = augmented.tangent(leg.begin[0], begin, moved), leg.plan.tolerances(1.0, {})[: len(begin)]
+        off, size = np.abs(found - moved) / sizes, np.max(np.abs(moved) / sizes, initial=0.0)
+        contacts = leg.plan.assembly.own_equations.contacts
+        if contacts and np.max(off, initial=0.0) > _TANGENT * max(size, 1.0):
+            rows = [one.row.rate for one in contacts]
+            state = np.array([leg.begin[0]]), begin[None, :], moved[None, :, :]
+            _, slopes = derivatives(leg.plan.assembly, rows, *state, seeds)
+            part = contacts[int(np.argmax(np.max(np.abs(slopes[:, :, 0]), axis=1)))].row.key[0]
+            raise SolveError(
+                f"at t = {leg.begin[0]:.9g} s it touches, and a small change in one direction would let it go or make "
+                "it collide: there are no derivatives",
+                where=part,
+                advice="Start a little before, or with the gap open, or leave that value out.",
+            )
+        return found
 
     def _refuse_singular(self, segment: SegmentRecord) -> None:
         for crossing in segment.singular_crossings:
@@ -122,6 +148,9 @@ class Passage:
         made = made.with_relations(now.relation_values) if now.relations else made
         return made.with_held(now.held_now) if now.discrete_states else made
 
+    def _parameters(self, now: Assembly, column: Column, share: float) -> FloatArray:
+        return self._beside(now, column, share).parameter_values
+
     def _seeds(self, leg: Leg, held: FloatArray) -> FloatArray:
         """Return the change of each parameter in a stretch by each column."""
         plain, symbols = leg.assembly, leg.plan.assembly.parameters
@@ -131,7 +160,7 @@ class Passage:
         seeds = np.zeros((len(self.columns), len(symbols)))
         for j, column in enumerate(self.columns):
             if not column.is_start:
-                values = extrapolated(lambda x, one=column: self._beside(plain, one, x).parameter_values)
+                values = extrapolated(partial(self._parameters, plain, column))
                 seeds[j, own] = values[kept]
         for k, one in enumerate(plain.discrete_states):
             seeds[:, places[one.symbol]] = held[:, k]
@@ -192,9 +221,14 @@ class Passage:
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return derivatives of the state and of discrete states behind a change, and the state there."""
         n = len(change.assembly.own_equations.coordinates)
-        now = np.array(change.assembly.held_now)
+        now, equations = np.array(change.assembly.held_now), change.assembly.own_equations
+        sizes = np.concatenate([one(equations, self.start.length) for one in (coordinate_scales, motion_scales)])
 
-        def moved(column: Column, by: FloatArray, kept: FloatArray, later: float, share: float) -> FloatArray:
+        def moved(
+            column: Column, by: FloatArray, kept: FloatArray, later: float, scale: float, step: float
+        ) -> FloatArray:
+            share = scale * step
+
             def beside(one: Assembly) -> Assembly:
                 made = self._beside(one, column, share)
                 return made.with_held(tuple(now + share * kept)) if len(kept) else made
@@ -208,13 +242,12 @@ class Passage:
         base = np.concatenate(change.apply(plain, (t, state[:n], state[n:])))
         for j, column in enumerate(self.columns):
             own = columns[j], held[j], float(moments[j])
-            largest = max(1.0, float(np.max(np.abs(columns[j]), initial=0.0))) * 2.0**-7 / _MOVED
-            scale = 1.0 / largest
-            slope = extrapolated(lambda x, own=own, one=column, scale=scale: moved(one, *own, scale * x)) / scale
-            found.append(slope)
-        size = len(base) - len(now)
+            size = max(1.0, float(np.max(np.abs(columns[j] / sizes), initial=0.0)))
+            scale = _MOVED / (SHARES[0] * size)
+            found.append(extrapolated(partial(moved, column, *own, scale)) / scale)
+        count = len(base) - len(now)
         made = np.array(found)
-        return made[:, :size], made[:, size:], base[:size]
+        return made[:, :count], made[:, count:], base[:count]
 
     def _moments(self, leg: Leg, columns: FloatArray, seeds: FloatArray) -> FloatArray:
         """Return by how much the time at which a stretch ends changes with each column, s."""
@@ -235,7 +268,9 @@ class Passage:
         about = (event.part, event.law, event.target)
         numbers = [i for i, one in enumerate(functions) if (one.part, one.law, one.target) == about]
         if leg.outcome.sides:
-            numbers = [i for i, one in enumerate(functions) if one.target == "side" and int(one.law) in leg.outcome.sides]
+            numbers = [
+                i for i, one in enumerate(functions) if one.target == "side" and int(one.law) in leg.outcome.sides
+            ]
         rates = _rates(leg, leg.end)
         every = np.concatenate([columns, rates[None, :]])[None, :, :]
         state, times = np.concatenate(leg.end[1:])[None, :], np.array([t])
@@ -248,8 +283,8 @@ class Passage:
         rate = float(slopes[first, -1, 0])
         if not abs(rate) * leg.plan.scales.time > _GRAZING * scales[first]:
             raise SolveError(
-                f"at t = {t:.9g} s it touches the place of an event ({event.message}) without passing it, and there are "
-                "no derivatives",
+                f"at t = {t:.9g} s it touches the place of an event ({event.message}) without passing it, and there "
+                "are no derivatives",
                 where=event.part or self.where,
                 advice="Change the scene or its start a little, or let the run end before.",
             )
@@ -279,8 +314,8 @@ class Passage:
             raise UnsupportedError(f"its times do not follow it: {error.message}", where=column.path) from error
 
 
-def _held(assembly: Assembly) -> FloatArray:
-    return np.array(assembly.held_at_start)
+def _held_near(column: Column, share: float) -> FloatArray:
+    return np.array(column.near(share).held_at_start)
 
 
 def _rates(leg: Leg, state: tuple[float, FloatArray, FloatArray]) -> FloatArray:

@@ -1,0 +1,129 @@
+"""Derivatives over events: against formulas, and against differences of runs."""
+
+import numpy as np
+import pytest
+
+from atwood import (
+    Component,
+    Load,
+    Point,
+    Scene,
+    SolveError,
+    assemble,
+    connector,
+    force,
+    parameter,
+    select,
+    sensitivities,
+    simulate,
+)
+from atwood_library import Force, Ground, PointMass, Pulse, Rod, Rope
+from atwood_library.scenes import BouncingBall, CartPole, NewtonsCradle, RockingBlock, StickSlip, Woodpecker
+
+
+def slack_rope():
+    """A bob on a rope that goes slack at 0.487 s and comes taut with a jerk at 1.108 s."""
+    scene = Scene(t_end=2.0)
+    ground, rope = scene.add("ground", Ground()), scene.add("rope", Rope(length=1.0, when_slack="slack"))
+    bob = scene.add("bob", PointMass(mass=1.0))
+    scene.connect(ground.frame, rope.a)
+    scene.connect(rope.b, bob.point)
+    scene.guess["bob.position.z"] = -1.0
+    scene.start.update({"bob.position.x": 0.0, "bob.velocity.x": 5.2})
+    return scene
+
+
+def pushed():
+    """A pendulum that is pushed for a while again and again."""
+    scene = Scene()
+    ground, rod = scene.add("ground", Ground()), scene.add("rod", Rod(length=1.0))
+    bob, push = scene.add("bob", PointMass(mass=1.0)), scene.add("push", Force())
+    source = scene.add("source", Pulse(amplitude=3.0, start_time=0.2, period=0.7, width=0.4))
+    scene.connect(ground.frame, rod.a)
+    scene.connect(rod.b, bob.point)
+    scene.connect(push.point, bob.point)
+    scene.connect(source.output("value"), push.input("value"))
+    scene.start["rod.angle"] = 0.4
+    return scene
+
+
+class Wind(Component):
+    """Pushes beyond a place."""
+
+    point: Point = connector(Point, "Where it pushes.")
+    place = parameter(0.3, unit="m", doc="From where on it pushes.")
+    size = parameter(2.0, unit="N", doc="How much.")
+
+    @force
+    def push(self):
+        yield Load(self.point, (select(self.point.position.x > self.place, self.size, 0.0), 0.0, 0.0))
+
+
+def in_wind():
+    scene = Scene()
+    bob, wind = scene.add("bob", PointMass(mass=1.0)), scene.add("wind", Wind())
+    scene.connect(bob.point, wind.point)
+    scene.start.update({"bob.position.x": 0.0, "bob.velocity.x": 0.5, "bob.position.z": 0.0})
+    return scene
+
+
+CASES = [
+    (BouncingBall, "ball.position.z", "height", None, False, 0.8),
+    (StickSlip, "body.position.x", "belt_speed", None, False, 3.0),
+    (RockingBlock, "block.angle", "tilt", None, False, 1.0),
+    (CartPole, "rail.displacement", "lean", None, False, 0.3),
+    (NewtonsCradle, "rod5.angle", "ball5.mass", "ball5.mass", False, 0.8),
+    (Woodpecker, "sleeve.position.z", "hinge.angular_velocity", -10.5, True, 0.15),
+    (slack_rope, "bob.position.x", "rope.length", 1.0, False, 1.5),
+    (slack_rope, "bob.position.z", "bob.velocity.x", 5.2, True, 1.5),
+    (pushed, "bob.position.x", "source.start_time", 0.2, False, 1.0),
+    (pushed, "bob.position.x", "source.width", 0.4, False, 1.0),
+    (in_wind, "bob.position.x", "wind.place", 0.3, False, 1.0),
+]
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+@pytest.mark.parametrize(("make", "quantity", "path", "value", "is_start", "t_end"), CASES)
+def test_meets_differences(make, quantity, path, value, is_start, t_end, form):
+    scene = make()
+    if not isinstance(value, float):
+        owner, _, name = path.rpartition(".")
+        value = (scene[owner] if owner else scene)._value(name)
+    given = {"start" if is_start else "parameters": [path]}
+    outputs = [0.5 * t_end, t_end]
+    found = sensitivities(scene, [quantity], **given, t_end=t_end, outputs=outputs, form=form, rtol=1e-11)
+    assembly = assemble(scene, form=form)
+
+    def at(change):
+        values = {path: value + change}
+        other = assembly.with_values({}, start=values) if is_start else assembly.with_values(values)
+        return simulate(other, t_end=t_end, outputs=outputs, rtol=1e-13)[quantity]
+
+    h = 2e-4
+    slopes = [(at(one) - at(-one)) / (2.0 * one) for one in (h, h / 2.0)]
+    near = (4.0 * slopes[1] - slopes[0]) / 3.0
+    assert found[quantity, path] == pytest.approx(near, abs=1e-7 * max(1.0, np.max(np.abs(near))))
+
+
+def test_of_a_bounce():
+    """From a height h down in sqrt(2 h / g), then up again with a share e of the speed."""
+    scene = BouncingBall()
+    found = sensitivities(scene, ["ball.velocity.z"], parameters=["height"], t_end=0.8, outputs=[0.8])
+    impacts = [one for one in found.result.events if one.kind == "impact"]
+    assert len(impacts) == 1
+    gravity, time = found.result.assembly.flat.gravity, impacts[0].time
+    restitution = -impacts[0].struck.after / impacts[0].struck.before
+    by_height = 1.0 / (gravity * time)  # of the time of the impact
+    assert found["ball.velocity.z", "height"][-1] == pytest.approx((1.0 + restitution) * gravity * by_height, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("make", "given", "t_end", "said"),
+    [
+        (BouncingBall, {"parameters": ["height"]}, 20.0, "impacts have accumulated"),
+        (NewtonsCradle, {"start": ["rod5.angular_velocity"]}, 1.0, "touch4: at t = 0 s it touches"),
+    ],
+)
+def test_where_there_are_none(make, given, t_end, said):
+    with pytest.raises(SolveError, match=said):
+        sensitivities(make(), **given, t_end=t_end)
