@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -183,16 +184,29 @@ class Samples:
 def sample_times(t: float, options: RunOptions) -> Samples:
     """Return all samples, the start among them."""
     if isinstance(options.outputs, (int, np.integer)):
-        asked = np.linspace(t, options.t_end, int(options.outputs))
-    else:
-        asked = options.outputs
-        if asked[0] < t or asked[-1] > options.t_end:
-            raise UsageError(
-                f"outputs go from {asked[0]:g} to {asked[-1]:g} s",
-                advice=f"Give times between {t:g} and {options.t_end:g}.",
-            )
-    filling = np.linspace(t, options.t_end, options.samples + 1)
-    near = 1e-9 * (options.t_end - t)
+        return _even_samples(t, options.t_end, int(options.outputs), options.samples)
+    asked = options.outputs
+    if asked[0] < t or asked[-1] > options.t_end:
+        raise UsageError(
+            f"outputs go from {asked[0]:g} to {asked[-1]:g} s",
+            advice=f"Give times between {t:g} and {options.t_end:g}.",
+        )
+    return _filled(t, options.t_end, asked, options.samples)
+
+
+@lru_cache(maxsize=4)
+def _even_samples(t: float, t_end: float, outputs: int, samples: int) -> Samples:
+    """Return samples with evenly spread outputs; a run again has the same."""
+    found = _filled(t, t_end, np.linspace(t, t_end, outputs), samples)
+    for values in (found.times, found.shown, found.between):
+        values.flags.writeable = False
+    return found
+
+
+def _filled(t: float, t_end: float, asked: FloatArray, samples: int) -> Samples:
+    """Return outputs that were asked for, with samples between them."""
+    filling = np.linspace(t, t_end, samples + 1)
+    near = 1e-9 * (t_end - t)
     next_asked = np.minimum(np.searchsorted(asked, filling), len(asked) - 1)
     distance = np.minimum(np.abs(asked[next_asked] - filling), np.abs(asked[np.maximum(next_asked - 1, 0)] - filling))
     filling = filling[distance > near]

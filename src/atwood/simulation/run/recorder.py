@@ -30,8 +30,8 @@ _LAST = 32
 """The same where time may be short."""
 
 
-_Waiting: TypeAlias = Sequence[tuple[float, FloatArray, bool]]
-"""States of the solver, and whether they are outputs."""
+_States: TypeAlias = tuple[FloatArray, FloatArray, NDArray[np.bool_]]
+"""Times, states of the solver, one row each, and whether they are outputs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,36 +117,39 @@ class Recorder:
         self._changes: list[Change] = []
         self.loss_until: Callable[[FloatArray], FloatArray] | None = None
         # What is done, and states that wait: changed together, so that an interruption loses and repeats nothing.
-        self._samples: tuple[tuple[_Block, ...], list[tuple[float, FloatArray, bool]]] = ((), [])
+        self._samples: tuple[tuple[_Block, ...], list[_States]] = ((), [])
 
     @property
     def end(self) -> float:
         """Time of the last sample; minus infinity if there is none."""
         blocks, pending = self._samples
         if pending:
-            return pending[-1][0]
+            return float(pending[-1][0][-1])
         return float(blocks[-1].time[-1]) if blocks else -np.inf
 
     def take(self, t: float, y: FloatArray, shown: bool) -> None:
         """Record a state of the solver; one at the time of the last takes its place, as after an event."""
         blocks, pending = self._samples
+        one = np.array([t]), np.array(y)[None], np.array([shown])
         if t == self.end:
             if pending:
-                pending[-1] = (t, y, shown)
+                rest = _cut(pending[-1], stop=-1)
+                pending[-1:] = [rest, one] if len(rest[0]) else [one]
                 return
             last = blocks[-1].without_last()
             blocks = (*blocks[:-1], last) if len(last.time) else blocks[:-1]
-            self._samples = (blocks, [(t, y, shown)])
+            self._samples = (blocks, [one])
             return
-        pending.append((t, y, shown))
+        pending.append(one)
         if len(pending) >= _PENDING:
             self.settle()
 
     def take_all(self, t: Sequence[float], y: FloatArray, shown: Sequence[bool]) -> None:
         """Record states of the solver after the last sample, one row each, to be projected with those that wait."""
         pending = self._samples[1]
-        pending.extend(zip(t, y, shown, strict=True))
-        if len(pending) >= _PENDING:
+        if len(t):
+            pending.append((np.array(t), y, np.array(shown, dtype=bool)))
+        if _count(pending) >= _PENDING:
             self.settle()
 
     def take_many(
@@ -172,15 +175,12 @@ class Recorder:
             )  # an output at a jump is that after it
             t, y, shown = t[once], y[once], shown[once]
             self._jumps += times[::2].tolist()
-        if self.plan.balance.constraints and len(pending) + len(t) < _PENDING:  # projected with what follows
-            pending.extend(zip(t.tolist(), y, shown.tolist(), strict=True))
+        if not len(t):
             return
-        if len(t) and pending:
-            t = np.concatenate([[one[0] for one in pending], t])
-            y = np.concatenate([[one[1] for one in pending], y])
-            shown = np.concatenate([[one[2] for one in pending], shown])
-        if len(t):
-            self._finish(t, y, shown)
+        if self.plan.balance.constraints and _count(pending) + len(t) < _PENDING:  # projected with what follows
+            pending.append((t, y, shown))
+            return
+        self._finish(*_joined([*pending, (t, y, shown)]))
 
     def take_changes(self, changes: Sequence[Change]) -> None:
         """Record states of contacts from some moments on."""
@@ -225,20 +225,20 @@ class Recorder:
         """Forget all samples after a time."""
         blocks, pending = self._samples
         kept = (one.first(int(np.searchsorted(one.time, t, side="right"))) for one in blocks)
-        self._samples = (tuple(one for one in kept if len(one.time)), [one for one in pending if one[0] <= t])
+        waiting = (_cut(one, stop=int(np.searchsorted(one[0], t, side="right"))) for one in pending)
+        self._samples = (tuple(one for one in kept if len(one.time)), [one for one in waiting if len(one[0])])
 
     def settle(self) -> None:
         """Project all that waits."""
-        self._settle(len(self._samples[1]))
+        self._settle(None)
 
-    def _settle(self, count: int) -> None:
-        """Project the first of what waits."""
+    def _settle(self, count: int | None) -> None:
+        """Project so many of what waits, the first; all if that is None."""
         pending = self._samples[1]
-        if not pending:
-            return
-        t = np.array([one[0] for one in pending[:count]])
-        y = np.array([one[1] for one in pending[:count]])
-        self._finish(t, y, np.array([one[2] for one in pending[:count]]), pending[count:])
+        if pending:
+            waiting = _joined(pending)
+            rest = _cut(waiting, count) if count is not None and count < len(waiting[0]) else None
+            self._finish(*_cut(waiting, stop=count), [] if rest is None else [rest])
 
     def last(self) -> tuple[float, FloatArray, FloatArray, FloatArray]:
         """Return time, coordinates and speeds of the last sample, and by how much the constraints were missed."""
@@ -292,7 +292,7 @@ class Recorder:
             for (first, last), change in zip(pairwise(ends), changes, strict=True)
         ]
 
-    def _finish(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_], waiting: _Waiting = ()) -> None:
+    def _finish(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_], waiting: Sequence[_States] = ()) -> None:
         q, u = (part.copy() for part in self.plan.program.split(y.T))
         q = self.plan.balance.kinematic_map.normalized(q)
         if not self.plan.balance.constraints:
@@ -311,6 +311,23 @@ class Recorder:
                 raise
         self._add(block, waiting)
 
-    def _add(self, block: _Block, waiting: _Waiting = ()) -> None:
+    def _add(self, block: _Block, waiting: Sequence[_States] = ()) -> None:
         blocks = self._samples[0]
         self._samples = ((*blocks, block) if len(block.time) else blocks, list(waiting))
+
+
+def _count(pending: Sequence[_States]) -> int:
+    """Return how many states wait."""
+    return sum(len(one[0]) for one in pending)
+
+
+def _joined(pending: Sequence[_States]) -> _States:
+    """Return states in one piece."""
+    t, y, shown = (np.concatenate(each) for each in zip(*pending, strict=True))
+    return t, y, shown
+
+
+def _cut(one: _States, start: int | None = None, stop: int | None = None) -> _States:
+    """Return some of the states, in their order."""
+    t, y, shown = one
+    return t[start:stop], y[start:stop], shown[start:stop]
