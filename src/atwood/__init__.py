@@ -86,6 +86,7 @@ if TYPE_CHECKING:
         check as check,
     )
     from atwood.exchange.c.export import export_c as export_c
+    from atwood.exchange.environments.environment import Environment as Environment
     from atwood.exchange.fmi.export import (
         ExportedFMU as ExportedFMU,
         export_fmu as export_fmu,
@@ -312,6 +313,7 @@ _ROOMS = {
     "atwood.reporting": ("MechanismReport", "report"),
     "atwood.result.files": ("SavedResult", "load_result", "save_result"),
     "atwood.result.result": ("Result",),
+    "atwood.exchange.environments.environment": ("Environment",),
     "atwood.study": ("Comparison", "ComparisonRow", "SobolIndices", "Sweep", "compare", "load_sweep", "sweep"),
     "atwood.study.sensitivities.fit": ("Fit", "fit"),
     "atwood.study.sensitivities.sensitivities": ("Sensitivities", "sensitivities"),
