@@ -176,7 +176,7 @@ def _jump() -> Routine:
     with r.count(size) as j:
         y[j] = search.y[j] - m.late * search.yp[j]
     r.copy(m.before, y, size)
-    sets.ahead = m.ahead
+    sets.ahead, sets.rough = m.ahead, m.rough
     with r.when(r.call("resolve", m.sets, m.now, r.value(0, INTEGER), r.value(1, INTEGER)) != 0):
         _back(r, m, search)
     some = r.variable(False, BOOLEAN)

@@ -30,7 +30,7 @@ _PROGRAMS = tuple(f"{name}_{what}" for name in ("kernel", "nearer", "event") for
 JUMP: dict[str, Kind] = {
     **dict.fromkeys(("sets", "table", "shift", "margins", "seen", "states", "near", "before", "values"), ADDRESS),
     **dict.fromkeys(("places", "log", "project", "project_data", "scratch", "event_scratch", *_PROGRAMS), ADDRESS),
-    **dict.fromkeys(("now", "late", "began", "shortest", "ahead", "time"), NUMBER),
+    **dict.fromkeys(("now", "late", "began", "shortest", "ahead", "rough", "time"), NUMBER),
     **dict.fromkeys(("events", "size", "stride", "logged", "capacity", "stays"), INTEGER),
 }
 """The memory of changes. `late` is how much after `now` an event was seen, `began` when the set did, `shortest` how
@@ -202,7 +202,7 @@ class SetJumps(Jumps):
         Scales are what is small, how long a set lasts at least, how long impacts may go on that are summed, and the
         time of the scene.
         """
-        near, shortest, ahead, time = scales
+        near, shortest, ahead, rough, time = scales
         self._pieces["values"][:] = parameter_values
         self._pieces["derived"][:] = self.set_code.built.derive("contacts", self.set_code.program, parameter_values)[0]
         units = self._pieces["units"].reshape(self._units.shape)
@@ -213,7 +213,7 @@ class SetJumps(Jumps):
         known = list(past)[-PAST:]
         self._pieces["past"][: 2 * len(known)] = np.ravel(known)
         self._put("sets", {"known": len(known)})
-        self._put("own", {"logged": 0, "shortest": shortest, "ahead": ahead, "time": time})
+        self._put("own", {"logged": 0, "shortest": shortest, "ahead": ahead, "rough": rough, "time": time})
         self._told = 0
 
     def begin(self, t: float) -> None:

@@ -31,13 +31,14 @@ from atwood.numerics.contact_sets import CLEAR, GOES_ON, OPEN, SLACK, STICKS, ST
 FIELDS: dict[str, Kind] = {
     **dict.fromkeys(("derived", "scratch", "y", "out", "units", "rows", "matrix", "left"), ADDRESS),
     **dict.fromkeys(("shares", "pattern", "past", "log"), ADDRESS),
-    **dict.fromkeys(("finite", "blur", "pace", "tolerance", "inside", "ahead", "better_x", "better_y"), NUMBER),
+    **dict.fromkeys(("finite", "blur", "pace", "tolerance", "inside", "ahead", "rough", "better_x", "better_y"), NUMBER),
     **dict.fromkeys(("count", "size", "entries", "coordinates", "speeds", "number", "better"), INTEGER),
     **dict.fromkeys(("logged", "known", "stops", "repeats", "shared"), INTEGER),
 }
 """The memory of sets. `finite` is 0 where limits are of impulses, which finite forces do not have; `blur` and `pace`
 are multiples of what is small and slow; `inside` is how deep a gap may be, in multiples of what is small; `ahead` is
-how long impacts may still go on that are summed, and then how long they do; `shared` is 1 where forces of a set that
+how long impacts may still go on that are summed, and then how long they do, `rough` how long where rounding tells the
+length of their intervals; `shared` is 1 where forces of a set that
 was found are not determined, as rows repeat each other, and `repeats` where those solved for last are not."""
 
 UNITS = {
@@ -93,6 +94,12 @@ SPANS = 4, 12
 
 EVEN = 4.0
 """Intervals of a series shrink by factors that differ by no more than this from their mean."""
+
+STEADY, LATER = 1.5, 0.001
+"""Where factors differ by more than the first from their mean, a series is summed later: at this share of its rest."""
+
+FLATTENS = 0.9
+"""Where the newest interval shrinks by less than this share of what all do on average, rounding tells its length."""
 
 ALIKE = 100.0
 """Gaps that come to rest together part at speeds that differ by no larger factor."""
@@ -896,10 +903,12 @@ def _series() -> Routine:
     cube, typical = spans[0] / spans[SPANS[0] - 1], r.variable(0.5)
     with r.count(60):  # the cube root: the mean factor of three intervals
         typical.now = typical.now - (typical.now - cube / (typical.now * typical.now)) * (1.0 / 3.0)
-    even = r.variable(1, INTEGER)
+    even, steady = r.variable(1, INTEGER), r.variable(True, BOOLEAN)
     with r.count(count.now, 1) as k, r.when(even.now == k):
         factor = spans[k - 1] / spans[k] / typical.now
-        even.now = r.choose((factor <= EVEN) & (factor * EVEN >= 1.0), k + 1, even.now)
+        is_even = (factor <= EVEN) & (factor * EVEN >= 1.0)
+        steady.now = steady.now & (~is_even | ((factor <= STEADY) & (factor * STEADY >= 1.0)))
+        even.now = r.choose(is_even, k + 1, even.now)
     with r.when(even.now < SPANS[0]):
         r.give()
     oldest, share = spans[even.now - 1], r.variable(typical.now)
@@ -910,7 +919,9 @@ def _series() -> Routine:
             power.now = power.now * share.now
         share.now = share.now - (share.now - ratio / power.now) / (even.now - 1).number()
     left = spans[0] * share.now / (1.0 - share.now)
-    with r.when(left < m.ahead):
+    flattens = 1.0 - spans[0] / spans[1] < FLATTENS * (1.0 - share.now)
+    longest = r.choose(steady.now, r.choose(flattens, m.rough, m.ahead), LATER * m.ahead)
+    with r.when(left < longest):
         m.ahead, m.stops, m.blur, m.pace = left, 1, NEAR_REST, NEAR_REST
     r.give()
     return r

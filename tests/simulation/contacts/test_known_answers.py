@@ -485,3 +485,38 @@ def test_stops_that_mean_nothing_are_refused(settings: dict[str, float], what: s
     scene.add("pivot", Pivot(**settings))
     with pytest.raises(aw.ParameterError, match=what):
         aw.assemble(scene)
+
+
+def block_on_floor(height: float) -> Scene:
+    """Return Housner's block on a floor somewhere, on its corner."""
+    scene = Scene()
+    ground, m = scene.add("ground", Ground(position=(0.0, 0.0, height))), scene.add("m", Box(length_x=0.5, length_z=2.0))
+    contact = scene.add("c", BoxContact(length=0.5, height=2.0, friction=10.0))
+    scene.connect(ground.frame, contact.plane)
+    scene.connect(m.frame, contact.box)
+    scene.start.update({"m.angle": 0.15, "m.angular_velocity.y": 0.0, "c.corner[0].gap": 0.0, "c.corner[0].slip": 0.0})
+    return scene
+
+
+@pytest.mark.parametrize(("height", "rtol", "off"), [(0.0, 1e-13, 1e-6), (1e4, 1e-10, 1e-5)])
+def test_impacts_come_to_an_end_where_rounding_tells_in_their_intervals(height: float, rtol: float, off: float) -> None:
+    """A block hops by 1e-14 m at last; rounding would have it go on for ever."""
+    result = simulate(block_on_floor(height), t_end=9.0, rtol=rtol, outputs=[0.0, 9.0])
+    assert times(result, "rests") == [pytest.approx(8.6907773166, abs=off)]
+
+
+def test_impacts_at_two_ends_in_turn_are_no_series_of_one() -> None:
+    """A plank lands a little askew: its ends bounce in turn, by uneven intervals, and come to rest one after the other."""
+
+    def rests(rtol: float) -> list[float]:
+        scene = Scene()
+        ground, m = scene.add("ground", Ground()), scene.add("m", Box(mass=1.0, length_x=2.0, length_z=0.1))
+        contact = scene.add("c", BoxContact(length=2.0, height=0.1, restitution=0.3))
+        scene.connect(ground.frame, contact.plane)
+        scene.connect(m.frame, contact.box)
+        scene.start["m.angle"] = 0.23
+        start_at(scene, 0.0, 0.6, 0.0, 0.0)
+        scene.start["m.angular_velocity.y"] = 0.0
+        return times(simulate(scene, t_end=0.6, rtol=rtol, outputs=[0.0, 0.6]), "rests")
+
+    assert rests(1e-7) == pytest.approx(rests(1e-11), abs=1e-4)

@@ -16,7 +16,7 @@ from atwood.integrators.jumps import Jump, Jumps
 from atwood.mechanics.dynamics.equations import ContactRow
 from atwood.mechanics.outputs.event_functions import CLOSES
 from atwood.model.values.units import ALONG
-from atwood.simulation.contacts.changes import LEFT, NEAR, told_impact
+from atwood.simulation.contacts.changes import NEAR, longest_left, told_impact
 from atwood.simulation.events.modes import EventProbe, EventRecord
 from atwood.simulation.problem.explicit_scene import impact_code, values_on_constraints
 from atwood.simulation.problem.problem import SceneProblem
@@ -64,7 +64,7 @@ def fill_bounces(
     parts = {part: i for i, part in enumerate(dict.fromkeys(one.row.key[0] for one in gaps))}
     past = [(time, parts[part]) for time, part in impacts if part in parts]
     table = np.array([rows, sizes, sizes / scales.time])
-    left = LEFT * relative**0.5 * scales.time
+    left = max(longest_left(relative, scales))
     jumps.fill(values_on_constraints(plan), table, [parts[one.row.key[0]] for one in gaps], left, past)
 
 

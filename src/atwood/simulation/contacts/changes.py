@@ -15,7 +15,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError, StartError
 from atwood.forms.assembly import Assembly
-from atwood.integrators.set_routines import ALIKE, BEGINS, EVEN, GAIN, NEAR_REST, SEEN, SPANS
+from atwood.integrators.set_routines import ALIKE, BEGINS, EVEN, FLATTENS, GAIN, LATER, NEAR_REST, SEEN, SPANS, STEADY
 from atwood.lazy_dataclasses import dataclass, made_of, replace
 from atwood.mechanics.dynamics.equations import ContactRow
 from atwood.mechanics.outputs.event_functions import CLOSES, OPENS, RESTS, STOPS, YIELDS
@@ -49,8 +49,11 @@ NEAR = 10.0
 LEFT = 10.0
 """Times the root of the tolerance, in units of the scene's time: so long may impacts still go on that are summed.
 
-What still rises in one interval rises by some tolerances, and rounding does not tell in its intervals yet.
+What still rises in one interval rises by some tolerances, and rounding mostly does not tell in its intervals yet.
 """
+
+ROUGH = 0.01
+"""In units of the scene's time: so long may impacts still go on that are summed where rounding tells in them."""
 
 MOST_TURNS = 50
 """Limits that are curved in the forces are met in so many turns at most."""
@@ -172,11 +175,12 @@ class _Moment:
             advice="With impacts='together' they are solved at once.",
         )
 
-    def left_of(self, impacts: Sequence[tuple[float, str]], unit: float) -> float | None:
+    def left_of(self, impacts: Sequence[tuple[float, str]], longest: tuple[float, float]) -> float | None:
         """Return in how long impacts that follow each other ever faster have come to an end; None if they do not.
 
         Intervals that shrink by a factor r are a geometric series: what is left of it is the last one times r/(1 - r).
-        It counts what moves together with the gap that closes now.
+        It counts what moves together with the gap that closes now. Where rounding tells, as far from the origin or at
+        the tightest tolerances, r grows to 1, and nothing is gained by going on (see `longest_left`).
         """
         closing = [k for k, one in enumerate(self.first) if self.trigger(k) == CLOSES and not one.is_speed]
         if not closing or len(impacts) < SPANS[0]:
@@ -204,7 +208,9 @@ class _Moment:
             return None
         share = float(np.exp(np.mean(np.log(ratios[:count]))))
         left: float = spans[0] * share / (1.0 - share)
-        if not left < LEFT * unit:
+        is_steady = np.all(np.abs(np.log(ratios[:count] / typical)) <= math.log(STEADY))
+        flattens = 1.0 - ratios[0] < FLATTENS * (1.0 - share)
+        if not left < (longest[1 if flattens else 0] if is_steady else LATER * longest[0]):
             return None
         self.small, self.slow = NEAR_REST * self.small, NEAR_REST * self.slow
         return left
@@ -508,6 +514,12 @@ def check_start(assembly: Assembly, state: tuple[float, FloatArray, FloatArray],
     _Moment(ContactValues(assembly, *state, length), scales, 0.1 * tolerances.CLOSED, ()).check_start()
 
 
+def longest_left(relative: float, scales: Scales) -> tuple[float, float]:
+    """Return how long impacts may still go on that are summed, s: as a rule, and where rounding tells in them."""
+    usual = LEFT * relative**0.5 * scales.time
+    return usual, max(usual, ROUGH * scales.time)
+
+
 def told_rest(t: float, key: tuple[str, str], left: float) -> EventRecord:
     """Return the event of a gap whose impacts have accumulated, which have come to an end some time later."""
     return EventRecord(t + left, *key, "impacts have accumulated: it rests", "", True, "rests")
@@ -663,7 +675,7 @@ def resolve(
     t, q, u = state
     moment = _Moment(ContactValues(assembly, t, q, u, length), scales, relative, triggers)
     before = moment.values.u
-    left = moment.left_of(impacts, relative**0.5 * scales.time)
+    left = moment.left_of(impacts, longest_left(relative, scales))
     if is_start:
         moment.check_start()
     touching = moment.all_closed()

@@ -23,7 +23,7 @@ from atwood.mechanics.dynamics.equations import ContactRow
 from atwood.mechanics.outputs.event_functions import CLOSES, CONTACT, OPENS, RESTS, STOPS, YIELDS
 from atwood.model.values.units import ALONG
 from atwood.numerics.contact_sets import STICKS, State
-from atwood.simulation.contacts.changes import LEFT, NEAR, states_of, told_change, told_impact, told_rest
+from atwood.simulation.contacts.changes import NEAR, longest_left, states_of, told_change, told_impact, told_rest
 from atwood.simulation.contacts.values import Layout, layout_of
 from atwood.simulation.events.modes import MARGIN, EventProbe, EventRecord
 from atwood.simulation.problem.explicit_scene import light_speeds, program_on_constraints, values_on_constraints
@@ -191,8 +191,8 @@ def fill_sets(
     ).T
     parts = _parts(layout)
     past = [(time, parts[part]) for time, part in impacts if part in parts]
-    near, ahead = NEAR * max(relative, 1e-13), LEFT * relative**0.5 * scales.time
-    jumps.give(values_on_constraints(plan), states, table, (near, shortest, ahead, scales.time), past)
+    near, left = NEAR * max(relative, 1e-13), longest_left(relative, scales)
+    jumps.give(values_on_constraints(plan), states, table, (near, shortest, *left, scales.time), past)
 
 
 def told_sets(jumps: Sequence[SetJump], assembly: Assembly) -> list[Change]:
