@@ -506,7 +506,7 @@ def test_impacts_come_to_an_end_where_rounding_tells_in_their_intervals(height: 
 
 
 def test_impacts_at_two_ends_in_turn_are_no_series_of_one() -> None:
-    """A plank lands a little askew: its ends bounce in turn, by uneven intervals, and come to rest one after the other."""
+    """A plank lands askew: its ends bounce in turn, by uneven intervals, and come to rest one after the other."""
 
     def rests(rtol: float) -> list[float]:
         scene = Scene()
