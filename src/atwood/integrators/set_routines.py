@@ -31,7 +31,8 @@ from atwood.numerics.contact_sets import CLEAR, GOES_ON, OPEN, SLACK, STICKS, ST
 FIELDS: dict[str, Kind] = {
     **dict.fromkeys(("derived", "scratch", "y", "out", "units", "rows", "matrix", "left"), ADDRESS),
     **dict.fromkeys(("shares", "pattern", "past", "log"), ADDRESS),
-    **dict.fromkeys(("finite", "blur", "pace", "tolerance", "inside", "ahead", "rough", "better_x", "better_y"), NUMBER),
+    **dict.fromkeys(("finite", "blur", "pace", "tolerance", "inside", "ahead", "rough"), NUMBER),
+    **dict.fromkeys(("better_x", "better_y"), NUMBER),
     **dict.fromkeys(("count", "size", "entries", "coordinates", "speeds", "number", "better"), INTEGER),
     **dict.fromkeys(("logged", "known", "stops", "repeats", "shared"), INTEGER),
 }

@@ -490,7 +490,8 @@ def test_stops_that_mean_nothing_are_refused(settings: dict[str, float], what: s
 def block_on_floor(height: float) -> Scene:
     """Return Housner's block on a floor somewhere, on its corner."""
     scene = Scene()
-    ground, m = scene.add("ground", Ground(position=(0.0, 0.0, height))), scene.add("m", Box(length_x=0.5, length_z=2.0))
+    ground = scene.add("ground", Ground(position=(0.0, 0.0, height)))
+    m = scene.add("m", Box(length_x=0.5, length_z=2.0))
     contact = scene.add("c", BoxContact(length=0.5, height=2.0, friction=10.0))
     scene.connect(ground.frame, contact.plane)
     scene.connect(m.frame, contact.box)
