@@ -194,13 +194,13 @@ class SetJumps(Jumps):
         parameter_values: FloatArray,
         states: FloatArray,
         table: FloatArray,
-        scales: tuple[float, float, float, float],
+        scales: tuple[float, float, float, float, float],
         past: Sequence[tuple[float, float]],
     ) -> None:
         """Begin again with other parameters, states of gaps and slips, and impacts that have been.
 
-        Scales are what is small, how long a set lasts at least, how long impacts may go on that are summed, and the
-        time of the scene.
+        Scales are what is small, how long a set lasts at least, how long impacts may go on that are summed, as a rule
+        and where rounding tells in them, and the time of the scene.
         """
         near, shortest, ahead, rough, time = scales
         self._pieces["values"][:] = parameter_values
