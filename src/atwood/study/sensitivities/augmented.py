@@ -37,7 +37,7 @@ _MOTION: Key[Programs] = Key("a motion with its derivatives")
 _LONGEST = 60_000
 """So many nodes of all columns together are written out; more columns are done in several runs."""
 
-_CLOSER = 0.1
+_CLOSER = 0.5
 """Tolerance of a motion with its derivatives, in that which was asked for."""
 
 

@@ -63,11 +63,11 @@ class Leg:
     plan, assembly
         The scene in it; the second with its laws as they are.
     probe
-        What was watched.
+        What was watched; None where nothing happens.
     begin, end
         The states at its ends.
     outcome
-        How it ended.
+        How it ended; None where nothing comes after it.
     number
         Of its record among the segments of the run.
     """
@@ -75,10 +75,10 @@ class Leg:
     changes: tuple[Change, ...]
     plan: SceneProblem
     assembly: Assembly
-    probe: EventProbe
+    probe: EventProbe | None
     begin: State
     end: State
-    outcome: Outcome
+    outcome: Outcome | None
     number: int
 
 

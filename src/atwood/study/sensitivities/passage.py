@@ -74,9 +74,13 @@ class Passage:
                 where=self.where,
                 advice="Ask with orientation='quaternion'.",
             )
-        walk, self.run = walked(run.assembly, run.start, run.options, WatchedWalk)
+        self.segments: tuple[SegmentRecord, ...] = run.segments
+        if len(run.segments) == 1 and not run.events and not run.assembly.discrete_states:
+            self.legs = [_only_leg(run.segments[0])]
+            return
+        walk, again = walked(run.assembly, run.start, run.options, WatchedWalk)
         assert isinstance(walk, WatchedWalk)
-        self.legs, self.segments = walk.legs, self.run.segments
+        self.legs, self.segments = walk.legs, again.segments
         shown = np.concatenate([one.time[one.shown] for one in self.segments])
         if len(shown) != len(result.time):
             raise SolveError("the run came out otherwise when it was made again", where=self.where)
@@ -251,6 +255,8 @@ class Passage:
 
     def _moments(self, leg: Leg, columns: FloatArray, seeds: FloatArray) -> FloatArray:
         """Return by how much the time at which a stretch ends changes with each column, s."""
+        assert leg.outcome is not None
+        assert leg.probe is not None
         event, t = leg.outcome.event, leg.end[0]
         if event is None:
             return np.array([self._moment_of_time(leg, column, t) for column in self.columns])
@@ -312,6 +318,14 @@ class Passage:
             return float(extrapolated(at)[0])
         except AtwoodError as error:
             raise UnsupportedError(f"its times do not follow it: {error.message}", where=column.path) from error
+
+
+def _only_leg(segment: SegmentRecord) -> Leg:
+    """Return a run in which nothing happens as one stretch."""
+    begin, end = (
+        (float(segment.time[k]), segment.coordinates[:, k].copy(), segment.speeds[:, k].copy()) for k in (0, -1)
+    )
+    return Leg((), segment.plan, segment.assembly, None, begin, end, None, 0)
 
 
 def _held_near(column: Column, share: float) -> FloatArray:
