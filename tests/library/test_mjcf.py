@@ -9,7 +9,8 @@ import pytest
 
 from atwood import AtwoodError, Scene, dynamics, simulate
 from atwood.cli.scenes import find_scene
-from atwood_library.robots import read_mjcf
+from atwood_library import Box, Ground, Pivot, PointMass, Slider, Spherical, Weld
+from atwood_library.robots import read_mjcf, write_mjcf
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*left out.*")
 
@@ -192,3 +193,73 @@ def test_what_is_wrong_is_said_with_file_and_line(case: str, tmp_path: Path) -> 
     body, around, said = BAD[case]
     with pytest.raises(AtwoodError, match=said):
         read_mjcf(model(tmp_path, body, around))
+
+
+def test_written_and_read_again(tmp_path: Path) -> None:
+    body = (
+        f'<body name="cart" pos="0 0 1"><joint name="x" type="slide" axis="1 0 0" armature="0.3"/>'
+        f'<joint name="turn" axis="0 1 1" pos="0.1 0.2 0.3" stiffness="3" springref="10" range="-20 90"/>{BALL}'
+        f'<body name="rod" pos="0 0 -1" euler="10 20 30"><joint name="swing" axis="0 1 0" pos="0 0 1"/>{BALL}'
+        f'<body name="tip" pos="0 1 0"><joint name="ball" type="ball" damping="0.1"/>{BALL}</body></body></body>'
+        f'<body name="fixed" pos="1 1 1">{BALL}</body>'
+        f'<body name="far" pos="3 2 1"><freejoint name="free"/>{BALL}</body>'
+    )
+    after = (
+        '<option gravity="1 2 -9"/><actuator><motor name="push" joint="x" gear="3"/></actuator>'
+        '<equality><joint name="tied" joint1="swing" joint2="turn" polycoef="0.1 2 0 0 0"/></equality>'
+    )
+    scene = read_mjcf(model(tmp_path, body, after), stops=0.1)
+    again = read_mjcf(write_mjcf(scene, tmp_path / "again.xml"), stops=0.1)
+    assert set(again.parts) == set(scene.parts)
+    assert again["push"].gain == 3.0
+    one, other = dynamics(read_mjcf(tmp_path / "model.xml")), dynamics(read_mjcf(tmp_path / "again.xml"))
+    generator = np.random.default_rng(1)
+    q, (u, a) = generator.normal(size=len(one.coordinates)), generator.normal(size=(2, len(one.speeds)))
+    places = [one.coordinates.index(path) for path in other.coordinates]
+    rows = [one.speeds.index(path) for path in other.speeds]
+    found, wanted = other.inverse_dynamics(q[places], u[rows], a[rows]), one.inverse_dynamics(q, u, a)[rows]
+    assert found == pytest.approx(wanted, rel=1e-12, abs=1e-12)
+    assert read_mjcf(tmp_path / "again.xml").guess["free.x"] == 3.0
+
+
+def test_scenes_of_ones_own_are_written(tmp_path: Path) -> None:
+    """A joint the other way round, a weld between two joints without a body, and a base that moves freely."""
+    scene = Scene(space="space")
+    hinge, weld = (
+        scene.add("hinge", Pivot(axis=(0.0, 1.0, 0.5))),
+        scene.add("weld", Weld(displacement=(0.1, 0.2, 0.3), angle=1.0)),
+    )
+    slide, low, high = (
+        scene.add("slide", Slider(axis=(0.0, 0.0, 1.0))),
+        scene.add("low", Box(mass=2.0)),
+        scene.add("high", Box(mass=3.0)),
+    )
+    ends = ((low.frame, hinge.b), (hinge.a, weld.a), (weld.b, slide.a), (slide.b, high.frame))
+    for pair in ends:
+        scene.connect(*pair)
+    ground = scene.add("ground", Ground())
+    hanging = scene.add("hanging", Spherical())
+    scene.connect(ground.frame, hanging.a)
+    scene.connect(hanging.b, low.frame)
+    again = read_mjcf(write_mjcf(scene, tmp_path / "own.xml"))
+    one, other = dynamics(scene), dynamics(again)
+    q, u = one.start()
+    q[[one.coordinates.index("hinge.angle"), one.coordinates.index("slide.displacement")]] = 0.4, 0.7
+    places = [one.coordinates.index(path) for path in other.coordinates]
+    rows = [one.speeds.index(path) for path in other.speeds]
+    assert other.mass_matrix(q[places]) == pytest.approx(one.mass_matrix(q)[np.ix_(rows, rows)], rel=1e-12, abs=1e-14)
+    assert other.bias(q[places], u) == pytest.approx(one.bias(q, u)[rows], rel=1e-12, abs=1e-12)
+
+
+def test_what_mjcf_has_not_is_refused_by_name(tmp_path: Path) -> None:
+    scene = read_mjcf(model(tmp_path, f'<body name="b"><joint name="j"/>{BALL}</body>'))
+    load = scene.add("load", PointMass(mass=1.0))
+    scene.connect(scene["b"].frame, load.point)
+    with pytest.raises(AtwoodError, match=r"no counterpart in MJCF: load \(PointMass\)"):
+        write_mjcf(scene, tmp_path / "own.xml")
+    scene = read_mjcf(tmp_path / "model.xml")
+    scene["j"].stop_stiffness = 3.0
+    scene["j"].upper_stop = 1.0
+    with pytest.raises(AtwoodError, match=r"j: MJCF"):
+        write_mjcf(scene, tmp_path / "own.xml")
+    assert not (tmp_path / "own.xml").exists()

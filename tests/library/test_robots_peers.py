@@ -9,20 +9,24 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from atwood import Dynamics, dynamics
-from atwood_library.robots import nearest_inertia, read_mjcf, read_urdf
+from atwood import Dynamics, Scene, dynamics
+from atwood_library.robots import nearest_inertia, read_mjcf, read_urdf, write_mjcf, write_urdf
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 
 
+def folder_of(package: str, module: str, inner: str) -> Path:
+    """Return a folder of a package; without it the tests are skipped."""
+    pytest.importorskip(module, reason=f"{module} is not installed")
+    try:
+        return Path(str(metadata.distribution(package).locate_file(inner)))
+    except metadata.PackageNotFoundError:
+        pytest.skip(f"{package} is not installed", allow_module_level=True)
+
+
 def robots() -> list[Path]:
     """Return the URDF files of example-robot-data; ur3.urdf is a macro without links."""
-    pytest.importorskip("pinocchio", reason="Pinocchio (pin) is not installed")
-    try:
-        data = metadata.distribution("example-robot-data")
-    except metadata.PackageNotFoundError:
-        pytest.skip("example-robot-data is not installed", allow_module_level=True)
-    found = sorted(Path(str(data.locate_file("cmeel.prefix/share"))).rglob("*.urdf"))
+    found = sorted(folder_of("example-robot-data", "pinocchio", "cmeel.prefix/share").rglob("*.urdf"))
     return [one for one in found if one.name != "ur3.urdf"]
 
 
@@ -164,12 +168,11 @@ def test_urdf_that_moves_freely_beside_pinocchio(name: str) -> None:
 
 def models() -> list[Path]:
     """Return the models of dm_control's suite and of gymnasium."""
-    found: list[Path] = []
-    for name in ("dm_control", "gymnasium"):
-        place = metadata.distribution(name).locate_file(name)
-        folder = Path(str(place)) / ("suite" if name == "dm_control" else "envs/mujoco/assets")
-        found += sorted(folder.glob("*.xml"))
-    return found
+    suite = folder_of("dm-control", "mujoco", "dm_control/suite")
+    return [*sorted(suite.glob("*.xml")), *sorted(folder_of("gymnasium", "mujoco", GYMNASIUM).glob("*.xml"))]
+
+
+GYMNASIUM = "gymnasium/envs/mujoco/assets"
 
 
 class BesideMujoco:
@@ -262,3 +265,30 @@ def test_mjcf_beside_mujoco(file: Path) -> None:
         errors, sizes = np.max([beside.errors(generator) for _ in range(20)], axis=0).T
         bound = np.array([1e-10, 1e-10, 1e-8 if file.stem == "dog" else 1e-10])  # its bones are meshes: M to 7e-12
         assert np.all(errors < bound * sizes)
+
+
+def differences(first: Scene, second: Scene) -> float:
+    """Return by how much mass matrix and inverse dynamics of two scenes with the same coordinates differ."""
+    one, other = dynamics(first), dynamics(second)
+    generator = np.random.default_rng(1)
+    q, (u, a) = generator.normal(size=len(one.coordinates)), generator.normal(size=(2, len(one.speeds)))
+    places = [one.coordinates.index(path) for path in other.coordinates]
+    rows = [one.speeds.index(path) for path in other.speeds]
+    pairs = (
+        (one.mass_matrix(q)[np.ix_(rows, rows)], other.mass_matrix(q[places])),
+        (one.inverse_dynamics(q, u, a)[rows], other.inverse_dynamics(q[places], u[rows], a[rows])),
+    )
+    return max(float(np.max(np.abs(x - y)) / np.max(np.abs(x))) for x, y in pairs)
+
+
+@pytest.mark.parametrize("file", [*robots(), *models()], ids=lambda file: f"{file.parent.name}-{file.stem}")
+@pytest.mark.sample(6)
+def test_written_and_read_again(file: Path, tmp_path: Path) -> None:
+    if file.suffix == ".urdf":
+        first = read_urdf(file, inertias="nearest", friction=False)
+        second = read_urdf(write_urdf(first, tmp_path / "again.urdf"))
+    else:
+        first = read_mjcf(file, friction=False)
+        second = read_mjcf(write_mjcf(first, tmp_path / "again.xml"))
+    if dynamics(first).speeds:
+        assert differences(first, second) < 1e-12

@@ -215,8 +215,11 @@ def _read_body(
         pose = (pose[0], pose[1] + pose[0] @ anchor) if count == 1 else (np.eye(3), anchor - shift)
         if joint.get("type") != "free":
             carrier = _placed(building, f"{label}_origin", carrier, pose)
-        elif len(joints) > 1:
-            raise UsageError(f"body {name!r} has a free joint and others", where=joint.place)
+        else:
+            if len(joints) > 1:
+                raise UsageError(f"body {name!r} has a free joint and others", where=joint.place)
+            starts = zip("xyz", map(float, local[1]), strict=True)
+            building.scene.guess.update({f"{part.path}.{letter}": value for letter, value in starts})
         building.scene.connect(carrier, part.a)
         carrier, shift, pose = part.b, anchor, (np.eye(3), -anchor)
         if isinstance(part, (Pivot, Slider)):

@@ -182,22 +182,33 @@ def _add_others(graph: Graph, root: Element, joints: dict[str, Element], names: 
         joint = joints[graph.at(name, "b")]
         dynamics = joint.find("dynamics")
         dynamics = SubElement(joint, "dynamics") if dynamics is None else dynamics
-        size = float(part.sliding(1.0))
-        if part.against != "ground" or size != float(part.sliding(2.0)) or part.peak != 1.0 or part.viscous:
-            raise UsageError("URDF knows friction of one size alone, about the joint", where=name)
-        dynamics.set("friction", written(size))
+        dynamics.set("friction", written(friction_of(part, "URDF")))
     for name, part in graph.of(*GEARS):
         _add_mimic(graph, joints, name, part)
     for name, part in graph.of(CoordinateLagrangian):
         _add_rotor(graph, root, name, part)
 
 
-def _add_mimic(graph: Graph, joints: dict[str, Element], name: str, part: Any) -> None:
-    follower, master = ("rack", "pinion") if type(part) is RackAndPinion else ("a", "b")
-    ratio, offset = float(part.radius if type(part) is RackAndPinion else part.ratio), float(part.offset)
+def friction_of(part: Any, language: str) -> float:
+    """Return the size of dry friction about a joint, or refuse what is more than a size."""
+    size = float(part.sliding(1.0))
+    if part.against != "ground" or size != float(part.sliding(2.0)) or part.peak != 1.0 or part.viscous:
+        raise UsageError(f"{language} knows friction of one size alone, about the joint", where=part.path)
+    return size
+
+
+def gear_of(graph: Graph, name: str, part: Any) -> tuple[str, str, float, float]:
+    """Return which joint follows which, with ratio and offset."""
+    is_rack = type(part) is RackAndPinion
+    follower, master = ("rack", "pinion") if is_rack else ("a", "b")
     if type(part) is Gear and part.support != "ground":
-        raise UsageError("URDF has no gear with a housing", where=name)
-    follows, followed = graph.at(name, follower), graph.at(name, master)
+        raise UsageError("robots' files have no gear with a housing", where=name)
+    ratio = float(part.radius if is_rack else part.ratio)
+    return graph.at(name, follower), graph.at(name, master), ratio, float(part.offset)
+
+
+def _add_mimic(graph: Graph, joints: dict[str, Element], name: str, part: Any) -> None:
+    follows, followed, ratio, offset = gear_of(graph, name, part)
     if joints[follows].find("mimic") is not None:  # the other way round
         follows, followed, ratio, offset = followed, follows, 1.0 / ratio, -offset / ratio
     if joints[follows].find("mimic") is not None:
@@ -206,12 +217,18 @@ def _add_mimic(graph: Graph, joints: dict[str, Element], name: str, part: Any) -
     SubElement(joints[follows], "mimic", given)
 
 
-def _add_rotor(graph: Graph, root: Element, name: str, part: Any) -> None:
+def armature_of(graph: Graph, name: str, part: Any) -> tuple[str, float]:
+    """Return the joint with whose coordinate a rotor turns, and its inertia."""
     inertia = 2.0 * _kinetic(part, 1.0)
     if part.shafts + part.slides != 1 or abs(_kinetic(part, 3.0) - 4.5 * inertia) > 1e-12 * inertia or inertia <= 0.0:
-        raise UsageError("URDF knows the inertia of a rotor alone, J rate^2/2", where=name)
+        raise UsageError("robots' files know the inertia of a rotor alone, J rate^2/2", where=name)
+    return graph.at(name, "shaft[0]" if part.shafts else "slide[0]"), inertia
+
+
+def _add_rotor(graph: Graph, root: Element, name: str, part: Any) -> None:
+    joint, inertia = armature_of(graph, name, part)
     transmission = SubElement(root, "transmission", name=name)
-    SubElement(transmission, "joint", name=graph.at(name, "shaft[0]" if part.shafts else "slide[0]"))
+    SubElement(transmission, "joint", name=joint)
     actuator = SubElement(transmission, "actuator", name=name)
     SubElement(actuator, "mechanicalReduction").text = "1.0"
     SubElement(actuator, "rotorInertia").text = written(inertia)
