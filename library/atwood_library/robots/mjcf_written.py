@@ -28,9 +28,9 @@ __all__ = ["write_mjcf"]
 def write_mjcf(scene: Scene, file: str | os.PathLike[str]) -> Path:
     """Write a scene of bodies and joints as an MJCF file, and return its path.
 
-    What `read_mjcf` gives is written so that it is read again with the same equations; joints without a body between them
-    are of one body. Meshes are left out, and so are start values but those of free joints. MuJoCo itself refuses bodies
-    that move and have no mass.
+    What `read_mjcf` gives is written so that it is read again with the same equations; joints without a body between
+    them are of one body. Meshes are left out, and so are start values but those of free joints. MuJoCo itself refuses
+    bodies that move and have no mass.
 
     Parameters
     ----------
