@@ -118,10 +118,16 @@ def assemble(
     return assemble_flat(flat, own, form=form, level=level, orientation=orientation)
 
 
-def _to_run(scene: Model, form: str = "reduced", level: str = "ggl", orientation: str = "quaternion") -> Assembly:
-    """Assemble a scene to be run; the equations of one that had the same structure are used again."""
+_USUAL = {"form": "reduced", "level": "ggl", "orientation": "quaternion"}
+
+
+def _to_run(scene: Model | Assembly, **given: str | None) -> Assembly:
+    """Return an assembly, or assemble a scene to be run; the equations of one of the same structure are used again."""
+    if isinstance(scene, Assembly):
+        return assembly_of(scene, **given)
     with stage("flatten"):
         flat, own = flatten(scene, None), scene.copy()
+    form, level, orientation = (given[key] or usual for key, usual in _USUAL.items())
     new = partial(assemble_flat, flat, own, form=form, level=level, orientation=orientation)
     made, before = assembled_again(new, flat, Source(find_places, own), form, level, orientation)
     if before is not None:
@@ -319,9 +325,7 @@ def simulate(
     refuse_idle_settings(solver, order, step, first_step)
     refuse_two_accuracies(accuracy, rtol, atol, step)
     with watching() as stopwatch:
-        asked = {"form": form, "level": level, "orientation": orientation}
-        given = {key: value for key, value in asked.items() if value is not None}
-        assembly = assembly_of(scene, **given) if isinstance(scene, Assembly) else _to_run(scene, **given)
+        assembly = _to_run(scene, form=form, level=level, orientation=orientation)
         end = assembly.flat.t_end if t_end is None else float(t_end)
         with told(progress, assembly.flat.name, partial(_share, assembly.flat.t_start, end)) as watch:
             options = RunOptions(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -125,13 +126,37 @@ class BySet(Spring):
         return 0.5 * max(STATES) * self.length() ** 2
 
 
-@pytest.mark.parametrize("kind", [ByName, ByTable, BySet])
+SETTINGS = ModuleType("settings")
+SETTINGS.rate = 10.0  # type: ignore[attr-defined]
+
+
+class ByModule(Spring):
+    """A spring whose law reads a number of another module."""
+
+    @potential
+    def elastic_energy(self) -> Scalar:
+        return 0.5 * SETTINGS.rate * self.length() ** 2
+
+
+class ByClass(Spring):
+    """A spring whose law reads a number of its class."""
+
+    rate = 10.0
+
+    @potential
+    def elastic_energy(self) -> Scalar:
+        return 0.5 * self.rate * self.length() ** 2
+
+
+@pytest.mark.parametrize("kind", [ByName, ByTable, BySet, ByModule, ByClass])
 def test_what_laws_read_by_name_may_change(kind: type[Spring], monkeypatch: pytest.MonkeyPatch) -> None:
     """As in a notebook, where a cell changes a number that a law has read."""
     before = alone(hanging(None, kind))
     monkeypatch.setitem(globals(), "RATE", 20.0)
     monkeypatch.setitem(TABLE, "rates", [20.0])
     monkeypatch.setitem(globals(), "STATES", {20.0})
+    monkeypatch.setattr(SETTINGS, "rate", 20.0)
+    monkeypatch.setattr(ByClass, "rate", 20.0)
     after = run(hanging(None, kind))
     assert after["mass.acceleration.x"][0] - before["mass.acceleration.x"][0] == pytest.approx(-10.0 * 0.5)
     assert after.assembly.shared is not before.assembly.shared

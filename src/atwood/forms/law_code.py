@@ -7,10 +7,22 @@ modules, in between, as one does in a notebook.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
+from types import (
+    BuiltinFunctionType,
+    CodeType,
+    FunctionType,
+    GetSetDescriptorType,
+    MemberDescriptorType,
+    ModuleType,
+)
 from typing import Any
 
 _PLAIN = (int, float, complex, str, bytes, type(None))
+
+_CONSTANT = {
+    "abc", "atwood", "builtins", "cmath", "collections", "functools", "itertools", "math", "numpy", "operator", "typing"
+}  # fmt: skip
+"""Modules whose names nobody binds anew; of any other, a law may read what changes."""
 
 
 def law_code(classes: Iterable[type]) -> list[Any] | None:
@@ -39,7 +51,7 @@ def law_code(classes: Iterable[type]) -> list[Any] | None:
             waiting += _read_by(one)
         elif isinstance(one, type):
             found.append(one)
-            waiting += [part for base in one.__mro__ if not _is_own(base) for part in _functions_of(base)]
+            waiting += [part for base in one.__mro__ if not _is_own(base) for part in _body_of(base)]
         elif isinstance(one, BuiltinFunctionType):
             found.append(one)
         else:
@@ -48,20 +60,24 @@ def law_code(classes: Iterable[type]) -> list[Any] | None:
 
 
 def _is_own(one: Any) -> bool:
-    """Return whether something belongs to Atwood itself, or is a module or a class of Python."""
+    """Return whether something stays as it is: what is of Python or of Atwood, but for plain values."""
     if isinstance(one, ModuleType):
-        return True
-    module = getattr(one, "__module__", None) if isinstance(one, (type, FunctionType)) else type(one).__module__
-    return str(module).split(".")[0] == "atwood" or (isinstance(one, type) and module in ("builtins", "typing", "abc"))
+        return one.__name__.split(".")[0] in _CONSTANT
+    if isinstance(one, (type, FunctionType)):
+        return str(one.__module__).split(".")[0] in _CONSTANT
+    return type(one).__module__.split(".")[0] == "atwood"
 
 
-def _functions_of(one: type) -> Iterator[FunctionType]:
-    """Yield the functions in the body of a class, those of its laws and properties too."""
+def _body_of(one: type) -> Iterator[Any]:
+    """Yield what stands in the body of a class: values, and the functions of methods, laws and properties."""
     for value in vars(one).values():
-        for part in (value, *getattr(value, "__dict__", {}).values(), *(getattr(value, "fget", None),)):
-            function = getattr(part, "__func__", part)
-            if isinstance(function, FunctionType):
-                yield function
+        if isinstance(value, (GetSetDescriptorType, MemberDescriptorType)):
+            continue
+        wrapped = (value, *getattr(value, "__dict__", {}).values(), getattr(value, "fget", None))
+        functions = [
+            part for part in (getattr(one, "__func__", one) for one in wrapped) if isinstance(part, FunctionType)
+        ]
+        yield from functions or [value]
 
 
 def _read_by(function: FunctionType) -> Iterator[Any]:
