@@ -137,6 +137,7 @@ if TYPE_CHECKING:
     from atwood_library.sensors.relative_position_sensor import RelativePositionSensor as RelativePositionSensor
     from atwood_library.sensors.totals_sensor import TotalsSensor as TotalsSensor
     from atwood_library.sources.minimum_jerk import MinimumJerk as MinimumJerk
+    from atwood_library.sources.noise import Noise as Noise
     from atwood_library.sources.point_to_point import PointToPoint as PointToPoint
     from atwood_library.sources.pulse import Pulse as Pulse
     from atwood_library.sources.quintic import Quintic as Quintic
@@ -195,6 +196,7 @@ _MODULES = {
     "MeshBody": "parts.mesh_body",
     "MinimumJerk": "sources.minimum_jerk",
     "MutualPotential": "fields.mutual_potential",
+    "Noise": "sources.noise",
     "OneWayClutch": "contacts.one_way_clutch",
     "OrientationSensor": "sensors.orientation_sensor",
     "PI": "blocks.pi",
