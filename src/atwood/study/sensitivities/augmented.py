@@ -202,7 +202,7 @@ class Augmented:
             raise SolveError(
                 f"the motion with its derivatives does not go on: {ended.message}",
                 where=plan.assembly.flat.name,
-                advice="Ask for a larger rtol or max_steps, or let the run end before.",
+                advice="Its steps are explicit, and many where it is stiff: ask for a larger rtol or max_steps.",
             )
         if programs.projection is not None:
             found = self._projected(programs.projection, values, times, found)

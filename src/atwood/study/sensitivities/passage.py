@@ -26,6 +26,9 @@ from atwood.study.sensitivities.quantities import derivatives, written
 _AGREES = 1e3
 """So many tolerances may lie between a motion with derivatives and the run; its own errors grow like the columns."""
 
+_MORE = 100
+"""Times the steps of the run: explicit steps that are so many more tell of a stiff motion."""
+
 _GRAZING = 1e-7
 """In the scene's sizes and times: what passes zero more slowly touches it."""
 
@@ -56,8 +59,11 @@ class Passage:
     def __init__(
         self, result: Result, columns: tuple[Column, ...], paths: tuple[str, ...], rtol: float, max_steps: int | None
     ) -> None:
-        self.columns, self.paths, self.rtol, self.max_steps = columns, paths, rtol, max_steps
+        self.columns, self.paths, self.rtol = columns, paths, rtol
+        self.max_steps: int | None = max_steps
         run = result.run
+        if max_steps is None:
+            self.max_steps = _MORE * (run.statistics.steps + 1000)
         self.where, self.first, self.end = run.assembly.flat.name, run.assembly, run.options.t_end
         rests = next((one for one in run.events if one.kind == "rests"), None)
         if rests is not None:

@@ -54,7 +54,6 @@ class Sensitivities(Shown):
     values: FloatArray
     derivatives: FloatArray
     units: dict[tuple[str, str], str]
-    scales: FloatArray = field(repr=False)
 
     def __getitem__(self, pair: tuple[str, str]) -> FloatArray:
         if len(pair) != 2:
@@ -136,7 +135,8 @@ def sensitivities(
     rtol
         Relative tolerance of the motion, and of each derivative.
     max_steps
-        Limit of steps.
+        Limit of the steps of each stretch; a hundred times those of the run when not given, since a stiff motion would
+        need very many.
 
     Returns
     -------
@@ -186,5 +186,4 @@ def derivatives_of(
         values=values,
         derivatives=found / scales[:, None],
         units={(path, one.path): unit_by(units[path], one.unit) for path in paths for one in columns},
-        scales=scales,
     )
