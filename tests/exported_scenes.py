@@ -3,7 +3,10 @@
 Each is compiled with all warnings as errors, and run for 2 s at 1e-11; what is compared are all its quantities, in
 units of what is largest of their kind along the motion.
 
-python -m tests.exported_scenes [NAME ...]
+With ``--fmu`` (and fmpy) their FMUs of both versions instead: what fmpy finds wrong with them, and their co-simulation
+at 1e-9 beside `simulate` at 1e-12, which at 1e-9 is as far as is said as its own.
+
+python -m tests.exported_scenes [--fmu] [NAME ...]
 """
 
 from __future__ import annotations
@@ -19,8 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from atwood import assemble, export_c, simulate
-from atwood.errors import AtwoodError
+from atwood import assemble, export_c, export_fmu, simulate
 from atwood_library.scenes import SCENES
 
 SPAN, RTOL, POINTS = 2.0, 1e-11, 9
@@ -78,29 +80,60 @@ def apart(found: dict[str, np.ndarray], result: Any, assembly: Any) -> tuple[flo
     return worst, where, f"{len(equal & states)} of {len(states)} states, {len(equal)} of {len(found) - 1} quantities"
 
 
+def of_units(name: str, span: float) -> str:
+    """Return what fmpy says of the FMUs of a scene, and how far their co-simulation is from `simulate`."""
+    import fmpy
+    from fmpy.validation import validate_fmu
+
+    said = []
+    outputs = np.linspace(0.0, span, POINTS)
+    asked = {"t_end": span, "outputs": outputs, "solver": "explicit"}
+    result, loose = (simulate(SCENES[name](), rtol=one, **asked) for one in (1e-12, 1e-9))
+    assembly = assemble(SCENES[name]())
+    for fmi in (2, 3):
+        with tempfile.TemporaryDirectory() as folder:
+            made = export_fmu(SCENES[name](), Path(folder) / "a.fmu", fmi=fmi)
+            problems = validate_fmu(str(made.file))
+            settings = {"stop_time": span, "output_interval": span / (POINTS - 1), "relative_tolerance": 1e-9}
+            rows = fmpy.simulate_fmu(str(made.file), fmi_type="CoSimulation", **settings)
+            assert len(rows) == POINTS
+            found = {one: rows[one] for one in rows.dtype.names if one in result.paths}
+            worst, where, _ = apart(found, result, assembly)
+            own, _, _ = apart({one: np.asarray(loose[one]) for one in found}, result, assembly)
+            far = "  FAR" if worst > max(1e-7, 10.0 * own) else ""
+            kinds = "both" if len(made.kinds) == 2 else "co-simulation"
+            said.append(f"FMI {fmi}: {len(problems)} problems, {kinds}, {worst:.1e} {where} (own {own:.1e}){far}")
+    return "; ".join(said)
+
+
+def of_c(name: str, form: str, span: float) -> str:
+    """Return how far the C of a scene is from `simulate`."""
+    scene = SCENES[name]()
+    with tempfile.TemporaryDirectory() as folder:
+        began = time.perf_counter()
+        program = built(scene, Path(folder), form)
+        took = time.perf_counter() - began
+        found = printed(program, span, RTOL, POINTS)
+        outputs = np.linspace(0.0, span, POINTS)
+        result = simulate(scene, rtol=RTOL, form=form, t_end=span, outputs=outputs, solver="explicit")
+        worst, where, equal = apart(found, result, assemble(scene, form=form))
+    far = "  FAR" if worst > 1e-9 else ""
+    return f"{worst:.1e} {where}, equal: {equal}, made in {took:.1f} s{far}"
+
+
 def main(names: list[str]) -> None:
     """Print the table."""
-    for name in names:
-        scene = SCENES[name]()
-        span = min(SPAN, getattr(scene, "t_end", SPAN))
-        for form in ("reduced", "dae"):
-            with tempfile.TemporaryDirectory() as folder:
-                try:
-                    began = time.perf_counter()
-                    program = built(scene, Path(folder), form)
-                    took = time.perf_counter() - began
-                    found = printed(program, span, RTOL, POINTS)
-                    outputs = np.linspace(0.0, span, POINTS)
-                    settings = {"form": form, "t_end": span, "outputs": outputs, "solver": "explicit"}
-                    assembly = assemble(scene, form=form)
-                    worst, where, equal = apart(found, simulate(scene, rtol=RTOL, **settings), assembly)
-                    far = "  FAR" if worst > 1e-9 else ""
-                    said = f"{worst:.1e} {where}, equal: {equal}, made in {took:.1f} s{far}"
-                except (AtwoodError, AssertionError) as error:
-                    said = f"{type(error).__name__}: {error}".splitlines()[0]
+    asks_units = "--fmu" in names
+    for name in [one for one in names if one != "--fmu"] or list(SCENES):
+        span = min(SPAN, getattr(SCENES[name](), "t_end", SPAN))
+        for form in ("reduced",) if asks_units else ("reduced", "dae"):
+            try:
+                said = of_units(name, span) if asks_units else of_c(name, form, span)
+            except Exception as error:  # of fmpy, too
+                said = f"{type(error).__name__}: {error}".splitlines()[0]
             print(f"{name:24} {form:8} {said}", flush=True)
 
 
 if __name__ == "__main__":
     warnings.simplefilter("ignore")
-    main(sys.argv[1:] or list(SCENES))
+    main(sys.argv[1:])

@@ -104,7 +104,7 @@ def test_wrong_paths_and_folders_are_refused(tmp_path: Path) -> None:
 
 def test_names_are_those_of_c() -> None:
     assert [c_name(one) for one in ("DoublePendulum", "double", "3 bodies", "ü/-", "a.b")] == [
-        *("double_pendulum", "model_double", "model_3_bodies", "model", "a_b")
+        *("double_pendulum", "double_model", "model_3_bodies", "model_model", "a_b")
     ]
     assert quoted('a"\\?ü') == '"a\\042\\134\\077\\303\\274"'
 

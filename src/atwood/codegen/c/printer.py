@@ -10,7 +10,7 @@ others are told by an option (``-ffp-contract=off``).  Integers wrap at 64 bits.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from atwood.codegen.routines import (
@@ -113,10 +113,18 @@ def reached(routines: Iterable[Routine], roots: Iterable[str]) -> list[Routine]:
     return [one for name, one in known.items() if name in found]
 
 
-def print_routines(routines: Sequence[Routine]) -> str:
-    """Return the declarations and the functions of some routines, and the tables that they read."""
+def print_routines(routines: Sequence[Routine], known: Mapping[str, Mapping[int, int]] | None = None) -> str:
+    """Return the declarations and the functions of some routines, and the tables that they read.
+
+    Parameters
+    ----------
+    routines
+        The routines.
+    known
+        By the name of a routine, what is known of the integers that its first argument leads to, by their places.
+    """
     tables: dict[tuple[float, ...], str] = {}
-    printers = [_Printer(one, tables) for one in routines]
+    printers = [_Printer(one, tables, (known or {}).get(one.name, {})) for one in routines]
     parts = [one.text() for one in printers]
     heads = [f"static const double {name}[] = {{{', '.join(map(literal, one))}}};" for one, name in tables.items()]
     return "\n".join([*(f"{one.head()};" for one in printers), *heads, *parts]) + "\n"
@@ -125,11 +133,14 @@ def print_routines(routines: Sequence[Routine]) -> str:
 class _Printer:
     """The lines of one function."""
 
-    def __init__(self, routine: Routine, tables: dict[tuple[float, ...], str]) -> None:
+    def __init__(
+        self, routine: Routine, tables: dict[tuple[float, ...], str], constants: Mapping[int, int] | None = None
+    ) -> None:
         self.routine, self.tables = routine, tables
+        self.constants = _constants(routine, constants or {})
         self.lines: list[str] = []
         self.names = {one.name: f"{one.name}_" if one.name in _RESERVED else str(one.name) for one in routine.arguments}
-        self.live = _live(routine)
+        self.live = _live(routine, self.constants)
         self.loops: list[tuple[Loop, int]] = []
         self.labels: set[str] = set()
         self._count = 0
@@ -260,6 +271,8 @@ class _Printer:
     def _expression(self, operation: str, result: Value, values: tuple[Any, ...]) -> tuple[str, ...]:
         count = result.kind.count if isinstance(result.kind, Lanes) else 1
         if operation == "load":
+            if result.name in self.constants:
+                return (_whole(self.constants[result.name]),)
             place, field = self._one(values[0]), _field(result.kind)
             cast = "(int32_t)" if result.kind is CODE else "(int)" if result.kind is BOOLEAN else ""
             return tuple(f"{cast}{place}[{k}].{field}" for k in range(count))
@@ -364,10 +377,27 @@ def _statements(block: Block) -> Iterator[Instruction | Call | Branch | Loop | J
             yield from _statements(one.body)
 
 
-def _live(routine: Routine) -> set[str | int | float]:
+_Name = str | int | float
+
+
+def _constants(routine: Routine, known: Mapping[int, int]) -> dict[_Name, int]:
+    """Return the values that are known of what is read at the first argument, by their names."""
+    places: dict[_Name, int] = {}
+    found: dict[_Name, int] = {}
+    for one in _statements(routine.body) if known else ():
+        if not isinstance(one, Instruction) or one.result is None:
+            continue
+        if one.operation == "offset" and one.arguments[0].name == routine.arguments[0].name:
+            places[one.result.name] = one.arguments[1].name
+        elif one.operation == "load" and one.result.kind is INTEGER and places.get(one.arguments[0].name) in known:
+            found[one.result.name] = known[places[one.arguments[0].name]]
+    return found
+
+
+def _live(routine: Routine, constants: Mapping[_Name, int]) -> set[_Name]:
     """Return the names of the values that something comes of: what is stored, returned, compared or handed on."""
-    made: dict[str | int | float, Instruction] = {}
-    settings: dict[str | int | float, list[Value]] = {}
+    made: dict[_Name, Instruction] = {}
+    settings: dict[_Name, list[Value]] = {}
     waiting: list[Value] = []
     for one in _statements(routine.body):
         match one:
@@ -384,13 +414,13 @@ def _live(routine: Routine) -> set[str | int | float]:
                 waiting.append(one.condition)
             case _:
                 pass
-    live: set[str | int | float] = set()
+    live: set[_Name] = set()
     while waiting:
         name = waiting.pop().name
         if name in live:
             continue
         live.add(name)
         waiting += settings.get(name, ())
-        if name in made:
+        if name in made and name not in constants:
             waiting += [each for each in made[name].arguments if isinstance(each, Value)]
     return live

@@ -16,7 +16,7 @@ from atwood.errors import UnsupportedError
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.program import Program
 
-_LONGEST = 1000
+_LONGEST = 500
 """Operations in one function."""
 
 _SIGNS = {"add": "+", "sub": "-", "mul": "*", "div": "/", "less": "<", "less_equal": "<="}

@@ -234,7 +234,9 @@ def _source(mode: ModeText, parameters: Sequence[dict[str, Any]], beside: dict[s
     every = programs | beside
     printed = [print_program(name, one)[0] for name, one in every.items()]
     routines = _routines(every, sizes, printed)
-    body = print_routines(routines)
+    places = {name: k for k, name in enumerate(FIELDS)}
+    counts = {places["size"]: sizes["SIZE"], places["padded"]: sizes["PADDED"]}
+    body = print_routines(routines, {one.name: counts for one in write_steps(TABLEAU)})
     bits = [line for line in BITS.splitlines() if _is_called(line, [body, *printed, *BITS.splitlines()])]
     parts = [
         f"/* {mode.flat.name.replace('*/', '')}: equations of motion and the method that solves them. */",
