@@ -91,6 +91,7 @@ if TYPE_CHECKING:
         ExportedFMU as ExportedFMU,
         export_fmu as export_fmu,
     )
+    from atwood.exchange.fmi.part import FMU as FMU
     from atwood.expr.sympy_bridge import (
         Formula as Formula,
         formula as formula,
@@ -295,6 +296,7 @@ if TYPE_CHECKING:
 _ROOMS = {
     "atwood.checking": ("CheckReport", "check"),
     "atwood.exchange.c.export": ("export_c",),
+    "atwood.exchange.fmi.part": ("FMU",),
     "atwood.exchange.fmi.export": ("ExportedFMU", "export_fmu"),
     "atwood.expr.sympy_bridge": ("Formula", "formula"),
     "atwood.model.compose.serialization": ("from_data", "load_scene", "save_scene", "to_data"),

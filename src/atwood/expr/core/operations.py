@@ -33,11 +33,15 @@ class ExternalFunction:
         The partial derivatives, one for each argument, themselves external functions of the same
         arguments.  ``None`` (as a whole, or for one argument) means "not known": differentiating
         with respect to it is an error.
+    is_smooth
+        Whether it is known to change smoothly, so that the error of steps sees what it does. Of any other function
+        samples are taken, and a run says so.
     """
 
     name: str
     function: Callable[..., float]
     derivatives: tuple[ExternalFunction | None, ...] | None = None
+    is_smooth: bool = False
 
     def __post_init__(self) -> None:
         check_fields(self, name=NAME, function=CALLBACK)

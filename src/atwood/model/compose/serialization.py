@@ -37,6 +37,8 @@ FORMAT = "atwood scene"
 VERSION = 1
 
 _MODULES = each(NAME, "names of modules, such as ['my_parts']")
+_FOREIGN = "atwood.exchange.fmi.part:FMU"
+"""Parts of this class run code that is in a file."""
 
 
 @takes(scene=instance("a Scene or a Model", Model))
@@ -76,7 +78,8 @@ def from_data(data: Mapping[str, Any], trust: Iterable[str] = ()) -> Model:
     data
         As returned by `to_data`.
     trust
-        Names of other modules or packages whose classes may be used, such as ``"my_parts"``, with all modules in them.
+        Names of other modules or packages whose classes may be used, such as ``"my_parts"``, with all modules in them;
+        and paths of FMUs, as they stand in the data, which run foreign code.
 
     Raises
     ------
@@ -177,6 +180,8 @@ def _refuse_strangers(scene: Any, trust: tuple[str, ...]) -> None:
         stack += [(join_path(where, str(name)), inner) for name, inner in one.items()]
         name = one.get("class")
         module = name.partition(":")[0] if isinstance(name, str) else ""
+        if name == _FOREIGN:
+            _refuse_foreign(one, where, trust)
         if not module or is_within(module, ("atwood", *trust)):
             continue
         libraries = installed_libraries() if libraries is None else libraries
@@ -186,6 +191,18 @@ def _refuse_strangers(scene: Any, trust: tuple[str, ...]) -> None:
                 where=where,
                 advice=f"If you trust that code, have it imported with trust={module!r}.",
             )
+
+
+def _refuse_foreign(one: Mapping[str, Any], where: str, trust: tuple[str, ...]) -> None:
+    """Refuse a part whose code is in a file that is not trusted."""
+    values = one.get("values")
+    file = values.get("file") if isinstance(values, Mapping) else None
+    if file not in trust:
+        raise UsageError(
+            f"the file names the FMU {file!r}, which runs foreign code",
+            where=where,
+            advice=f"If you trust that code, have it loaded with trust={file!r}.",
+        )
 
 
 def _read(data: Any, where: str) -> Component:
@@ -198,6 +215,7 @@ def _read(data: Any, where: str) -> Component:
     parts = {
         name: _read_parts(part, join_path(where, name)) for name, part in _mapping(entries.get("parts"), where).items()
     }
+    cls = cls._of_values(given, where)
     if not issubclass(cls, Model):
         if "parts" in entries or "changes" in entries:
             raise UsageError(f"a {cls.__name__} has no parts", where=where)

@@ -22,7 +22,7 @@ CHANGES = ("settings", "replaced", "added", "connections", "starts")
 
 def write_component(component: Component, path: str) -> dict[str, Any]:
     """Return a component as plain data: its class, the values it was given, and what its parts were made of."""
-    written: dict[str, Any] = {"class": _class_name(type(component), path)}
+    written: dict[str, Any] = {"class": _class_name(component._written_class(), path)}
     values = {name: _write_value(value, join_path(path, name)) for name, value in component._settings.items()}
     if values:
         written["values"] = values

@@ -227,6 +227,16 @@ class Component(metaclass=ComponentType):
             If they do not, with the path of the parameter and what to do.
         """
 
+    @classmethod
+    def _of_values(cls, values: Mapping[str, Any], where: str) -> type[Component]:
+        """Return the class that a component with some values is of; one whose fields are in a file overrides this."""
+        return cls
+
+    @classmethod
+    def _written_class(cls) -> type[Component]:
+        """Return the class that stands for this one in a file."""
+        return cls
+
     def check_run(self, start: float, end: float) -> None:
         """Refuse a run that the component is not made for, as one that goes on beyond the end of a table.
 

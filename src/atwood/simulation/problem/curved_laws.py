@@ -73,13 +73,17 @@ def find_curved(assembly: Assembly, is_estimated: bool = True) -> tuple[Curved, 
 
 
 def find_external(assembly: Assembly) -> tuple[Expression, ...]:
-    """Return the calls of functions in Python that move a scene, in the coordinates and speeds of its form."""
+    """Return the calls of functions in Python that move a scene, in the coordinates and speeds of its form.
+
+    Those that are known to be smooth are none of them.
+    """
 
     def find() -> tuple[Expression, ...]:
         equations = assembly.own_equations
         nodes = live([*equations.rows, *equations.rates, *(one.second for one in equations.constraints)])
         known = _known(assembly, equations)
-        called = [one for one in nodes if one.operation == "external" and not one.is_parametric]
+        calls = (one for one in nodes if one.operation == "external" and not one.is_parametric)
+        called = [one for one in calls if not one.payload.is_smooth]
         return tuple(one for one in called if all(node in known for node in live([one]) if node.is_symbol))
 
     return assembly.shared.get(_EXTERNAL, find, assembly.form)

@@ -41,7 +41,7 @@ def make_problem(
     """Prepare a run from a consistent state in the coordinates of the form."""
     about = t, q.tobytes(), u.tobytes(), length, span
     made = assembly.kept.get(_PLAN, lambda: _make_problem(assembly, t, q, u, length, span), *about)
-    if made.not_compilable:
+    if made.not_compilable and "foreign code" not in made.not_compilable:
         announce(assembly, made.not_compilable)
     return replace(made)  # its dependent coordinates change on the way
 
@@ -161,6 +161,8 @@ def _describe(assembly: Assembly, program: Program) -> str:
 
 def _reason(node: Expression) -> str:
     if node.operation == "external":
+        if node.payload.is_smooth:  # its author knows of it: it stands for what cannot be written in Atwood's functions
+            return f"calls {node.payload.name!r}, which is foreign code"
         return f"calls the function {node.payload.name!r} in Python"
     return f"needs the operation {node.operation!r}, for which there is no machine code"
 
