@@ -13,6 +13,7 @@ import pytest
 import atwood
 from atwood import FMU, AtwoodError, Scene, load_scene, save_scene, simulate
 from atwood.exchange.fmi.binary import describe, platform_folder
+from atwood_library.scenes import DoublePendulum
 
 REFERENCE = Path(__file__).parents[3] / "shared" / "reference" / "fmu"
 
@@ -176,6 +177,18 @@ def test_damaged_files_are_refused(tmp_path):
             FMU(tmp_path / "bad.fmu")
     with pytest.raises(AtwoodError):
         FMU(tmp_path / "none.fmu")
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_an_exported_scene_is_the_same_when_it_comes_back(tmp_path, fmi):
+    if shutil.which("cc") is None:
+        pytest.skip("no C compiler: cc")
+    scene = DoublePendulum()
+    atwood.export_fmu(scene, tmp_path / "dp.fmu", fmi=fmi)
+    expected = simulate(scene, t_end=2.0, rtol=1e-11, atol=1e-12)
+    back = simulate(with_part(tmp_path / "dp.fmu"), t_end=2.0, rtol=1e-11, atol=1e-12)
+    for path in ("rod1.angle", "bob2.position.x", "rod1.tension"):
+        assert back["f." + path.replace(".", "_")][-1] == pytest.approx(expected[path][-1], abs=1e-9)
 
 
 # -- the Reference FMUs ------------------------------------------------------------------------------------------
