@@ -227,6 +227,27 @@ def test_a_cone_that_is_no_stop() -> None:
         Spherical(bend_stop=math.pi)
 
 
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        ({"bend_stop": 0.3}, "ball: its stops are neither elastic nor rigid"),
+        (
+            {"bend_stop": 0.3, "stop_restitution": 0.0, "stop_stiffness": 10.0},
+            "ball: its stops cannot be elastic and rigid",
+        ),
+        ({"stop_restitution": 0.0}, "ball: its rigid stops are nowhere"),
+    ],
+)
+def test_stops_that_hold_nothing(values: dict[str, float], text: str) -> None:
+    scene = Scene(space="space")
+    ground, ball, body = scene.add("ground", Ground()), scene.add("ball", Spherical(**values)), Sphere()
+    scene.add("body", body)
+    scene.connect(ground.frame, ball.a)
+    scene.connect(ball.b, body.frame)
+    with pytest.raises(AtwoodError, match=text):
+        assemble(scene)
+
+
 def test_what_moves_is_not_called_immobile() -> None:
     scene = SphericalPendulum()
     assert report(scene).immobile is None

@@ -83,8 +83,14 @@ def stops_of(stiffness: float, restitution: float | None, *bounds: float | None)
 
 
 def check_stops(part: Component, stiffness: float, restitution: float | None, *bounds: float | None) -> None:
-    """Refuse stops that are rigid and elastic, and those that are nowhere."""
+    """Refuse stops that are rigid and elastic, those that are neither, and those that are nowhere."""
     if restitution is None:
+        if not stiffness and any(one is not None for one in bounds):
+            raise ParameterError(
+                "its stops are neither elastic nor rigid, and hold nothing",
+                where=part.path,
+                advice="Give stop_stiffness, or stop_restitution for rigid ones; or leave away where they are.",
+            )
         return
     if stiffness:
         raise ParameterError(
