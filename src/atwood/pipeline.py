@@ -37,7 +37,7 @@ from atwood.model.compose.composite import Model
 from atwood.model.local.flatten import FlatScene, flatten
 from atwood.progress import told
 from atwood.result.result import Result
-from atwood.simulation.initialization.start import find_places, start_with_line_signs, take_start
+from atwood.simulation.initialization.start import find_places, has_start, start_with_line_signs, take_start
 from atwood.simulation.problem.arguments import (
     ACCURACY,
     ATOL,
@@ -129,7 +129,7 @@ def _to_run(scene: Model | Assembly, **given: str | None) -> Assembly:
         flat, own = flatten(scene, None), scene.copy()
     form, level, orientation = (given[key] or usual for key, usual in _USUAL.items())
     new = partial(assemble_flat, flat, own, form=form, level=level, orientation=orientation)
-    made, before = assembled_again(new, flat, Source(find_places, own), form, level, orientation)
+    made, before = assembled_again(new, flat, Source(find_places, own), has_start, form, level, orientation)
     if before is not None:
         take_start(made, before)
     return made

@@ -9,6 +9,7 @@ import pytest
 
 import atwood.solids
 import atwood_library
+from atwood_library import robots
 
 from ..pages import OVERVIEWS
 
@@ -40,5 +41,5 @@ def test_every_public_name_has_its_place_in_the_reference():
     pages = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "docs" / "api").glob("*.md"))
     shown = re.findall(r"^\.\. auto(?:class|function|data):: (\w+)", pages, re.MULTILINE)
     assert len(shown) == len(set(shown))
-    public = {*atwood.__all__, *atwood.solids.__all__, *atwood_library.__all__} - {"__version__"}
+    public = {*atwood.__all__, *atwood.solids.__all__, *atwood_library.__all__, *robots.__all__} - {"__version__"}
     assert set(shown) == public

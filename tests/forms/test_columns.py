@@ -7,6 +7,7 @@ import pytest
 
 from atwood import simulate
 from atwood.forms import program as derivative
+from atwood.forms.reassembly import STRUCTURES
 from atwood.pipeline import assemble
 from atwood.simulation.dynamics.balance import balance_of, columns_of, masses_at
 from atwood_library.scenes import Chain
@@ -24,6 +25,7 @@ def both(monkeypatch, make):
     entries = make()
     with monkeypatch.context() as patch:
         patch.setattr(derivative, "_LONGEST", 0)
+        STRUCTURES.clear()  # or the equations of the first are used again
         columns = make()
     return entries, columns
 

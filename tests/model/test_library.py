@@ -43,7 +43,10 @@ def components_of(module) -> list[type[aw.Component]]:
     ]
 
 
-MODULES = [module for module in library_modules() if ".interfaces." not in module.__name__]
+OTHER = (".interfaces.", ".robots.", ".readers")
+"""Modules of the library that declare no components of their own, or what readers of files make."""
+
+MODULES = [module for module in library_modules() if not any(one in module.__name__ for one in OTHER)]
 COMPONENTS = [cls for module in MODULES for cls in components_of(module) if not issubclass(cls, aw.Model)]
 
 

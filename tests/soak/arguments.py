@@ -73,6 +73,7 @@ BAD: dict[str, list[Any]] = {
     "array out": [*NOTHING_SOUND, 3, "x", [0.0], np.zeros(7), np.zeros(1, dtype=int), np.zeros((1, 1, 1))],
     "expression": [b"x", object(), {1, 2}, Odd(), Odd, [1.0], None, "(", "x y z +", math.nan],
     "file": [*NOTHING_SOUND, 3, "", " ", "a\0b.npz", None, "no/such/directory/x.npz", "."],
+    "optional folder": [*NOTHING_SOUND, 3, "", "a\0b"],
     "picture": [b"x", 1j, object(), Odd(), 3, "", "a\0b.png", "no/such/directory/x.png", ".", "x.unknown"],
     "callback": [3, "x", 2.5, [], {}, 1j, b"x"],
     "flag": [*NOTHING_SOUND, "yes", 2, None, 0.5, []],

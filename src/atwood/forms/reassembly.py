@@ -96,18 +96,23 @@ _OWN = {"_parent", "_name", "_settings", "_token", "_declared"}
 
 
 def assembled_again(
-    assembly: Callable[[], Assembly], flat: FlatScene, source: Source, *form: str
+    assembly: Callable[[], Assembly],
+    flat: FlatScene,
+    source: Source,
+    has_run: Callable[[Assembly], bool],
+    *form: str,
 ) -> tuple[Assembly, Assembly | None]:
-    """Return the assembly of a scene, and the one of the same structure that it follows, if one was assembled before.
+    """Return the assembly of a scene, and the one of the same structure that it follows, if one has run before.
 
     Both scenes have the same classes of parts, with laws as they were, connections, letters and times, and the
-    structure stays as it does for other values (`follow`).
+    structure stays as it does for other values (`follow`). One that found no start is not followed: its parts may
+    contradict each other, and those of the other scene not.
     """
     key = flat.name, *form
     laws, known = STRUCTURES.pop(key, (None, None))
     now = law_code(dict.fromkeys(type(part.component) for part in flat.parts.values()))
     found = None
-    if known is not None and now is not None and laws == now and _is_alike(known.flat, flat):
+    if known is not None and has_run(known) and now is not None and laws == now and _is_alike(known.flat, flat):
         found, _ = follow(known, flat, source)
     made = assembly() if found is None else found
     if now is not None and len(flat.parts) <= _LARGEST:

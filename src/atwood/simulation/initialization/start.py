@@ -139,6 +139,11 @@ def find_start(assembly: Assembly) -> Start:
     return assembly.kept.get(_START, lambda: _find(assembly))
 
 
+def has_start(assembly: Assembly) -> bool:
+    """Return whether the start of an assembly has been found."""
+    return assembly.kept.known(_START) is not None
+
+
 def take_start(assembly: Assembly, before: Assembly) -> None:
     """Take up the start of an assembly of the same structure, if all values that it follows from are the same."""
     start, flat, other = before.kept.known(_START), assembly.flat, before.flat
