@@ -8,7 +8,7 @@ import numpy as np
 
 from atwood import Result
 from atwood.simulation.problem.projection import project_safely
-from atwood.simulation.run.recorder import SegmentRecord
+from atwood.simulation.run.recorder import Stretch
 from atwood.simulation.singular.collocation import find_arc
 
 __all__ = ["by_arcs"]
@@ -22,10 +22,10 @@ def by_arcs(result: Result) -> Result:
 
     Nothing of the solver that made it is used but the start and the sample times.
     """
-    return Result(replace(result.run, segments=tuple(_anew(one) for one in result.run.segments)))
+    return Result(replace(result.run, stretches=tuple(_anew(one) for one in result.run.stretches)))
 
 
-def _anew(segment: SegmentRecord) -> SegmentRecord:
+def _anew(segment: Stretch) -> Stretch:
     plan, kinematic_map = segment.plan, segment.plan.balance.kinematic_map
     places, speeds = segment.coordinates.copy(), segment.speeds.copy()
     t, q, u = float(segment.time[0]), places[:, 0], speeds[:, 0]

@@ -7,9 +7,8 @@ times and events never change the solution.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from math import inf, isfinite
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +17,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import StartError, UsageError
 from atwood.integrators.compiled_location import FOUND, CompiledLocator
 from atwood.integrators.event_location import ROUNDING, EventLocator, Root
-from atwood.integrators.jumps import Jump
+from atwood.integrators.jumps import JumpLog
 from atwood.integrators.protocol import (
     Budget,
     ExplicitProblem,
@@ -31,9 +30,6 @@ from atwood.integrators.protocol import (
 )
 from atwood.integrators.session import SteppingSession, copied
 from atwood.integrators.stepper import Outcome, Stepper
-
-if TYPE_CHECKING:
-    from atwood.integrators.set_jumps import SetJump
 
 FIRST_CHUNK, LARGEST_CHUNK = 4000, 100_000
 """So many steps are taken before limits are looked at: at first, for one unknown, and at most."""
@@ -108,10 +104,12 @@ class ExplicitSession(SteppingSession):
             self._jumps.begin(t)
             self._leaps = self._stepper.leap(self._compiled, self._jumps, end)
 
-    def take_jumps(self) -> Sequence[Jump | SetJump]:
-        """Return the jumps since this was last asked, in order."""
-        made = [] if self._jumps is None else self._jumps.take()
-        self._starts += len(made)
+    def take_jumps(self) -> JumpLog | None:
+        """Return the jumps since this was last asked; None where there are none."""
+        made = None if self._jumps is None else self._jumps.take()
+        if made is None or not len(made.time):
+            return None
+        self._starts += len(made.time)
         return made
 
     @property

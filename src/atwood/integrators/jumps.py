@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from atwood.codegen.sundials.events import EventData
-    from atwood.integrators.set_jumps import SetJump
 
 FIELDS: dict[str, Kind] = {
     **dict.fromkeys(("derived", "scratch", "shift", "seen", "table", "parts", "moved", "room", "log"), ADDRESS),
@@ -37,8 +36,11 @@ TABLE = ("row", "small", "slow")
 ENTRY = ("time", "event", "part", "impulse", "before", "after")
 """What begins an entry of the log; states before and after follow."""
 
-_PAST, _ROOM = 64, 1024
-"""So many jumps before are known at most, and so many are made without Python."""
+_PAST = 64
+"""So many jumps before are known at most."""
+
+ROOM = 1 << 17
+"""Numbers of a log, which are a megabyte: it is Python's turn where they are full."""
 
 _PLACES = {name: k for k, name in enumerate(FIELDS)}
 
@@ -52,6 +54,23 @@ class Jump(NamedTuple):
     before: float
     after: float
     states: FloatArray
+
+
+class JumpLog:
+    """What the log of jumps says: times, states before and after with shape (jumps, 2, size), and entries."""
+
+    def __init__(self, entries: FloatArray, before: int, size: int) -> None:
+        self.entries, self.time = entries, entries[:, 0]
+        self.states = entries[:, before : before + 2 * size].reshape(-1, 2, size)
+
+    def jumps(self) -> list[Jump]:
+        """Return the jumps."""
+        return [
+            Jump(time, int(event), impulse, before, after, states)
+            for (time, event, _, impulse, before, after), states in zip(
+                self.entries[:, : len(ENTRY)].tolist(), self.states, strict=True
+            )
+        ]
 
 
 class JumpCode:
@@ -86,6 +105,7 @@ class Jumps:
     def __init__(self, code: JumpCode, events: EventData) -> None:
         self.code, self._size, count = code, code.coordinates + code.speeds, events.count
         self._stride = len(ENTRY) + 2 * self._size
+        self._room = ROOM // self._stride
         room = self._size + 4 * code.gaps + 1  # what the program gives, and what it is asked
         counts = (
             len(FIELDS),
@@ -95,7 +115,7 @@ class Jumps:
             *[code.gaps] * 2,
             room,
         )
-        ends = np.cumsum((*counts, self._stride * (_PAST + _ROOM)))
+        ends = np.cumsum((*counts, self._stride * (_PAST + self._room)))
         memory = np.zeros(int(ends[-1]))
         pieces = np.split(memory, ends[:-1])
         self._numbers, self._derived, _, table, self._parts, _, _, log = pieces
@@ -126,7 +146,7 @@ class Jumps:
         self._log[: len(known), [0, 2]] = np.reshape(known, (-1, 2))
         self._numbers[_PLACES["left"]] = left
         self._told = len(known)
-        self._set(logged=self._told, capacity=self._told + _ROOM)
+        self._set(logged=self._told, capacity=self._told + self._room)
 
     def begin(self, t: float) -> None:
         """Learn when the steps begin, where that matters."""
@@ -142,14 +162,7 @@ class Jumps:
         entry = self._log[logged - 1]
         return (float(entry[0]) if logged > self._told else -inf), entry[-self._size :].copy()
 
-    def take(self) -> Sequence[Jump | SetJump]:
+    def take(self) -> JumpLog:
         """Return the jumps since this was last asked."""
         first, self._told = self._told, int(self._integers[_PLACES["logged"]])
-        return [
-            Jump(time, int(event), impulse, before, after, states)
-            for (time, event, _, impulse, before, after), states in zip(
-                self._log[first : self._told, : len(ENTRY)].tolist(),
-                self._log[first : self._told, len(ENTRY) :].reshape(-1, 2, self._size).copy(),
-                strict=True,
-            )
-        ]
+        return JumpLog(self._log[first : self._told].copy(), len(ENTRY), self._size)

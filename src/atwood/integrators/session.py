@@ -6,7 +6,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from math import inf
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, UsageError
 from atwood.integrators.event_location import EventLocator, Root
-from atwood.integrators.jumps import Jump
+from atwood.integrators.jumps import JumpLog
 from atwood.integrators.protocol import (
     Budget,
     ExplicitProblem,
@@ -25,10 +25,6 @@ from atwood.integrators.protocol import (
     StepMonitor,
     StepResult,
 )
-
-if TYPE_CHECKING:
-    from atwood.integrators.set_jumps import SetJump
-
 
 _T = TypeVar("_T")
 
@@ -97,9 +93,9 @@ class Session(ABC):
         """
         return np.empty((0, len(self._here[1])))
 
-    def take_jumps(self) -> Sequence[Jump | SetJump]:
-        """Return the jumps that were made without stopping since this was last asked, in order."""
-        return []
+    def take_jumps(self) -> JumpLog | None:
+        """Return the jumps that were made without stopping since this was last asked; None where there are none."""
+        return None
 
     def set_monitor(self, monitor: StepMonitor) -> bool:
         """Let the motion be looked at, and end with `Status.NOTICED` where something is seen; return whether it can."""

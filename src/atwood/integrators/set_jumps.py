@@ -7,6 +7,7 @@ shorter.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from math import inf
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -17,7 +18,7 @@ from atwood.codegen.llvm.build import RoutineSource, build_code, default_options
 from atwood.codegen.llvm.module import Part
 from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Kind
 from atwood.expr.core.program import Program
-from atwood.integrators.jumps import Jumps
+from atwood.integrators.jumps import ROOM, JumpLog, Jumps
 from atwood.integrators.protocol import RATES
 from atwood.integrators.set_routines import CAPACITY, ENTRY, FIELDS, ROWS, UNITS
 
@@ -42,9 +43,6 @@ EVENTS = ("unit", "code", "small", "placed")
 HEAD, PAST, MOST_IMPACTS = 4, 64, 8
 """Numbers that begin an entry of the log, impacts that are remembered, and how many there may be in an entry."""
 
-_ROOM = 1024
-"""So many changes are made without Python."""
-
 
 class SetJump(NamedTuple):
     """A change of a set: the states before and after, those of gaps and slips, and what has happened.
@@ -59,6 +57,43 @@ class SetJump(NamedTuple):
     stopped: int
     left: float
     struck: FloatArray
+
+
+class SetLog(JumpLog):
+    """What the log of changes of sets says, of some number of gaps and slips with some number of rows."""
+
+    def __init__(self, entries: FloatArray, size: int, units: int, rows: int) -> None:
+        super().__init__(entries, HEAD, size)
+        self._ends = HEAD + 2 * size + 3 * units
+        self._begins, self._each = self._ends - 3 * units, len(ENTRY) + rows
+
+    @property
+    def last(self) -> SetLog:
+        """The last change alone."""
+        found = copy(self)
+        found.entries, found.time, found.states = self.entries[-1:], self.time[-1:], self.states[-1:]
+        return found
+
+    def strikes(self) -> list[tuple[float, int]]:
+        """Return times and gaps of the impacts."""
+        found = self.entries[:, 3].astype(int)
+        return [
+            (time, int(row[self._ends + i * self._each]))
+            for time, row, count in zip(
+                self.time[found > 0].tolist(), self.entries[found > 0], found[found > 0].tolist(), strict=True
+            )
+            for i in range(count)
+        ]
+
+    def changes(self) -> list[SetJump]:
+        """Return the changes."""
+        made = []
+        for row, states in zip(self.entries, self.states, strict=True):
+            time, stopped, left, struck = row[:HEAD].tolist()
+            impacts = row[self._ends : self._ends + int(struck) * self._each].reshape(-1, self._each)
+            set_ = row[self._begins : self._ends].reshape(3, -1)
+            made.append(SetJump(time, states, set_, int(stopped), left, impacts))
+        return made
 
 
 class SetCode:
@@ -124,6 +159,7 @@ class SetJumps(Jumps):
         self.set_code, self._size, self._units = code, own, units.copy()
         self._each = size + len(ENTRY)
         self._stride = HEAD + 2 * own + 3 * number + MOST_IMPACTS * self._each
+        self._room = max(64, ROOM // self._stride)
         lengths = {
             "own": len(JUMP),
             "sets": len(FIELDS),
@@ -146,7 +182,7 @@ class SetJumps(Jumps):
             "before": own,
             "values": len(code.program.parameters),
             "places": 2 * number,
-            "log": self._stride * _ROOM,
+            "log": self._stride * self._room,
         }
         ends = np.cumsum(list(lengths.values()))
         memory = np.zeros(int(ends[-1]))
@@ -157,7 +193,7 @@ class SetJumps(Jumps):
         self._pieces["units"][:] = units.ravel()
         self._put("sets", {"count": number, "size": size, "entries": len(pattern), "inside": 1.0})
         self._put(
-            "own", {"events": events.count, "size": own, "stride": self._stride, "capacity": _ROOM, "stays": stays}
+            "own", {"events": events.count, "size": own, "stride": self._stride, "capacity": self._room, "stays": stays}
         )
         self._place(events, rates, given)
         self._rates = RATES(rates.function), rates.data
@@ -231,18 +267,12 @@ class SetJumps(Jumps):
     def last(self) -> tuple[float, FloatArray]:
         """Time and state after the last change; minus infinity where there has been none."""
         logged = self._got("logged")
-        entry = self._pieces["log"].reshape(_ROOM, self._stride)[logged - 1]
+        entry = self._pieces["log"].reshape(-1, self._stride)[logged - 1]
         after = HEAD + self._size
         return (float(entry[0]) if logged else -inf), entry[after : after + self._size].copy()
 
-    def take(self) -> list[SetJump]:
+    def take(self) -> SetLog:
         """Return the changes since this was last asked."""
         first, self._told = self._told, self._got("logged")
-        found, states = [], HEAD + 2 * self._size
-        for row in self._pieces["log"].reshape(_ROOM, self._stride)[first : self._told].copy():
-            time, stopped, left, struck = row[:HEAD].tolist()
-            ends = states + 3 * self._units.shape[1]
-            impacts = row[ends : ends + int(struck) * self._each].reshape(-1, self._each)
-            set_ = row[states:ends].reshape(3, -1)
-            found.append(SetJump(time, row[HEAD:states].reshape(2, -1), set_, int(stopped), left, impacts))
-        return found
+        entries = self._pieces["log"].reshape(-1, self._stride)[first : self._told].copy()
+        return SetLog(entries, self._size, self._units.shape[1], self._each - len(ENTRY))

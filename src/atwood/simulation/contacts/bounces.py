@@ -12,12 +12,12 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.codegen.sundials.events import EventData
 from atwood.forms.loose import is_loose
-from atwood.integrators.jumps import Jump, Jumps
+from atwood.integrators.jumps import JumpLog, Jumps
 from atwood.mechanics.dynamics.equations import ContactRow
 from atwood.mechanics.outputs.event_functions import CLOSES
 from atwood.model.values.units import ALONG
 from atwood.simulation.contacts.changes import NEAR, longest_left, told_impact
-from atwood.simulation.events.modes import EventProbe, EventRecord
+from atwood.simulation.events.modes import LAST, EventProbe, ToldLater
 from atwood.simulation.problem.explicit_scene import impact_code, values_on_constraints
 from atwood.simulation.problem.problem import SceneProblem
 
@@ -68,11 +68,17 @@ def fill_bounces(
     jumps.fill(values_on_constraints(plan), table, [parts[one.row.key[0]] for one in gaps], left, past)
 
 
-def told_bounces(jumps: Sequence[Jump], plan: SceneProblem, probe: EventProbe) -> list[EventRecord]:
-    """Return what is told of impacts."""
+def noted_bounces(log: JumpLog, plan: SceneProblem, probe: EventProbe) -> ToldLater:
+    """Return what is told of impacts, and when which parts had the last of them."""
     units = {one.row.key[:2]: one.law.options.unit for one in _gaps(plan)}
     watched = [(one.part, one.law) for one in probe.event_functions]
-    return [
-        told_impact(one.time, watched[one.event], units[watched[one.event]], (one.impulse,), (one.before, one.after))
-        for one in jumps
-    ]
+    last = log.entries[-LAST:, :2].tolist()
+    return ToldLater(
+        lambda: [
+            told_impact(
+                one.time, watched[one.event], units[watched[one.event]], (one.impulse,), (one.before, one.after)
+            )
+            for one in log.jumps()
+        ],
+        [(time, watched[int(event)][0]) for time, event in last],
+    )

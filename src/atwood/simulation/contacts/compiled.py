@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from atwood.forms.constrained import contacts_program
 from atwood.forms.loose import is_loose, loose_equations
 from atwood.integrators import set_routines as sets
 from atwood.integrators.embedded.rates import OwnRates
-from atwood.integrators.set_jumps import EVENTS, SetCode, SetJump, SetJumps
+from atwood.integrators.set_jumps import EVENTS, SetCode, SetJump, SetJumps, SetLog
 from atwood.integrators.set_routines import UNITS
 from atwood.integrators.time_stepping.session import Change
 from atwood.lazy_dataclasses import dataclass
@@ -25,7 +25,7 @@ from atwood.model.values.units import ALONG
 from atwood.numerics.contact_sets import STICKS, State
 from atwood.simulation.contacts.changes import NEAR, longest_left, states_of, told_change, told_impact, told_rest
 from atwood.simulation.contacts.values import Layout, layout_of
-from atwood.simulation.events.modes import MARGIN, EventProbe, EventRecord
+from atwood.simulation.events.modes import MARGIN, EventProbe, EventRecord, ToldLater
 from atwood.simulation.problem.explicit_scene import light_speeds, program_on_constraints, values_on_constraints
 from atwood.simulation.problem.problem import SceneProblem
 
@@ -195,22 +195,39 @@ def fill_sets(
     jumps.give(values_on_constraints(plan), states, table, (near, shortest, *left, scales.time), past)
 
 
-def told_sets(jumps: Sequence[SetJump], assembly: Assembly) -> list[Change]:
+def noted_sets(log: SetLog, assembly: Assembly, changes: Callable[[], Sequence[Change]]) -> ToldLater:
+    """Return what is told of changes, with the parts of the impacts among them."""
+    parts = [one.row.key[0] for one in layout_of(assembly).first]
+    return ToldLater(
+        lambda: [event for one in changes() for event in one.told],
+        [(time, parts[gap]) for time, gap in log.strikes()],
+    )
+
+
+def held_after(jump: SetJump, assembly: Assembly) -> tuple[float, ...]:
+    """Return the discrete states after a change."""
+    layout, held = layout_of(assembly), list(assembly.held_now)
+    for is_slip, places, values in zip(layout.is_slip, layout.places, jump.set.T.tolist(), strict=True):
+        own = values if is_slip else (float(values[0] == STICKS),)
+        for place, value in zip(places, own, strict=False):
+            held[place] = value
+    return tuple(held)
+
+
+def told_sets(log: SetLog, assembly: Assembly) -> list[Change]:
     """Return changes with the discrete states after each, and what is told of it."""
-    layout, held, found = layout_of(assembly), list(assembly.held_now), list[Change]()
-    for one in jumps:
+    layout, held, found = layout_of(assembly), assembly.held_now, list[Change]()
+    for one in log.changes():
         before, told = states_of(layout, held), list[EventRecord]()
         if one.stopped >= 0:
             told.append(told_rest(one.time, layout.first[one.stopped].row.key[:2], one.left))
         told += [_struck(layout, one.time, row) for row in one.struck.tolist()]
         for k, (state, *ways) in enumerate(one.set.T.tolist()):
             after: State = (int(state), tuple(ways[: len(layout.units[k])]))
-            values = (state, *after[1]) if layout.is_slip[k] else (float(after[0] == STICKS),)
-            for place, value in zip(layout.places[k], values, strict=True):
-                held[place] = value
             change = told_change(one.time, layout.first[k], before[k], after)
             told += [] if change is None else [change]
-        found.append(Change(one.time, one.states, tuple(held), told, any(each.impact for each in told)))
+        held = held_after(one, assembly)
+        found.append(Change(one.time, one.states, held, told, any(each.impact for each in told)))
     return found
 
 

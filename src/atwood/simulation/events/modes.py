@@ -6,6 +6,7 @@ An event maps (mode, q, u) to (mode, q, u). States pass between modes through ma
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -117,6 +118,31 @@ class EventRecord:
     def describe(self) -> str:
         """Return what happened, where and when."""
         return f"at t = {self.time:.9g} s, {self.part}{': ' if self.part else ''}{self.message}"
+
+
+LAST = 1000
+"""So many impacts are remembered, to see whether they follow each other ever faster."""
+
+
+@dataclass(frozen=True, eq=False)
+class ToldLater:
+    """Events at jumps that the steps have made by themselves, which few ask for.
+
+    Attributes
+    ----------
+    make
+        Tells of them, in order.
+    impacts
+        Times and parts of the impacts among them, of many the last.
+    """
+
+    make: Callable[[], Sequence[EventRecord]]
+    impacts: Sequence[tuple[float, str]]
+
+    @cached_property
+    def events(self) -> Sequence[EventRecord]:
+        """The events."""
+        return self.make()
 
 
 def find_event_functions(assembly: Assembly) -> tuple[EventFunction, ...]:

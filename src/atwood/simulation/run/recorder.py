@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from itertools import pairwise
+from collections.abc import Callable, Iterable, Sequence
+from itertools import chain, pairwise
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -18,7 +18,6 @@ from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.projection import Nearest, misses_of, project_safely, project_states
 
 if TYPE_CHECKING:
-    from atwood.integrators.jumps import Jump
     from atwood.integrators.time_stepping.session import Change
     from atwood.simulation.singular.crossing import SingularCrossing
 
@@ -79,6 +78,66 @@ class SegmentRecord:
 
 
 @dataclass(frozen=True, eq=False)
+class Stretch:
+    """What was recorded from one stop of the solver to the next: records from jump to jump, made when asked for.
+
+    Attributes
+    ----------
+    plan, impact, after_time_event
+        As of the first record.
+    time, coordinates, speeds, shown, held, singular_crossings, lost
+        As of `SegmentRecord`, for all records.
+    starts
+        Numbers of the samples that begin a record.
+    changes
+        Make the changes of the states of contacts, in order.
+    """
+
+    plan: SceneProblem
+    impact: bool
+    after_time_event: bool
+    time: FloatArray
+    coordinates: FloatArray
+    speeds: FloatArray
+    shown: NDArray[np.bool_]
+    held: FloatArray
+    singular_crossings: tuple[SingularCrossing, ...]
+    starts: NDArray[np.int_]
+    changes: Sequence[Callable[[], Sequence[Change]]]
+    lost: FloatArray | None
+
+    def records(self) -> Iterable[SegmentRecord]:
+        """Return the records from jump to jump."""
+        known: dict[tuple[float, ...], SceneProblem] = {}
+        changes = list(chain.from_iterable(make() for make in self.changes))
+        found = np.searchsorted([one.time for one in changes], self.time[self.starts], side="right").tolist()
+        ends = [*self.starts.tolist(), len(self.time)]
+        for (first, last), number in zip(pairwise(ends), found, strict=True):
+            change, each = changes[number - 1] if number else None, slice(first, last)
+            yield made_of(
+                SegmentRecord,
+                plan=self._plan_of(change, known),
+                impact=self.impact if first == 0 else change is None or change.strikes,
+                time=self.time[each],
+                coordinates=self.coordinates[:, each],
+                speeds=self.speeds[:, each],
+                shown=self.shown[each],
+                held=self.held[:, each],
+                singular_crossings=self.singular_crossings,
+                lost=None if self.lost is None else self.lost[each],
+                after_time_event=self.after_time_event and first == 0,
+            )
+
+    def _plan_of(self, change: Change | None, known: dict[tuple[float, ...], SceneProblem]) -> SceneProblem:
+        """Return the plan in the states that contacts have from a change on."""
+        if change is None or change.held is None:
+            return self.plan
+        if change.held not in known:
+            known[change.held] = self.plan.in_piece(self.plan.assembly.with_held(change.held))
+        return known[change.held]
+
+
+@dataclass(frozen=True, eq=False)
 class _Block:
     """Samples that are done: shapes (samples,), (number, samples) and (2, samples)."""
 
@@ -113,8 +172,8 @@ class Recorder:
         self.plan = plan
         self.singular_crossings: list[SingularCrossing] = []
         self.nearest: Nearest | None = None
-        self._jumps: list[float] = []
-        self._changes: list[Change] = []
+        self._jumps: list[FloatArray] = []
+        self._changes: list[Callable[[], Sequence[Change]]] = []
         self.loss_until: Callable[[FloatArray], FloatArray] | None = None
         # What is done, and states that wait: changed together, so that an interruption loses and repeats nothing.
         self._samples: tuple[tuple[_Block, ...], list[_States]] = ((), [])
@@ -157,14 +216,17 @@ class Recorder:
         t: FloatArray,
         y: FloatArray,
         shown: NDArray[np.bool_],
-        jumps: Sequence[Jump | Change] = (),
+        jumps: tuple[FloatArray, FloatArray] | None = None,
         shows_jumps: bool = True,
     ) -> None:
-        """Record states of the solver after the last sample, one row each, with those at jumps among them."""
+        """Record states of the solver after the last sample, one row each, with those at jumps among them.
+
+        Jumps are times, and states before and after.
+        """
         pending = self._samples[1]
-        if jumps:
-            times = np.repeat([one.time for one in jumps], 2)
-            places, states = np.searchsorted(t, times), np.concatenate([one.states for one in jumps])
+        if jumps is not None and len(jumps[0]):
+            times, states = np.repeat(jumps[0], 2), jumps[1].reshape(-1, jumps[1].shape[-1])
+            places = np.searchsorted(t, times)
             t, y, shown = (
                 np.insert(t, places, times),
                 np.insert(y, places, states, axis=0),
@@ -174,7 +236,7 @@ class Recorder:
                 [True, True], (t[2:] != t[1:-1]) | (t[2:] != t[:-2])
             )  # an output at a jump is that after it
             t, y, shown = t[once], y[once], shown[once]
-            self._jumps += times[::2].tolist()
+            self._jumps.append(jumps[0])
         if not len(t):
             return
         if self.plan.balance.constraints and _count(pending) + len(t) < _PENDING:  # projected with what follows
@@ -182,22 +244,9 @@ class Recorder:
             return
         self._finish(*_joined([*pending, (t, y, shown)]))
 
-    def take_changes(self, changes: Sequence[Change]) -> None:
-        """Record states of contacts from some moments on."""
-        self._changes += changes
-
-    def _changed_at(self, times: FloatArray) -> list[Change | None]:
-        """Return the last change of the states of contacts up to each of some times; None where there is none."""
-        found = np.searchsorted([one.time for one in self._changes], times, side="right")
-        return [self._changes[i - 1] if i else None for i in found.tolist()]
-
-    def _plan_of(self, change: Change | None, known: dict[tuple[float, ...], SceneProblem]) -> SceneProblem:
-        """Return the plan in the states that contacts have from a change on."""
-        if change is None or change.held is None:
-            return self.plan
-        if change.held not in known:
-            known[change.held] = self.plan.in_piece(self.plan.assembly.with_held(change.held))
-        return known[change.held]
+    def take_changes(self, changes: Callable[[], Sequence[Change]]) -> None:
+        """Record what makes the states of contacts from some moments on."""
+        self._changes.append(changes)
 
     def pass_over(self, crossing: SingularCrossing, t: FloatArray, shown: NDArray[np.bool_]) -> None:
         """Record a singular crossing, in place of all samples since its start; its states are not to be projected."""
@@ -263,34 +312,21 @@ class Recorder:
         """Whether nothing has been recorded, and nothing waits."""
         return not any(self._samples)
 
-    def segments(self, impact: bool, after_time_event: bool = False) -> list[SegmentRecord]:
-        """Return what was recorded, from jump to jump."""
+    def stretch(self, impact: bool, after_time_event: bool = False) -> Stretch:
+        """Return what was recorded."""
         self.settle()
         blocks = self._samples[0]
         q, u, held = (np.concatenate([getattr(one, name) for one in blocks], axis=1) for name in ("q", "u", "held"))
         time, shown = (np.concatenate([getattr(one, name) for one in blocks]) for name in ("time", "shown"))
         # A path may lead over a place behind the end, or behind an event.
         crossings = tuple(one for one in self.singular_crossings if one.path is None or one.time <= time[-1])
-        cuts = np.searchsorted(time, self._jumps) + 1 if self._jumps else ()
-        ends = [0, *(int(one) for one in cuts if one < len(time)), len(time)]
-        known: dict[tuple[float, ...], SceneProblem] = {}
-        changes = self._changed_at(time[ends[:-1]])
-        return [
-            made_of(
-                SegmentRecord,
-                plan=self._plan_of(change, known),
-                impact=impact if first == 0 else change is None or change.strikes,
-                time=time[first:last],
-                coordinates=q[:, first:last],
-                speeds=u[:, first:last],
-                shown=shown[first:last],
-                held=held[:, first:last],
-                singular_crossings=crossings,
-                lost=None if self.loss_until is None else self.loss_until(time[first:last]),
-                after_time_event=after_time_event and first == 0,
-            )
-            for (first, last), change in zip(pairwise(ends), changes, strict=True)
-        ]
+        starts = np.zeros(1, dtype=int)
+        if self._jumps:
+            starts = np.append(starts, np.searchsorted(time, np.concatenate(self._jumps)) + 1)
+            starts = starts[starts < len(time)]
+        lost = None if self.loss_until is None else self.loss_until(time)
+        rest = crossings, starts, tuple(self._changes), lost
+        return Stretch(self.plan, impact, after_time_event, time, q, u, shown, held, *rest)
 
     def _finish(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_], waiting: Sequence[_States] = ()) -> None:
         q, u = (part.copy() for part in self.plan.program.split(y.T))

@@ -24,7 +24,7 @@ from atwood.simulation.dynamics.orientation_coordinates import (
     switch_coordinates,
     to_regular,
 )
-from atwood.simulation.events.modes import EventProbe, EventRecord
+from atwood.simulation.events.modes import LAST, EventProbe, EventRecord, ToldLater
 from atwood.simulation.events.sampling import Updated, find_sampler
 from atwood.simulation.events.sides import SIDE
 from atwood.simulation.events.time_events import Schedule, find_schedule
@@ -35,7 +35,7 @@ from atwood.simulation.problem.options import RunOptions, Samples, sample_times
 from atwood.simulation.problem.preparation import problem_of_run
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.run.choice import Choice, check_asked, check_solver, choose
-from atwood.simulation.run.recorder import Recorder, SegmentRecord
+from atwood.simulation.run.recorder import Recorder, Stretch
 from atwood.simulation.run.run_record import (
     Outcome,
     Run,
@@ -121,10 +121,6 @@ def walked(assembly: Assembly, start: Start, options: RunOptions, kind: type[Wal
     return walk, walk.go()
 
 
-_IMPACTS = 1000
-"""So many impacts are remembered, to see whether they follow each other ever faster."""
-
-
 class Walk:
     """The way of a run through its modes."""
 
@@ -144,8 +140,8 @@ class Walk:
         self._schedules: dict[Shared, Schedule] = {}
         self._plans: dict[tuple[tuple[float, ...], tuple[float, ...] | None], SceneProblem] = {}
         self._kept, self._sides = KeptSession(), SidesOfRun(options)
-        self.segments: list[SegmentRecord] = []
-        self.events: list[EventRecord] = []
+        self.segments: list[Stretch] = []
+        self.events: list[EventRecord | ToldLater] = []
         self.choices: list[Choice] = []
         self.statistics = Statistics(error_test_failures=0, convergence_failures=0)
         self.t = self._piece_start = start.time
@@ -252,8 +248,8 @@ class Walk:
             raise outcome.error
         if recorder.is_empty:  # nor was there time to
             return recorder, outcome
-        for record in recorder.segments(self.impact, after_time_event):
-            self.segments.append(self._sides.recorded(record, self.plan, self.assembly, bool(outcome.sides)))
+        record = recorder.stretch(self.impact, after_time_event)
+        self.segments.append(self._sides.recorded(record, self.plan, self.assembly, bool(outcome.sides)))
         if outcome.held is not None and outcome.held != self.held:  # sets of contacts have changed on the way
             self.held, self.assembly = outcome.held, self.assembly.with_held(outcome.held)
             self.plan, self.probe, self._plans = self.plan.in_piece(self.assembly), None, {}
@@ -335,10 +331,14 @@ class Walk:
         self.probe, self._plans, self._handed = None, {}, ()
         return plan.in_piece(self._sides.like(self.assembly, plan))
 
-    def _remember(self, events: Sequence[EventRecord]) -> None:
+    def _remember(self, events: Sequence[EventRecord | ToldLater]) -> None:
         """Remember the impacts among some events."""
-        self._impacts += [(one.time, one.part) for one in events if one.kind == "impact"]
-        del self._impacts[:-_IMPACTS]
+        for one in events:
+            if isinstance(one, ToldLater):
+                self._impacts += one.impacts
+            elif one.kind == "impact":
+                self._impacts.append((one.time, one.part))
+        del self._impacts[:-LAST]
 
     def _plan(self) -> SceneProblem:
         assembly = self._sides.in_pieces(self.assembly, self.t, self.q, self.u)

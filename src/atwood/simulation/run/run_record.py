@@ -9,6 +9,8 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
+from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,12 +23,12 @@ from atwood.lazy_dataclasses import dataclass, replace
 from atwood.simulation.dynamics.orientation_coordinates import (
     CoordinateSwitch,
 )
-from atwood.simulation.events.modes import EventProbe, EventRecord
+from atwood.simulation.events.modes import EventProbe, EventRecord, ToldLater
 from atwood.simulation.initialization.start import Start
 from atwood.simulation.problem.options import RunOptions, Samples
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.run.choice import Choice, describe_choices
-from atwood.simulation.run.recorder import SegmentRecord
+from atwood.simulation.run.recorder import SegmentRecord, Stretch
 from atwood.simulation.run.session import KeptSession
 
 if TYPE_CHECKING:
@@ -41,10 +43,10 @@ class Run:
     ----------
     assembly
         The scene as it was assembled at the start.
-    segments
-        The stretches between changes of mode; none where time was used up before the start was recorded.
-    events
-        Events, in order.
+    stretches
+        What the solver did from stop to stop; none where time was used up before the start was recorded.
+    told
+        Events, in order; those of jumps are made when somebody asks for `events`.
     statistics
         What the solver did.
     status
@@ -67,8 +69,8 @@ class Run:
     """
 
     assembly: Assembly
-    segments: tuple[SegmentRecord, ...]
-    events: tuple[EventRecord, ...]
+    stretches: tuple[Stretch, ...]
+    told: tuple[EventRecord | ToldLater, ...]
     statistics: Statistics
     status: str
     message: str
@@ -84,7 +86,18 @@ class Run:
         texts = tuple(one for one in self.options.conditions if isinstance(one.given, str))
         options = replace(self.options, progress=None, on_step=None, conditions=texts)
         again = self.again if len(texts) == len(self.options.conditions) else None
-        return {**vars(self), "options": options, "again": again}
+        made = {"segments": self.segments, "events": self.events, "stretches": (), "told": ()}
+        return {**vars(self), **made, "options": options, "again": again}
+
+    @cached_property
+    def segments(self) -> tuple[SegmentRecord, ...]:
+        """The stretches between changes of mode; none where time was used up before the start was recorded."""
+        return tuple(record for one in self.stretches for record in one.records())
+
+    @cached_property
+    def events(self) -> tuple[EventRecord, ...]:
+        """Events, in order."""
+        return tuple(one for some in self.told for one in (some.events if isinstance(some, ToldLater) else (some,)))
 
     @property
     def singular_crossings(self) -> tuple[SingularCrossing, ...]:
@@ -102,26 +115,24 @@ class Run:
         return describe_choices(self.choices)
 
 
-def as_asked(segments: Sequence[SegmentRecord], outputs: int | FloatArray) -> tuple[SegmentRecord, ...]:
-    """Return segments that show just the times that were asked for, if these were given.
+def as_asked(stretches: Sequence[Stretch], outputs: int | FloatArray) -> tuple[Stretch, ...]:
+    """Return stretches that show just the times that were asked for, if these were given.
 
     At an event the state after it is shown. Where no time that was asked for is reached, the last state is.
     """
-    if isinstance(outputs, (int, np.integer)) or not segments:
-        return tuple(segments)
-    counts = [len(one.time) for one in segments]
-    time, before = (np.concatenate([getattr(one, name) for one in segments]) for name in ("time", "shown"))
-    starts = np.array([one.time[0] if len(one.time) else np.inf for one in segments])
-    later = np.append(np.minimum.accumulate(starts[::-1])[::-1][1:], np.inf)
+    if isinstance(outputs, (int, np.integer)) or not stretches:
+        return tuple(stretches)
+    time, before = (np.concatenate([getattr(one, name) for one in stretches]) for name in ("time", "shown"))
+    ends = np.cumsum([0, *(len(one.time) for one in stretches)]).tolist()
+    starts = np.concatenate([first + one.starts for first, one in zip(ends, stretches, strict=False)])
+    later = np.append(np.minimum.accumulate(time[starts][::-1])[::-1][1:], np.inf)
     place = np.minimum(np.searchsorted(outputs, time), len(outputs) - 1)
-    shown = (outputs[place] == time) & (time < np.repeat(later, counts))
+    shown = (outputs[place] == time) & (time < np.repeat(later, np.diff([*starts, len(time)])))
     if not shown.any():
         shown[-1] = True
-    ends = np.cumsum(counts)
-    changed = set(np.searchsorted(ends, np.flatnonzero(shown != before), side="right").tolist())
     return tuple(
-        replace(one, shown=shown[ends[i] - counts[i] : ends[i]]) if i in changed else one
-        for i, one in enumerate(segments)
+        one if np.array_equal(shown[first:last], before[first:last]) else replace(one, shown=shown[first:last])
+        for one, (first, last) in zip(stretches, pairwise(ends), strict=True)
     )
 
 
@@ -205,7 +216,7 @@ class Outcome:
     choices: tuple[Choice, ...]
     event: EventRecord | None = None
     error: SolveError | None = None
-    noted: tuple[EventRecord, ...] = ()
+    noted: tuple[EventRecord | ToldLater, ...] = ()
     together: tuple[EventRecord, ...] = ()
     handed: tuple[int, ...] = ()
     sides: tuple[int, ...] = ()

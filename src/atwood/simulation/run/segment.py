@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
+from functools import cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,7 +28,7 @@ from atwood.simulation.dynamics.orientation_coordinates import (
     COORDINATE_SWITCH,
 )
 from atwood.simulation.dynamics.redundancy import RankFinding
-from atwood.simulation.events.modes import EventProbe, EventRecord, without_margin
+from atwood.simulation.events.modes import EventProbe, EventRecord, ToldLater, without_margin
 from atwood.simulation.events.sides import SIDE
 from atwood.simulation.problem.preparation import pack_state
 from atwood.simulation.problem.problem import SceneProblem
@@ -39,9 +40,7 @@ from atwood.simulation.run.session import SolverRequest, open_session
 from atwood.simulation.run.stall_diagnosis import explain_stuck, too_tight
 
 if TYPE_CHECKING:
-    from atwood.integrators.jumps import Jump
-    from atwood.integrators.set_jumps import SetJump
-    from atwood.integrators.time_stepping.session import Change
+    from atwood.integrators.set_jumps import SetLog
     from atwood.simulation.singular.crossing import SingularCrossing
     from atwood.simulation.singular.monitor import SingularityMonitor
 
@@ -130,7 +129,7 @@ class _Runner:
         self.monitor: SingularityMonitor | None = None
         self.request: SolverRequest | None = None
         self.opened: StepResult | None = None
-        self.noted: list[EventRecord] = []
+        self.noted: list[EventRecord | ToldLater] = []
 
     @property
     def method(self) -> Method:
@@ -361,47 +360,45 @@ class _Runner:
                 progress(float(times[-1]))
         return done, None
 
-    def _take_jumps(self, session: Session) -> Sequence[Jump | Change]:
-        """Return the jumps of a session since this was last asked, and note what is told of them."""
+    def _take_jumps(self, session: Session) -> tuple[FloatArray, FloatArray] | None:
+        """Return times and states of the jumps since this was last asked, and note what is told of them."""
         if not self.method.looks_for_events:
             from atwood.integrators.time_stepping.session import TimeSteppingSession  # few runs step over events
 
             assert isinstance(session, TimeSteppingSession)
             changes = session.take_changes()
             self.noted += [event for one in changes for event in one.told]
-            self.recorder.take_changes(changes)
+            self.recorder.take_changes(lambda: changes)
             self.recorder.loss_until = session.loss_until if session.has_losses else None
-            return [one for one in changes if one.time > self.began]
-        jumps = session.take_jumps()
-        if not jumps:
-            return ()
-        from atwood.integrators.set_jumps import SetJump
+            later = [one for one in changes if one.time > self.began]
+            return (np.array([one.time for one in later]), np.array([one.states for one in later])) if later else None
+        log = session.take_jumps()
+        if log is None:
+            return None
+        from atwood.integrators.set_jumps import SetLog
 
-        sets = [one for one in jumps if isinstance(one, SetJump)]
-        if sets:
-            return self._take_sets(sets)
-        plain = [one for one in jumps if not isinstance(one, SetJump)]
-        from atwood.simulation.contacts.bounces import told_bounces
+        if isinstance(log, SetLog):
+            self._take_sets(log)
+        else:
+            from atwood.simulation.contacts.bounces import noted_bounces
 
-        self.noted += told_bounces(plain, self.segment.plan, self.segment.probe)
-        return plain
+            self.noted.append(noted_bounces(log, self.segment.plan, self.segment.probe))
+        return log.time, log.states
 
-    def _take_sets(self, jumps: Sequence[SetJump]) -> Sequence[Change]:
-        """Return the changes of a set of contacts, and go on with the last of them."""
-        from atwood.simulation.contacts.compiled import told_sets
+    def _take_sets(self, log: SetLog) -> None:
+        """Take up the changes of a set of contacts, and go on with the last of them."""
+        from atwood.simulation.contacts.compiled import held_after, noted_sets, told_sets
 
         segment, assembly, options = self.segment, self.segment.plan.assembly, self.segment.options
-        changes = told_sets(jumps, assembly)
-        self.noted += [event for one in changes for event in one.told]
+        changes = cache(partial(told_sets, log, assembly))
+        self.noted.append(noted_sets(log, assembly, changes))
         self.recorder.take_changes(changes)
         self.recorder.nearest = None  # it takes states onto what holds now
-        last = changes[-1]
-        assert last.held is not None
-        plan = segment.plan.in_piece(kept_touching(assembly.with_held(last.held)))
+        [last] = log.last.changes()
+        plan = segment.plan.in_piece(kept_touching(assembly.with_held(held_after(last, assembly))))
         q, u = plan.program.split(last.states[1])
         probe = EventProbe(plan, last.time, q, u, options.relative_tolerance, options.conditions)
         self.segment, self.began = replace(segment, plan=plan, probe=probe), last.time
-        return changes
 
     def _sample_watched(self, session: Session, done: int) -> tuple[int, StepResult | None]:
         """Let an explicit method fill tables, with looks at the motion where constraints stay."""

@@ -14,7 +14,7 @@ from atwood.lazy_dataclasses import replace
 from atwood.simulation.events.sides import find_sides, layers, plain_sides
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.problem.problem import SceneProblem
-from atwood.simulation.run.recorder import SegmentRecord
+from atwood.simulation.run.recorder import Stretch
 
 _ASIDE = 1e-12
 """Of the scene's time: so far from a switch, on the side that a stretch is on, the states at its ends are recorded."""
@@ -66,9 +66,7 @@ class SidesOfRun:
             return assembly
         return replace(assembly, shared=sides.shared, sides=sides, side_values=values)
 
-    def recorded(
-        self, record: SegmentRecord, plan: SceneProblem, assembly: Assembly, ends_at_switch: bool
-    ) -> SegmentRecord:
+    def recorded(self, record: Stretch, plan: SceneProblem, assembly: Assembly, ends_at_switch: bool) -> Stretch:
         """Return what was recorded of a stretch with the laws as they are; on a switch, those of the stretch hold."""
         starts_at_switch, self._begins_at_switch = self._begins_at_switch, ends_at_switch
         if plan.assembly.sides is None:

@@ -413,7 +413,7 @@ def mode_motion(
     start = Start(point.t, point.q, point.u, linear.length, (), (), (), point.q)
     options = RunOptions(t_end=point.t + 1e-6 * period, outputs=2, samples=1)
     begun = run(point.assembly, start, options, point.assembly.other_mode)
-    first = begun.segments[0]
+    first = begun.stretches[0]
     segment = replace(
         first,
         time=times,
@@ -423,7 +423,7 @@ def mode_motion(
         shown=np.ones(frames, dtype=bool),
         held=np.zeros((2, frames)),
     )  # fmt: skip
-    return Result(replace(begun, segments=(segment,)))
+    return Result(replace(begun, stretches=(segment,)))
 
 
 @dataclass(frozen=True, eq=False)
