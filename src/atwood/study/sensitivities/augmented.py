@@ -129,9 +129,13 @@ class Augmented:
         Where it begins: coordinates and speeds.
     seeds
         The change of each parameter by each column, shape (columns, parameters).
+    pattern
+        The parameters that change with each column, or do in another stretch of the run.
     """
 
-    def __init__(self, plan: SceneProblem, t: float, y: FloatArray, seeds: FloatArray) -> None:
+    def __init__(
+        self, plan: SceneProblem, t: float, y: FloatArray, seeds: FloatArray, pattern: Pattern | None = None
+    ) -> None:
         assembly = plan.assembly
         if plan.not_compilable:
             raise UnsupportedError(
@@ -144,6 +148,7 @@ class Augmented:
         count = len(plain.accelerations.nodes)
         self.block = max(1, _LONGEST // max(1, 4 * count))
         self.plain = plain
+        self.pattern = tuple(tuple(np.flatnonzero(row).tolist()) for row in seeds) if pattern is None else pattern
 
     def _programs(self, pattern: Pattern) -> tuple[Programs, CompiledAccelerations]:
         from atwood.integrators.embedded.rates import CompiledAccelerations
@@ -159,7 +164,7 @@ class Augmented:
     ) -> Stretch:
         """Integrate over some times, of which the last is the end, from a state and its derivatives (columns, n)."""
         parts = [slice(k, k + self.block) for k in range(0, len(columns), self.block)]
-        found = [self._run(t, y, columns[part], self.seeds[part], times, rtol, max_steps) for part in parts]
+        found = [self._run(t, y, columns[part], part, times, rtol, max_steps) for part in parts]
         return Stretch(
             found[0].states, np.concatenate([one.columns for one in found], axis=1), sum(one.steps for one in found)
         )
@@ -169,16 +174,14 @@ class Augmented:
         t: float,
         y: FloatArray,
         columns: FloatArray,
-        seeds: FloatArray,
+        part: slice,
         times: FloatArray,
         rtol: float,
         max_steps: int | None,
     ) -> Stretch:
         plan, (n, m), count = self.plan, self.split, len(columns)
-        pattern = tuple(tuple(np.flatnonzero(row).tolist()) for row in seeds)
-        programs, code = self._programs(pattern)
-        chosen = [seeds[j, list(own)] for j, own in enumerate(pattern)]
-        values = np.concatenate([self.values, *chosen])
+        programs, code = self._programs(self.pattern[part])
+        values = self._values(part)
         absolute = _CLOSER * plan.tolerances(rtol, {})[: n + m]
         z, packed = self._packed(y, columns), self._packed(absolute, np.tile(absolute, (count, 1)))
         problem = ExplicitProblem(size=len(z), rates=_no_rates, compiled=code.bind(values))
@@ -209,6 +212,11 @@ class Augmented:
         rows = self._unpacked(found, count)
         return Stretch(rows[:, 0], rows[:, 1:], session.statistics.steps)
 
+    def _values(self, part: slice) -> FloatArray:
+        """Return the values of parameters and seeds of some columns."""
+        pairs = zip(self.seeds[part], self.pattern[part], strict=True)
+        return np.concatenate([self.values, *(seeds[list(own)] for seeds, own in pairs)])
+
     def _packed(self, y: FloatArray, columns: FloatArray) -> FloatArray:
         n, _ = self.split
         every = np.concatenate([y[None, :], columns])
@@ -235,10 +243,9 @@ class Augmented:
         """Return columns taken onto the constraints, to which the state belongs."""
         if self.plain.projection is None:
             return columns
-        pattern = tuple(tuple(np.flatnonzero(row).tolist()) for row in self.seeds)
-        programs, _ = self._programs(pattern)
+        programs, _ = self._programs(self.pattern)
         assert programs.projection is not None
-        values = np.concatenate([self.values, *(self.seeds[j, list(own)] for j, own in enumerate(pattern))])
+        values = self._values(slice(None))
         z = self._projected(programs.projection, values, np.array([t]), self._packed(y, columns)[None, :])
         return self._unpacked(z, len(columns))[0, 1:]
 

@@ -30,6 +30,7 @@ from atwood.simulation.run.recorder import Recorder
 from atwood.simulation.run.run import Walk
 from atwood.simulation.run.run_record import Outcome
 from atwood.simulation.run.session import KeptSession
+from atwood.study.sensitivities.inputs import is_nodes
 
 State = tuple[float, FloatArray, FloatArray]
 Beside = Callable[[Assembly], Assembly]
@@ -46,10 +47,13 @@ class Change:
         The scene before it.
     apply
         Gives coordinates, speeds and discrete states behind it, from those before it in a scene.
+    enters
+        The parts of inputs of which another piece begins, where that is all that happens.
     """
 
     assembly: Assembly
     apply: Callable[[Beside, State], tuple[FloatArray, FloatArray, tuple[float, ...]]]
+    enters: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +86,10 @@ class Leg:
     number: int
 
 
+def _stays(beside: Beside, state: State) -> tuple[FloatArray, FloatArray, tuple[float, ...]]:
+    raise NotImplementedError  # what it changes is known
+
+
 class _Session(KeptSession):
     """Sessions that stop at every event."""
 
@@ -110,15 +118,22 @@ class WatchedWalk(Walk):
         return recorder, outcome
 
     def _update(self, due: Sequence[int]) -> None:
-        chosen, sampler = tuple(due), self.sampler
+        sampler, before = self.sampler, self.assembly
+        nodes = [i for i in due if is_nodes(before, sampler.updates[i].path)]
+        if nodes:  # they read nothing, and come first
+            parts = tuple(sampler.updates[i].path for i in nodes)
+            self.changes.append(Change(before, _stays, parts))
+            before = before.with_held(sampler.call(nodes, before, self.t, self.q, self.u).held)
+        chosen = tuple(i for i in due if i not in nodes)
 
         def apply(beside: Beside, state: State) -> tuple[FloatArray, FloatArray, tuple[float, ...]]:
             t, q, u = state
             made = sampler.call(chosen, beside(assembly), t, q, u)
             return made.coordinates, u, made.held
 
-        assembly = self.assembly
-        self.changes.append(Change(assembly, apply))
+        assembly = before
+        if chosen:
+            self.changes.append(Change(assembly, apply))
         super()._update(due)
 
     def _jump(self, before: Assembly, show_both: bool = False) -> None:

@@ -86,11 +86,16 @@ class Column:
 
 
 def find_columns(
-    assembly: Assembly, start: Start, parameters: Iterable[str], starts: Iterable[str]
+    assembly: Assembly,
+    start: Start,
+    parameters: Iterable[str],
+    starts: Iterable[str],
+    inputs: Sequence[Column] = (),
 ) -> tuple[Column, ...]:
     """Return what a run is differentiated by; what it cannot be is refused by name."""
     found = [_parameter(assembly, path) for path in parameters]
     found += [_start_value(assembly, start, path) for path in starts]
+    found += inputs
     if not found:
         raise UsageError(
             "nothing is said that it is to be differentiated by",

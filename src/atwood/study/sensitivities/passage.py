@@ -21,6 +21,7 @@ from atwood.simulation.run.run import walked
 from atwood.study.sensitivities.augmented import Augmented, Stretch
 from atwood.study.sensitivities.changes import Beside, Change, Leg, WatchedWalk
 from atwood.study.sensitivities.columns import SHARES, Column, extrapolated
+from atwood.study.sensitivities.inputs import NodeColumn
 from atwood.study.sensitivities.quantities import derivatives, written
 
 _AGREES = 1e3
@@ -96,7 +97,7 @@ class Passage:
         moved = np.array([one.start(own_state(self.first, self.start), self.start.length) for one in self.columns])
         held = np.zeros((len(self.columns), len(self.first.discrete_states)))
         if held.size:
-            held = np.array([extrapolated(partial(_held_near, one)) for one in self.columns])
+            held = np.array([self._held_at_start(one) for one in self.columns])
         state, still = np.concatenate(own_state(self.first, self.start)), np.zeros(len(self.columns))
         for change in self.legs[0].changes:
             moved, held, state = self._changed(change, self.start.time, state, moved, held, still)
@@ -105,7 +106,7 @@ class Passage:
             segment = self.segments[leg.number]
             self._refuse_singular(segment)
             seeds, begin = self._seeds(leg, held), np.concatenate(leg.begin[1:])
-            augmented = Augmented(leg.plan, leg.begin[0], begin, seeds)
+            augmented = Augmented(leg.plan, leg.begin[0], begin, seeds, self._pattern(leg, seeds))
             moved = self._tangent(leg, augmented, begin, moved, seeds)
             stretch = self._along(leg, segment, augmented, begin, moved)
             shown = np.flatnonzero(segment.shown)
@@ -176,6 +177,19 @@ class Passage:
             seeds[:, places[one.symbol]] = held[:, k]
         return seeds
 
+    def _pattern(self, leg: Leg, seeds: FloatArray) -> tuple[tuple[int, ...], ...]:
+        """Return the parameters that change with each column; those of inputs in any stretch, so that all are alike."""
+        places = {symbol: k for k, symbol in enumerate(leg.plan.assembly.parameters)}
+        states = leg.assembly.discrete_states
+        found = []
+        for column, row in zip(self.columns, seeds, strict=True):
+            own = set(np.flatnonzero(row).tolist())
+            if isinstance(column, NodeColumn):
+                part = column.driven.part
+                own |= {places[one.symbol] for one in states if one.path.startswith(f"{part}.piece[")}
+            found.append(tuple(sorted(own)))
+        return tuple(found)
+
     def _along(
         self, leg: Leg, segment: SegmentRecord, augmented: Augmented, begin: FloatArray, moved: FloatArray
     ) -> Stretch:
@@ -230,6 +244,8 @@ class Passage:
         moments: FloatArray,
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return derivatives of the state and of discrete states behind a change, and the state there."""
+        if change.enters:
+            return columns, self._entered(change, t, held), state
         n = len(change.assembly.own_equations.coordinates)
         now, equations = np.array(change.assembly.held_now), change.assembly.own_equations
         sizes = np.concatenate([one(equations, self.start.length) for one in (coordinate_scales, motion_scales)])
@@ -258,6 +274,21 @@ class Passage:
         count = len(base) - len(now)
         made = np.array(found)
         return made[:, :count], made[:, count:], base[:count]
+
+    def _held_at_start(self, column: Column) -> FloatArray:
+        if isinstance(column, NodeColumn):
+            return column.pieces(self.first, self.start.time)
+        return extrapolated(lambda share: np.array(column.near(share).held_at_start))
+
+    def _entered(self, change: Change, t: float, held: FloatArray) -> FloatArray:
+        """Return derivatives of the discrete states where other pieces of inputs begin."""
+        found, parts = held.copy(), change.enters
+        states = change.assembly.discrete_states
+        found[:, [i for i, one in enumerate(states) if one.path.rpartition(".")[0] in parts]] = 0.0
+        for j, column in enumerate(self.columns):
+            if isinstance(column, NodeColumn) and column.driven.part in parts:
+                found[j] += column.pieces(change.assembly, t)
+        return found
 
     def _moments(self, leg: Leg, columns: FloatArray, seeds: FloatArray) -> FloatArray:
         """Return by how much the time at which a stretch ends changes with each column, s."""
@@ -332,10 +363,6 @@ def _only_leg(segment: SegmentRecord) -> Leg:
         (float(segment.time[k]), segment.coordinates[:, k].copy(), segment.speeds[:, k].copy()) for k in (0, -1)
     )
     return Leg((), segment.plan, segment.assembly, None, begin, end, None, 0)
-
-
-def _held_near(column: Column, share: float) -> FloatArray:
-    return np.array(column.near(share).held_at_start)
 
 
 def _rates(leg: Leg, state: tuple[float, FloatArray, FloatArray]) -> FloatArray:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field
 from itertools import product
 from typing import Any
 
 import numpy as np
 
-from atwood.arguments import PATHS, one_of, optional, takes, whole
+from atwood.arguments import ANYTHING, PATHS, one_of, optional, takes, whole
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError, UsageError
 from atwood.forms.assembly import Assembly
@@ -21,6 +21,7 @@ from atwood.pipeline import SCENE, assembly_of, simulate
 from atwood.result.result import Result
 from atwood.simulation.problem.arguments import FORM, OUTPUTS, RTOL, T_END
 from atwood.study.sensitivities.columns import find_columns
+from atwood.study.sensitivities.inputs import HELD, LINEAR, Driven, with_inputs
 from atwood.study.sensitivities.passage import Passage
 from atwood.table import Shown, Table, table
 
@@ -29,7 +30,8 @@ from atwood.table import Shown, Table, table
 class Sensitivities(Shown):
     """Derivatives of quantities of a run by what was varied.
 
-    ``found["bob.position.x", "rod.length"]`` is an array over the output times.
+    ``found["bob.position.x", "rod.length"]`` is an array over the output times, and ``found["bob.position.x",
+    "push.value"]`` one of shape (nodes, times) where the input ``push.value`` has nodes.
 
     Attributes
     ----------
@@ -38,13 +40,15 @@ class Sensitivities(Shown):
     time
         Output times, s, shape (times,).
     quantities, by
-        Paths of what is differentiated, and of what by: parameters first, then start values.
+        Paths of what is differentiated, and of what by: parameters, then start values, then inputs at their nodes.
     values
         The quantities, shape (quantities, times).
     derivatives
         In SI units, shape (quantities, columns, times). At an event they are those after it.
     units
         Of each derivative, by the two paths.
+    inputs
+        Inputs with the times and values of their nodes.
     """
 
     result: Result = field(repr=False)
@@ -54,12 +58,16 @@ class Sensitivities(Shown):
     values: FloatArray
     derivatives: FloatArray
     units: dict[tuple[str, str], str]
+    inputs: tuple[Driven, ...] = ()
 
     def __getitem__(self, pair: tuple[str, str]) -> FloatArray:
         if len(pair) != 2:
             advice = "Give both: found['bob.position.x', 'rod.length']."
             raise UsageError("a derivative is of a quantity by a parameter", advice=advice)
         places = []
+        nodes = next((one for one in self.inputs if one.path == pair[1] and not one.is_constant), None)
+        if nodes is not None:
+            return np.array([self[pair[0], nodes.name(k)] for k in range(len(nodes.times))])
         for path, known, what in zip(pair, (self.quantities, self.by), ("of", "by"), strict=True):
             if path not in known:
                 raise UsageError(f"there are no derivatives {what} it; there are {', '.join(known)}", where=str(path))
@@ -94,6 +102,8 @@ def unit_by(quantity: str, parameter: str) -> str:
     quantities=PATHS,
     parameters=PATHS,
     start=PATHS,
+    inputs=ANYTHING,
+    between=one_of((LINEAR, HELD)),
     t_end=T_END,
     outputs=OUTPUTS,
     form=optional(FORM),
@@ -107,6 +117,8 @@ def sensitivities(
     *,
     parameters: Iterable[str] = (),
     start: Iterable[str] = (),
+    inputs: Mapping[str, Any] | Iterable[str] = (),
+    between: str = LINEAR,
     t_end: float | str | None = None,
     outputs: Any = 201,
     form: str | None = None,
@@ -114,7 +126,7 @@ def sensitivities(
     rtol: float = 1e-10,
     max_steps: int | None = None,
 ) -> Sensitivities:
-    """Return the derivatives of quantities along a run by parameters and start values.
+    """Return the derivatives of quantities along a run by parameters, start values and inputs.
 
     The variational equations come from derivatives of the expression graph and are integrated together with the
     motion; no runs are compared.
@@ -128,6 +140,13 @@ def sensitivities(
     parameters, start
         Paths of parameters and of start values. A parameter that shapes the equations, or is exactly zero, is refused.
         By a start value that the scene does not give, derivatives are as if it gave the one that it has.
+    inputs
+        Inputs (signals) of parts, each with its values at nodes: ``{"push.value": [(0.0, 6.0), (1.0, -6.0)]}``, rows of
+        time, s, and value, which cover the run. The run has these, and there is one derivative by the value at each
+        node, called ``"push.value[0]"`` and so on; ``found[quantity, "push.value"]`` has all, shape (nodes, times).
+        With a number, or with paths alone, an input is constant, and there is one. Zero is a value as any other.
+    between
+        What an input is between two nodes: ``"linear"``, or ``"held"``, as what a computer puts out is.
     t_end, outputs, form
         See `atwood.simulate`.
     mode
@@ -151,7 +170,10 @@ def sensitivities(
         If the run does not get to its end, or has no derivative at an event, with time and part.
     """
     assembly = assembly_of(scene, form=form)
-    return derivatives_of(assembly, tuple(quantities), tuple(parameters), tuple(start), t_end, outputs, rtol, max_steps)
+    end = assembly.flat.t_end if t_end is None else float(t_end)
+    assembly, driven = with_inputs(assembly, inputs, between, end)
+    about = tuple(quantities), tuple(parameters), tuple(start)
+    return derivatives_of(assembly, *about, t_end, outputs, rtol, max_steps, driven)
 
 
 def derivatives_of(
@@ -163,6 +185,7 @@ def derivatives_of(
     outputs: Any,
     rtol: float,
     max_steps: int | None,
+    driven: tuple[Driven, ...] = (),
 ) -> Sensitivities:
     """Return the derivatives along a run; see `sensitivities`."""
     from atwood.study.sweeps.runs import expand_paths
@@ -172,7 +195,9 @@ def derivatives_of(
     if result.status not in ("finished", "stopped"):
         raise SolveError(f"the run does not get to its end: {result.message}", where=assembly.flat.name)
     assert run.start is not None
-    columns = find_columns(run.assembly, run.start, parameters, starts)
+    columns = find_columns(
+        run.assembly, run.start, parameters, starts, [one for some in driven for one in some.columns()]
+    )
     paths = tuple(expand_paths(assembly, quantities or None))
     passage = Passage(result, columns, paths, rtol, max_steps)
     values, found = passage.go()
@@ -186,4 +211,5 @@ def derivatives_of(
         values=values,
         derivatives=found / scales[:, None],
         units={(path, one.path): unit_by(units[path], one.unit) for path in paths for one in columns},
+        inputs=driven,
     )
