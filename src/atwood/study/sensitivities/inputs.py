@@ -1,7 +1,7 @@
 """Inputs of parts as values at nodes of time, and what a run is differentiated by them.
 
 Between two nodes an input is linear, or is held. So a change of the value at one node changes the input by a hat, or
-by a value for a while (J. T. Betts, Practical Methods for Optimal Control, 2nd edition, 2010). A run stops at each node.
+by a value for a while (J. T. Betts, Practical Methods for Optimal Control, 2nd ed., 2010). A run stops at each node.
 """
 
 from __future__ import annotations
