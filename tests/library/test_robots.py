@@ -189,7 +189,7 @@ BAD = {
     ),
     "impossible inertia": (
         link("a", moments="1 1 5"),
-        r"robot\.urdf:2: link 'a'.*principal moments are 1, 1, 5 kg m\^2",
+        r"robot\.urdf:2: link 'a'.*principal moments 1, 1, 5 kg m\^2",
     ),
 }
 

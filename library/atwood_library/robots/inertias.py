@@ -52,8 +52,9 @@ def checked_inertia(mass: float, centre: Any, inertia: Any, inertias: str, where
             near = nearest_inertia(inertia) if mass > 0.0 else np.zeros((3, 3))
             return MassProperties(mass, centre, near)
         moments = ", ".join(f"{one:.6g}" for one in np.linalg.eigvalsh(np.asarray(inertia)))
+        said = "" if moments in error.message else f"; its principal moments are {moments} kg m^2"
         raise ParameterError(
-            f"no body has this inertia: {error.message}; its principal moments are {moments} kg m^2",
+            f"{error.message}{said}",
             where=where,
             advice="Correct the file, or read it with inertias='nearest'.",
         ) from None

@@ -81,8 +81,12 @@ def find_scene(text: str) -> tuple[Model, str]:
         raise UsageError(
             "no component library is installed", where=text, advice="Install one, or give a scene as FILE.py:NAME."
         )
-    close = suggestion(text, known) if near_matches(text, known) else "see `atwood list`, or give FILE.py:NAME"
-    raise UsageError("there is no such scene", where=text, advice=f"{close[0].upper()}{close[1:]}")
+    advice = "See `atwood list`, or give FILE.py:NAME, or a file of a robot (.urdf, .xml)."
+    if near_matches(text, known):
+        advice = suggestion(text, known)
+    elif Path(text).is_file():
+        raise UsageError("nothing reads such a file as a scene", where=text, advice=advice)
+    raise UsageError("there is no such scene", where=text, advice=advice)
 
 
 def prepare(text: str, settings: Sequence[str], starts: Sequence[str]) -> tuple[Model, str]:

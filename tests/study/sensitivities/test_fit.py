@@ -123,7 +123,7 @@ def broken(**changes):
         ({"time": np.arange(3.0), "bob3.position.x": np.arange(3.0)}, {}, "no quantity"),
         ({"time": np.arange(3.0), PATHS[0]: np.arange(2.0)}, {}, "differ in length"),
         ({"time": np.arange(3.0)}, {}, "no column"),
-        ({"time": np.arange(3.0), PATHS[0]: ["a", "b", "c"]}, {}, "no numbers"),
+        ({"time": np.arange(3.0), PATHS[0]: ["1", "b", "c"]}, {}, "'b' is no number"),
         ([], {}, "no data"),
         ("nowhere.csv", {}, "cannot be read"),
         (3.0, {}, "nothing that data are read from"),
@@ -139,6 +139,24 @@ def broken(**changes):
 def test_bad_input(data, given, said):
     with pytest.raises(AtwoodError, match=said):
         fit(DoublePendulum(), data, **{"vary": ["mass1"], **given})
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "it is empty"),
+        (f"time,{PATHS[0]}\n", "no rows"),
+        (f"time;{PATHS[0]}\n0;1\n", "separated by commas"),
+        (f"time,{PATHS[0]}, {PATHS[0]}\n0,1,2\n", "two columns"),
+        (f"# remark\ntime,{PATHS[0]}\n\n0,1\n1\n", "line 5 has 1 entries"),
+        (f"time,{PATHS[0]}\n0,1\n,\n", "'' is no number"),
+    ],
+)
+def test_bad_file(tmp_path, text, said):
+    file = tmp_path / "data.csv"
+    file.write_text(text)
+    with pytest.raises(AtwoodError, match=said):
+        fit(DoublePendulum(), file, ["mass1"])
 
 
 def test_command(tmp_path):

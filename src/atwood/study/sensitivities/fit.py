@@ -459,8 +459,8 @@ def _ends(one: Column, bounds: Any) -> tuple[float, float]:
             else (side if end is None else number().read(end))
             for end, side in ((low, -np.inf), (high, np.inf))
         )
-    except AtwoodError:
-        raise
+    except AtwoodError as error:
+        raise UsageError(error.message, where=one.path, advice=error.advice) from None
     except Exception:
         raise UsageError(
             f"{bounds!r} are no bounds", where=one.path, advice="Give two numbers, low and high."

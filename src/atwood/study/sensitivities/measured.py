@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from atwood.arguments import show
 from atwood.arrays import FloatArray, IndexArray
 from atwood.errors import AtwoodError, UsageError, suggestion_in_parts
 from atwood.forms.assembly import Assembly
@@ -70,7 +71,7 @@ def _experiment(assembly: Assembly, data: Any, quantities: Iterable[str] | None,
         chosen = [one.name for one in assembly.reduced.names if one.name in columns and one.name in known]
     stray = [one for one in chosen if one not in known]
     if stray or not chosen:
-        advice = f"{suggestion_in_parts(stray[0], known) if stray else ''} Name the ones that count in quantities."
+        advice = f"{suggestion_in_parts(stray[0], known) if stray else ''} Or name what counts in quantities."
         raise UsageError(
             f"no quantity is called as its column {', '.join(stray[:1])}", where=name, advice=advice.strip()
         )
@@ -139,10 +140,20 @@ def _numbers(values: Any, name: str, column: str) -> FloatArray:
     try:
         found = np.asarray(values, dtype=float)
     except (TypeError, ValueError):
-        raise UsageError("it has entries that are no numbers", where=f"{name}: {column}") from None
+        stray = next((one for one in values if not _is_number(one)), values)
+        said = f"its entry {show(stray)} is no number"
+        raise UsageError(said, where=f"{name}: {column}", advice="Leave out rows without values.") from None
     if found.ndim != 1 or not len(found):
         raise UsageError(f"its shape is {found.shape}, and not one of numbers over time", where=f"{name}: {column}")
     return found
+
+
+def _is_number(one: Any) -> bool:
+    try:
+        float(one)
+    except (TypeError, ValueError):
+        return False
+    return True
 
 
 def _first_is_time(columns: Mapping[str, FloatArray], name: str) -> _Columns:
@@ -162,17 +173,25 @@ def _first_is_time(columns: Mapping[str, FloatArray], name: str) -> _Columns:
 
 def _csv(file: Path, name: str) -> _Columns:
     try:
-        with file.open(encoding="utf-8", newline="") as stream:
-            rows = [row for row in csv.reader(stream) if row and not row[0].lstrip().startswith("#")]
+        with file.open(encoding="utf-8-sig", newline="") as stream:  # some programs begin a file with a mark of order
+            reader = csv.reader(stream)
+            rows = [(row, reader.line_num) for row in reader if row and not row[0].lstrip().startswith("#")]
     except (OSError, UnicodeDecodeError) as error:
         raise UsageError(f"it cannot be read ({error})", where=name) from None
     if len(rows) < 2:
-        raise UsageError("it has no rows below its headings", where=name)
-    heading, *lines = rows
-    for number, line in enumerate(lines, start=2):
+        said = "it has no rows below its headings" if rows else "it is empty"
+        raise UsageError(said, where=name, advice="Write headings in its first line and numbers below.")
+    heading = [one.strip() for one in rows[0][0]]
+    if len(heading) == 1:
+        advice = "The first column is the time; columns are separated by commas."
+        raise UsageError(f"it has a single column, {heading[0]!r}", where=name, advice=advice)
+    twice = next((one for k, one in enumerate(heading) if one in heading[:k]), None)
+    if twice is not None:
+        raise UsageError(f"it has two columns {twice!r}", where=name, advice="Leave one of them out.")
+    for line, number in rows[1:]:
         if len(line) != len(heading):
             raise UsageError(f"line {number} has {len(line)} entries under {len(heading)} headings", where=name)
-    columns = {one.strip(): _numbers([line[k] for line in lines], name, one) for k, one in enumerate(heading)}
+    columns = {one: _numbers([line[k] for line, _ in rows[1:]], name, one) for k, one in enumerate(heading)}
     return _first_is_time(columns, name)
 
 
