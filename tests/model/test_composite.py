@@ -6,6 +6,7 @@ from hypothesis import given, settings, strategies as st
 
 import atwood as aw
 from atwood.model.local.flatten import flatten
+from atwood_library import Mass1D, TranslationalFriction
 
 from .things import (
     Bar,
@@ -453,3 +454,11 @@ def test_a_model_passes_its_input_on():
         _ = 2 * Driven.pull
     with pytest.raises(aw.ParameterError, match="cannot follow the input"):
         Bob(mass=Driven.pull)
+
+
+def test_what_could_be_joined_instead_is_named():
+    scene = aw.Scene()
+    mass, brake = scene.add("mass", Mass1D()), scene.add("brake", TranslationalFriction())
+    for ends in ((mass.flange, brake.b), (brake.b, mass.flange)):
+        with pytest.raises(aw.ConnectError, match=r"Connect mass\.slide, a Slide, instead of mass\.flange\."):
+            scene.connect(*ends)

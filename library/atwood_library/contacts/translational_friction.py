@@ -21,7 +21,6 @@ class TranslationalFriction(Rubbing):
     synonyms: ClassVar[tuple[str, ...]] = (
         *("Friction", "SupportFriction", "Translational.Components.Brake", "Guide friction", "Stick-slip"),
     )
-    spaces: ClassVar[tuple[str, ...]] = ("plane", "space")
 
     sliding: Any = parameter(
         "1.0", unit="N", function_of={"v": "m/s"}, doc="Friction at a speed v of slip, of its size, at level 1."

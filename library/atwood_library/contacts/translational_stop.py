@@ -19,7 +19,6 @@ class TranslationalStop(Bounded):
     """
 
     synonyms: ClassVar[tuple[str, ...]] = ("Hard stop", "Stop", "MassWithStopAndFriction")
-    spaces: ClassVar[tuple[str, ...]] = ("plane", "space")
 
     lower: Number = parameter(None, unit="m", doc="Where it ends below; nowhere if not given.")
     upper: Number = parameter(None, unit="m", doc="Where it ends above; nowhere if not given.")
@@ -42,4 +41,5 @@ class TranslationalStop(Bounded):
         unit="N",
         doc="Play {way} the {end} end.",
         reaction_doc="What the {end} end exerts on b, away from it.",
+        spaces=("line", "plane", "space"),
     )

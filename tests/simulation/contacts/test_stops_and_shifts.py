@@ -118,10 +118,11 @@ def test_modelica_s_translational_friction_of_a_mass_that_is_pushed(form: str) -
     assert result["mass.displacement"][-1] == pytest.approx(known, abs=1e-9)
 
 
+@pytest.mark.parametrize("space", ["line", "plane"])
 @FORMS
-def test_modelica_s_translational_friction_of_a_mass_between_stops(form: str) -> None:
+def test_modelica_s_translational_friction_of_a_mass_between_stops(form: str, space: str) -> None:
     """The same, stop2: a mass on a spring runs into a stop, goes back and stays where friction holds it."""
-    scene = Scene()
+    scene = Scene(space=space)
     mass = scene.add("mass", Mass1D(mass=1.0))
     rub = scene.add("rub", TranslationalFriction(sliding="v + 3 + 5*exp(-2*v)", against="ground"))
     law = TranslationalSource(value=0.0, against="ground", law=lambda x: -500.0 * (x + 0.25))

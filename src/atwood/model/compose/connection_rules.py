@@ -121,8 +121,19 @@ def check_ends(a: Any, b: Any, path_a: str, path_b: str) -> None:
     if kind_a.family != kind_b.family:
         raise ConnectError(
             f"{path_a} is a {kind_a.__name__} and {path_b} is a {kind_b.__name__}; they are unlike and cannot meet",
-            advice="A Groove takes a rope's bend, a Shaft or a Slide a gear; points and frames meet each other.",
+            advice=_of_family(a, kind_b, path_a)
+            or _of_family(b, kind_a, path_b)
+            or "A Groove takes a rope's bend, a Shaft or a Slide a gear; points and frames meet each other.",
         )
+
+
+def _of_family(end: Any, kind: type[Connector], path: str) -> str:
+    """Return which connectors of an end's part could be joined to one of another kind; nothing where none could."""
+    if not isinstance(end, Connector):
+        return ""
+    part = path.removesuffix(end.name)
+    fits = [part + name for name, one in end.component.connectors().items() if one.family == kind.family]
+    return f"Connect {' or '.join(fits)}, a {kind.__name__}, instead of {path}." if fits else ""
 
 
 def _check_signal_units(source: OutputRef, target: InputRef, path_source: str, path_target: str) -> None:
