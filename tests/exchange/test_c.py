@@ -10,7 +10,8 @@ import pytest
 from atwood import assemble, export_c, simulate
 from atwood.cli import main
 from atwood.errors import ParameterError, UnsupportedError, UsageError
-from atwood.exchange.c.text import c_name, quoted
+from atwood.exchange.c.tables import quoted
+from atwood.exchange.c.text import c_name
 from atwood_library.scenes import SCENES
 
 from ..exported_scenes import FLAGS, apart, built, compiler, printed

@@ -35,6 +35,18 @@ static int32_t events_at(double t, word *y, word *yp, word *target, word *data)
 }
 #endif
 
+#if EVENTS || SWITCHES
+static void log_event(scene *s, double time, int source, int kind, double speed)
+{
+    scene_happening *const one = s->log + s->happened % scene_LOGGED;
+    one->time = time;
+    one->speed = speed;
+    one->source = source;
+    one->kind = kind;
+    s->happened++;
+}
+#endif
+
 /* Where everything lies; after an instance was copied, too. */
 static void link_memory(scene *s)
 {
@@ -75,6 +87,20 @@ static void link_memory(scene *s)
     s->sought[SOUGHT_shifted].p = s->shifted;
     s->sought[SOUGHT_turns].p = s->turns;
     s->sought[SOUGHT_rows].p = s->rows;
+#endif
+#if CONTACTS
+    s->sets[SET_derived].p = s->contacts_derived;
+    s->sets[SET_scratch].p = s->scratch;
+    s->sets[SET_y].p = s->y;
+    s->sets[SET_out].p = s->contacts_0;
+    s->sets[SET_units].p = s->units;
+    s->sets[SET_rows].p = s->set_rows;
+    s->sets[SET_matrix].p = s->matrix;
+    s->sets[SET_left].p = s->left;
+    s->sets[SET_shares].p = s->shares;
+    s->sets[SET_pattern].p = s->pattern;
+    s->sets[SET_past].p = s->impacts;
+    s->sets[SET_log].p = s->log_of_sets;
 #endif
 }
 
@@ -261,17 +287,36 @@ static void in_piece(scene *s, double t)
     fill(s);
 }
 
+#if UPDATES
+/* The first moment after a time at which updates are due. */
+static int next_moment(double t)
+{
+    int low = 0, high = MOMENTS;
+    while (low < high) {
+        const int middle = low + (high - low) / 2;
+        if (moment_times[middle] > t) high = middle;
+        else low = middle + 1;
+    }
+    return low;
+}
+#endif
+
 static double next_piece(const scene *s)
 {
     double next = known_until;
 #if PIECES
     int k;
     for (k = PIECES - 1; k >= 0; k--) {
-        if (piece_times[k] > s->began) next = piece_times[k] < known_until ? piece_times[k] : known_until;
+        if (piece_times[k] > s->began && piece_times[k] < next) next = piece_times[k];
     }
-#else
-    (void)s;
 #endif
+#if UPDATES
+    {
+        const int moment = next_moment(s->began);
+        if (moment < MOMENTS && moment_times[moment] < next) next = moment_times[moment];
+    }
+#endif
+    (void)s;
     return next;
 }
 
@@ -294,6 +339,7 @@ static int at(scene *s, double t)
 }
 
 #if EVENTS
+/* contacts */
 /* Take the signs of events at a start; those that start at zero have a margin to pass, in the direction that counts. */
 static int listen(scene *s, double t)
 {
@@ -307,7 +353,10 @@ static int listen(scene *s, double t)
         s->rows[EVENTS * SEARCHED_direction + i].f = event_direction[i];
         s->rows[EVENTS * SEARCHED_sign + i].f = 0.0;
     }
-    s->sought[SOUGHT_is_first].i = 0;
+#if CONTACTS
+    arm(s, t);
+#endif
+    s->sought[SOUGHT_is_first].i = CONTACTS > 0;
     return restart(s->sought, t) == 0 ? 0 : 1;
 }
 
@@ -318,16 +367,12 @@ static int broken(const scene *s)
     for (i = 0; i < EVENTS; i++) {
         const double small = event_small[i] * s->rtol;
         const double known = s->rows[EVENTS * SEARCHED_known + i].f;
+#if CONTACTS
+        if (s->calm[i]) continue;
+#endif
         if (!event_noted[i] && event_direction[i] * (known - s->shifts[i].f) > 0.9 * small) return i;
     }
     return -1;
-}
-
-static int happen(scene *s, int i)
-{
-    s->event = i;
-    s->event_time = s->time;
-    return event_stops[i] ? say(s, STOPPED, event_messages[i]) : say(s, READY, "");
 }
 
 /* The time at which the value of what happened was zero, where it came from the other side and the margin made it late. */
@@ -396,13 +441,95 @@ static void watch(scene *s)
     s->searched = s->coming_kind == READY ? until : s->found;
 }
 
-/* Begin at a state, taken onto the constraints. */
-static int begin_at(scene *s, double t, const double *state)
+/* passage */
+#if UPDATES
+/* What updates make of the state, one after the other; 0 where one has no value. */
+static int update(scene *s, const int *list, int count, const int *known)
+{
+    int i, j;
+    for (i = 0; i < count; i++) {
+        const int k = list[i];
+        const double *given = known != NULL && known[i] >= 0 ? given_values + known[i] : NULL;
+        for (j = 0; j < SIZE; j++) s->y[j].f = s->state[j];
+        if (given == NULL) given = updated(s, k);
+        if (given == NULL) return 0;
+        for (j = update_starts[k]; j < update_starts[k + 1]; j++) {
+            const double value = given[j - update_starts[k]];
+            if (!(value - value == 0.0)) return 0;
+            if (update_is_held[j]) s->values[update_places[j]].f = value;
+            else s->state[update_places[j]] = value;
+        }
+        fill(s);
+        s->is_evaluated = 0;
+    }
+    return 1;
+}
+
+/* The updates that are due at a time. */
+static int sample(scene *s, double t)
+{
+    const int moment = next_moment(t) - 1, first = moment < 0 ? 0 : due_starts[moment];
+    if (moment < 0 || moment_times[moment] != t) return 1;
+    return update(s, due + first, due_starts[moment + 1] - first, due_given + first);
+}
+#endif
+
+#define AGAIN (-1)   /* a motion begins anew from the state that there is */
+#define CHANGES (-2) /* it goes on in the mode that an event leads to */
+
+/* Go on from s->state where values change that functions of time, or updates, give: a motion that these prescribe may
+ * jump in speed, which is an impact.  An event gives its updates; otherwise those are made that are due. */
+static int alter(scene *s, double t, int event)
+{
+#if SWITCHES
+    double *const q = s->places, *const u = s->velocities, *const was = s->was, *const now = s->now;
+    double fastest, faster = 0.0;
+    int i, has_impact = 0;
+    if (bodies_of(s, t, s->state, q, u) != 0) return say(s, FAILED, "the bodies have no place");
+    fastest = misses(s, t, q, u, was, was + BODY_CONSTRAINTS);
+#endif
+    s->time = t;
+    in_piece(s, t);
+#if UPDATES
+    {
+        const int is_good = event < 0 ? sample(s, t)
+            : update(s, event_updates + update_firsts[event], update_firsts[event + 1] - update_firsts[event], NULL);
+        if (!is_good) return say(s, FAILED, "an update has no value");
+    }
+#else
+    (void)event;
+#endif
+#if SWITCHES
+    faster = misses(s, t, q, u, now, now + BODY_CONSTRAINTS);
+    if (!(fastest - fastest == 0.0 && faster - faster == 0.0)) return say(s, FAILED, "a constraint has no value");
+    for (i = 0; i < BODY_CONSTRAINTS; i++) {
+        if (fabs(now[i] - was[i]) <= HELD) continue;
+        s->constraint = i;
+        return say(s, FAILED, "a motion that is prescribed jumps, and no position can");
+    }
+    for (i = BODY_CONSTRAINTS; i < 2 * BODY_CONSTRAINTS; i++) {
+        if (fabs(now[i] - was[i]) <= 1e-9 * fmax(fastest, faster)) continue;
+        if (!has_impact || body_laws[i - BODY_CONSTRAINTS] != body_laws[i - BODY_CONSTRAINTS - 1]) {
+            log_event(s, t, body_laws[i - BODY_CONSTRAINTS], scene_IMPACT, 0.0);
+        }
+        has_impact = 1;
+    }
+    if (has_impact) {
+        double guess[COORDINATES + 1];
+        const int code = struck(s, t, q, u);
+        if (code == 1) return say(s, FAILED, "an impact, in which something has no value");
+        if (code == 2) return say(s, FAILED, "an impact, in which a constraint would have to act against its one side");
+        for (i = 0; i < COORDINATES; i++) guess[i] = s->state[i];
+        if (state_of(s, t, guess, q, u, s->state) != READY) return FAILED;
+    }
+#endif
+    return AGAIN;
+}
+
+/* Begin at a state, taken onto the constraints, whatever gaps and slips do. */
+static int begin_mode(scene *s, double t)
 {
     int i;
-    in_piece(s, t);
-    for (i = 0; i < SIZE; i++) s->y[i].f = state[i];
-    take(s, t, s->y);
     normalize(s->y);
 #if PROJECTS
     if (project(t, s->y, s->block + 2) != 0) return say(s, FAILED, "the constraints cannot be met near this state");
@@ -422,10 +549,78 @@ static int begin_at(scene *s, double t, const double *state)
 #endif
 #if EVENTS
     if (listen(s, t) != 0) return say(s, FAILED, "an event has no value");
-    i = broken(s);
-    if (i >= 0) return happen(s, i);
 #endif
-    return say(s, READY, "");
+    (void)i;
+    return READY;
+}
+
+#if EVENTS
+/* What an event leads to. */
+static int happen(scene *s, int i)
+{
+    s->event = i;
+    s->event_time = s->time;
+#if CONTACTS
+    if (event_contact[i] >= 0) {
+        int j;
+        for (j = 0; j < EVENTS; j++) {
+            if (event_contact[j] >= 0 && (j == i || s->fired[j])) s->triggers[event_contact[j]] = event_code[j];
+        }
+        memset(s->fired, 0, sizeof s->fired);
+        return AGAIN;
+    }
+#endif
+    log_event(s, s->time, i, scene_EVENT, 0.0);
+    if (event_action[i] == ENDS) return say(s, STOPPED, event_messages[i]);
+    if (event_action[i] == UPDATES_STATES) return alter(s, s->time, i);
+    return event_action[i] == LEADS ? CHANGES : say(s, READY, "");
+}
+#endif
+
+/* Begin at a state, and go on with what happens there until nothing more does. */
+static int begin_at(scene *s, double t, const double *state, int is_start)
+{
+    int i, turn;
+    for (i = 0; i < SIZE; i++) s->state[i] = state[i];
+    s->time = t;
+    for (turn = 0;; turn++) {
+        in_piece(s, t);
+        s->is_evaluated = 0;
+#if UPDATES
+        if (is_start && !sample(s, t)) return say(s, FAILED, "an update has no value");
+#endif
+        for (i = 0; i < SIZE; i++) s->y[i].f = s->state[i];
+#if CONTACTS
+        if (resolve_contacts(s, t, is_start) != READY) return FAILED;
+#endif
+        if (begin_mode(s, t) != READY) return FAILED;
+        (void)is_start;
+        is_start = 0;
+#if EVENTS
+        for (i = 0; i < EVENTS; i++) {
+            if (s->fired[i]) return say(s, READY, "");
+        }
+        i = broken(s);
+        if (i >= 0) {
+            const int status = happen(s, i);
+            if (status != AGAIN) return status;
+            if (turn > 1000) return say(s, FAILED, "it changes without end");
+            continue;
+        }
+#endif
+        return say(s, READY, "");
+    }
+}
+
+static int begin_again(scene *s, int status)
+{
+    if (status == AGAIN) {
+        s->changes = s->time - s->changed <= 1e-9 * horizon ? s->changes + 1 : 0;
+        s->changed = s->time;
+        if (s->changes > 10000) return say(s, FAILED, "it changes without end");
+        return begin_at(s, s->time, s->state, 0);
+    }
+    return status;
 }
 
 /* Go over what comes. */
@@ -443,15 +638,15 @@ static int pass(scene *s)
 #endif
 #if EVENTS
     {
-        int i, stops = -1;
+        int i, leads = -1;
         take(s, s->coming, s->event_y);
         for (i = 0; i < EVENTS; i++) {
-            if (s->fired[i] && event_stops[i] && stops < 0) stops = i;
+            if (s->fired[i] && event_action[i] != NOTED && leads < 0) leads = i;
         }
         for (i = 0; i < EVENTS; i++) {
-            if (s->fired[i] && !event_stops[i]) happen(s, i);
+            if (s->fired[i] && event_action[i] == NOTED) happen(s, i);
         }
-        if (stops >= 0) return happen(s, stops);
+        if (leads >= 0) return begin_again(s, happen(s, leads));
         watch(s);
     }
 #endif
@@ -463,6 +658,7 @@ void scene_default(scene *s)
     int i;
     memset(s, 0, sizeof *s);
     s->rtol = 1e-8;
+    s->is_new = 1;
     for (i = 0; i < VALUES; i++) s->values[i].f = values[i];
     for (i = 0; i < SIZE; i++) s->state[i] = start_state[i];
     s->time = scene_start_time;
@@ -502,7 +698,19 @@ int scene_begin(scene *s)
         s->turns[SIZE + i].f = turns[SIZE + i];
     }
 #endif
-    return begin_at(s, s->time, s->state);
+#if CONTACTS
+    s->sets[SET_count].i = CONTACTS;
+    s->sets[SET_size].i = CONTACT_ROWS;
+    s->sets[SET_entries].i = PATTERN;
+    s->sets[SET_coordinates].i = COORDINATES;
+    s->sets[SET_speeds].i = SPEEDS;
+    for (i = 0; i < 2 * PATTERN; i++) s->pattern[i].f = contact_pattern[i];
+#endif
+    i = s->is_new;
+    s->is_new = 0;
+    if (i) s->happened = 0;
+    s->changes = 0;
+    return begin_at(s, s->time, s->state, i);
 }
 
 int scene_advance(scene *s, double target)
@@ -513,30 +721,29 @@ int scene_advance(scene *s, double target)
     if (target < s->time) return say(s, FAILED, "the time to go to has passed");
     for (;;) {
         const double edge = next_piece(s), here = fmin(s->coming, edge);
-        if (here <= target && here <= f[FIELD_t].f) {
+        /* what is at the target but for rounding is at it */
+        const double until = here == edge ? target + 16.0 * ROUNDING * fabs(target) : target;
+        if (here <= until && here <= f[FIELD_t].f) {
             int status;
             if (s->coming <= edge) {
                 status = pass(s);
             } else {
-                double state[SIZE];
-                int i;
                 if (edge == known_until) return say(s, STOPPED, "it is not known how its functions of time go on");
                 if (at(s, edge) != 0) return say(s, FAILED, "the equations have no value within a step");
-                for (i = 0; i < SIZE; i++) state[i] = s->y[i].f;
+                take(s, edge, s->y);
 #if EVENTS
                 memset(s->fired, 0, sizeof s->fired);
 #endif
-                status = begin_at(s, edge, state);
+                status = begin_again(s, alter(s, edge, -1));
             }
             if (status != READY) return status;
             continue;
         }
-        if (f[FIELD_t].f >= target) break;
+        if (f[FIELD_t].f >= until) break;
         if (strays(row(s, ROW_y))) {
-            double state[SIZE];
             int i;
-            for (i = 0; i < SIZE; i++) state[i] = row(s, ROW_y)[i].f;
-            begin_at(s, f[FIELD_t].f, state);
+            for (i = 0; i < SIZE; i++) s->y[i] = row(s, ROW_y)[i];
+            begin_mode(s, f[FIELD_t].f);
         }
         f[FIELD_limit].i = f[FIELD_steps].i + 1;
         f[FIELD_stop].f = INFINITY;

@@ -1,4 +1,5 @@
-/* ./a.out END RTOL OUTPUTS [--step H] [--output PATH ...]: the motion as CSV, with the time and quantities by path. */
+/* ./a.out END RTOL OUTPUTS [--step H] [--output PATH ...] [--events]: the motion as CSV, with the time and quantities by
+ * path.  --events adds a column with what has happened since the row before: kind, source, time, speed of approach. */
 #include "scene.h"
 
 #include <stdio.h>
@@ -21,21 +22,36 @@ static int find(const char *path)
     return -1;
 }
 
+static void print_events(const scene *s, int told)
+{
+    int k;
+    for (k = told > s->happened - scene_LOGGED ? told : s->happened - scene_LOGGED; k < s->happened; k++) {
+        const scene_happening *const one = s->log + k % scene_LOGGED;
+        printf("%s%s %s %.17g %.17g", k > told ? "; " : "", scene_kinds[one->kind], scene_sources[one->source], one->time,
+               one->speed);
+    }
+}
+
 int main(int count, char **given)
 {
     static scene s;
     static double values[scene_QUANTITIES + 1];
     static int shown[scene_QUANTITIES + 1];
     double end, rtol, outputs;
-    int k, i, chosen = 0, status;
+    int k, i, chosen = 0, status, told = 0, shows_events = 0;
     if (count < 4 || !number(given[1], &end) || !number(given[2], &rtol) || !number(given[3], &outputs)
         || !(rtol > 0.0) || !(outputs >= 2.0 && outputs <= 1e9)) {
-        fprintf(stderr, "usage: %s END RTOL OUTPUTS [--step H] [--output PATH ...]\n", given[0]);
+        fprintf(stderr, "usage: %s END RTOL OUTPUTS [--step H] [--output PATH ...] [--events]\n", given[0]);
         return 2;
     }
     scene_default(&s);
     s.rtol = rtol;
     for (k = 4; k < count; k += 2) {
+        if (strcmp(given[k], "--events") == 0) {
+            shows_events = 1;
+            k--;
+            continue;
+        }
         if (k + 1 < count && strcmp(given[k], "--step") == 0 && number(given[k + 1], &s.step) && s.step > 0.0) continue;
         if (k + 1 < count && strcmp(given[k], "--output") == 0 && chosen < scene_QUANTITIES) {
             shown[chosen] = find(given[k + 1]);
@@ -51,7 +67,7 @@ int main(int count, char **given)
     }
     printf("time");
     for (k = 0; k < chosen; k++) printf(",%s", scene_quantities[shown[k]].path);
-    printf("\n");
+    printf(shows_events ? ",events\n" : "\n");
     status = scene_begin(&s);
     for (i = 0; i < (int)outputs && status == scene_READY; i++) {
         const double t = scene_start_time + (end - scene_start_time) * i / (outputs - 1.0);
@@ -60,6 +76,12 @@ int main(int count, char **given)
         if (status != scene_READY) break;
         printf("%.17g", s.time);
         for (k = 0; k < chosen; k++) printf(",%.17g", values[shown[k]]);
+        if (shows_events) {
+            printf(",\"");
+            print_events(&s, told);
+            printf("\"");
+            told = s.happened;
+        }
         printf("\n");
     }
     if (status != scene_READY) {

@@ -33,6 +33,12 @@ typedef struct {
     double value, low, high;
 } scene_parameter_of;
 
+/* What happened: when, the source of it, its kind, and the speed of approach of an impact. */
+typedef struct {
+    double time, speed;
+    int source, kind;
+} scene_happening;
+
 typedef struct scene {
     /* To be set before scene_begin: tolerances (atol is taken as rtol where it is 0), the longest step, or, if step
      * is above 0, the length of all steps, whose error nothing then controls. */
@@ -43,18 +49,22 @@ typedef struct scene {
     /* How the last call returned, and why. */
     int status;
     const char *text;
-    /* The last event that happened, its time, and the constraint that a failure or a singular position names. */
+    /* How much has happened, and the last of it: number k is in log[k % scene_LOGGED]. */
+    int happened;
+    scene_happening log[scene_LOGGED];
+    /* The last event of a part, its time, and the constraint that a failure or a singular position names. */
     int event, constraint;
     double event_time;
     /* What the engine remembers. */
-    double began, searched, coming, found;
-    int coming_kind, is_evaluated;
+    double began, searched, coming, found, changed;
+    int coming_kind, is_evaluated, is_new, changes, side;
     /* memory */
 } scene;
 
 extern const double scene_start_time, scene_end_time;
 extern const scene_variable scene_states[], scene_quantities[];
 extern const scene_parameter_of scene_parameters[];
+extern const char *const scene_sources[], *const scene_kinds[];
 
 void scene_default(scene *s);
 int scene_begin(scene *s);

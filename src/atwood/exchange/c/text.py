@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib.resources import files
-from itertools import accumulate
 from typing import Any
 
-from atwood.codegen.c.printer import BITS, HEAD, WORDS, literal, print_routines, reached
+from atwood.codegen.c.printer import BITS, HEAD, WORDS, print_routines, reached
 from atwood.codegen.c.program import functions_of, print_program
 from atwood.codegen.functions import write_routines as write_functions
 from atwood.codegen.llvm.linear_systems import write_elimination
 from atwood.codegen.routines import Routine
 from atwood.errors import UnsupportedError
 from atwood.expr.core.program import Program
+from atwood.exchange.c.tables import ENDS, KINDS, LEADS, NOTED, UPDATES, action_of, sources, tables_of
 from atwood.forms.assembly import Assembly
+from atwood.integrators import set_routines as sets
 from atwood.integrators.compiled_location import FIELDS as SEARCH_FIELDS, ROWS as SEARCH_ROWS, STACK
 from atwood.integrators.embedded.rates import write_routines as write_rates
 from atwood.integrators.embedded.stepper import FIELDS
@@ -24,18 +24,26 @@ from atwood.integrators.embedded.steps import write_routines as write_steps
 from atwood.integrators.event_location import MOST
 from atwood.integrators.event_routines import write_routines as write_search
 from atwood.integrators.methods.dormand_prince import TABLEAU
+from atwood.integrators.set_routines import write_sets
 from atwood.integrators.step_guard import write_routines as write_guard
 from atwood.integrators.stepper import WIDTH
 from atwood.lazy_dataclasses import dataclass
 from atwood.plotting.live.mode import ModeText
 from atwood.plotting.live.parameters import live_parameters
 from atwood.plotting.live.program import live_modes
+from atwood.plotting.live.start import add_tangent
 
 _CALLED = {"constraints": "held"}
 """Programs that C calls otherwise, since a routine of the method has their name."""
 
-_ASKED = "events", "constraints", "quantities", "loads"
-"""Programs of (t, q, u) and more that the engine calls itself."""
+_ASKED = "constraints", "quantities", "loads", "contacts", "maximal", "impact", "tangent"
+"""Programs of (t, q, u) and more that the engine calls itself, beside updates."""
+
+_LOGGED = 64
+"""Events that are remembered."""
+
+_PAST = 64
+"""Impacts that are remembered."""
 
 _POINTS = STACK + MOST + 2
 """Points that a search for events remembers."""
@@ -95,6 +103,8 @@ def scene_text(
     modes, _ = live_modes(assembly, quantities=quantities)
     mode = modes[0]
     _refuse(mode, len(modes))
+    if "passage" in mode.data:
+        add_tangent(mode)
     name, parameters = c_name(assembly.flat.name), live_parameters(mode.assembly)
     beside = more(mode) if more else {}
     return SceneText(
@@ -111,21 +121,12 @@ def scene_text(
 
 def _refuse(mode: ModeText, modes: int) -> None:
     """Say what C does not follow."""
-    targets = {event["target"]: event for event in mode.data["events"]}
-    for target, event in targets.items():
-        where = f"{event['part']}.{event['law']}"
-        if target == "side":
-            raise UnsupportedError("a law that compares what moves is not exported", where=mode.flat.name)
-        if "contact" in event:
-            raise UnsupportedError("gaps and dry friction are not exported", where=where)
-        if modes > 1 and target not in ("", "stop"):
-            raise UnsupportedError(f"an event that leads to the mode {target!r} is not exported", where=where)
-        if event["updates"]:
-            raise UnsupportedError("an event with updates is not exported", where=where)
-    if mode.data.get("updates"):
-        raise UnsupportedError("updates at moments are not exported", where=mode.flat.name)
-    if "contacts" in mode.data:
-        raise UnsupportedError("gaps and dry friction are not exported", where=mode.flat.name)
+    if "sides" in mode.data:
+        raise UnsupportedError("a law that compares what moves is not exported", where=mode.flat.name)
+    for event in mode.data["events"]:
+        if modes > 1 and action_of(event) == LEADS and "contact" not in event:
+            where = f"{event['part']}.{event['law']}"
+            raise UnsupportedError(f"an event that leads to the mode {event['target']!r} is not exported", where=where)
 
 
 def c_name(name: str) -> str:
@@ -149,7 +150,9 @@ def _template(name: str) -> str:
 def _programs(mode: ModeText) -> dict[str, Program]:
     """Return the programs that a motion needs, by their names in C."""
     known = mode.programs
-    names = ["kernel", "nearer", "judge", "events", "constraints", "quantities", "loads"]
+    names = ["kernel", "nearer", "judge", "events", "constraints", "quantities", "loads", "contacts"]
+    names += [one for one in known if one.startswith("update_")]
+    names += ["maximal", "impact", "tangent"] if "passage" in mode.data else []
     found = {one: known[own] for one in names if (own := _CALLED.get(one, one)) in known}
     if not mode.data["constraints"]:
         found.pop("constraints", None)
@@ -182,7 +185,30 @@ def _sizes(mode: ModeText, programs: dict[str, Program]) -> dict[str, int]:
         "RELATION": pieces["first"],
         "PLAIN": len(data["paths"]["quantities"]),
         "LOADS": len(data["paths"].get("loads", ())),
+        **_sizes_of_changes(data, programs),
     }
+
+
+def _sizes_of_changes(data: dict[str, Any], programs: dict[str, Program]) -> dict[str, int]:
+    """Return the numbers of what updates, contacts, and passages through all bodies need."""
+    updates, contacts, passage = (data.get(name) or {} for name in ("updates", "contacts", "passage"))
+    found = {"UPDATES": len(updates.get("laws", ())), "MOMENTS": len(updates.get("times", ()))}
+    found |= {"CONTACTS": len(contacts.get("keys", ())), "PASSAGE": int(bool(passage))}
+    found["SWITCHES"] = int(bool(passage) and passage["switches"])
+    if contacts:
+        found |= {"CONTACT_ROWS": contacts["size"], "PATTERN": len(contacts["pattern"]) // 2}
+        found |= {"UNITS": len(sets.UNITS), "ENTRY": len(sets.ENTRY)}
+        found |= {"WATCH_GAP": 1, "WATCH_REST": 2, "WATCH_RUN": 3}
+    if passage:
+        n, m = passage["counts"]
+        found |= {"BODY_COORDINATES": n, "BODY_SPEEDS": m, "BODY_CONSTRAINTS": len(passage["labels"])}
+        found |= {"BODY_TURNS": len(passage["turns"]), "BODY_MASSES": len(passage["mass"][0])}
+        found |= {"BODY_SLOPES": len(passage["slopes_of_constraints"][0])}
+        found |= {"HAS_MAXIMAL": int("maximal" in programs), "ONE_SIDES": sum(map(len, passage["refused"]))}
+        found |= {"PLACE_SLOPES": len(passage.get("slopes", [()])[0]), "ALONG": len(passage["along"])}
+        found |= {"TURNED": len(passage["turned"]), "HAS_TANGENT": int("tangent" in programs)}
+        found |= {"TANGENTS": len(data.get("tangent", [()])[0])}
+    return found
 
 
 # -- header ---------------------------------------------------------------------------------------------------------
@@ -194,7 +220,9 @@ def _header(mode: ModeText, parameters: Sequence[dict[str, Any]], beside: dict[s
     text = _template("scene.h")
     counts = {"STATES": sizes["SIZE"], "PARAMETERS": len(parameters), "QUANTITIES": len(mode.known)}
     counts |= {"COORDINATES": sizes["COORDINATES"]}
+    counts |= {"SOURCES": len(sources(mode)), "LOGGED": _LOGGED}
     lines = "\n".join(f"#define scene_{key} {one}" for key, one in counts.items())
+    lines += f"\nenum {{ {', '.join(f'scene_{one.upper()}' for one in KINDS)} }};"
     text = text.replace("/* counts */", lines).replace("/* word */", WORDS.replace("word", "scene_word"))
     return text.replace("    /* memory */", "\n".join(f"    {one};" for one in _memory(programs | beside, sizes)))
 
@@ -213,16 +241,39 @@ def _memory(programs: dict[str, Program], sizes: dict[str, int]) -> list[str]:
     if events:
         words |= {"sought": len(SEARCH_FIELDS), "event_y": most, "event_yp": most, "shifted": size, "turns": 2 * size}
         words |= {"rows": len(SEARCH_ROWS) * events + _POINTS * (1 + 2 * events), "shifts": events, "self": 1}
+    if sizes["CONTACTS"]:
+        count, rows = sizes["CONTACTS"], sizes["CONTACT_ROWS"]
+        words |= {"sets": len(sets.FIELDS), "units": len(sets.UNITS) * count, "set_rows": len(sets.ROWS) * rows}
+        words |= {"matrix": rows * rows, "left": rows * (rows + 1), "shares": 4 * count * rows}
+        words |= {"pattern": 2 * sizes["PATTERN"], "impacts": 2 * _PAST}
+        words |= {"log_of_sets": sets.CAPACITY * (rows + len(sets.ENTRY))}
+    if sizes["PASSAGE"]:
+        words["body"] = max(size, sizes["BODY_COORDINATES"] + sizes["BODY_SPEEDS"])
     for name, one in programs.items():
         words[f"{name}_derived"] = len(one.prologue)
-        if name in _ASKED and name != "events":
+        if _is_asked(name):
             words |= {f"{name}_{k}": len(group.expressions) for k, group in enumerate(one.outputs)}
     lines = [f"scene_word {name}[{max(count, 1)}]" for name, count in words.items()]
     if sizes["CONSTRAINTS"]:
         lines.append("double held_size")
     if sizes["WATCHED"]:
         lines += ["double held_last, held_largest", f"double held_most[{max(sizes['KEPT'], 1)}]"]
+    if sizes["CONTACTS"]:
+        lines += [f"double triggers[{sizes['CONTACTS']}]", f"int calm[{max(events, 1)}]"]
+    if sizes["UPDATES"]:
+        most = max((len(one.results) for name, one in programs.items() if name.startswith("update_")), default=1)
+        lines.append(f"double set_by_update[{max(most, 1)}]")
+    if sizes["PASSAGE"]:
+        m, held = sizes["BODY_SPEEDS"], sizes["BODY_CONSTRAINTS"]
+        numbers = {"masses": m * m, "slopes": held * m, "rows_of_impact": max((m + held) ** 2, m * sizes["SPEEDS"])}
+        numbers |= dict.fromkeys(("right", "unknowns"), max(m + held, sizes["SPEEDS"]))
+        numbers |= {"places": sizes["BODY_COORDINATES"], "velocities": m, "was": 2 * held, "now": 2 * held}
+        lines += [f"double {name}[{max(count, 1)}]" for name, count in numbers.items()]
     return [*lines, *([f"int fired[{events}]"] if events else [])]
+
+
+def _is_asked(name: str) -> bool:
+    return name in _ASKED or name.startswith("update_")
 
 
 # -- source ---------------------------------------------------------------------------------------------------------
@@ -248,15 +299,18 @@ def _source(mode: ModeText, parameters: Sequence[dict[str, Any]], beside: dict[s
         _numbered("FIELD", FIELDS),
         _numbered("ROW", TABLEAU.rows),
         *([_numbered("SOUGHT", SEARCH_FIELDS), _numbered("SEARCHED", SEARCH_ROWS)] if sizes["EVENTS"] else []),
+        *([_numbered("SET", sets.FIELDS), _numbered("UNIT", sets.UNITS)] if sizes["CONTACTS"] else []),
+        f"enum {{ NOTED = {NOTED}, ENDS = {ENDS}, UPDATES_STATES = {UPDATES}, LEADS = {LEADS} }};",
         "",
         *bits,
         *(_declared(name) for name in every),
         body,
         *printed,
-        *_tables(mode, parameters, sizes),
-        *(_asking(name, one) for name, one in programs.items() if name in _ASKED and name != "events"),
+        *tables_of(mode, parameters, sizes),
+        *(_asking(name, one) for name, one in programs.items() if _is_asked(name)),
+        *([_updating(programs)] if sizes["UPDATES"] else []),
         _filling(programs),
-        _template("engine.c"),
+        _engine(sizes),
     ]
     return "\n".join(parts)
 
@@ -278,6 +332,9 @@ def _routines(programs: dict[str, Program], sizes: dict[str, int], printed: Sequ
     if sizes["EVENTS"]:
         known += write_search()
         roots += ["search", "restart"]
+    if sizes["CONTACTS"]:
+        known += write_sets()
+        roots.append("resolve")
     if any("factorise(" in one for one in printed):
         known += write_elimination()
         roots += ["factorise", "substitute"]
@@ -305,7 +362,7 @@ def _asking(name: str, program: Program) -> str:
     moment.f = t;
     in[0].p = &moment;
     in[1].p = y;
-    in[2].p = y + COORDINATES;
+    in[2].p = y + {"BODY_" if name == "impact" else ""}COORDINATES;
     in[3].p = a;
 {outputs}
     return {name}(in, s->{name}_derived, s->scratch, out);
@@ -313,89 +370,37 @@ def _asking(name: str, program: Program) -> str:
 """
 
 
+def _updating(programs: dict[str, Program]) -> str:
+    """Return the function that makes an update of the state in s->y; no address where it has no value."""
+    cases = "\n".join(
+        f"    case {name.removeprefix('update_')}:\n        count = {len(one.results)};\n        found = s->{name}_0;\n"
+        f"        if (call_{name}(s, s->time, s->y, NULL) != 0) return NULL;\n        break;"
+        for name, one in programs.items()
+        if name.startswith("update_")
+    )
+    return f"""static const double *updated(scene *s, int k)
+{{
+    const word *found;
+    int i, count;
+    switch (k) {{
+{cases}
+    default:
+        return NULL;
+    }}
+    for (i = 0; i < count; i++) s->set_by_update[i] = found[i].f;
+    return s->set_by_update;
+}}
+"""
+
+
+def _engine(sizes: dict[str, int]) -> str:
+    """Return the engine, with what passes through all bodies and what meets contacts where there are any."""
+    text = _template("engine.c")
+    for name in ("contacts", "passage"):
+        text = text.replace(f"/* {name} */\n", _template(f"{name}.c") if sizes[name.upper()] else "")
+    return text
+
+
 def _filling(programs: dict[str, Program]) -> str:
     lines = "\n".join(f"    {name}_prologue(s->values, s->{name}_derived, s->scratch);" for name in programs)
     return f"/* What depends on parameters alone. */\nstatic void fill(scene *s)\n{{\n{lines}\n}}\n"
-
-
-def _tables(mode: ModeText, parameters: Sequence[dict[str, Any]], sizes: dict[str, int]) -> list[str]:
-    """Return the data of a scene."""
-    data = mode.data
-    span = mode.flat.t_end - mode.flat.t_start
-    until = data["schedule"]["end"]
-    lines = [
-        f"const double scene_start_time = {literal(mode.flat.t_start)};",
-        f"const double scene_end_time = {literal(mode.flat.t_end)};",
-        _array("values", data["values"]),
-        _array("start_state", data["state"]),
-        _array("tolerances", data["tolerances"]),
-        f"static const double relative_share = {literal(data['relative'])};",
-        f"static const double horizon = {literal(span if span > 0 else 1.0)};",
-        f"static const double known_until = {literal(math.inf if until is None else until)};",
-        _array("parameter_places", [data["numbers"][one["path"]] for one in parameters], "int"),
-    ]
-    if sizes["JUDGES"]:
-        lines.append(_array("judged_by", data["judged"]))
-    if sizes["TURNS"]:
-        lines.append(_array("turn_starts", accumulate(map(len, data["turns"]), initial=0), "int"))
-        lines.append(_array("turn_places", [i for turn in data["turns"] for i in turn], "int"))
-    if sizes["CONSTRAINTS"]:
-        lines += [_array("sizes", data["sizes"]), f"static const double time_scale = {literal(data['time'])};"]
-        lines += [
-            _array(f"slope_{name}", one, "int") for name, one in zip(("rows", "columns"), data["slopes"], strict=True)
-        ]
-    if sizes["WATCHED"]:
-        rank = {i: k for k, i in enumerate(data["kept"])}
-        lines.append(_array("kept_rank", [rank.get(i, -1) for i in range(sizes["CONSTRAINTS"])], "int"))
-        lines.append(_array("kept_constraints", data["kept"], "int"))
-    if sizes["PIECES"]:
-        lines.append(_array("piece_times", data["schedule"]["times"]))
-    if sizes["RELATIONS"]:
-        lines.append(_array("piece_values", [x for one in data["schedule"]["values"] for x in one]))
-    if sizes["EVENTS"]:
-        events = data["events"]
-        lines += [_array(f"event_{name}", [one[name] for one in events]) for name in ("small", "direction")]
-        lines.append(_array("event_noted", [int(one["noted"]) for one in events], "int"))
-        lines.append(_array("event_stops", [int(one["target"] == "stop") for one in events], "int"))
-        texts = [quoted(f"{one['part']}: {one['message']}") for one in events]
-        lines.append(f"static const char *const event_messages[] = {{{', '.join(texts)}}};")
-        waves = [f(1 + 2.4 * i) for f in (math.cos, math.sin) for i in range(sizes["SIZE"])]
-        lines.append(_array("turns", waves))
-    names = [*data["coordinates"], *data["speeds"]]
-    described = [("states", [(one["name"], one["unit"]) for one in names])]
-    described.append(("quantities", [(one.path, one.unit) for one in mode.known]))
-    for key, ones in described:
-        rows = ",\n".join(f"    {{{quoted(path)}, {quoted(unit)}}}" for path, unit in ones) or '    {"", ""}'
-        lines.append(f"const scene_variable scene_{key}[] = {{\n{rows}\n}};")
-    rows = ",\n".join(map(_parameter, parameters)) or '    {"", "", 0.0, 0.0, 0.0}'
-    lines.append(f"const scene_parameter_of scene_parameters[] = {{\n{rows}\n}};")
-    return lines
-
-
-def _parameter(one: dict[str, Any]) -> str:
-    low = -math.inf if one["low"] is None else math.nextafter(one["low"], math.inf) if one["lower_open"] else one["low"]
-    high = math.inf if one["high"] is None else one["high"]
-    numbers = ", ".join(_number(float(x)) for x in (one["value"], low, high))
-    return f"    {{{quoted(one['path'])}, {quoted(one['unit'])}, {numbers}}}"
-
-
-def _number(value: float) -> str:
-    """Return a number as C writes it in a table of constants that may be infinite."""
-    return literal(value).replace("((double)INFINITY)", "HUGE_VAL").replace("(-(double)INFINITY)", "-HUGE_VAL")
-
-
-def _array(name: str, values: Iterable[Any], kind: str = "double") -> str:
-    texts = [literal(float(one)) if kind == "double" else str(int(one)) for one in values] or ["0"]
-    lines = ",\n    ".join(", ".join(texts[k : k + 8]) for k in range(0, len(texts), 8))
-    return f"static const {kind} {name}[] = {{\n    {lines}\n}};"
-
-
-_ESCAPED = b'"\\?'
-
-
-def quoted(text: str) -> str:
-    """Return a text as C writes it."""
-    found = ""
-    for one in text.encode():
-        found += chr(one) if 32 <= one < 127 and one not in _ESCAPED else f"\\{one:03o}"
-    return f'"{found}"'

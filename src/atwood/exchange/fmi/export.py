@@ -13,6 +13,7 @@ from pathlib import Path
 from atwood.arguments import FILE, PATHS, each, one_of, optional, takes, whole
 from atwood.errors import UsageError
 from atwood.exchange.c.export import exported
+from atwood.exchange.c.tables import quoted
 from atwood.exchange.c.text import SceneText, with_name
 from atwood.exchange.fmi.build import PLATFORMS, compiled, own_platform, place_of
 from atwood.exchange.fmi.description import build_xml, description_2, description_3, structure, variables_of
@@ -119,7 +120,8 @@ def export_fmu(
     check_directory(target)
     text = exported(scene, form, output, _tangents)
     inputs = _inputs(text.mode)
-    both = "nearer" not in text.mode.programs
+    reason = _why_alone(text.mode)
+    both = not reason
     sources = _sources(text, fmi, inputs)
     token = "{" + hashlib.sha256("".join(sources.values()).encode()).hexdigest()[:32] + "}"
     main = f"fmi{fmi}.c"
@@ -134,13 +136,23 @@ def export_fmu(
     binaries = _binaries(text.name, sources, main, fmi, platform)
     content |= {place_of(text.name, one, fmi): binary for one, binary in binaries.items()}
     write_atomically(target, lambda part: _pack(part, content))
-    reason = "" if both else "its states depend on each other, which steps keep so"
     kinds = ("model exchange", "co-simulation") if both else ("co-simulation",)
     return ExportedFMU(target, kinds, tuple(binaries), reason)
 
 
+def _why_alone(mode: ModeText) -> str:
+    """Return why a scene is for co-simulation alone; empty where it is for model exchange, too."""
+    if "nearer" in mode.programs:
+        return "its states depend on each other, which steps keep so"
+    if "contacts" in mode.data:
+        return "gaps and slips hold by turns, which steps find"
+    if any(event["updates"] for event in mode.data["events"]):
+        return "its events set states, which steps find"
+    return ""
+
+
 def _tangents(mode: ModeText) -> dict[str, Program]:
-    return {} if "nearer" in mode.programs else tangent_programs(mode, _inputs(mode))
+    return {} if _why_alone(mode) else tangent_programs(mode, _inputs(mode))
 
 
 def _inputs(mode: ModeText) -> list[int]:
@@ -154,8 +166,9 @@ def _sources(text: SceneText, fmi: int, inputs: Sequence[int]) -> dict[str, str]
     room = files("atwood.exchange.fmi")
     of_parameters = [text.mode.data["numbers"][one["path"]] for one in text.parameters]
     numbers = ", ".join(str(of_parameters.index(one)) for one in inputs) or "0"
-    table = f"#define INPUTS {len(inputs)}\n"
-    if "nearer" not in text.mode.programs:
+    why = _why_alone(text.mode)
+    table = f"#define INPUTS {len(inputs)}\n#define EXCHANGES {int(not why)}\n#define ALONE {quoted(why)}\n"
+    if not why:
         table += f"static const int input_numbers[] = {{{numbers}}};\n"
     shared = room.joinpath("fmu.c").read_text(encoding="utf-8").replace("/* inputs */\n", table)
     shared = with_name(shared.replace('"scene.c"', f'"{text.name}.c"'), text.name)

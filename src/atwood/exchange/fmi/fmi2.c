@@ -45,7 +45,7 @@ EXPORT handle fmi2Instantiate(const char *name, int kind, const char *token, con
     logger2 *const log = calls != NULL ? calls->logger : NULL;
     (void)path; (void)is_visible; (void)logs;
     if (token == NULL || strcmp(token, TOKEN) != 0) why = "the guid is not that of this unit";
-    if (PROJECTS && kind == 0) why = "its states depend on each other: use co-simulation";
+    if (!EXCHANGES && kind == 0) why = "it is for co-simulation alone: " ALONE;
     if (why != NULL) {
         if (log != NULL) log(calls->environment, name, ERROR, "logStatusError", "%s", why);
         return NULL;
@@ -199,7 +199,7 @@ EXPORT status2 fmi2GetStringStatus(handle o, int kind, const char **value)
     return DISCARD;
 }
 
-#if !PROJECTS
+#if EXCHANGES
 EXPORT status2 fmi2EnterEventMode(handle o) { (void)o; return OK; }
 EXPORT status2 fmi2EnterContinuousTimeMode(handle o) { (void)o; return OK; }
 EXPORT status2 fmi2SetTime(handle o, double time) { take_time((instance *)o, time); return OK; }

@@ -42,9 +42,9 @@ EXPORT handle fmi3InstantiateModelExchange(const char *name, const char *token, 
                                            bool logs, void *environment, logger3 *log)
 {
     (void)path; (void)is_visible; (void)logs;
-#if PROJECTS
+#if !EXCHANGES
     (void)name; (void)token;
-    if (log != NULL) log(environment, ERROR, "logStatusError", "its states depend on each other: use co-simulation");
+    if (log != NULL) log(environment, ERROR, "logStatusError", "it is for co-simulation alone: " ALONE);
     return NULL;
 #else
     return make3(1, name, token, environment, log);
@@ -273,7 +273,7 @@ EXPORT status3 fmi3DoStep(handle o, double time, double length, bool keeps, bool
 EXPORT status3 fmi3GetNumberOfContinuousStates(handle o, size_t *n) { (void)o; *n = SIZE; return OK; }
 EXPORT status3 fmi3GetNumberOfEventIndicators(handle o, size_t *n) { (void)o; *n = EVENTS; return OK; }
 
-#if PROJECTS
+#if !EXCHANGES
 #define ONLY_CO_SIMULATION(...) (void)o, __VA_ARGS__, ERROR
 EXPORT status3 fmi3EnterContinuousTimeMode(handle o) { (void)o; return ERROR; }
 EXPORT status3 fmi3SetTime(handle o, double time) { return ONLY_CO_SIMULATION((void)time); }

@@ -87,13 +87,16 @@ static int read_values(instance *o)
 static int indicators(instance *o, double *values)
 {
 #if EVENTS
-    word y[SIZE], found[EVENTS];
-    int i;
+    word y[SIZE], found[EVENTS], kept[EVENTS];
+    int i, code;
     if (o->is_changed) fill(&o->s);
     for (i = 0; i < SIZE; i++) y[i].f = o->s.state[i];
+    memcpy(kept, o->s.shifts, sizeof kept); /* of a co-simulation, which goes on with them */
     memset(o->s.shifts, 0, sizeof o->s.shifts);
     o->s.self[0].p = (word *)(void *)&o->s;
-    if (events_at(o->s.time, y, NULL, found, o->s.self) != 0) return tell_failure(o, "an event has no value");
+    code = events_at(o->s.time, y, NULL, found, o->s.self);
+    memcpy(o->s.shifts, kept, sizeof kept);
+    if (code != 0) return tell_failure(o, "an event has no value");
     for (i = 0; i < EVENTS; i++) values[i] = found[i].f;
 #else
     (void)o;
@@ -167,6 +170,9 @@ static int begin_motion(instance *o)
     o->is_new = 0;
     if (o->is_model_exchange) {
         in_piece(&o->s, o->s.time);
+#if UPDATES
+        if (!sample(&o->s, o->s.time)) return tell_failure(o, "an update has no value");
+#endif
         o->s.began = o->s.time;
         o->is_read = 0;
         return 1;
@@ -182,7 +188,7 @@ static int step_to(instance *o, double time)
     int status = READY;
     if (o->is_changed) {
         o->is_changed = 0;
-        if (o->s.status == READY) status = begin_at(&o->s, o->s.time, o->s.state);
+        if (o->s.status == READY) status = begin_at(&o->s, o->s.time, o->s.state, 0);
     }
     if (status == READY) status = scene_advance(&o->s, time);
     o->is_read = 0;
@@ -190,22 +196,28 @@ static int step_to(instance *o, double time)
     return status == READY ? 1 : tell_failure(o, o->s.text);
 }
 
-#if !PROJECTS
+#if EXCHANGES
 /* What an event makes of a state: whether the motion ends, and whether coordinates were made of length one again. */
 static int update_discrete(instance *o, int *ends, int *changes, int *is_next, double *next)
 {
+    const double time = o->s.time, rounding = 16.0 * ROUNDING * fabs(time);
     int i;
     word y[SIZE];
-    in_piece(&o->s, o->s.time);
-    o->s.began = o->s.time;
-    *ends = o->s.time >= known_until;
+    *ends = time >= known_until;
     *changes = 0;
+    while ((*next = next_piece(&o->s)) <= time + rounding && *next < known_until) {
+        if (alter(&o->s, *next, -1) != AGAIN) return tell_failure(o, o->s.text);
+        o->s.began = *next;
+        *changes = 1;
+    }
+    take_time(o, time);
+    if (time > o->s.began) o->s.began = time;
 #if EVENTS
     {
         double values[EVENTS];
         if (!indicators(o, values)) return 0;
         for (i = 0; i < EVENTS; i++) {
-            if (event_stops[i] && event_direction[i] * values[i] > event_small[i] * o->s.rtol) *ends = 1;
+            if (event_action[i] == ENDS && event_direction[i] * values[i] > event_small[i] * o->s.rtol) *ends = 1;
         }
     }
 #endif

@@ -1,0 +1,212 @@
+"""The data of a scene as tables of C."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from itertools import accumulate
+from typing import Any
+
+from atwood.codegen.c.printer import literal
+from atwood.integrators import set_routines as sets
+from atwood.mechanics.outputs.event_functions import CLOSES, RESTS, RUNS, UPDATE
+from atwood.plotting.live.mode import ModeText
+
+NOTED, ENDS, UPDATES, LEADS = range(4)
+"""What an event leads to: nothing, the end, other states, or another mode."""
+
+KINDS = ("event", "impact", "rests", "closes", "opens", "reverses", "sticks", "slips")
+"""What happens, as results name it."""
+
+
+def tables_of(mode: ModeText, parameters: Sequence[dict[str, Any]], sizes: dict[str, int]) -> list[str]:
+    """Return the data of a scene."""
+    data = mode.data
+    span = mode.flat.t_end - mode.flat.t_start
+    until = data["schedule"]["end"]
+    lines = [
+        f"const double scene_start_time = {literal(mode.flat.t_start)};",
+        f"const double scene_end_time = {literal(mode.flat.t_end)};",
+        array("values", data["values"]),
+        array("start_state", data["state"]),
+        array("tolerances", data["tolerances"]),
+        f"static const double relative_share = {literal(data['relative'])};",
+        f"static const double horizon = {literal(span if span > 0 else 1.0)};",
+        f"static const double known_until = {literal(math.inf if until is None else until)};",
+        array("parameter_places", [data["numbers"][one["path"]] for one in parameters], "int"),
+    ]
+    if sizes["JUDGES"]:
+        lines.append(array("judged_by", data["judged"]))
+    if sizes["TURNS"]:
+        lines.append(array("turn_starts", accumulate(map(len, data["turns"]), initial=0), "int"))
+        lines.append(array("turn_places", [i for turn in data["turns"] for i in turn], "int"))
+    if sizes["CONSTRAINTS"] or sizes["PASSAGE"]:
+        lines.append(array("sizes", data["sizes"]))
+    if sizes["CONSTRAINTS"] or sizes["CONTACTS"]:
+        lines.append(f"static const double time_scale = {literal(data['time'])};")
+    if sizes["CONSTRAINTS"]:
+        lines += _places(("slope_rows", "slope_columns"), data["slopes"])
+    if sizes["WATCHED"]:
+        rank = {i: k for k, i in enumerate(data["kept"])}
+        lines.append(array("kept_rank", [rank.get(i, -1) for i in range(sizes["CONSTRAINTS"])], "int"))
+        lines.append(array("kept_constraints", data["kept"], "int"))
+    if sizes["PIECES"]:
+        lines.append(array("piece_times", data["schedule"]["times"]))
+    if sizes["RELATIONS"]:
+        lines.append(array("piece_values", [x for one in data["schedule"]["values"] for x in one]))
+    if sizes["EVENTS"]:
+        lines += _events(data, sizes)
+    if sizes["CONTACTS"]:
+        lines += _contacts(data["contacts"])
+    if sizes["UPDATES"]:
+        lines += _updates(data)
+        lines += _lists("event_updates", [one["updates"] for one in data["events"]], "update_firsts")
+    if sizes["PASSAGE"]:
+        lines += _passage(data["passage"], sizes)
+    lines.append(_texts("const char *const scene_sources", sources(mode)))
+    lines.append(_texts("const char *const scene_kinds", KINDS))
+    names = [*data["coordinates"], *data["speeds"]]
+    described = [("states", [(one["name"], one["unit"]) for one in names])]
+    described.append(("quantities", [(one.path, one.unit) for one in mode.known]))
+    for key, ones in described:
+        rows = ",\n".join(f"    {{{quoted(path)}, {quoted(unit)}}}" for path, unit in ones) or '    {"", ""}'
+        lines.append(f"const scene_variable scene_{key}[] = {{\n{rows}\n}};")
+    rows = ",\n".join(map(_parameter, parameters)) or '    {"", "", 0.0, 0.0, 0.0}'
+    lines.append(f"const scene_parameter_of scene_parameters[] = {{\n{rows}\n}};")
+    return lines
+
+
+def sources(mode: ModeText) -> list[str]:
+    """Return the paths of what events come from: of events, of gaps and slips, and of constraints that may jump."""
+    data = mode.data
+    laws = [f"{one['part']}.{one['law']}" for one in data["events"]]
+    laws += [".".join(one) for one in data.get("contacts", {}).get("keys", ())]
+    return laws + list(dict.fromkeys(".".join(one) for one in data.get("passage", {}).get("laws", ())))
+
+
+def _places(names: Sequence[str], found: Sequence[Sequence[int]]) -> list[str]:
+    return [array(name, one, "int") for name, one in zip(names, found, strict=True)]
+
+
+def action_of(event: dict[str, Any]) -> int:
+    """Return what an event leads to."""
+    if event["updates"]:
+        return UPDATES
+    if event["target"] in ("", UPDATE):
+        return NOTED
+    return ENDS if event["target"] == "stop" else LEADS
+
+
+def _events(data: dict[str, Any], sizes: dict[str, int]) -> list[str]:
+    events = data["events"]
+    lines = [array(f"event_{name}", [one[name] for one in events]) for name in ("small", "direction")]
+    lines.append(array("event_noted", [int(one["noted"]) for one in events], "int"))
+    lines.append(array("event_action", map(action_of, events), "int"))
+    texts = [f"{one['part']}: {one['message']}" for one in events]
+    lines.append(_texts("static const char *const event_messages", texts))
+    waves = [f(1 + 2.4 * i) for f in (math.cos, math.sin) for i in range(sizes["SIZE"])]
+    lines.append(array("turns", waves))
+    if sizes["CONTACTS"]:
+        units, found = data["contacts"]["units"], [one.get("contact", (-1, 0)) for one in events]
+        lines.append(array("event_contact", [k for k, _ in found], "int"))
+        lines.append(array("event_code", [code for _, code in found]))
+        of_speed = units[sets.UNITS["speed"]]
+        watches = {RESTS: 2, RUNS: 3}
+        kinds = [
+            int(not of_speed[k]) if k >= 0 and one["target"] == CLOSES else watches.get(one["target"], 0)
+            for (k, _), one in zip(found, events, strict=True)
+        ]
+        lines.append(array("event_watch", kinds, "int"))
+    return lines
+
+
+def _lists(name: str, lists: Sequence[Sequence[int]], starts: str) -> list[str]:
+    ends = accumulate(map(len, lists), initial=0)
+    return [array(name, [k for one in lists for k in one], "int"), array(starts, ends, "int")]
+
+
+def _contacts(contacts: dict[str, Any]) -> list[str]:
+    places = [place for some in contacts["places"] for place in [*some, -1, -1][:3]]
+    refused = ["", *(sets.REFUSED[code] for code in sorted(sets.REFUSED))]
+    return [
+        array("contact_units", [x for row in contacts["units"] for x in row]),
+        array("contact_places", places, "int"),
+        array("contact_pattern", contacts["pattern"]),
+        _texts("static const char *const refused", refused),
+    ]
+
+
+def _updates(data: dict[str, Any]) -> list[str]:
+    updates, first = data["updates"], len(data["coordinates"])
+    laws = updates["laws"]
+    assert all(i < first for one in laws for kind, i in one["sets"] if kind == "state")
+    numbers: list[float] = []
+    known = []
+    for moment, due in enumerate(updates["due"]):
+        for k in due:
+            given = laws[k].get("given", {}).get(moment)
+            known.append(-1 if given is None else len(numbers))
+            numbers += given or ()
+    every = [one for law in laws for one in law["sets"]]
+    return [
+        array("moment_times", updates["times"]),
+        *_lists("due", updates["due"], "due_starts"),
+        array("due_given", known, "int"),
+        array("given_values", numbers),
+        array("update_starts", accumulate((len(one["sets"]) for one in laws), initial=0), "int"),
+        array("update_is_held", [int(kind == "held") for kind, _ in every], "int"),
+        array("update_places", [i for _, i in every], "int"),
+    ]
+
+
+def _passage(passage: dict[str, Any], sizes: dict[str, int]) -> list[str]:
+    sides = [(i, float(sign)) for i, each in enumerate(passage["refused"]) for sign, _ in each]
+    laws = list(dict.fromkeys(map(tuple, passage["laws"])))
+    first = sizes["EVENTS"] + sizes["CONTACTS"]
+    lines = [
+        array("body_sizes", passage["sizes"]),
+        array("body_turns", [i for turn in passage["turns"] for i in turn], "int"),
+        array("body_laws", [first + laws.index(tuple(one)) for one in passage["laws"]], "int"),
+        array("one_sides", [int(x) for side in sides for x in side], "int"),
+        *_places(("body_mass_rows", "body_mass_columns"), passage["mass"]),
+        *_places(("body_slope_rows", "body_slope_columns"), passage["slopes_of_constraints"]),
+    ]
+    if "slopes" in passage:
+        lines += _places(("place_rows", "place_columns"), passage["slopes"])
+        lines.append(array("body_spins", [i for spin in passage["spins"] for i in spin], "int"))
+        lines.append(array("along_places", [i for pair in passage["along"] for i in pair], "int"))
+        lines.append(array("turned_places", [i for pair in passage["turned"] for i in pair], "int"))
+    return lines
+
+
+def _parameter(one: dict[str, Any]) -> str:
+    low = -math.inf if one["low"] is None else math.nextafter(one["low"], math.inf) if one["lower_open"] else one["low"]
+    high = math.inf if one["high"] is None else one["high"]
+    numbers = ", ".join(_number(float(x)) for x in (one["value"], low, high))
+    return f"    {{{quoted(one['path'])}, {quoted(one['unit'])}, {numbers}}}"
+
+
+def _number(value: float) -> str:
+    """Return a number as C writes it in a table of constants that may be infinite."""
+    return literal(value).replace("((double)INFINITY)", "HUGE_VAL").replace("(-(double)INFINITY)", "-HUGE_VAL")
+
+
+def _texts(name: str, texts: Sequence[str]) -> str:
+    return f"{name}[] = {{{', '.join(map(quoted, texts or ['']))}}};"
+
+
+def array(name: str, values: Iterable[Any], kind: str = "double") -> str:
+    texts = [literal(float(one)) if kind == "double" else str(int(one)) for one in values] or ["0"]
+    lines = ",\n    ".join(", ".join(texts[k : k + 8]) for k in range(0, len(texts), 8))
+    return f"static const {kind} {name}[] = {{\n    {lines}\n}};"
+
+
+_ESCAPED = b'"\\?'
+
+
+def quoted(text: str) -> str:
+    """Return a text as C writes it."""
+    found = ""
+    for one in text.encode():
+        found += chr(one) if 32 <= one < 127 and one not in _ESCAPED else f"\\{one:03o}"
+    return f'"{found}"'
