@@ -70,13 +70,15 @@ def told_apart(program: Path, result: Any, end: float, rtol: float) -> str:
     found = sorted(one for one in happened(program, end, rtol))
     if [one[:2] for one in known] != [one[:2] for one in found]:
         return f", OTHER EVENTS: {len(found)} for {len(known)}"
-    return f", {len(known)} events within {max((abs(a[2] - b[2]) for a, b in zip(known, found)), default=0.0):.1e} s"
+    late = max((abs(a[2] - b[2]) for a, b in zip(known, found, strict=True)), default=0.0)
+    return f", {len(known)} events within {late:.1e} s"
 
 
 def apart(found: dict[str, np.ndarray], result: Any, assembly: Any) -> tuple[float, str, str]:
     """Return the largest difference in units of the largest value, where it is, and which numbers are equal.
 
-    States of gaps and slips are told by what they do: one that bears no force may be in either.  Angles agree up to whole turns, which a result counts; two that share an axis at a pole are not compared.
+    States of gaps and slips are told by what they do: one that bears no force may be in either.  Angles
+    agree up to whole turns, which a result counts; two that share an axis at a pole are not compared.
     """
     worst, where, equal = 0.0, "", set()
     rows = {".".join(row.row.key[:2]) for row in assembly.own_equations.contacts}

@@ -205,7 +205,7 @@ def test_what_cannot_be_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="fmi cannot be 4"):
         export_fmu(scene, tmp_path / "a.fmu", fmi=4)
     with pytest.raises(UnsupportedError, match="not exported"):
-        export_fmu(SCENES["bouncing-ball"](), tmp_path / "a.fmu")
+        export_fmu(SCENES["trebuchet"](), tmp_path / "a.fmu")
 
 
 @needs_a_compiler

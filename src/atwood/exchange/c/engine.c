@@ -35,7 +35,7 @@ static int32_t events_at(double t, word *y, word *yp, word *target, word *data)
 }
 #endif
 
-#if EVENTS || SWITCHES
+#if EVENTS || CONTACTS || SWITCHES
 static void log_event(scene *s, double time, int source, int kind, double speed)
 {
     scene_happening *const one = s->log + s->happened % scene_LOGGED;

@@ -30,7 +30,7 @@ def export_c(
     """Write a scene as C99: a source, its header, and a program that prints the motion.
 
     The source has all that a motion needs: the equations, the explicit method of order 8(5,3) with its choice of steps
-    and its dense output, steps of one length, the projection onto constraints, and events that end a motion. It
+    and its dense output, steps of one length, the projection onto constraints, events, contacts and updates. It
     allocates nothing, keeps all in one struct, and calls ``sqrt``, ``fabs`` and ``floor`` of the C library alone:
     other functions are those of Atwood, so that a motion has the same bits wherever sums and products do, which
     contraction must not change (``-ffp-contract=off``, with gcc).
@@ -54,7 +54,8 @@ def export_c(
     Raises
     ------
     UnsupportedError
-        If the scene needs what has no counterpart in C: functions in Python, changes of the mode, contacts, updates.
+        If the scene needs what has no counterpart in C: functions in Python, changes of the mode, laws that compare
+        what moves.
     ParameterError
         If there is no such quantity.
     UsageError

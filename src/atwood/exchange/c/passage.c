@@ -70,6 +70,7 @@ static void spread(const word *entries, int count, const int *rows, const int *c
     for (k = 0; k < count; k++) target[rows[k] * width + columns[k]] = entries[k].f * units[columns[k]];
 }
 
+#if HAS_MAXIMAL
 static void length_one(double *q, const double *same)
 {
     int i, k;
@@ -84,6 +85,7 @@ static void length_one(double *q, const double *same)
         for (k = 0; k < 4; k++) q[turn[k]] /= sum;
     }
 }
+#endif
 
 /* Coordinates and speeds of all bodies in a state, which is in s->body; 1 where they have no value. */
 static int bodies_of(scene *s, double t, const double *state, double *q, double *u)
@@ -181,7 +183,7 @@ static double misses(scene *s, double t, const double *q, const double *u, doubl
 
 #if HAS_MAXIMAL
 /* Where bodies are, beside where they are to be: displacements along their speeds, in their sizes. */
-static int look(scene *s, double t, const word *place, const double *q, double *off)
+static int place_apart(scene *s, double t, const word *place, const double *q, double *off)
 {
     double found[BODY_COORDINATES];
     int i, k;
@@ -221,7 +223,7 @@ static int state_of(scene *s, double t, const double *guess, const double *q, co
     for (i = 0; i < TURNED; i++) s->y[turned_places[2 * i]].f = q[turned_places[2 * i + 1]];
     normalize(s->y);
     for (turn = 0; turn < 30; turn++) {
-        if (look(s, t, s->y, q, off) != 0) return say(s, FAILED, "the new mode, in which something has no value");
+        if (place_apart(s, t, s->y, q, off) != 0) return say(s, FAILED, "the new mode, in which something has no value");
         least_norm(s->rows_of_impact, off, BODY_SPEEDS, SPEEDS, step);
         far = largest_of(step, SPEEDS);
 #if HAS_TANGENT
@@ -239,7 +241,7 @@ static int state_of(scene *s, double t, const double *guess, const double *q, co
         if (far < 1e-15 || (far < 1e-11 && far >= last)) break;
         last = far;
     }
-    if (look(s, t, s->y, q, off) != 0 || !(largest_of(off, BODY_SPEEDS) <= HELD)) {
+    if (place_apart(s, t, s->y, q, off) != 0 || !(largest_of(off, BODY_SPEEDS) <= HELD)) {
         return say(s, FAILED, "a change of mode would change a position at once");
     }
     for (i = 0; i < BODY_SPEEDS; i++) off[i] = (u[i] - s->maximal_1[i].f) / body_sizes[i];

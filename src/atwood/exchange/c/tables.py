@@ -165,14 +165,15 @@ def _passage(passage: dict[str, Any], sizes: dict[str, int]) -> list[str]:
     first = sizes["EVENTS"] + sizes["CONTACTS"]
     lines = [
         array("body_sizes", passage["sizes"]),
-        array("body_turns", [i for turn in passage["turns"] for i in turn], "int"),
-        array("body_laws", [first + laws.index(tuple(one)) for one in passage["laws"]], "int"),
         array("one_sides", [int(x) for side in sides for x in side], "int"),
         *_places(("body_mass_rows", "body_mass_columns"), passage["mass"]),
         *_places(("body_slope_rows", "body_slope_columns"), passage["slopes_of_constraints"]),
     ]
+    if sizes["SWITCHES"]:
+        lines.append(array("body_laws", [first + laws.index(tuple(one)) for one in passage["laws"]], "int"))
     if "slopes" in passage:
         lines += _places(("place_rows", "place_columns"), passage["slopes"])
+        lines.append(array("body_turns", [i for turn in passage["turns"] for i in turn], "int"))
         lines.append(array("body_spins", [i for spin in passage["spins"] for i in spin], "int"))
         lines.append(array("along_places", [i for pair in passage["along"] for i in pair], "int"))
         lines.append(array("turned_places", [i for pair in passage["turned"] for i in pair], "int"))
@@ -196,6 +197,7 @@ def _texts(name: str, texts: Sequence[str]) -> str:
 
 
 def array(name: str, values: Iterable[Any], kind: str = "double") -> str:
+    """Return a table of C."""
     texts = [literal(float(one)) if kind == "double" else str(int(one)) for one in values] or ["0"]
     lines = ",\n    ".join(", ".join(texts[k : k + 8]) for k in range(0, len(texts), 8))
     return f"static const {kind} {name}[] = {{\n    {lines}\n}};"

@@ -13,8 +13,8 @@ from atwood.codegen.functions import write_routines as write_functions
 from atwood.codegen.llvm.linear_systems import write_elimination
 from atwood.codegen.routines import Routine
 from atwood.errors import UnsupportedError
-from atwood.expr.core.program import Program
 from atwood.exchange.c.tables import ENDS, KINDS, LEADS, NOTED, UPDATES, action_of, sources, tables_of
+from atwood.expr.core.program import Program
 from atwood.forms.assembly import Assembly
 from atwood.integrators import set_routines as sets
 from atwood.integrators.compiled_location import FIELDS as SEARCH_FIELDS, ROWS as SEARCH_ROWS, STACK
@@ -139,8 +139,7 @@ def c_name(name: str) -> str:
 
 def with_name(text: str, name: str) -> str:
     """Return a text in which names of the header begin with that of the scene."""
-    text = text.replace('"scene.h"', f'"{name}.h"')
-    return re.sub(r"\bscene_(?=[A-Za-z])", f"{name}_", re.sub(r"\bscene\b(?=[ ;*)])", name, text))
+    return re.sub(r'(?<=")scene(?=\.h")|\bscene(?=_[A-Za-z])|\bscene\b(?=[ ;*)])', name, text)
 
 
 def _template(name: str) -> str:

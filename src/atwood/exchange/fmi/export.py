@@ -77,7 +77,8 @@ def export_fmu(
     that nothing drives inputs, quantities outputs.  On what outputs and rates depend is read from the equations.  An
     FMU is for model exchange, where whoever imports it solves its equations, with directional derivatives (and adjoint
     ones in FMI 3.0), and for co-simulation, where it solves them itself by the method of order 8(5,3).  Where states
-    depend on each other (loops that are kept by projection, constraints on velocities), it is for co-simulation alone.
+    depend on each other (loops that are kept by projection, constraints on velocities), and where there are contacts or
+    events that set states, it is for co-simulation alone.
 
     Parameters
     ----------
