@@ -18,6 +18,7 @@ from timing import options, print_table, save
 
 from atwood import Assembly, AtwoodError, assemble, simulate
 from atwood.integrators.ida.memory import IdaMemory
+from atwood.integrators.moments import Moments
 from atwood.integrators.stepper import NativeStepper
 from atwood_library.scenes import SCENES
 
@@ -52,6 +53,7 @@ def watch_calls() -> None:
         owners += owner.__subclasses__()
         if "_go_on" in vars(owner):
             owner._go_on = timed(owner._go_on)  # type: ignore[attr-defined]
+    Moments.advance = timed(Moments.advance)  # type: ignore[method-assign]
     IdaMemory.solve = timed(IdaMemory.solve)  # type: ignore[method-assign]
     filling = IdaMemory.fill
     IdaMemory.fill = lambda memory, monitor: timed(filling(memory, monitor))  # type: ignore[method-assign]

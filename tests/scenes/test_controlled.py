@@ -54,7 +54,7 @@ def test_it_comes_to_rest_and_its_gains_are_those_of_the_sampled_model() -> None
 
 def test_300_sample_periods_make_no_program() -> None:
     assembly = assemble(CartPole())
-    simulate(assembly, t_end=0.1, samples=1)
+    simulate(assembly, t_end=0.5, samples=1)
     made = len(assembly.shared._made)
     result = simulate(assembly, t_end=6.0, samples=1, outputs=2)
     assert len(assembly.shared._made) == made

@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from math import inf, isfinite
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,9 @@ from atwood.integrators.protocol import (
 )
 from atwood.integrators.session import SteppingSession, copied
 from atwood.integrators.stepper import Outcome, Stepper
+
+if TYPE_CHECKING:
+    from atwood.integrators.moments import Changes, Moments
 
 FIRST_CHUNK, LARGEST_CHUNK = 4000, 100_000
 """So many steps are taken before limits are looked at: at first, for one unknown, and at most."""
@@ -164,6 +168,19 @@ class ExplicitSession(SteppingSession):
     def nearest(self, t: FloatArray, y: FloatArray) -> NDArray[np.bool_] | None:
         """Take states, one row each, onto the constraints as steps are; return which could be, None where none can."""
         return self._stepper.nearest(t, y)
+
+    def through(self, changes: Changes) -> Moments | None:
+        """Return a way through moments at which parameters change, from the start on; None where there is none."""
+        plain = self._locator is None and self._jumps is None and self.budget.poll is None
+        return self._stepper.through(changes) if plain and self.budget.max_steps is None else None
+
+    def pass_moments(self, moments: Moments, ask: Callable[[int, FloatArray, FloatArray], bool], most: int) -> int:
+        """Go on through moments for a while; see `Moments.advance`."""
+        began = time.perf_counter()
+        try:
+            return moments.advance(ask, most)
+        finally:
+            self._seconds += time.perf_counter() - began
 
     def set_monitor(self, monitor: StepMonitor) -> bool:
         """Let the motion be looked at, and end with `Status.NOTICED` where something is seen; return whether it can."""

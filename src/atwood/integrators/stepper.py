@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from atwood.integrators.batch import BatchPlaces
     from atwood.integrators.compiled_location import CompiledLocator
     from atwood.integrators.jumps import Jumps
+    from atwood.integrators.moments import Changes, Moments
 
 
 class Outcome(IntEnum):
@@ -111,6 +112,10 @@ class Stepper(ABC):
     def leap(self, locator: CompiledLocator, jumps: Jumps, last: float) -> bool:
         """Locate events without Python, up to a last time, and make the jumps that can be made so; whether it can."""
         return False
+
+    def through(self, changes: Changes) -> Moments | None:
+        """Return a way through moments at which parameters change, from the start on; None where there is none."""
+        return None
 
     @property
     def waits(self) -> bool:

@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from atwood.integrators.batch import BatchPlaces
     from atwood.integrators.compiled_location import CompiledLocator
     from atwood.integrators.jumps import Jumps
+    from atwood.integrators.moments import Changes, Moments
 
 FIELDS = fields_of(
     (
@@ -149,6 +150,13 @@ class CompiledStepper(NativeStepper):
     def batch_places(self) -> BatchPlaces:
         """Return the addresses with which many runs can be made in one call."""
         return self._batch_places(self._routines.built, self._arrays[self._rows["absolute"]])
+
+    def through(self, changes: Changes) -> Moments | None:
+        """Return a way through moments at which parameters change, from the start on."""
+        from atwood.integrators.moments import Moments
+
+        horizon = self._session + 8 * self._places["horizon"]
+        return Moments(self.batch_places(), horizon, changes, self._ends[0])
 
     def watch(self, events: EventData) -> bool:
         """Come back with `Outcome.NOTICED` after a step in which an event may have happened."""

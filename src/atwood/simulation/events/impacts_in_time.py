@@ -78,7 +78,7 @@ def pass_time_event(
     before: Assembly, after: Assembly, t: float, q: FloatArray, u: FloatArray, length: float
 ) -> tuple[FloatArray, FloatArray, tuple[EventRecord, ...]]:
     """Return the state just after a time event, and the impacts, one for each part whose motion jumps in speed."""
-    if not after.shared.get(_MOTION_SWITCHES, lambda: bool(switching(after))):
+    if not motion_switches(after):
         return q, u, ()
     big_q, big_u = (x[:, 0] for x in maximal_state(before, np.array([t]), q[:, None], u[:, None]))
     sizes = motion_scales(after.maximal, length)
@@ -123,6 +123,11 @@ def pass_time_event(
     if after.form == "dae":
         return q, big_u, impacts
     return q, generalized_speeds(after, t, q, big_u, sizes), impacts
+
+
+def motion_switches(assembly: Assembly) -> bool:
+    """Return whether a constraint may change at a time event or with a discrete state."""
+    return assembly.shared.get(_MOTION_SWITCHES, lambda: bool(switching(assembly)))
 
 
 def _values_after(after: Assembly, balance: Balance, t: float, q: FloatArray, u: FloatArray) -> BalanceValues:

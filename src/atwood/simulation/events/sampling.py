@@ -24,6 +24,8 @@ from atwood.mechanics.build import resolve_signals
 from atwood.model.declare.component import Binding, Component, bind
 from atwood.model.declare.laws import Law
 
+_SAMPLER: Key[Sampler] = Key("sample times")
+
 _ROUNDING = 16.0
 """Times that are so many units of rounding apart are one moment."""
 
@@ -104,6 +106,16 @@ class Sampler:
         """Return which updates are due at a time."""
         number = int(self.times.searchsorted(t, side="left"))
         return self.due[number] if number < len(self.times) and self.times[number] == t else ()
+
+    def due_at_each(self, times: FloatArray) -> list[tuple[int, ...]]:
+        """Return which updates are due at each of some times."""
+        known = dict(zip(self.times.tolist(), self.due, strict=True))
+        return [known.get(t, ()) for t in times.tolist()]
+
+    @property
+    def is_pure(self) -> bool:
+        """Whether all updates give the same where they are called again."""
+        return all(one.law.options.pure for one in self.updates)
 
     def due_after(self, part: str, event: str) -> tuple[int, ...]:
         """Return which updates an event calls."""
@@ -219,6 +231,11 @@ def refuse_updates(assembly: Assembly) -> None:
 
 def find_sampler(assembly: Assembly, start: float, end: float, moments: FloatArray) -> Sampler:
     """Return the updates of a scene, and when they are due in a run."""
+    about = start, end, moments.tobytes()
+    return assembly.kept.get(_SAMPLER, lambda: _find_sampler(assembly, start, end, moments), *about)
+
+
+def _find_sampler(assembly: Assembly, start: float, end: float, moments: FloatArray) -> Sampler:
     for path, part in assembly.flat.parts.items():
         if type(part.component).check_run is not Component.check_run:
             _bound(assembly, path, start).check_run(start, end)

@@ -91,6 +91,8 @@ class Stretch:
         Numbers of the samples that begin a record.
     changes
         Make the changes of the states of contacts, in order.
+    plan_at
+        Gives the plan of each record by its number, where these begin at moments and not at jumps.
     """
 
     plan: SceneProblem
@@ -105,6 +107,7 @@ class Stretch:
     starts: NDArray[np.int_]
     changes: Sequence[Callable[[], Sequence[Change]]]
     lost: FloatArray | None
+    plan_at: Callable[[int], SceneProblem] | None = None
 
     def records(self) -> Iterable[SegmentRecord]:
         """Return the records from jump to jump."""
@@ -112,12 +115,13 @@ class Stretch:
         changes = list(chain.from_iterable(make() for make in self.changes))
         found = np.searchsorted([one.time for one in changes], self.time[self.starts], side="right").tolist()
         ends = [*self.starts.tolist(), len(self.time)]
-        for (first, last), number in zip(pairwise(ends), found, strict=True):
+        at, is_moment = self.plan_at, self.plan_at is not None
+        for k, ((first, last), number) in enumerate(zip(pairwise(ends), found, strict=True)):
             change, each = changes[number - 1] if number else None, slice(first, last)
             yield made_of(
                 SegmentRecord,
-                plan=self._plan_of(change, known),
-                impact=self.impact if first == 0 else change is None or change.strikes,
+                plan=at(k) if at is not None else self._plan_of(change, known),
+                impact=self.impact if first == 0 else not is_moment and (change is None or change.strikes),
                 time=self.time[each],
                 coordinates=self.coordinates[:, each],
                 speeds=self.speeds[:, each],
@@ -125,7 +129,7 @@ class Stretch:
                 held=self.held[:, each],
                 singular_crossings=self.singular_crossings,
                 lost=None if self.lost is None else self.lost[each],
-                after_time_event=self.after_time_event and first == 0,
+                after_time_event=self.after_time_event if first == 0 else is_moment,
             )
 
     def _plan_of(self, change: Change | None, known: dict[tuple[float, ...], SceneProblem]) -> SceneProblem:
@@ -174,6 +178,7 @@ class Recorder:
         self.nearest: Nearest | None = None
         self._jumps: list[FloatArray] = []
         self._changes: list[Callable[[], Sequence[Change]]] = []
+        self._plan_at: Callable[[int], SceneProblem] | None = None
         self.loss_until: Callable[[FloatArray], FloatArray] | None = None
         # What is done, and states that wait: changed together, so that an interruption loses and repeats nothing.
         self._samples: tuple[tuple[_Block, ...], list[_States]] = ((), [])
@@ -243,6 +248,21 @@ class Recorder:
             pending.append((t, y, shown))
             return
         self._finish(*_joined([*pending, (t, y, shown)]))
+
+    def take_pieces(
+        self,
+        t: FloatArray,
+        y: FloatArray,
+        shown: NDArray[np.bool_],
+        moments: FloatArray,
+        plan_at: Callable[[int], SceneProblem],
+    ) -> None:
+        """Record a stretch that goes through moments, in place of all; it has samples before and after each.
+
+        What gives the plan from the start, 0, and from each moment on is called when somebody asks.
+        """
+        self._samples, self._jumps, self._plan_at = ((), [(t, y, shown)]), [moments], plan_at
+        self.settle()
 
     def take_changes(self, changes: Callable[[], Sequence[Change]]) -> None:
         """Record what makes the states of contacts from some moments on."""
@@ -325,7 +345,7 @@ class Recorder:
             starts = np.append(starts, np.searchsorted(time, np.concatenate(self._jumps)) + 1)
             starts = starts[starts < len(time)]
         lost = None if self.loss_until is None else self.loss_until(time)
-        rest = crossings, starts, tuple(self._changes), lost
+        rest = crossings, starts, tuple(self._changes), lost, self._plan_at
         return Stretch(self.plan, impact, after_time_event, time, q, u, shown, held, *rest)
 
     def _finish(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_], waiting: Sequence[_States] = ()) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -51,6 +52,9 @@ from atwood.simulation.run.sides_of_run import SidesOfRun
 from atwood.simulation.run.stall_diagnosis import allowed, failed
 from atwood.stages import stage
 from atwood.topology.orientation_coordinates import Orientation
+
+if TYPE_CHECKING:
+    from atwood.simulation.run.moments import Ahead, Passed
 
 _CHATTER, _MOST_CONTACTS = 50, 2000
 """So many changes of mode without time passing end a run, and so many of gaps and slips."""
@@ -123,6 +127,9 @@ def walked(assembly: Assembly, start: Start, options: RunOptions, kind: type[Wal
 
 class Walk:
     """The way of a run through its modes."""
+
+    passes_moments = True
+    """Whether steps may pass sample times and time events by themselves."""
 
     def __init__(
         self,
@@ -235,7 +242,9 @@ class Walk:
         ahead = self.samples.until(t, limit)
         if limit < options.t_end or (t < limit and self.sampler.due_at(limit)):  # the state just after it is shown
             ahead = ahead.without_last_shown()
-        segment = Segment(self.plan, self.probe, options, self.choice, ahead, self.show, self.statistics, self._kept)
+        coming = self._moments(schedule)
+        stretch = self.plan, self.probe, options, self.choice, ahead, self.show, self.statistics, self._kept
+        segment = Segment(*stretch, coming)
         recorder = Recorder(self.plan)
         outcome = run_segment(segment, recorder, t, q, u)
         if (
@@ -250,7 +259,9 @@ class Walk:
             return recorder, outcome
         record = recorder.stretch(self.impact, after_time_event)
         self.segments.append(self._sides.recorded(record, self.plan, self.assembly, bool(outcome.sides)))
-        if outcome.held is not None and outcome.held != self.held:  # sets of contacts have changed on the way
+        if outcome.passed is not None:
+            self._passed(outcome.passed)
+        elif outcome.held is not None and outcome.held != self.held:  # sets of contacts have changed on the way
             self.held, self.assembly = outcome.held, self.assembly.with_held(outcome.held)
             self.plan, self.probe, self._plans = self.plan.in_piece(self.assembly), None, {}
         self.statistics = self.statistics + outcome.statistics
@@ -258,7 +269,30 @@ class Walk:
             if not self.choices or not choice.is_like(self.choices[-1]):
                 self.choices.append(choice)
         self.choice = outcome.choices[-1]
+        if outcome.passed is not None and outcome.passed.error is not None:
+            self.t = outcome.t
+            raise outcome.passed.error
         return recorder, outcome
+
+    def _moments(self, schedule: Schedule) -> Ahead | None:
+        """Return the moments that steps may pass by themselves from here on; None where there are none."""
+        if not (len(schedule.times) or len(self.sampler.times)) or not self.passes_moments:
+            return None
+        from atwood.simulation.run.moments import Ahead, times_ahead
+
+        assert self.plan is not None
+        times, end = times_ahead(self.plan, schedule, self.sampler, self.t, self.options), self.options.t_end
+        if len(times) < 2:
+            return None
+        return Ahead(times, self.samples.until(self.t, end), schedule, self.sampler, self._made)
+
+    def _passed(self, passed: Passed) -> None:
+        """Take up where the run is that went through moments."""
+        assert self.plan is not None
+        self._piece_start, self.held = passed.begun, passed.held
+        self.assembly = self._in_piece(self.assembly)
+        self.plan, self.probe, self._plans = self.plan.in_piece(self.assembly), None, {}
+        self.passes_moments = self.passes_moments and not passed.is_refused
 
     def _due(self) -> tuple[int, ...]:
         """Return which updates are still to be made now."""
@@ -385,11 +419,7 @@ class Walk:
     def _update(self, due: Sequence[int]) -> None:
         """Go on with what updates make of the state."""
         before, self._unsettled = self.assembly, ()
-        if self._known is not None and len(self.log) < len(self._known):
-            made = self._known[len(self.log)]
-        else:
-            made = self.sampler.call(due, before, self.t, self.q, self.u)
-        self.log.append(made)
+        made = self._made(due, before, self.t, self.q, self.u)
         self.q, self.held = made.coordinates, made.held
         self.assembly = before.with_held(self.held) if self.held else before
         self.show = True  # as after any event: values that are held jump
@@ -397,6 +427,15 @@ class Walk:
         if self.plan is not None:
             self.probe, self._plans = None, {}
             self.plan = self.plan.in_piece(self._sides.like(self.assembly, self.plan))
+
+    def _made(self, due: Sequence[int], assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> Updated:
+        """Return what updates make of a state, or have made of it before."""
+        if self.sampler.is_pure:
+            return self.sampler.call(due, assembly, t, q, u)
+        known = self._known or ()
+        made = known[len(self.log)] if len(self.log) < len(known) else self.sampler.call(due, assembly, t, q, u)
+        self.log.append(made)
+        return made
 
     def _jump(self, before: Assembly, show_both: bool = False) -> None:
         """Go on where prescribed motions switch: velocities may jump, and one-sided constraints let go."""

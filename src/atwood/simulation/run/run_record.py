@@ -32,6 +32,7 @@ from atwood.simulation.run.recorder import SegmentRecord, Stretch
 from atwood.simulation.run.session import KeptSession
 
 if TYPE_CHECKING:
+    from atwood.simulation.run.moments import Ahead, Passed
     from atwood.simulation.singular.crossing import SingularCrossing
 
 
@@ -162,6 +163,8 @@ class Segment:
         What the run has cost before.
     kept
         The session of an explicit method that the run has opened before.
+    ahead
+        Moments that it may pass by itself.
     """
 
     plan: SceneProblem
@@ -172,6 +175,7 @@ class Segment:
     first_shown: bool
     spent: Statistics
     kept: KeptSession
+    ahead: Ahead | None = None
 
     @property
     def end(self) -> float:
@@ -207,6 +211,8 @@ class Outcome:
         Numbers of the relations of what moves that change at its end.
     held
         The discrete states at its end, if it has some.
+    passed
+        The moments that it went through, if there are any.
     """
 
     t: float
@@ -221,6 +227,7 @@ class Outcome:
     handed: tuple[int, ...] = ()
     sides: tuple[int, ...] = ()
     held: tuple[float, ...] | None = None
+    passed: Passed | None = None
 
 
 def goes_on(outcome: Outcome, end: float) -> bool:

@@ -14,6 +14,7 @@ from atwood.arrays import FloatArray
 from atwood.clock import TimeIsUp, check_time, more_time, time_left
 from atwood.errors import AtwoodError, SolveError, StartError
 from atwood.forms.loose import kept_touching
+from atwood.integrators.explicit_session import ExplicitSession
 from atwood.integrators.methods import AUTO, Method
 from atwood.integrators.protocol import Budget, Statistics, Status, StepResult
 from atwood.integrators.session import Session
@@ -141,6 +142,10 @@ class _Runner:
         self.began, done = t, 0
         try:
             session = self._open(t, y, yp)
+            passed = self._pass_moments(session, y)
+            if passed is not None:
+                return passed
+            session = self.session or session
             while True:
                 if not self.method.is_implicit and (self.monitor is None or self.monitor.next == np.inf):
                     done, step_result = self._sample_watched(session, done)
@@ -164,6 +169,21 @@ class _Runner:
             if not is_numerical(error):
                 raise
             return self._failed(self._numerical_failure(error, (t, y)))
+
+    def _pass_moments(self, session: Session, y: FloatArray) -> Outcome | None:
+        """Go on through the moments ahead; None where the session has begun anew, or there are none to pass."""
+        segment, filling = self.segment, self.segment.kept.filling_of(session)
+        if segment.ahead is None or filling is None or self.monitor is not None or len(segment.probe.directions):
+            return None
+        assert isinstance(session, ExplicitSession)
+        from atwood.simulation.run.moments import pass_moments
+
+        given = y, segment.first_shown, segment.options.progress
+        passed = pass_moments(session, filling, self.recorder, segment.ahead, *given)
+        if passed is None:
+            self._open(self.began, y, np.zeros(0))
+            return None
+        return replace(self._ended(passed.t, "finished", ""), held=passed.held, passed=passed)
 
     def _failed(self, error: SolveError) -> Outcome:
         return replace(self._ended(self.recorder.end, "failed", error.message), error=error)

@@ -257,9 +257,7 @@ class KeptSession:
         Whether there are no gaps and slips, or nothing is to happen at them.
     """
 
-    kept: list[tuple[tuple[object, ...], ExplicitSession, Callable[[SolverRequest], object]]] = field(
-        default_factory=list
-    )
+    kept: list[tuple[tuple[object, ...], ExplicitSession, Filling]] = field(default_factory=list)
     impacts: list[tuple[float, str]] | None = None
     is_undisturbed: bool = True
     changes: int = 0
@@ -270,6 +268,10 @@ class KeptSession:
         """Whether there were so many impacts, or changes of a set, that steps are to add to them."""
         many = self.impacts is not None and len(self.impacts) >= _MANY_IMPACTS
         return many or (self.impacts is not None and self.changes >= _MANY_CHANGES)
+
+    def filling_of(self, session: Session | None) -> Filling | None:
+        """Return what gives a session its parameters; None where it is not kept."""
+        return next((fill for _, one, fill in self.kept if one is session), None)
 
     def begin_again(
         self, request: SolverRequest, method: Method, t: float, y: FloatArray, on_stiff: OnStiff | None
@@ -284,7 +286,7 @@ class KeptSession:
                 return session
         return None
 
-    def keep(self, opened_with: tuple[object, ...], session: Session, fill: Callable[[SolverRequest], object]) -> None:
+    def keep(self, opened_with: tuple[object, ...], session: Session, fill: Filling) -> None:
         """Keep a session for what comes next, with the one before it."""
         assert isinstance(session, ExplicitSession)
         self.kept[:] = [*self.kept[-1:], (opened_with, session, fill)]
@@ -311,7 +313,7 @@ def _open_tree(request: SolverRequest, method: Method, t: float, y: FloatArray, 
         return session
     problem, assembly = _explicit_problem(request, method), plan.assembly
     own = own_rates(assembly) if _can_be_kept(problem, method) else None
-    fill = None if own is None else _filling(*own, problem, lambda one: one.plan.assembly.parameter_values)
+    fill = None if own is None else Filling(*own, problem, lambda one: one.assembly.parameter_values)
     if own is not None and fill is not None:
         fill(request)
         rates = own[1].rates
@@ -335,17 +337,29 @@ def _open_tree(request: SolverRequest, method: Method, t: float, y: FloatArray, 
     return opened
 
 
-def _filling(
-    code: CompiledAccelerations,
-    rates: OwnRates,
-    problem: ExplicitProblem,
-    values: Callable[[SolverRequest], FloatArray],
-) -> Callable[[SolverRequest], None]:
-    """Return what gives rates, and events if there are any, the parameters of a request."""
-    events, jumps = problem.compiled_events, problem.jumps
+@dataclass(frozen=True, eq=False)
+class Filling:
+    """What gives the functions of a session, its rates and events if there are any, the parameters of a request.
 
-    def fill(request: SolverRequest) -> None:
-        code.fill(rates, values(request))
+    Attributes
+    ----------
+    code, own
+        The rates.
+    problem
+        What the session was opened for.
+    values
+        The parameters of the rates.
+    """
+
+    code: CompiledAccelerations
+    own: OwnRates
+    problem: ExplicitProblem
+    values: Callable[[SceneProblem], FloatArray]
+
+    def __call__(self, request: SolverRequest) -> None:
+        """Give them the parameters of a request."""
+        self.code.fill(self.own, self.values(request.plan))
+        events, jumps = self.problem.compiled_events, self.problem.jumps
         if jumps is not None:
             from atwood.integrators.set_jumps import SetJumps
             from atwood.simulation.contacts.bounces import fill_bounces
@@ -359,8 +373,6 @@ def _filling(
         found = None if events is None else request.probe.code(for_ida=False)
         if found is not None and events is not None:
             found.fill(events, request.plan.assembly.parameter_values, request.probe.shift)
-
-    return fill
 
 
 def equations_of(
@@ -412,7 +424,7 @@ def _open_on_constraints(
         if found is None and alone is not None:
             found = sets_of(plan, probe, t, y, explicit.compiled_events, alone)
         explicit = replace(explicit, jumps=found)
-    fill = None if own is None else _filling(*own, explicit, lambda one: values_on_constraints(one.plan))
+    fill = None if own is None else Filling(*own, explicit, values_on_constraints)
     if own is not None and fill is not None:
         fill(request)
         rates = own[1].rates

@@ -101,6 +101,8 @@ class _Session(KeptSession):
 class WatchedWalk(Walk):
     """The way of a run that takes note of what happens to its state."""
 
+    passes_moments = False
+
     def __init__(self, *given: Any) -> None:
         super().__init__(*given)
         self._kept, self.legs, self.changes = _Session(), list[Leg](), list[Change]()

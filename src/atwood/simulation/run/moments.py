@@ -1,0 +1,234 @@
+"""Sample times and time events of a run that its steps pass without Python; see `atwood.integrators.moments`.
+
+That is where nothing is watched, nothing prescribed jumps, and the steps are machine code. What is recorded is what
+single stretches record, to the bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atwood.arrays import FloatArray
+from atwood.clock import check_time
+from atwood.forms.assembly import Assembly
+from atwood.integrators.explicit_session import ExplicitSession
+from atwood.integrators.moments import DONE, PAUSES, USED_UP, Changes
+from atwood.lazy_dataclasses import dataclass
+from atwood.simulation.events.impacts_in_time import motion_switches
+from atwood.simulation.events.sampling import Sampler, Updated
+from atwood.simulation.events.time_events import Schedule
+from atwood.simulation.problem.options import RunOptions, Samples
+from atwood.simulation.problem.problem import SceneProblem
+from atwood.simulation.run.recorder import Recorder
+from atwood.simulation.run.session import Filling
+
+_ROUNDING = 16.0
+"""Times that are so many units of rounding apart are one moment."""
+
+_BLOCKS = 50
+"""Progress is told about so many times."""
+
+_MANY = 20
+"""From so many updates on it pays to compile them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ahead:
+    """The moments that lie ahead of a stretch.
+
+    Attributes
+    ----------
+    times
+        Its start, and the moments, s.
+    samples
+        Those of the rest of the run.
+    schedule, sampler
+        What they are made of.
+    update
+        Makes updates at a time, of a scene in a state, in Python.
+    """
+
+    times: FloatArray
+    samples: Samples
+    schedule: Schedule
+    sampler: Sampler
+    update: Callable[[Sequence[int], Assembly, float, FloatArray, FloatArray], Updated]
+
+
+@dataclass(frozen=True, eq=False)
+class Passed:
+    """Where a run is that went through moments.
+
+    Attributes
+    ----------
+    t, begun
+        The time, and that of the last moment that it went through, s.
+    held
+        The discrete states.
+    is_refused
+        Whether it did not go on by itself.
+    error
+        What an update has raised.
+    """
+
+    t: float
+    begun: float
+    held: tuple[float, ...]
+    is_refused: bool
+    error: Exception | None
+
+
+def times_ahead(plan: SceneProblem, schedule: Schedule, sampler: Sampler, t: float, options: RunOptions) -> FloatArray:
+    """Return a time, and the moments after it that steps can pass by themselves: none if they cannot."""
+    assembly, end = plan.assembly, options.t_end
+    own = assembly.own_equations
+    moments = [
+        one[slice(*one.searchsorted([t, end], side="right"))] for one in (schedule.times, sampler.times) if len(one)
+    ]
+    if not any(map(len, moments)):
+        return np.array([t])
+    times = np.unique(np.concatenate([[t], *moments]))
+    times = times[times < end]
+    is_plain = not (
+        plan.finding.redundant
+        or plan.dependent_speeds
+        or own.contacts
+        or assembly.sides is not None
+        or plan.balance.kinematic_map.has_homogeneous
+        or motion_switches(assembly)
+        or options.max_steps is not None
+        or options.on_step is not None
+        or options.conditions
+        or any(one.law.options.at for one in sampler.updates)
+    )
+    gaps = np.diff(np.append(times, end))
+    return times if is_plain and np.all(gaps > _ROUNDING * np.spacing(np.abs(times) + end)) else np.array([t])
+
+
+def pass_moments(
+    session: ExplicitSession,
+    filling: Filling,
+    recorder: Recorder,
+    ahead: Ahead,
+    start: FloatArray,
+    first_shown: bool,
+    progress: Callable[[float], object] | None,
+) -> Passed | None:
+    """Go through moments, and record what single stretches would; None where not even the first came out well."""
+    way = _Way(ahead, recorder.plan)
+    samples, shown, first = _rows(ahead, way.due, first_shown)
+    moments = session.through(way.changes(filling, samples, first))
+    if moments is None:
+        return None
+    code, most = PAUSES, len(ahead.times) if progress is None else -(-len(ahead.times) // _BLOCKS)
+    try:
+        while code in (PAUSES, USED_UP):
+            code = session.pass_moments(moments, way.ask, most)
+            if progress is not None:
+                progress(float(samples[moments.filled - 1]))
+            check_time()
+    finally:
+        is_whole = code in (DONE, PAUSES, USED_UP)
+        count = moments.filled if is_whole else int(first[moments.now])
+        begun = moments.now + is_whole
+        way.held = moments.held
+        if count > 1:
+            rows = samples[:count], moments.values[:count], shown[:count]
+            recorder.take_pieces(*rows, ahead.times[1:begun], way.plan_at)
+    if count == 1:
+        return None
+    held = tuple(moments.held[begun - 1].tolist())
+    return Passed(float(samples[count - 1]), float(ahead.times[begun - 1]), held, code != DONE, way.error)
+
+
+def _rows(
+    ahead: Ahead, due: Sequence[tuple[int, ...]], first_shown: bool
+) -> tuple[FloatArray, NDArray[np.bool_], NDArray[np.int64]]:
+    """Return the samples of all stretches, each with both its ends, which are shown, and where each begins."""
+    moments, given = ahead.times, ahead.samples
+    end = float(given.times[-1])
+    later = given.times[int(given.times.searchsorted(moments[0], side="right")) :]
+    times = np.union1d(moments, later)
+    counts = np.ones(len(times), dtype=np.intp)
+    counts[times.searchsorted(moments[1:])] = 2
+    rows = np.repeat(times, counts)
+    place = np.minimum(given.times.searchsorted(rows), len(given.times) - 1)
+    shown = (given.times[place] == rows) & given.shown[place]
+    begins = rows.searchsorted(moments, side="right") - 1  # behind the state before
+    shown[begins[1:] - 1] = False
+    shown[begins[np.array([k > 0 and bool(one) for k, one in enumerate(due)])]] = True
+    shown[0] = first_shown
+    if ahead.sampler.due_at(end):  # the state just after it is shown
+        shown[-1] = False
+    return rows, shown, np.append(begins, len(rows)).astype(np.int64)
+
+
+class _Way:
+    """What happens at the moments, and the scene between them."""
+
+    def __init__(self, ahead: Ahead, plan: SceneProblem) -> None:
+        self._ahead, self._plan = ahead, plan
+        self._pieces = ahead.schedule.times.searchsorted(ahead.times, side="right")
+        self.due = ahead.sampler.due_at_each(ahead.times)
+        self.held = np.zeros((0, 0))
+        self.error: Exception | None = None
+
+    def changes(self, filling: Filling, samples: FloatArray, first: NDArray[np.int64]) -> Changes:
+        """Return what happens, for the session of some rates."""
+        ahead, assembly, rates = self._ahead, self._plan.assembly, filling.own.rates
+        which = np.array([-1 if due else 0 for due in self.due], dtype=np.int64)
+        update: tuple[int, int] = 0, 0
+        keep: object = None
+        if np.count_nonzero(which) >= _MANY:
+            from atwood.simulation.events.traced import update_code
+
+            found = update_code(assembly, ahead.sampler)
+            if found is not None:
+                code, chains = found
+                which = np.array([chains.get(due, 0) for due in self.due], dtype=np.int64)
+                data, keep = code.bind(assembly)
+                update = code.address, data
+        which[0] = 0  # what happens at the start has happened
+        relations = np.ascontiguousarray(ahead.schedule.values[:, self._pieces].T)
+        return Changes(
+            ahead.times,
+            first,
+            samples,
+            which,
+            relations,
+            filling.values(self._plan).copy(),
+            (len(assembly.mechanism.table.values), len(assembly.discrete_states)),
+            update,
+            tuple(zip(filling.own.prologues, filling.own.places, strict=True)),
+            filling.own.scratch,
+            (rates.project, rates.project_data),
+            float(ahead.samples.times[-1]),
+            (keep, filling),
+        )
+
+    def assembly_at(self, held: tuple[float, ...], k: int) -> Assembly:
+        """Return the scene with the relations from a moment on, and with some discrete states."""
+        found = self._ahead.schedule.applied(self._plan.assembly, int(self._pieces[k]))
+        return found.with_held(held) if held else found
+
+    def plan_at(self, k: int) -> SceneProblem:
+        """Return the plan for the stretch from a moment on."""
+        return self._plan if k == 0 else self._plan.in_piece(self.assembly_at(tuple(self.held[k].tolist()), k))
+
+    def ask(self, k: int, state: FloatArray, parameters: FloatArray) -> bool:
+        """Make the updates of a moment in Python."""
+        assembly = self._plan.assembly
+        own = len(assembly.mechanism.table.values)
+        held = slice(own, own + len(assembly.discrete_states))
+        q, u = self._plan.program.split(state)
+        there = self.assembly_at(tuple(parameters[held].tolist()), k)
+        try:
+            made = self._ahead.update(self.due[k], there, float(self._ahead.times[k]), q.copy(), u.copy())
+        except Exception as error:  # it is raised where the stretches before are recorded
+            self.error = error
+            return False
+        q[:], parameters[held] = made.coordinates, made.held
+        return True
