@@ -19,7 +19,7 @@ from atwood.expr import Expression, InputGroup, OutputGroup, Program, jvp
 from atwood.forms.accelerations import accelerations_of
 from atwood.forms.caches import Key
 from atwood.integrators.methods import EXPLICIT, LEAST, Task
-from atwood.integrators.protocol import Budget, ExplicitProblem, SolverOptions, Status
+from atwood.integrators.protocol import Budget, ExplicitProblem, SolverOptions, Status, StepGuard
 from atwood.lazy_dataclasses import dataclass
 from atwood.simulation.dynamics.orientation_coordinates import longest_step
 from atwood.simulation.problem.explicit_scene import program_on_constraints
@@ -179,15 +179,48 @@ class Augmented:
         rtol: float,
         max_steps: int | None,
     ) -> Stretch:
-        plan, (n, m), count = self.plan, self.split, len(columns)
+        count = len(columns)
         programs, code = self._programs(self.pattern[part])
-        values = self._values(part)
-        absolute = _CLOSER * plan.tolerances(rtol, {})[: n + m]
+        values, absolute = self._values(part), self._absolute(rtol)
         z, packed = self._packed(y, columns), self._packed(absolute, np.tile(absolute, (count, 1)))
         problem = ExplicitProblem(size=len(z), rates=_no_rates, compiled=code.bind(values))
+        found, steps = self._sampled(problem, t, z, y, packed, times, rtol, max_steps)
+        if programs.projection is not None:
+            found = self._projected(programs.projection, values, times, found)
+        rows = self._unpacked(found, count)
+        return Stretch(rows[:, 0], rows[:, 1:], steps)
+
+    def steps_of(
+        self, t: float, y: FloatArray, times: FloatArray, rtol: float, max_steps: int | None, guard: StepGuard
+    ) -> None:
+        """Integrate the motion alone, and show each step to a guard."""
+        from atwood.integrators.embedded.rates import CompiledAccelerations
+
+        about = self.plain.accelerations, self.plain.projection
+        code = self.plan.assembly.shared.get(_CODE, lambda: CompiledAccelerations(*about), *about)
+        problem = ExplicitProblem(size=len(y), rates=_no_rates, compiled=code.bind(self.values), guard=guard)
+        self._sampled(problem, t, y, y, self._absolute(rtol), times, rtol, max_steps)
+
+    def _absolute(self, rtol: float) -> FloatArray:
+        found: FloatArray = _CLOSER * self.plan.tolerances(rtol, {})[: sum(self.split)]
+        return found
+
+    def _sampled(
+        self,
+        problem: ExplicitProblem,
+        t: float,
+        z: FloatArray,
+        y: FloatArray,
+        absolute: FloatArray,
+        times: FloatArray,
+        rtol: float,
+        max_steps: int | None,
+    ) -> tuple[FloatArray, int]:
+        """Integrate a problem; return it at some times, and the number of steps."""
+        plan = self.plan
         settings = SolverOptions(
             relative_tolerance=max(_CLOSER * rtol * plan.relative_share, LEAST),
-            absolute_tolerances=packed,
+            absolute_tolerances=absolute,
             horizon=max(float(times[-1]) - t, 1e-300),
         )
         task = Task(settings, t, z, budget=Budget(max_steps=max_steps), end=float(times[-1]), explicit=problem)
@@ -199,7 +232,7 @@ class Augmented:
                 where=plan.assembly.flat.name,
                 advice="Start a little beside that state, or let the run end before.",
             ) from error
-        session.limit_steps(longest_step(plan.assembly.own_equations, y[n:]))
+        session.limit_steps(longest_step(plan.assembly.own_equations, y[self.split[0] :]))
         found, _, ended = session.sample(times)
         if ended.status is not Status.REACHED:
             raise SolveError(
@@ -207,10 +240,7 @@ class Augmented:
                 where=plan.assembly.flat.name,
                 advice="Its steps are explicit, and many where it is stiff: ask for a larger rtol or max_steps.",
             )
-        if programs.projection is not None:
-            found = self._projected(programs.projection, values, times, found)
-        rows = self._unpacked(found, count)
-        return Stretch(rows[:, 0], rows[:, 1:], session.statistics.steps)
+        return found, session.statistics.steps
 
     def _values(self, part: slice) -> FloatArray:
         """Return the values of parameters and seeds of some columns."""

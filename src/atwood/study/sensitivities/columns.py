@@ -18,11 +18,15 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, UsageError
+from atwood.expr import read_by
 from atwood.forms.assembly import Assembly
+from atwood.forms.other_values import starting
 from atwood.forms.quantities import observer
 from atwood.lazy_dataclasses import dataclass
+from atwood.model.declare.component import Component
 from atwood.simulation.dynamics.scales import scene_length
 from atwood.simulation.initialization.start import Start, find_start, own_state
+from atwood.simulation.initialization.system import sort_targets
 
 SHARES: tuple[float, ...] = (2.0**-7, 2.0**-8, 2.0**-9)
 """Lengths of the differences, in units of a column."""
@@ -52,6 +56,10 @@ class Column:
         What a change of it is measured by: the parameter itself, or for starts a size of the scene.
     near
         Gives the scene with the value moved by a share of the scale.
+    symbol
+        The name of the parameter of the equations that it is, and no other follows; empty where that is not known.
+    leaves_start
+        Whether the start does not depend on it for certain.
     """
 
     path: str
@@ -60,13 +68,13 @@ class Column:
     value: float
     scale: float
     near: Callable[[float], Assembly]
-
-    def parameters(self, at: Callable[[Assembly], Assembly] = lambda one: one) -> FloatArray:
-        """Return by how much each parameter of the equations changes with a change by the scale."""
-        return extrapolated(lambda share: at(self.near(share)).parameter_values)
+    symbol: str
+    leaves_start: bool
 
     def start(self, state: tuple[FloatArray, FloatArray], length: float) -> FloatArray:
-        """Return by how much coordinates and speeds at the start do."""
+        """Return by how much coordinates and speeds at the start change with a change by the scale."""
+        if self.leaves_start:
+            return np.zeros(len(state[0]) + len(state[1]))
         here, farthest = np.concatenate(state), 0.3 * max(1.0, length)
 
         def there(share: float) -> FloatArray:
@@ -93,7 +101,8 @@ def find_columns(
     inputs: Sequence[Column] = (),
 ) -> tuple[Column, ...]:
     """Return what a run is differentiated by; what it cannot be is refused by name."""
-    found = [_parameter(assembly, path) for path in parameters]
+    reads = cache(lambda: _read_by_start(assembly))
+    found = [_parameter(assembly, path, reads) for path in parameters]
     found += [_start_value(assembly, start, path) for path in starts]
     found += inputs
     if not found:
@@ -126,7 +135,7 @@ def value_of(assembly: Assembly, path: str) -> tuple[Any, str]:
     return value, unit
 
 
-def _parameter(assembly: Assembly, path: str) -> Column:
+def _parameter(assembly: Assembly, path: str, reads: Callable[[], frozenset[str]]) -> Column:
     value, unit = value_of(assembly, path)
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise UsageError(
@@ -142,6 +151,9 @@ def _parameter(assembly: Assembly, path: str) -> Column:
     def near(share: float) -> Assembly:
         return _other(assembly, path, {path: number + share * scale}, {}, whole)
 
+    symbol = "" if number == 0.0 or whole else _own_symbol(assembly, path)
+    if symbol:
+        return Column(path, unit, False, number, scale, near, symbol, symbol not in reads())
     found = near(SHARES[0])
     if found.shared is not assembly.shared or found.why_new:
         zero = "it is exactly zero, and the equations are made without it"
@@ -152,7 +164,33 @@ def _parameter(assembly: Assembly, path: str) -> Column:
             if number == 0.0
             else "Leave it out; a sweep runs the scene with other values of it.",
         )
-    return Column(path, unit, False, number, scale, near)
+    return Column(path, unit, False, number, scale, near, "", False)
+
+
+def _own_symbol(assembly: Assembly, path: str) -> str:
+    """Return the name of the parameter of the equations that a value of a leaf is; nothing else is made of that."""
+    leaf = path.rpartition(".")[0]
+    is_own = leaf in assembly.flat.parts and any(one.name == path for one in assembly.parameters)
+    return path if is_own and not assembly.mechanism.constants else ""
+
+
+def _read_by_start(assembly: Assembly) -> frozenset[str]:
+    """Return the names of the parameters of the equations on which the start may depend."""
+    equations, flat = assembly.reduced, assembly.flat
+    said = {path.rpartition(".")[0] for path in (*flat.start, *flat.guess)} & set(flat.parts)
+    restates = any(type(flat.parts[one].component).restate_start is not Component.restate_start for one in said)
+    if restates or starting(assembly) is not assembly or assembly.mechanism.table.origin:
+        return frozenset(one.name for one in assembly.parameters)
+    values = [
+        one.observable.value for some in sort_targets(assembly, equations) for one in (*some.fixed, *some.guessed)
+    ]
+    if equations.constraints or equations.solved_speeds or equations.eliminated or assembly.form == "dae":
+        moved = equations.kinematics
+        places = (*moved.placements.positions.values(), *moved.velocities.values(), *moved.angular_velocities.values())
+        values += [component for one in places for component in one]
+    for one in equations.constraints:
+        values += [one.rate, *(() if one.value is None else (one.value,))]
+    return frozenset(one.name for one in read_by(values, assembly.parameters))
 
 
 def _other(
@@ -181,7 +219,7 @@ def _start_value(assembly: Assembly, start: Start, path: str) -> Column:
     near = cache(lambda share: _other(assembly, path, {}, {path: value + share * scale}))
     if near(SHARES[0]).shared is not assembly.shared:
         raise UsageError("it shapes the equations", where=path, advice="Leave it out; a sweep can vary it.")
-    return Column(path, unit, True, value, scale, near)
+    return Column(path, unit, True, value, scale, near, "", False)
 
 
 def _observed(assembly: Assembly, start: Start, path: str) -> float:
@@ -198,8 +236,3 @@ def _start_scale(assembly: Assembly, unit: str) -> float:
     fall = math.sqrt(length / assembly.flat.gravity) if assembly.flat.gravity else 1.0
     sizes = {"m": length, "rad": 1.0, "m/s": length / fall, "rad/s": 1.0 / fall}
     return sizes.get(unit, 1.0)
-
-
-def seeds_of(columns: Sequence[Column], at: Callable[[Assembly], Assembly] = lambda one: one) -> FloatArray:
-    """Return the change of each parameter of the equations by each column, shape (columns, parameters)."""
-    return np.array([one.parameters(at) for one in columns])

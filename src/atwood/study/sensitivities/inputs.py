@@ -103,7 +103,7 @@ class Driven:
         """Return one for each node."""
         size = max(map(abs, self.values)) or 1.0
         return [
-            NodeColumn(self.name(k), self.unit, True, value, size, _refuse, self, k)
+            NodeColumn(self.name(k), self.unit, True, value, size, _refuse, "", True, self, k)
             for k, value in enumerate(self.values)
         ]
 
@@ -128,10 +128,6 @@ class NodeColumn(Column):
 
     driven: Driven
     node: int
-
-    def start(self, state: tuple[FloatArray, FloatArray], length: float) -> FloatArray:
-        """Return zeros: forces do not change where a run starts."""
-        return np.zeros(len(state[0]) + len(state[1]))
 
     def pieces(self, assembly: Assembly, t: float) -> FloatArray:
         """Return the change of each discrete state where a piece begins, times its scale."""

@@ -61,10 +61,12 @@ class Passage:
         self, result: Result, columns: tuple[Column, ...], paths: tuple[str, ...], rtol: float, max_steps: int | None
     ) -> None:
         self.columns, self.paths, self.rtol = columns, paths, rtol
+        self._changes: dict[tuple[int, str], tuple[FloatArray, object]] = {}
         self.max_steps: int | None = max_steps
         run = result.run
+        self.steps: int = run.statistics.steps
         if max_steps is None:
-            self.max_steps = _MORE * (run.statistics.steps + 1000)
+            self.max_steps = _MORE * (self.steps + 1000)
         self.where, self.first, self.end = run.assembly.flat.name, run.assembly, run.options.t_end
         rests = next((one for one in run.events if one.kind == "rests"), None)
         if rests is not None:
@@ -94,13 +96,7 @@ class Passage:
 
     def go(self) -> tuple[FloatArray, FloatArray]:
         """Return values and derivatives of the quantities at the outputs, times the scales of the columns."""
-        moved = np.array([one.start(own_state(self.first, self.start), self.start.length) for one in self.columns])
-        held = np.zeros((len(self.columns), len(self.first.discrete_states)))
-        if held.size:
-            held = np.array([self._held_at_start(one) for one in self.columns])
-        state, still = np.concatenate(own_state(self.first, self.start)), np.zeros(len(self.columns))
-        for change in self.legs[0].changes:
-            moved, held, state = self._changed(change, self.start.time, state, moved, held, still)
+        moved, held = self._at_start()
         values, found = [], []
         for number, leg in enumerate(self.legs):
             segment = self.segments[leg.number]
@@ -119,6 +115,17 @@ class Passage:
             if number + 1 < len(self.legs):
                 moved, held = self._over(leg, self.legs[number + 1], stretch.columns[-1], held, seeds)
         return np.concatenate(values, axis=1), np.concatenate(found, axis=2)
+
+    def _at_start(self) -> tuple[FloatArray, FloatArray]:
+        """Return derivatives of the state and of discrete states where the first stretch begins."""
+        moved = np.array([one.start(own_state(self.first, self.start), self.start.length) for one in self.columns])
+        held = np.zeros((len(self.columns), len(self.first.discrete_states)))
+        if held.size:
+            held = np.array([self._held_at_start(one) for one in self.columns])
+        state, still = np.concatenate(own_state(self.first, self.start)), np.zeros(len(self.columns))
+        for change in self.legs[0].changes:
+            moved, held, state = self._changed(change, self.start.time, state, moved, held, still)
+        return moved, held
 
     def _tangent(
         self, leg: Leg, augmented: Augmented, begin: FloatArray, moved: FloatArray, seeds: FloatArray
@@ -153,14 +160,29 @@ class Passage:
         if column.is_start:
             return now
         plain = self.first if now.shared is self.first.shared else now
-        made = plain.with_values({column.path: column.value + share * column.scale})
+        there = {column.path: column.value + share * column.scale}
+        made = column.near(share) if plain is self.first else plain.with_values(there)
         if made.why_new:
             raise UnsupportedError(f"it shapes the equations in another mode: {made.why_new}", where=column.path)
         made = made.with_relations(now.relation_values) if now.relations else made
         return made.with_held(now.held_now) if now.discrete_states else made
 
-    def _parameters(self, now: Assembly, column: Column, share: float) -> FloatArray:
-        return self._beside(now, column, share).parameter_values
+    def _parameters(self, now: Assembly, column: Column) -> FloatArray:
+        """Return the change of each parameter in a mode with a column; found once in each mode."""
+        about = id(now.shared), column.path
+        if about not in self._changes:
+            self._changes[about] = self._changes_in(now, column), now.shared
+        return self._changes[about][0]
+
+    def _changes_in(self, now: Assembly, column: Column) -> FloatArray:
+        here = now.parameter_values
+        if column.symbol and now.shared is self.first.shared:
+            return np.array([column.scale * (one.name == column.symbol) for one in now.parameters])
+        near = self._beside(now, column, SHARES[0]).parameter_values
+        moved, to = near != here, column.value + SHARES[0] * column.scale
+        if np.all(here[moved] == column.value) and np.all(near[moved] == to):  # it is handed on as it is
+            return np.where(moved, column.scale, 0.0)
+        return extrapolated(lambda share: self._beside(now, column, share).parameter_values)
 
     def _seeds(self, leg: Leg, held: FloatArray) -> FloatArray:
         """Return the change of each parameter in a stretch by each column."""
@@ -171,8 +193,7 @@ class Passage:
         seeds = np.zeros((len(self.columns), len(symbols)))
         for j, column in enumerate(self.columns):
             if not column.is_start:
-                values = extrapolated(partial(self._parameters, plain, column))
-                seeds[j, own] = values[kept]
+                seeds[j, own] = self._parameters(plain, column)[kept]
         for k, one in enumerate(plain.discrete_states):
             seeds[:, places[one.symbol]] = held[:, k]
         return seeds
@@ -207,16 +228,24 @@ class Passage:
 
     def _check(self, segment: SegmentRecord, states: FloatArray, columns: FloatArray, wanted: IndexArray) -> None:
         """Refuse a motion that comes out otherwise than in the run, by more than errors can have grown."""
-        plan = segment.plan
-        sizes = plan.tolerances(1.0, {})[: states.shape[1]]
+        apart, size, sizes = self._apart(segment, states, wanted)
+        grown = 1.0 + np.max(np.abs(columns) / sizes, axis=(1, 2), initial=0.0) + size
+        self._refuse_apart(segment.time[wanted], apart, grown)
+
+    def _apart(
+        self, segment: SegmentRecord, states: FloatArray, wanted: IndexArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return how far states are from those of the run, how large these are, and the sizes that both are in."""
+        sizes = segment.plan.tolerances(1.0, {})[: states.shape[1]]
         run = np.concatenate([segment.coordinates, segment.speeds])[:, wanted].T
         apart = np.max(np.abs(states - run) / sizes, axis=1, initial=0.0)
-        size = np.max(np.abs(run) / sizes, axis=1, initial=0.0)
-        grown = 1.0 + np.max(np.abs(columns) / sizes, axis=(1, 2), initial=0.0) + size
+        return apart, np.max(np.abs(run) / sizes, axis=1, initial=0.0), sizes
+
+    def _refuse_apart(self, times: FloatArray, apart: FloatArray, grown: FloatArray) -> None:
         far = np.flatnonzero(~(apart <= _AGREES * max(self.rtol, 1e-13) * grown))
         if len(far):
             raise SolveError(
-                f"the motion with its derivatives leaves the run at t = {segment.time[wanted[far[0]]]:.9g} s",
+                f"the motion with its derivatives leaves the run at t = {times[far[0]]:.9g} s",
                 where=self.where,
                 advice="Ask for a smaller rtol, or let the run end before.",
             )

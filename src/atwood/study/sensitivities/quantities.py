@@ -8,7 +8,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import UnsupportedError
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, jvp, substitute
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, jvp, read_by, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.event_program import event_program
@@ -26,10 +26,11 @@ _DERIVED: Key[Program] = Key("quantities with their derivatives along a directio
 def written(plan: SceneProblem, paths: tuple[str, ...], t: float, y: FloatArray) -> tuple[Expression, ...]:
     """Return quantities as expressions of time, coordinates and speeds, with forces and accelerations solved for."""
     assembly = plan.assembly
-    kept, maximal = tuple(plan.finding.kept), _kept_in_maximal(assembly, plan, t, y)
+    wanted = [one.value for one in find_observables(assembly, paths)]
+    reads = bool(read_by(wanted, [one.symbol for one in assembly.reactions]))
+    kept, maximal = tuple(plan.finding.kept), _kept_in_maximal(assembly, plan, t, y) if reads else ()
 
     def make() -> tuple[Expression, ...]:
-        wanted = [one.value for one in find_observables(assembly, paths)]
         program = event_program(assembly, wanted, kept, maximal)
         if program is None:
             raise UnsupportedError(

@@ -20,7 +20,8 @@ from atwood.model.values.units import parse_unit, unit_of
 from atwood.pipeline import SCENE, assembly_of, simulate
 from atwood.result.result import Result
 from atwood.simulation.problem.arguments import FORM, OUTPUTS, RTOL, T_END
-from atwood.study.sensitivities.columns import find_columns
+from atwood.study.sensitivities.adjoint import Adjoint
+from atwood.study.sensitivities.columns import Column, find_columns
 from atwood.study.sensitivities.inputs import HELD, LINEAR, Driven, with_inputs
 from atwood.study.sensitivities.passage import Passage
 from atwood.table import Shown, Table, table
@@ -107,7 +108,7 @@ def unit_by(quantity: str, parameter: str) -> str:
     t_end=T_END,
     outputs=OUTPUTS,
     form=optional(FORM),
-    mode=one_of(("auto", "forward")),
+    mode=one_of(("auto", "forward", "adjoint")),
     rtol=RTOL,
     max_steps=optional(whole("a number of steps", 1)),
 )
@@ -150,9 +151,12 @@ def sensitivities(
     t_end, outputs, form
         See `atwood.simulate`.
     mode
-        ``"forward"``: one column for each parameter and start value; ``"auto"`` chooses it.
+        ``"forward"`` integrates one column for each parameter, start value and node, with the motion. ``"adjoint"``
+        goes back through the steps of the motion, once for each quantity and output time: a few times the cost of a
+        run, however many columns there are. Ask for few `outputs`, as ``[t_end]``. ``"auto"`` takes what costs less.
     rtol
-        Relative tolerance of the motion, and of each derivative.
+        Relative tolerance of the motion, and of each derivative. An adjoint is exact for the steps taken, whose errors
+        are those of the motion alone.
     max_steps
         Limit of the steps of each stretch; a hundred times those of the run when not given, since a stiff motion would
         need very many.
@@ -173,7 +177,7 @@ def sensitivities(
     end = assembly.flat.t_end if t_end is None else float(t_end)
     assembly, driven = with_inputs(assembly, inputs, between, end)
     about = tuple(quantities), tuple(parameters), tuple(start)
-    return derivatives_of(assembly, *about, t_end, outputs, rtol, max_steps, driven)
+    return derivatives_of(assembly, *about, t_end, outputs, rtol, max_steps, driven, mode)
 
 
 def derivatives_of(
@@ -186,6 +190,7 @@ def derivatives_of(
     rtol: float,
     max_steps: int | None,
     driven: tuple[Driven, ...] = (),
+    mode: str = "forward",
 ) -> Sensitivities:
     """Return the derivatives along a run; see `sensitivities`."""
     from atwood.study.sweeps.runs import expand_paths
@@ -199,8 +204,8 @@ def derivatives_of(
         run.assembly, run.start, parameters, starts, [one for some in driven for one in some.columns()]
     )
     paths = tuple(expand_paths(assembly, quantities or None))
-    passage = Passage(result, columns, paths, rtol, max_steps)
-    values, found = passage.go()
+    goes_back = mode == "adjoint" or (mode == "auto" and _DEARER * len(paths) * len(result.time) < len(columns))
+    values, found = (_gone_back if goes_back else _gone)(result, columns, paths, rtol, max_steps)
     scales = np.array([one.scale for one in columns])
     units = {one.path: one.unit for one in find_observables(assembly, paths)}
     return Sensitivities(
@@ -213,3 +218,27 @@ def derivatives_of(
         units={(path, one.path): unit_by(units[path], one.unit) for path in paths for one in columns},
         inputs=driven,
     )
+
+
+_DEARER = 2
+"""A way back costs as much as so many columns."""
+
+
+def _gone(
+    result: Result, columns: tuple[Column, ...], paths: tuple[str, ...], rtol: float, max_steps: int | None
+) -> tuple[FloatArray, FloatArray]:
+    return Passage(result, columns, paths, rtol, max_steps).go()
+
+
+def _gone_back(
+    result: Result, columns: tuple[Column, ...], paths: tuple[str, ...], rtol: float, max_steps: int | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return values and derivatives, by a way back for each quantity and output time."""
+    adjoint = Adjoint(result, columns, paths, rtol, max_steps)
+    values = adjoint.make()
+    found = np.empty((len(paths), len(columns), values.shape[1]))
+    for i, k in product(range(len(paths)), range(values.shape[1])):
+        weights = np.zeros(values.shape)
+        weights[i, k] = 1.0
+        found[i, :, k] = adjoint.gradient(weights)
+    return values, found
