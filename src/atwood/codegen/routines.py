@@ -639,7 +639,7 @@ def _words(kind: Kind) -> Kind:
 
 
 def call_kernel(
-    r: Routine, name: str, inputs: Sequence[Value], derived: Value, scratch: Value, outputs: Sequence[Value]
+    r: Routine, name: str | Value, inputs: Sequence[Value], derived: Value, scratch: Value, outputs: Sequence[Value]
 ) -> Value:
-    """Call a program; return 0, or 1 where a result is not finite."""
+    """Call a program, by its name or its address; return 0, or 1 where a result is not finite."""
     return r.call(name, addresses(r, inputs), derived, scratch, addresses(r, outputs))

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.codegen.llvm.build import RoutineSource, build_code, default_options
-from atwood.codegen.llvm.module import Part
+from atwood.codegen.llvm.build import Built, RoutineSource, build_code, default_options, once
+from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Kind
 from atwood.expr.core.program import Program
 from atwood.integrators.jumps import ROOM, JumpLog, Jumps
@@ -96,6 +96,16 @@ class SetLog(JumpLog):
         return made
 
 
+_OWN = ("compiled_location", "event_location", "event_routines", "set_jumps", "set_routines")
+_FILES = (*(f"integrators/{name}.py" for name in _OWN), "numerics/contact_sets.py")
+
+
+@once
+def _routines() -> Built:
+    source = RoutineSource("integrators.set_jump_routines", _FILES)
+    return build_code([], CodeOptions(level=2), exports=("jump",), routines=source)
+
+
 class SetCode:
     """Changes of sets as machine code, for any parameter values.
 
@@ -109,16 +119,7 @@ class SetCode:
         self.program = program
         _, self.coordinates, self.speeds = (len(group.symbols) for group in program.inputs)
         part = Part("contacts", program)
-        files = (
-            "integrators/compiled_location.py",
-            "integrators/event_location.py",
-            "integrators/event_routines.py",
-            "integrators/set_jumps.py",
-            "integrators/set_routines.py",
-            "numerics/contact_sets.py",
-        )
-        routines = RoutineSource("integrators.set_jump_routines", files)
-        self.built = build_code([part], default_options([part]), exports=["jump"], routines=routines)
+        self.built, self.routines = build_code([part], default_options([part])), _routines()
 
 
 class SetJumps(Jumps):
@@ -197,7 +198,7 @@ class SetJumps(Jumps):
         )
         self._place(events, rates, given)
         self._rates = RATES(rates.function), rates.data
-        self.function, self.data = code.built.code.addresses["jump"], self._pieces["own"].ctypes.data
+        self.function, self.data = code.routines.code.addresses["jump"], self._pieces["own"].ctypes.data
 
     def _place(
         self, events: EventData, rates: CompiledRates, given: tuple[tuple[int, ...], tuple[int, ...], int]
@@ -207,6 +208,7 @@ class SetJumps(Jumps):
         code, at = self.set_code, {name: one.ctypes.data for name, one in self._pieces.items()}
         same = ("derived", "y", "out", "units", "rows", "matrix", "left", "shares", "pattern", "past")
         self._put("sets", {name: at[name] for name in same} | {"scratch": at["room"], "log": at["struck"]})
+        self._put("sets", {"program": code.built.code.addresses["contacts"]})
         self._put("sets", {"coordinates": code.coordinates, "speeds": code.speeds})
         named = ("sets", "table", "margins", "states", "near", "before", "values", "places", "log")
         self._put("own", {name: at[name] for name in named} | {"shift": events.arrays[1].ctypes.data})

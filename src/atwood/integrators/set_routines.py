@@ -29,7 +29,7 @@ from atwood.codegen.routines import (
 from atwood.numerics.contact_sets import CLEAR, GOES_ON, OPEN, SLACK, STICKS, STILL, TURNS
 
 FIELDS: dict[str, Kind] = {
-    **dict.fromkeys(("derived", "scratch", "y", "out", "units", "rows", "matrix", "left"), ADDRESS),
+    **dict.fromkeys(("program", "derived", "scratch", "y", "out", "units", "rows", "matrix", "left"), ADDRESS),
     **dict.fromkeys(("shares", "pattern", "past", "log"), ADDRESS),
     **dict.fromkeys(("finite", "blur", "pace", "tolerance", "inside", "ahead", "rough"), NUMBER),
     **dict.fromkeys(("better_x", "better_y"), NUMBER),
@@ -542,7 +542,7 @@ def _read() -> Routine:
     r, m, (t,) = _open("read_contacts", {"t": NUMBER})
     y, shares, pattern, size, count, entries = m.y, m.shares, m.pattern, m.size, m.count, m.entries
     inputs = [place_of(r, t), y, y.at(m.coordinates)]
-    with r.when(call_kernel(r, "contacts", inputs, m.derived, m.scratch, [m.out]) != 0):
+    with r.when(call_kernel(r, m.program, inputs, m.derived, m.scratch, [m.out]) != 0):
         r.give(NO_VALUE)
     found = m.result("shares")
     r.clear(shares, shares.at(count * size * 4))

@@ -468,7 +468,7 @@ function openMode(mode, options) {
   if (touch) {
     const {keys, size, pattern} = data.contacts, {sets, units, rows: numbers, matrix: square, left, shares, at, impacts, log} = touch;
     const fields = {derived: places.contacts.derived, scratch, y, out: places.contacts.outputs[0], units, rows: numbers, left, shares};
-    Object.assign(fields, {matrix: square, pattern: at, past: impacts, log, count: keys.length, size, entries: pattern.length / 2});
+    Object.assign(fields, {program: address(functions.contacts), matrix: square, pattern: at, past: impacts, log, count: keys.length, size, entries: pattern.length / 2});
     Object.assign(fields, {coordinates: n, speeds: m});
     for (const [name, one] of Object.entries(fields)) M[sets + SETS[name]] = one;
     M.set(pattern, at);

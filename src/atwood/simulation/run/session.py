@@ -11,6 +11,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
+from atwood.forms.assembly import Assembly
 from atwood.forms.loose import is_loose
 from atwood.integrators.explicit_session import ExplicitSession, OnStiff
 from atwood.integrators.ida.guarded_residual import GuardedResidual
@@ -54,6 +55,9 @@ _MANY_IMPACTS = 3
 
 _MANY_CHANGES = 6
 """The same of the change of a set of contacts."""
+
+_FEW_ROWS = 6
+"""The program of a set of so few gaps and slips is small, so that it pays from the first change on."""
 
 OF_CONTACTS = 0.01
 """Of the tolerance, where gaps and slips decide how the motion goes on."""
@@ -263,11 +267,12 @@ class KeptSession:
     changes: int = 0
     shortest: float = 0.0
 
-    @property
-    def has_impacts(self) -> bool:
-        """Whether there were so many impacts, or changes of a set, that steps are to add to them."""
-        many = self.impacts is not None and len(self.impacts) >= _MANY_IMPACTS
-        return many or (self.impacts is not None and self.changes >= _MANY_CHANGES)
+    def jumps(self, assembly: Assembly) -> bool:
+        """Whether steps are to make impacts, or changes of a set of contacts, by themselves."""
+        if self.impacts is None:
+            return False
+        many = len(self.impacts) >= _MANY_IMPACTS or self.changes >= _MANY_CHANGES
+        return many or (not is_loose(assembly) and len(assembly.own_equations.contacts) <= _FEW_ROWS)
 
     def filling_of(self, session: Session | None) -> Filling | None:
         """Return what gives a session its parameters; None where it is not kept."""
@@ -296,7 +301,7 @@ def _opened_with(request: SolverRequest, method: Method, on_stiff: OnStiff | Non
     plan = request.plan
     scene = plan.assembly.shared, is_loose(plan.assembly), request.probe.code(for_ida=False)
     made = plan.program, request.options, plan.scales, plan.sizes, plan.finding
-    return method, *scene, *made, on_stiff is None, request.kept.has_impacts, request.kept.is_undisturbed
+    return method, *scene, *made, on_stiff is None, request.kept.jumps(plan.assembly), request.kept.is_undisturbed
 
 
 def _can_be_kept(problem: ExplicitProblem, method: Method) -> bool:
@@ -415,7 +420,7 @@ def _open_on_constraints(
     settings = replace(settings, absolute_tolerances=absolute)
     explicit = _watched(request, problem, method)
     own = own_rates_on_constraints(plan, t, y) if _can_be_kept(explicit, method) else None
-    if own is not None and explicit.compiled_events is not None and kept.has_impacts:
+    if own is not None and explicit.compiled_events is not None and kept.jumps(plan.assembly):
         from atwood.simulation.contacts.bounces import bounces_of
         from atwood.simulation.contacts.compiled import sets_of
 

@@ -93,8 +93,7 @@ def _stays(beside: Beside, state: State) -> tuple[FloatArray, FloatArray, tuple[
 class _Session(KeptSession):
     """Sessions that stop at every event."""
 
-    @property
-    def has_impacts(self) -> bool:
+    def jumps(self, assembly: Assembly) -> bool:
         return False
 
 
