@@ -11,7 +11,7 @@ from tests.helpers.contact_scenes import box_of_walls
 
 import atwood as aw
 from atwood import Component, Point, Scalar, Scene, connector, cos, parameter, simulate, unilateral
-from atwood.simulation.contacts import changes
+from atwood.simulation.contacts import changes, compiled
 from atwood.simulation.run import session
 from atwood_library import (
     Force,
@@ -145,7 +145,7 @@ def test_impacts_without_python_are_those_with_it(
     quick, few = run()
     monkeypatch.setattr(session, "_MANY_IMPACTS", math.inf)
     monkeypatch.setattr(session, "_MANY_CHANGES", math.inf)
-    monkeypatch.setattr(session, "_FEW_ROWS", 0)
+    monkeypatch.setattr(compiled, "FEW_ROWS", 0)
     slow, many = run()
     assert [(one.part, one.kind) for one in quick.events] == [(one.part, one.kind) for one in slow.events]
     assert [one.time for one in quick.events] == pytest.approx([one.time for one in slow.events], abs=1e-11)

@@ -33,16 +33,21 @@ def _plain(plan: SceneProblem) -> dict[tuple[str, str], int]:
     return {key: i for key, (i, law) in keys.items() if law == "newton" and key not in rubs}
 
 
+def has_plain_impacts(plan: SceneProblem) -> bool:
+    """Return whether there are impacts that steps make by themselves: no friction acts that needs no gap."""
+    assembly, equations = plan.assembly, plan.assembly.own_equations
+    always = any(one.is_speed or (one.is_slip and not one.law.options.at) for one in equations.contacts)
+    holds = plan.balance.constraints or equations.orientation_coordinates or assembly.sides
+    return not (always or holds) and bool(_plain(plan))
+
+
 def bounces_of(plan: SceneProblem, probe: EventProbe, t: float, y: FloatArray, events: EventData) -> Jumps | None:
     """Return the impacts of a session; None where there are none that can be made so.
 
-    Nothing but gaps on places may be watched, and no friction may act that needs no gap.
+    Nothing but gaps on places may be watched.
     """
-    assembly, equations = plan.assembly, plan.assembly.own_equations
-    always = [one for one in equations.contacts if one.is_speed or (one.is_slip and not one.law.options.at)]
     is_watched = any(one.target != CLOSES for one in probe.event_functions)
-    holds = plan.balance.constraints or equations.orientation_coordinates or assembly.sides
-    if always or is_watched or holds or not is_loose(assembly) or not _plain(plan):
+    if is_watched or not is_loose(plan.assembly) or not has_plain_impacts(plan):
         return None
     code = impact_code(plan, t, y, _gaps(plan))
     return None if code is None else Jumps(code, events)

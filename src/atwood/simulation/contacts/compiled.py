@@ -12,7 +12,7 @@ from atwood.expr import Program, depends_on, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.constrained import contacts_program
-from atwood.forms.loose import is_loose, loose_equations
+from atwood.forms.loose import is_loose, kept_touching, loose_equations
 from atwood.integrators import set_routines as sets
 from atwood.integrators.embedded.rates import OwnRates
 from atwood.integrators.set_jumps import EVENTS, SetCode, SetJump, SetJumps, SetLog
@@ -23,6 +23,7 @@ from atwood.mechanics.dynamics.equations import ContactRow
 from atwood.mechanics.outputs.event_functions import CLOSES, CONTACT, OPENS, RESTS, STOPS, YIELDS
 from atwood.model.values.units import ALONG
 from atwood.numerics.contact_sets import STICKS, State
+from atwood.simulation.contacts.bounces import has_plain_impacts
 from atwood.simulation.contacts.changes import NEAR, longest_left, states_of, told_change, told_impact, told_rest
 from atwood.simulation.contacts.values import Layout, layout_of
 from atwood.simulation.events.modes import MARGIN, EventProbe, EventRecord, ToldLater
@@ -34,6 +35,9 @@ HAPPENED = {CLOSES: sets.CLOSES, OPENS: sets.OPENS, YIELDS: sets.YIELDS, STOPS: 
 
 _SHORT = 300
 """Programs for all states that are no longer than this are used where nothing touches, too."""
+
+FEW_ROWS = 6
+"""The program of a set of so few gaps and slips is small, so that it pays from the first change on."""
 
 _MOST_ROWS = 40
 """Of more rows the responses to each other, which grow with the square, take too long to write and to compile."""
@@ -128,6 +132,35 @@ def _units(layout: Layout, plan: SceneProblem) -> FloatArray:
     return found
 
 
+def changes_in_steps(plan: SceneProblem) -> bool:
+    """Return whether steps can change the sets of a scene by themselves: its gaps and slips are in one direction."""
+    assembly, equations = plan.assembly, plan.assembly.own_equations
+    loops = plan.balance.constraints and assembly.form == "reduced"
+    if loops or equations.orientation_coordinates or assembly.sides or not equations.contacts:
+        return False
+    layout = layout_of(assembly)
+    return len(layout.contacts) <= _MOST_ROWS and all(len(rows) == 1 for rows in layout.units)
+
+
+def kept_whole(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> SceneProblem:
+    """Return a plan with the programs for all states, if these are short and its steps can change sets by themselves.
+
+    Then they need not stop where the last contact opens, and where the first one closes. Impacts that need no set are
+    quicker with the programs for none.
+    """
+    assembly = plan.assembly
+    if not is_loose(assembly) or len(assembly.own_equations.contacts) > FEW_ROWS or has_plain_impacts(plan):
+        return plan
+    if not changes_in_steps(plan) or why_in_python(assembly):
+        return plan
+    whole = plan.in_piece(kept_touching(assembly))
+    return whole if _is_short(whole, t, np.concatenate([q, u])) else plan
+
+
+def _is_short(plan: SceneProblem, t: float, y: FloatArray) -> bool:
+    return program_on_constraints(plan, t, y).accelerations.size <= _SHORT
+
+
 def sets_of(
     plan: SceneProblem, probe: EventProbe, t: float, y: FloatArray, events: EventData, rates: OwnRates
 ) -> SetJumps | None:
@@ -135,18 +168,9 @@ def sets_of(
 
     Nothing but gaps and slips in one direction may be watched.
     """
-    assembly, equations = plan.assembly, plan.assembly.own_equations
-    loops = plan.balance.constraints and assembly.form == "reduced"
-    if (
-        loops
-        or equations.orientation_coordinates
-        or assembly.sides
-        or is_loose(assembly)
-        or any(one.target not in CONTACT for one in probe.event_functions)
-    ):
-        return None
-    layout = layout_of(assembly)
-    if len(layout.contacts) > _MOST_ROWS or any(len(rows) > 1 for rows in layout.units):
+    assembly, layout = plan.assembly, layout_of(plan.assembly)
+    is_watched = any(one.target not in CONTACT for one in probe.event_functions)
+    if is_watched or is_loose(assembly) or not changes_in_steps(plan):
         return None
 
     def make() -> tuple[SetData, SetCode] | None:
@@ -161,8 +185,8 @@ def sets_of(
     data, code = made
     before = len(assembly.mechanism.table.values)
     places = np.array([[before + one[0], before + one[1] if len(one) > 1 else -1] for one in layout.places]).T
-    stays = program_on_constraints(plan, t, y).accelerations.size <= _SHORT
     given, count = (rates.prologues, rates.places, rates.scratch), len(layout.contacts)
+    stays = _is_short(plan, t, y)
     return SetJumps(code, events, rates.rates, given, data.pattern, data.units, count, places, stays)
 
 

@@ -13,7 +13,7 @@ from atwood.clock import GRACE, Clock, TimeIsUp
 from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Shared
-from atwood.forms.loose import has_touched
+from atwood.forms.loose import has_touched, is_loose
 from atwood.integrators.protocol import Statistics
 from atwood.lazy_dataclasses import replace
 from atwood.mechanics.outputs.event_functions import CONTACT, UPDATE
@@ -250,9 +250,14 @@ class Walk:
         if (
             contacts and self._kept.is_undisturbed and goes_on(outcome, options.t_end)
         ):  # it was tried as without contacts
-            self._kept.is_undisturbed, recorder = False, Recorder(self.plan)
-            self.statistics = self.statistics + outcome.statistics
-            outcome = run_segment(replace(segment, spent=self.statistics), recorder, t, q, u)
+            self._kept.is_undisturbed, self.statistics = False, self.statistics + outcome.statistics
+            self.plan = self._whole(self.plan)
+            if self.probe is None:
+                self.probe = EventProbe(self.plan, t, q, u, options.relative_tolerance, options.conditions)
+                self.probe.follow(())
+            recorder = Recorder(self.plan)
+            segment = replace(segment, plan=self.plan, probe=self.probe, spent=self.statistics)
+            outcome = run_segment(segment, recorder, t, q, u)
         if recorder.is_empty and outcome.error is not None:  # not even the start could be projected
             raise outcome.error
         if recorder.is_empty:  # nor was there time to
@@ -313,6 +318,8 @@ class Walk:
             self._plans, self.probe, self._handed = {}, None, ()
         plan = self._settled(plan)
         t, q, u = self.t, self.q, self.u
+        if self.segments:
+            plan = self._whole(plan)
         if is_new:
             self.choice = choose(plan, options, t, q, u)
         sided = self._sides.on(self.assembly, plan, t, q, u)
@@ -327,6 +334,18 @@ class Walk:
         self.plan = plan
         self.probe.follow(self._handed)
         return None
+
+    def _whole(self, plan: SceneProblem) -> SceneProblem:
+        """Return a plan with the programs for all states of gaps and slips, where steps then change these."""
+        if not is_loose(plan.assembly) or self.options.conditions or self.options.impacts == "one_by_one":
+            return plan
+        from atwood.simulation.contacts.compiled import kept_whole
+
+        whole = kept_whole(plan, self.t, self.q, self.u)
+        if whole is plan or not self._kept.jumps(whole.assembly):
+            return plan
+        self.probe = None
+        return whole
 
     def _settled(self, plan: SceneProblem) -> SceneProblem:
         """Return a plan with the states that gaps and slips have from now on, after impacts if there are any."""

@@ -56,9 +56,6 @@ _MANY_IMPACTS = 3
 _MANY_CHANGES = 6
 """The same of the change of a set of contacts."""
 
-_FEW_ROWS = 6
-"""The program of a set of so few gaps and slips is small, so that it pays from the first change on."""
-
 OF_CONTACTS = 0.01
 """Of the tolerance, where gaps and slips decide how the motion goes on."""
 
@@ -271,8 +268,10 @@ class KeptSession:
         """Whether steps are to make impacts, or changes of a set of contacts, by themselves."""
         if self.impacts is None:
             return False
+        from atwood.simulation.contacts.compiled import FEW_ROWS  # few scenes have any
+
         many = len(self.impacts) >= _MANY_IMPACTS or self.changes >= _MANY_CHANGES
-        return many or (not is_loose(assembly) and len(assembly.own_equations.contacts) <= _FEW_ROWS)
+        return many or (not is_loose(assembly) and len(assembly.own_equations.contacts) <= FEW_ROWS)
 
     def filling_of(self, session: Session | None) -> Filling | None:
         """Return what gives a session its parameters; None where it is not kept."""
