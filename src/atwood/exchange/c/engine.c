@@ -89,6 +89,8 @@ static void link_memory(scene *s)
     s->sought[SOUGHT_rows].p = s->rows;
 #endif
 #if CONTACTS
+    address(s, 5, (void (*)(void))contacts);
+    s->sets[SET_program].p = &s->functions[5];
     s->sets[SET_derived].p = s->contacts_derived;
     s->sets[SET_scratch].p = s->scratch;
     s->sets[SET_y].p = s->y;

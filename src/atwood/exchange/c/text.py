@@ -232,7 +232,7 @@ def _memory(programs: dict[str, Program], sizes: dict[str, int]) -> list[str]:
     scratch = max(print_program(name, one)[1] for name, one in programs.items())
     most = max(size, events)
     words = {"values": sizes["VALUES"], "session": len(FIELDS), "arrays": TABLEAU.rows["all"] * sizes["PADDED"]}
-    words |= {"scratch": scratch, "block": 5, "functions": 5, "y": size, "yp": most}
+    words |= {"scratch": scratch, "block": 5, "functions": 6, "y": size, "yp": most}
     if sizes["PROJECTS"]:
         words["nearer_room"] = size + sizes["SPEEDS"]
     if sizes["JUDGES"]:
