@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import atwood
 from atwood import AtwoodError, Environment, Scene, UnsupportedError, UsageError
-from atwood_library import Force, Ground, Link, Pivot, PointMass, Sine, Slider
+from atwood_library import Force, Ground, Link, Pivot, PointMass, Rope, SampledFeedback, Sine, Slider
 
 UPRIGHT = 0.5 * np.pi
 STATES = ["rail.displacement", "hinge.angle", "rail.speed", "hinge.angular_velocity"]
@@ -68,6 +68,7 @@ def test_gymnasium_finds_nothing_wrong() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # bounds of spaces are a matter of taste
         check_env(made())
+        check_env(walked(ball()))
 
 
 @has_gymnasium
@@ -142,6 +143,98 @@ def test_motions_at_other_times_see_their_own_time() -> None:
         assert_array_equal(alone.state[0], many._motions.state[k])
 
 
+def ball(force: float = 0.0, rope: str = "") -> Scene:
+    """A ball that bounces on stops or, on a rope, is caught by it; a controller damps it."""
+    scene = Scene()
+    ground, mass = scene.add("ground", Ground()), scene.add("mass", PointMass())
+    push, control = scene.add("push", Force(value=force, direction=(0.0, 0.0, 1.0))), SampledFeedback(gains=(0.5,))
+    if rope:
+        holds = scene.add("holds", Rope(starts="slack", when_slack=rope))
+        scene.start["mass.position.x"], scene.start["mass.position.z"] = 0.3, -0.9
+    else:
+        stops = {"axis": (0.0, 0.0, 1.0), "lower_stop": 0.01, "upper_stop": 2.0, "stop_restitution": 0.5}
+        holds = scene.add("holds", Slider(**stops))
+        scene.start["mass.position.z"] = 0.3
+    scene.connect(ground.frame, holds.a)
+    scene.connect(holds.b, mass.point)
+    scene.connect(mass.point, push.point)
+    brake = scene.add("brake", Force(direction=(0.0, 0.0, 1.0)))
+    scene.connect(mass.point, brake.point)
+    scene.connect(mass.output("velocity.z"), scene.add("control", control).input("u_1"))
+    scene.connect(control.output("y"), brake.input("value"))
+    return scene
+
+
+SEEN = ["mass.position.z", "mass.velocity.z", "mass.acceleration.z", "control.y"]
+
+
+def walked(scene: Scene, form: str = "reduced", **changed: Any) -> Environment:
+    given = {"observations": SEEN, "reward": lambda seen: -seen["mass.position.z"], "start": {}, "terminated": None}
+    return made(atwood.assemble(scene, form=form), **(given | changed))
+
+
+@has_gymnasium
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+@pytest.mark.parametrize("rope", ["", "slack"])
+def test_scenes_with_events_are_walked_as_simulate_runs_them(form: str, rope: str) -> None:
+    """With a force that is held all through, what is seen is what a run shows, also beyond impacts and samples."""
+    environment = walked(ball(rope=rope), form)
+    environment.reset(seed=0)
+    steps = np.array([environment.step([7.0])[0] for _ in range(30)])
+    held = atwood.simulate(ball(7.0, rope), t_end=0.6, form=form, outputs=0.02 * np.arange(1, 31))
+    assert held.events
+    assert_allclose(steps, np.array([held[path] for path in SEEN]).T, atol=1e-6, rtol=1e-6)
+
+
+@has_gymnasium
+def test_walked_motions_come_again_and_are_a_vector() -> None:
+    environment, rng = (
+        walked(ball(rope="slack"), start={"mass.position.x": (0.1, 0.3)}, t_end=0.2),
+        np.random.default_rng(0),
+    )
+    many = environment.vector(3)
+    actions = rng.uniform(-10.0, 10.0, (10, 3, 1))
+    steps = [many.reset(seed=7)[0], *(many.step(one)[0] for one in actions)]
+    for k in range(3):
+        alone = [environment.reset(seed=7 + k)[0], *(environment.step(one[k])[0] for one in actions)]
+        assert_array_equal([one[k] for one in steps], alone)
+    with pytest.raises(UsageError, match="Call reset"):
+        environment.step([0.0])
+    assert not many.step(actions[0])[2].any()  # all begin anew
+    assert_array_equal(many._motions.time, 0.0)
+
+
+@has_gymnasium
+def test_an_event_that_ends_the_run_ends_the_episode() -> None:
+    environment = walked(ball(rope="stop"), observations=["holds.tension"], render_mode="rgb_array")
+    environment.reset(seed=0)
+    first, over, force = environment.render(), False, -5.0
+    while not over:  # the rope is pulled taut, and let go
+        (tension,), _, over, late, _ = environment.step([force])
+        force = 10.0 if tension > 1.0 else force
+        assert not late
+    assert tension < 1e-5
+    assert environment._motions.time[0] < 0.02 * environment._motions.steps[0]
+    assert not np.array_equal(first, environment.render())
+    with pytest.raises(UsageError, match="Call reset"):
+        environment.step([0.0])
+
+
+@has_gymnasium
+def test_before_the_first_step_the_scene_has_its_own_values() -> None:
+    for scene in (cart_pole(2.0), cart_pole(2.0, stop=0.5)):
+        environment = made(scene, observations=["push.force"])
+        assert_array_equal(environment.reset(seed=0)[0], [2.0])
+        assert_array_equal(environment.step([-3.0])[0], [-3.0])
+        assert_array_equal(environment.reset()[0], [2.0])
+
+
+@has_gymnasium
+def test_where_motions_are_walked_actions_are_inputs() -> None:
+    with pytest.raises(UnsupportedError, match="no input"):
+        walked(ball(), actions={"mass.mass": (0.5, 2.0)})
+
+
 @has_gymnasium
 def test_a_picture_is_that_of_now() -> None:
     environment = made(render_mode="rgb_array")
@@ -181,9 +274,7 @@ def test_what_makes_no_environment_is_refused(changed: dict[str, Any], said: str
 
 
 @has_gymnasium
-def test_scenes_and_steps_that_cannot_be_are_refused() -> None:
-    with pytest.raises(UnsupportedError, match="from period to period"):
-        made(cart_pole(stop=0.5))
+def test_steps_that_cannot_be_are_refused() -> None:
     environment = made()
     with pytest.raises(UsageError, match="Call reset first"):
         environment.step([0.0])

@@ -13,6 +13,7 @@ from atwood.arguments import BY_PATH, CALLBACK, PATHS, check, number, one_of, op
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.exchange.environments.plant import Motions, Plant, Seen, make_plant
+from atwood.exchange.environments.walks import WalkedPlant, Walks
 from atwood.forms.assembly import Assembly
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of
@@ -41,11 +42,13 @@ class Environment(_Env):  # type: ignore[misc]
     Parameters
     ----------
     scene
-        A smooth scene in the reduced form, or an assembly of it. Scenes with stops, blocks, or constraints that no
-        formula solves are refused.
+        The scene, or an assembly of it in either form. Many motions of a smooth one in the reduced form go on
+        together in machine code. What has events, states of its own, or constraints that no formula solves is
+        simulated one motion after the other.
     actions
         Parameters that are set at each step, by path, with the least and the largest value:
-        ``{"push.value": (-10.0, 10.0)}``.
+        ``{"push.value": (-10.0, 10.0)}``. Where motions are simulated one after the other they must be inputs, which
+        nothing else feeds. Before the first step they have the scene's own values.
     observations
         Paths of quantities; the coordinates and speeds of joints, forces and whatever else the scene has.
     reward
@@ -54,7 +57,8 @@ class Environment(_Env):  # type: ignore[misc]
     period
         For how long an action is held, s.
     terminated
-        A function as `reward`, True where an episode is over; none is when not given.
+        A function as `reward`, True where an episode is over; where an event of the scene ends its run, it is over
+        in any case.
     start
         Start values by path: a range ``(low, high)`` or a distribution of `scipy.stats`, in SI units, drawn for each
         episode. The scene's own otherwise; ``reset(options={"start": {path: value}})`` gives one.
@@ -68,8 +72,7 @@ class Environment(_Env):  # type: ignore[misc]
     Raises
     ------
     AtwoodError
-        If gymnasium is not installed (``pip install 'atwood[gym]'``), a path is none, or the scene cannot be gone on
-        with from period to period.
+        If gymnasium is not installed (``pip install 'atwood[gym]'``), a path is none, or an action cannot be one.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"]}  # noqa: RUF012  # as gymnasium has it
@@ -102,12 +105,12 @@ class Environment(_Env):  # type: ignore[misc]
     ) -> None:
         if gymnasium is None:
             raise UsageError("gymnasium is not installed", where="Environment", advice="pip install 'atwood[gym]'")
-        assembly = assembly_of(scene, form="reduced")
+        assembly = assembly_of(scene)
         begin, end = assembly.flat.t_start, assembly.flat.t_end if t_end is None else float(t_end)
         if not period <= (end - begin) * (1.0 + 1e-9):
             raise UsageError(f"an episode of {end - begin:g} s ends before the first period", where="Environment")
-        self.plant: Plant = make_plant(assembly, actions, observations, start or {}, end, rtol)
         self.period, self.limit = period, math.ceil((end - begin) / period * (1.0 - 1e-9))
+        self.plant = make_plant(assembly, actions, observations, start or {}, end, rtol)
         self.reward, self.is_over = reward, terminated
         self.render_mode = render_mode
         self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / period))}
@@ -115,11 +118,11 @@ class Environment(_Env):  # type: ignore[misc]
         self.action_space = gymnasium.spaces.Box(low, high, dtype=np.float64)
         shape = (len(self.plant.observations),)
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, shape, dtype=np.float64)
-        self._motions = Motions(self.plant, 1, period)
+        self._motions = self.plant.motions(1, period, self.limit)
         self._begun = False
 
     def vector(self, count: int) -> Any:
-        """Return a vector of such environments, which go on together in one call of machine code.
+        """Return a vector of such environments; smooth ones go on together in one call of machine code.
 
         Parameters
         ----------
@@ -186,7 +189,7 @@ class VectorEnvironment(_VectorEnv):  # type: ignore[misc]
         self.single_action_space, self.single_observation_space = one.action_space, one.observation_space
         self.action_space = batch_space(one.action_space, count)
         self.observation_space = batch_space(one.observation_space, count)
-        self._motions = Motions(one.plant, count, one.period)
+        self._motions = one.plant.motions(count, one.period, one.limit)
         self._draw = [np.random.default_rng() for _ in range(count)]
         self._over = np.ones(count, dtype=bool)
         self._begun = False
@@ -233,21 +236,21 @@ class VectorEnvironment(_VectorEnv):  # type: ignore[misc]
         return tuple(picture_of(self._motions, k) for k in range(self.num_envs))
 
 
-def _given(plant: Plant, options: Mapping[str, Any] | None) -> dict[str, float]:
+def _given(plant: Plant | WalkedPlant, options: Mapping[str, Any] | None) -> dict[str, float]:
     """Return the start values of the options of a reset."""
     unknown = sorted(set(options or {}) - {"start"})
     given = (options or {}).get("start", {})
     if unknown or not isinstance(given, Mapping):
         advice = "Give options={'start': {path: value}}."
         raise UsageError(f"a reset has no options {unknown or given!r}", where="Environment.reset", advice=advice)
-    known = plant.request.assembly.start_observables
+    known = plant.assembly.start_observables
     for path, value in given.items():
         if path not in known or not isinstance(value, (int, float)) or not math.isfinite(value):
             raise UsageError(f"{value!r} is no start value, or there is none of this path", where=str(path))
     return {path: float(value) for path, value in given.items()}
 
 
-def _actions(plant: Plant, given: Any, lanes: tuple[int]) -> FloatArray:
+def _actions(plant: Plant | WalkedPlant, given: Any, lanes: tuple[int]) -> FloatArray:
     """Return actions, shape (lanes, actions), within their bounds."""
     low, high = plant.bounds
     try:
@@ -264,7 +267,7 @@ def _actions(plant: Plant, given: Any, lanes: tuple[int]) -> FloatArray:
 
 
 def _stepped(
-    environment: Environment, motions: Motions, which: NDArray[np.intp], actions: FloatArray
+    environment: Environment, motions: Motions | Walks, which: NDArray[np.intp], actions: FloatArray
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], NDArray[np.bool_]]:
     """Go on with some motions; return of all observations (a row each), rewards, and which are over or truncated."""
     if len(which):
@@ -275,9 +278,9 @@ def _stepped(
     rewards = _each(environment.reward(seen), count, "reward").astype(float)
     if not np.all(np.isfinite(rewards[which])):
         raise UsageError("a reward is no finite number", where="reward", advice="Look at what it is made of.")
-    over = np.zeros(count, dtype=bool)
+    over = motions.stopped.copy()
     if environment.is_over is not None:
-        over = _each(environment.is_over(seen), count, "terminated").astype(bool)
+        over |= _each(environment.is_over(seen), count, "terminated").astype(bool)
     return np.ascontiguousarray(observed.T), rewards, over, motions.steps >= environment.limit
 
 

@@ -1,5 +1,7 @@
 """A scene under actions that are held for a period each: many motions of it, gone on with in one call of machine code.
 
+What cannot be gone on with so is walked, motion by motion; see `atwood.exchange.environments.walks`.
+
 It is made of what sweeps are made of: starts and tolerances are arrays over the motions, and one call takes all of them
 a period further. An action is a parameter of the programs, so that nothing is compiled anew. Each motion takes the
 steps that it takes alone.
@@ -17,14 +19,17 @@ from numpy.typing import NDArray
 
 from atwood.arguments import show
 from atwood.arrays import FloatArray
-from atwood.errors import ResultError, SolveError, StartError, UnsupportedError, UsageError, suggestion
+from atwood.errors import ResultError, SolveError, StartError, UsageError, suggestion
+from atwood.exchange.environments.walks import WalkedPlant, Walks, make_walked
 from atwood.expr import depends_on
 from atwood.forms.assembly import Assembly
 from atwood.integrators.batch import Batch
 from atwood.lazy_dataclasses import dataclass
+from atwood.result.result import Result
 from atwood.simulation.events.modes import find_event_functions
-from atwood.simulation.initialization.start import find_start
+from atwood.simulation.initialization.start import Start, find_start
 from atwood.simulation.problem.options import RunOptions
+from atwood.simulation.run.run import Walk, begun
 from atwood.study.sweeps.batch import why_not_batched
 from atwood.study.sweeps.batch_values import StartRows
 from atwood.study.sweeps.cases import Axis, Cases, make_cases
@@ -48,6 +53,8 @@ class Plant:
         Paths of the actions.
     columns
         Where they are among the parameters.
+    own
+        Values of the actions in the scene itself, which hold at the start of an episode.
     bounds
         Least and largest action, shape (2, actions).
     starts
@@ -62,6 +69,7 @@ class Plant:
     way: Way
     actions: tuple[str, ...]
     columns: NDArray[np.intp]
+    own: FloatArray
     bounds: FloatArray
     starts: Mapping[str, Callable[[float], float]]
     places: Any
@@ -72,6 +80,15 @@ class Plant:
         """Paths of what is observed."""
         return self.request.paths
 
+    @property
+    def assembly(self) -> Assembly:
+        """The scene."""
+        return self.request.assembly
+
+    def motions(self, count: int, period: float, limit: int) -> Motions:
+        """Return motions of so many periods at most."""
+        return Motions(self, count, period)
+
 
 def make_plant(
     assembly: Assembly,
@@ -80,8 +97,8 @@ def make_plant(
     starts: Mapping[str, Any],
     t_end: float,
     rtol: float,
-) -> Plant:
-    """Compile a scene for actions; refuse what cannot be gone on with so, and say why."""
+) -> Plant | WalkedPlant:
+    """Compile a scene for actions; what machine code cannot go on with many at a time is walked."""
     assert assembly.source is not None
     scene = assembly.source.scene
     if scene is None:
@@ -90,6 +107,8 @@ def make_plant(
         advice = "Give paths of parameters with the least and the largest value: {'push.value': (-10.0, 10.0)}."
         raise UsageError("it has no actions", where="Environment", advice=advice)
     bounds = np.array([_bounds(scene, path, given) for path, given in actions.items()]).T
+    own = {path: _number(scene, path) for path in actions}
+    own = {path: value if math.isfinite(value) else 0.0 for path, value in own.items()}
     # Equations of a force of zero lack it: they are made for one that is not.
     nominal = {path: high or low for path, low, high in zip(actions, *bounds.tolist(), strict=True)}
     inverse = {path: _inverse(path, given) for path, given in starts.items()}
@@ -105,24 +124,22 @@ def make_plant(
     axes = [Axis(path, False, (value, value), np.array([value, value])) for path, value in nominal.items()]
     paths, options = expand_paths(first, observations), RunOptions(t_end, rtol)
     request = SweepRequest(first, Cases(tuple(axes), (2,)), paths, np.array([t_end]), False, options)
+    find_start(first)  # which says why there is none
     reason = why_not_batched(request)
     if not reason and find_event_functions(first):
         reason = "something in it stops, sticks or changes its mode"
-    way = None if reason else find_way(request)[0]
+    way, reason = (None, reason) if reason else find_way(request)
+    common = {"bounds": bounds, "starts": inverse, "observations": paths, "rtol": rtol}
     if way is None:
-        advice = (
-            "Environments are of smooth scenes in the reduced form: leave out stops, friction that sticks and blocks."
-        )
-        raise UnsupportedError(
-            f"it cannot be gone on with from period to period: {reason}", where=first.flat.name, advice=advice
-        )
+        return make_walked(assembly, scene, own, reason, **common)
     columns = np.array([names.index(path) for path in actions], dtype=np.intp)
     program = way.motion.program.program
     follows_time = depends_on(
         [one for group in program.outputs for one in group.expressions], program.inputs[0].symbols
     )
     places = open_places(way.motion, way.method, options, way.values)
-    return Plant(request, way, tuple(actions), columns, bounds, inverse, places, follows_time)
+    values = np.array(list(own.values()))
+    return Plant(request, way, tuple(actions), columns, values, bounds, inverse, places, follows_time)
 
 
 def _bounds(scene: Any, path: str, given: Any) -> tuple[float, float]:
@@ -130,18 +147,22 @@ def _bounds(scene: Any, path: str, given: Any) -> tuple[float, float]:
     advice = "Give the least and the largest value, such as (-10.0, 10.0)."
     if not isinstance(given, (tuple, list)) or len(given) != 2:
         raise UsageError(f"{show(given)} is no range of an action", where=path, advice=advice)
-    owner, _, name = path.rpartition(".")
-    trial = scene.copy()
-    found = []
+    trial, found = scene.copy(), []
     for one in given:
         trial.set(path, one)
-        part: Any = trial[owner] if owner else trial
-        value = part._value(name)
-        found.append(float(value) if isinstance(value, (int, float)) else math.nan)
+        found.append(_number(trial, path))
     low, high = found
     if not -math.inf < low < high < math.inf:
         raise UsageError(f"{show(given)} is no range of an action", where=path, advice=advice)
     return low, high
+
+
+def _number(scene: Any, path: str) -> float:
+    """Return the number that a parameter is; nan if it is none."""
+    owner, _, name = path.rpartition(".")
+    part: Any = scene[owner] if owner else scene
+    value = part._value(name)
+    return float(value) if isinstance(value, (int, float)) else math.nan
 
 
 def _inverse(path: str, given: Any) -> Callable[[float], float]:
@@ -155,6 +176,10 @@ def _inverse(path: str, given: Any) -> Callable[[float], float]:
         raise UsageError(f"{show(given)} is no range of a start value", where=path, advice=advice)
     low, high = given
     return lambda share: float(low + share * (high - low))
+
+
+_SHARE = 1e-3
+"""A picture is that of the beginning of a run, which takes so small a share of a period."""
 
 
 class Motions:
@@ -173,7 +198,7 @@ class Motions:
     def __init__(self, plant: Plant, count: int, period: float) -> None:
         self.plant, self.period = plant, period
         assembly = plant.request.assembly
-        self.steps = np.zeros(count, dtype=np.int64)
+        self.steps, self.stopped = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=bool)
         self.values = np.tile(plant.way.values, (count, 1))
         n = len(plant.way.motion.columns())
         self.state, self.tolerances = np.zeros((count, n)), np.ones((count, n))
@@ -184,6 +209,11 @@ class Motions:
         """The time of each motion, s."""
         return np.asarray(self._begin + self.period * self.steps, dtype=np.float64)
 
+    @property
+    def actions(self) -> FloatArray:
+        """What is held in each motion, shape (motions, actions)."""
+        return np.asarray(self.values[:, self.plant.columns])
+
     def begin(self, which: NDArray[np.intp], draw: list[Generator], given: Mapping[str, float]) -> None:
         """Begin some motions anew, each with a start of its own generator."""
         request = self.plant.request
@@ -193,6 +223,7 @@ class Motions:
         }
         columns |= {path: np.full(len(which), value) for path, value in given.items()}
         rows = np.tile(assembly.parameter_values, (len(which), 1))
+        rows[:, self.plant.columns] = self.plant.own
         if columns:
             axes = tuple(Axis(path, True, tuple(one.tolist()), one) for path, one in columns.items())
             own = SweepRequest(assembly, Cases(axes, (len(which),)), *_rest(request))
@@ -237,17 +268,18 @@ class Motions:
         numbers = np.arange(len(t))
         return read_quantities(plant.way.motion, paths, (t, q, u), self.values, numbers, lambda run: self.assembly(run))
 
-    def coordinates(self, run: int) -> tuple[FloatArray, FloatArray]:
-        """Return coordinates and speeds of a motion."""
-        q, u = self.plant.way.motion.states(
-            self.time[run : run + 1], self.state[run : run + 1], self.values[run : run + 1]
-        )
-        return q[:, 0], u[:, 0]
+    def picture_run(self, run: int) -> Result:
+        """Return a run that begins where a motion is now."""
+        t, state, values = self.time[run : run + 1], self.state[run : run + 1], self.values[run : run + 1]
+        q, u = (one[:, 0] for one in self.plant.way.motion.states(t, state, values))
+        assembly, start = self.assembly(run), Start(float(t[0]), q, u, 1.0, (), (), (), q)
+        options = RunOptions(start.time + _SHARE * self.period, outputs=2)
+        return Result(begun(assembly, start, options, Walk).go())
 
     def assembly(self, run: int) -> Assembly:
         """Return the scene with the actions of a motion."""
-        actions = self.values[run, self.plant.columns]
-        return self.plant.request.assembly.with_values(dict(zip(self.plant.actions, actions.tolist(), strict=True)))
+        actions = dict(zip(self.plant.actions, self.actions[run].tolist(), strict=True))
+        return self.plant.assembly.with_values(actions)
 
 
 def _rest(request: SweepRequest) -> tuple[Any, ...]:
@@ -267,22 +299,21 @@ class Seen(Mapping[str, FloatArray]):
         What was read already.
     """
 
-    def __init__(self, motions: Motions, observed: Mapping[str, FloatArray]) -> None:
+    def __init__(self, motions: Motions | Walks, observed: Mapping[str, FloatArray]) -> None:
         self._motions, self._known = motions, dict(observed)
         plant = motions.plant
-        actions = motions.values[:, plant.columns].T
-        self._known |= {"time": motions.time, **dict(zip(plant.actions, actions, strict=True))}
+        self._known |= {"time": motions.time, **dict(zip(plant.actions, motions.actions.T, strict=True))}
 
     def __getitem__(self, path: str) -> FloatArray:
         if path not in self._known:
-            known = self._motions.plant.request.assembly.observables
+            known = self._motions.plant.assembly.observables
             if path not in known:
                 raise ResultError("there is no such quantity", where=str(path), advice=suggestion(str(path), known))
             self._known[path] = self._motions.read((path,))[0]
         return self._known[path]
 
     def __iter__(self) -> Iterator[str]:
-        yield from {**self._known, **self._motions.plant.request.assembly.observables}
+        yield from {**self._known, **self._motions.plant.assembly.observables}
 
     def __len__(self) -> int:
         return sum(1 for _ in self)

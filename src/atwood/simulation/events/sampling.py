@@ -102,6 +102,11 @@ class Sampler:
         number = int(self.times.searchsorted(t, side="right"))
         return float(self.times[number]) if number < len(self.times) else end
 
+    def with_stops(self, times: FloatArray) -> Sampler:
+        """Return the same with further times, at which nothing is due of itself."""
+        merged = np.union1d(self.times, times)
+        return Sampler(self.updates, merged, [self.due_at(t) for t in merged.tolist()])
+
     def due_at(self, t: float) -> tuple[int, ...]:
         """Return which updates are due at a time."""
         number = int(self.times.searchsorted(t, side="left"))

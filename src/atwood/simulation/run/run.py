@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -56,6 +56,8 @@ from atwood.topology.orientation_coordinates import Orientation
 if TYPE_CHECKING:
     from atwood.simulation.run.moments import Ahead, Passed
 
+_Walk = TypeVar("_Walk", bound="Walk")
+
 _CHATTER, _MOST_CONTACTS = 50, 2000
 """So many changes of mode without time passing end a run, and so many of gaps and slips."""
 
@@ -72,7 +74,7 @@ def run(
 
     try:
         with clock.kept(GRACE):
-            walk = _prepared(assembly, start, reassemble, options, np.zeros(0))
+            walk = _prepared(Walk, assembly, start, reassemble, options, np.zeros(0))
     except TimeIsUp:
         return run_out_of_time(assembly, start, options)
     with clock.kept():
@@ -81,18 +83,18 @@ def run(
 
 def choice_at_start(assembly: Assembly, start: Start, options: RunOptions, reassemble: Reassemble) -> Choice:
     """Return what solves a scene at first, and why; what is made for it is kept for the run. Arguments as of `run`."""
-    return _prepared(assembly, start, reassemble, allowed(options), np.zeros(0)).choice
+    return _prepared(Walk, assembly, start, reassemble, allowed(options), np.zeros(0)).choice
 
 
 def _prepared(
+    kind: type[_Walk],
     assembly: Assembly,
     start: Start,
     reassemble: Reassemble,
     options: RunOptions,
     between: FloatArray,
     known: Sequence[Updated] | None = None,
-    kind: type[Walk] | None = None,
-) -> Walk:
+) -> _Walk:
     """Return a run that is ready to go, with samples in between that change nothing.
 
     Where it is made again, it is known what updates have made of its states, and nobody is asked twice.
@@ -102,7 +104,7 @@ def _prepared(
     check_prescribed(schedule.rows(assembly, samples.times), samples.times)
     log: list[Updated] = []
     again = partial(_again, assembly, start, reassemble, log)
-    walk = (kind or Walk)(assembly, start, options, reassemble, samples.with_more(between), again, log, known)
+    walk = kind(assembly, start, options, reassemble, samples.with_more(between), again, log, known)
     with named(walk.assembly, walk.t, walk.q, walk.u):
         walk.prepare()
     return walk
@@ -116,13 +118,18 @@ def _again(
     options: RunOptions,
     between: FloatArray,
 ) -> Run:
-    return _prepared(assembly, start, reassemble, options, between, log).go()
+    return _prepared(Walk, assembly, start, reassemble, options, between, log).go()
 
 
-def walked(assembly: Assembly, start: Start, options: RunOptions, kind: type[Walk]) -> tuple[Walk, Run]:
+def walked(assembly: Assembly, start: Start, options: RunOptions, kind: type[_Walk]) -> tuple[_Walk, Run]:
     """Make a run by a way that takes note of what happens; return both."""
-    walk = _prepared(assembly, start, assembly.other_mode, allowed(options), np.zeros(0), None, kind)
+    walk = begun(assembly, start, options, kind)
     return walk, walk.go()
+
+
+def begun(assembly: Assembly, start: Start, options: RunOptions, kind: type[_Walk]) -> _Walk:
+    """Return a run by a way of some kind, ready to go."""
+    return _prepared(kind, assembly, start, assembly.other_mode, allowed(options), np.zeros(0))
 
 
 class Walk:
@@ -172,7 +179,7 @@ class Walk:
         try:
             return self._go()
         except TimeIsUp:  # while the scene was prepared in another mode
-            return self._run_so_far("time_limit", self.options.out_of_time(self.t))
+            return self.run_so_far("time_limit", self.options.out_of_time(self.t))
         except AtwoodError as error:
             raise self._with_run(error) from error.__cause__
         except (ValueError, ArithmeticError) as error:  # between two segments
@@ -183,7 +190,7 @@ class Walk:
     def _with_run(self, error: AtwoodError) -> AtwoodError:
         """Return an error with what came before it."""
         if self.segments and not hasattr(error, "run"):
-            error.run = self._run_so_far("failed", error.message)  # type: ignore[attr-defined]
+            error.run = self.run_so_far("failed", error.message)  # type: ignore[attr-defined]
         return error
 
     def _go(self) -> Run:
@@ -437,8 +444,11 @@ class Walk:
 
     def _update(self, due: Sequence[int]) -> None:
         """Go on with what updates make of the state."""
+        self.take(self._made(due, self.assembly, self.t, self.q, self.u))
+
+    def take(self, made: Updated) -> None:
+        """Go on with other discrete states."""
         before, self._unsettled = self.assembly, ()
-        made = self._made(due, before, self.t, self.q, self.u)
         self.q, self.held = made.coordinates, made.held
         self.assembly = before.with_held(self.held) if self.held else before
         self.show = True  # as after any event: values that are held jump
@@ -504,14 +514,15 @@ class Walk:
         """Return the run, or raise with it what made it fail."""
         if outcome.error is not None:
             message = outcome.error.message
-        made = self._run_so_far(status, message)
+        made = self.run_so_far(status, message)
         if status == "failed":
             error = outcome.error or failed(message, self.assembly.flat.name, self.t > self.start.time)
             error.run = made  # type: ignore[attr-defined]
             raise error
         return made
 
-    def _run_so_far(self, status: str, message: str) -> Run:
+    def run_so_far(self, status: str, message: str) -> Run:
+        """Return what has been made of it."""
         segments = as_asked(self.segments, self.options.outputs)
         parts = (self.first, segments, tuple(self.events), self.statistics, status, message)
         return Run(*parts, self.start, self.options, tuple(self.choices), tuple(self.coordinate_switches), self.again)
