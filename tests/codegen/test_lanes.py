@@ -30,9 +30,11 @@ def program() -> Program:
     return Program("all", (ex.InputGroup("x", (a, b)),), (p,), (ex.OutputGroup("y", tuple(results)),))
 
 
-def values(made: Program, runs: int, x: FloatArray, p: FloatArray, chunk: int) -> tuple[FloatArray, list[bool]]:
+def values(
+    made: Program, runs: int, x: FloatArray, p: FloatArray, chunk: int, least_in_loops: int = 1_500
+) -> tuple[FloatArray, list[bool]]:
     """Return results of as many runs, one row each, and which are not finite; arrays hold one number of each run."""
-    built = build_code([Part("one", made)], CodeOptions(longest_chunk=chunk, runs=runs))
+    built = build_code([Part("one", made)], CodeOptions(chunk, least_in_loops, runs=runs))
     x, p = np.ascontiguousarray(x.T), np.ascontiguousarray(p)
     y = np.empty((len(made.outputs[0].expressions), runs))
     derived, scratch = np.empty(len(made.prologue) * runs), np.empty(built.scratch)

@@ -45,7 +45,10 @@ _GENERATOR = 1
 """Counts changes to the generated code that do not show in `GENERATORS`."""
 
 GENERATORS = (
-    *(f"llvm/{one}.py" for one in ("build", "engine", "layout", "linear_systems", "module", "own", "printer", "text")),
+    *(
+        f"llvm/{one}.py"
+        for one in ("build", "engine", "layout", "linear_systems", "loops", "module", "own", "printer", "text")
+    ),
     "routines.py",
 )
 """The files, by their place in the room of the code generators, on which the machine code of a program depends.

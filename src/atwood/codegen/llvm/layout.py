@@ -8,7 +8,9 @@ the scratch array, in slots that are used again once nobody needs their value an
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Generic, TypeVar
 
+from atwood.codegen.llvm.loops import Chunk, Loop, Unit as Unit, find_loops, rows_of, units_of
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.program import Program
 from atwood.lazy_dataclasses import dataclass
@@ -17,9 +19,6 @@ LARGEST_UNROLLED = 3
 """Linear systems up to this size are eliminated in registers; larger ones by a loop over the scratch array."""
 
 _PARTNER = {"sin": "cos", "cos": "sin"}
-
-Unit = tuple[Expression, ...]
-"""Operations that must stay together: a sine with its cosine, a linear system with its unknowns."""
 
 MatrixKey = tuple[int, ...]
 """The entries of a matrix, by the indices of their nodes."""
@@ -41,8 +40,11 @@ class Body:
     results: tuple[tuple[Expression, str, int], ...]
 
 
+C = TypeVar("C", bound=Chunk)
+
+
 @dataclass(frozen=True)
-class Layout:
+class LayoutOf(Generic[C]):
     """A body cut into chunks.
 
     Attributes
@@ -50,17 +52,21 @@ class Layout:
     chunks
         The operations of each chunk, in order.
     slots
-        Where in the scratch array a value lies that a later chunk needs.
+        Where in the scratch array a value lies that a later chunk, or another stretch of a loop, needs.
     regions
         Where the factors of a large matrix begin; they are followed by the pivots and the right-hand side.
     scratch
         The length of the scratch array.
     """
 
-    chunks: tuple[tuple[Unit, ...], ...]
+    chunks: tuple[C, ...]
     slots: dict[int, int]
     regions: dict[MatrixKey, int]
     scratch: int
+
+
+Layout = LayoutOf[tuple[Unit, ...]]
+"""A body cut into chunks without loops."""
 
 
 def main_body(program: Program, positions: Sequence[int] | None = None) -> Body:
@@ -90,17 +96,45 @@ def matrix_key(solve: Expression) -> MatrixKey:
 
 def lay_out(body: Body, longest: int) -> Layout:
     """Cut a body into chunks and give every value that crosses between them a place."""
-    known = {node.index for _, nodes in body.given for node in nodes}
-    chunks = _cut(_units(_depth_first([node for node, _, _ in body.results], known)), longest)
+    units = _units(_depth_first([node for node, _, _ in body.results], set(places_of(body))))
+    return _laid_out(_cut(units, longest))
+
+
+def lay_out_in_loops(body: Body, longest: int, least: int) -> LayoutOf[Chunk]:
+    """Do the same with loops where operations repeat, if there are at least so many."""
+    known = places_of(body)
+    units = _units(_depth_first([node for node, _, _ in body.results], set(known)))
+    if len(units) < least:
+        return _laid_out(list[Chunk](_cut(units, longest)))
+    chunks: list[Chunk] = []
+    for piece in find_loops(units, known, targets_of(body)):
+        chunks += [piece] if isinstance(piece, Loop) else _cut(piece, longest)
+    return _laid_out(chunks)
+
+
+def places_of(body: Body) -> dict[int, tuple[str, int]]:
+    """Return where the values lie that are given."""
+    return {node.index: (pointer, k) for pointer, nodes in body.given for k, node in enumerate(nodes)}
+
+
+def targets_of(body: Body) -> dict[int, list[tuple[str, int]]]:
+    """Return where each result goes."""
+    targets: dict[int, list[tuple[str, int]]] = {}
+    for node, pointer, position in body.results:
+        targets.setdefault(node.index, []).append((pointer, position))
+    return targets
+
+
+def _laid_out(chunks: Sequence[C]) -> LayoutOf[C]:
     slots, used = _share_slots(chunks)
     regions: dict[MatrixKey, int] = {}
     for chunk in chunks:
-        for unit in chunk:
+        for unit in units_of(chunk):
             solve = unit[0]
             if solve.operation == "solve" and solve.payload > LARGEST_UNROLLED and matrix_key(solve) not in regions:
                 regions[matrix_key(solve)] = used
                 used += solve.payload * (solve.payload + 2)
-    return Layout(chunks, slots, regions, used)
+    return LayoutOf(tuple(chunks), slots, regions, used)
 
 
 def _depth_first(results: Iterable[Expression], known: set[int]) -> list[Expression]:
@@ -178,24 +212,33 @@ def _cost(unit: Unit) -> int:
     return 1
 
 
-def _share_slots(chunks: Sequence[Sequence[Unit]]) -> tuple[dict[int, int], int]:
-    """Return the slots of the values that later chunks need, and how many slots there are."""
-    home: dict[int, int] = {}
+def _share_slots(chunks: Sequence[Chunk]) -> tuple[dict[int, int], int]:
+    """Return the slots of the values that later chunks need, and how many slots there are.
+
+    What an operation of a loop makes in all stretches lies side by side, if any of it is needed.
+    """
+    home: dict[int, tuple[int, int]] = {}
     last_use: dict[int, int] = {}
     for position, chunk in enumerate(chunks):
-        for unit in chunk:
-            for argument in unit[0].arguments:
-                made = home.get(argument.index, position)
-                if made != position:
-                    last_use[argument.index] = position
-            for node in unit:
-                home[node.index] = position
+        for number, stretch in enumerate(chunk.stretches if isinstance(chunk, Loop) else (chunk,)):
+            here = position, number
+            for unit in stretch:
+                for argument in unit[0].arguments:
+                    if home.get(argument.index, here) != here:
+                        last_use[argument.index] = position
+                for node in unit:
+                    home[node.index] = here
     slots: dict[int, int] = {}
     free: list[int] = []
     used = 0
     ending: dict[int, list[int]] = {}
     for position, chunk in enumerate(chunks):
-        for unit in chunk:
+        if isinstance(chunk, Loop):
+            for row in rows_of(chunk):
+                if any(node.index in last_use for node in row):
+                    slots |= {node.index: used + k for k, node in enumerate(row)}
+                    used += len(row)
+        for unit in () if isinstance(chunk, Loop) else chunk:
             for node in unit:
                 if node.index in last_use:
                     if not free:

@@ -16,11 +16,20 @@ each with arrays of its own.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from atwood.codegen.llvm.layout import Body, Layout, Unit, lay_out, main_body, prologue_body
+from atwood.codegen.llvm.layout import (
+    Body,
+    LayoutOf,
+    lay_out_in_loops,
+    main_body,
+    places_of,
+    prologue_body,
+    targets_of,
+)
 from atwood.codegen.llvm.linear_systems import Solver
-from atwood.codegen.llvm.text import INTRINSICS, OWN_FUNCTIONS, Needs, Writer, number_type, spread
+from atwood.codegen.llvm.loops import Chunk, Loop, Unit, rows_of, units_of
+from atwood.codegen.llvm.text import INTRINSICS, OWN_FUNCTIONS, Needs, Position, Strided, Writer, number_type, spread
 from atwood.codegen.routines import own_name
 from atwood.errors import UnsupportedError
 from atwood.expr.core.graph import Expression
@@ -45,6 +54,9 @@ class CodeOptions:
     ----------
     longest_chunk
         The number of operations in one function.
+    least_in_loops
+        With so many operations what repeats is written as loops: these run as fast only where straight code is so long
+        that it has to be fetched from far.
     level
         How hard LLVM works on the machine code, from 0 to 3.
     runs
@@ -53,6 +65,7 @@ class CodeOptions:
     """
 
     longest_chunk: int = 150
+    least_in_loops: int = 1_500
     level: int = 1
     runs: int = 1
 
@@ -117,7 +130,7 @@ def write_module(programs: Sequence[Part], options: CodeOptions) -> ModuleText:
         name, program = part.name, part.program
         bodies = ((name, main_body(program, part.positions)), (f"{name}_values", prologue_body(program)))
         for function, body in bodies:
-            layout = lay_out(body, options.longest_chunk)
+            layout = lay_out_in_loops(body, options.longest_chunk, options.least_in_loops)
             scratch = max(scratch, layout.scratch)
             try:
                 whole = part if function == name and len(layout.chunks) == 1 else None
@@ -136,27 +149,24 @@ def write_module(programs: Sequence[Part], options: CodeOptions) -> ModuleText:
 
 
 def _write_function(
-    name: str, body: Body, layout: Layout, options: CodeOptions, needs: Needs, whole: Part | None = None
+    name: str, body: Body, layout: LayoutOf[Chunk], options: CodeOptions, needs: Needs, whole: Part | None = None
 ) -> list[str]:
     """Write the chunks of a body, and the function that calls them; `whole` says how the only chunk stores results."""
-    places = {node.index: (pointer, k) for pointer, nodes in body.given for k, node in enumerate(nodes)}
+    places: dict[int, tuple[str, Position]] = {**places_of(body)}
     places |= {index: ("scratch", slot) for index, slot in layout.slots.items()}
-    targets: dict[int, list[tuple[str, int]]] = {}
-    results: dict[int, Expression] = {}
-    for node, pointer, position in body.results:
-        targets.setdefault(node.index, []).append((pointer, position))
-        results[node.index] = node
+    targets = targets_of(body)
     held = frozenset(f"out{group}" for group in whole.packed) if whole is not None else frozenset()
     solver = Solver(layout.regions)
     parts: list[str] = []
-    computed = {node.index for chunk in layout.chunks for unit in chunk for node in unit}
-    passed_on = [
-        (node, target) for index, node in results.items() if index not in computed for target in targets[index]
-    ]
-    cuts = range(0, len(passed_on), _STORES) if len(passed_on) > _STORES else ()
-    pieces = [passed_on[k : k + _STORES] for k in cuts]
-    alone = len(layout.chunks) == 1 and not pieces
-    for number, chunk in enumerate(layout.chunks):
+    computed = {node.index for chunk in layout.chunks for unit in units_of(chunk) for node in unit}
+    passed_on = [(node, pointer, at) for node, pointer, at in body.results if node.index not in computed]
+    pieces = _pieces(passed_on, places) if len(passed_on) > _STORES else []
+    chunks = layout.chunks if pieces or not isinstance(layout.chunks[-1], Loop) else (*layout.chunks, ())
+    alone = len(chunks) == 1 and not pieces
+    for number, chunk in enumerate(chunks):
+        if isinstance(chunk, Loop):
+            parts.append(_write_loop(f"{name}.{number}", chunk, places, targets, needs, options.runs))
+            continue
         writer = Writer(places, needs, held if alone else frozenset(), options.runs)
         solver.start_chunk()
         for unit in chunk:
@@ -164,23 +174,82 @@ def _write_function(
             for node in unit:
                 if node.index in layout.slots:
                     writer.store(writer.value(node), "scratch", layout.slots[node.index])
-                if node.index in results:
+                if node.index in targets:
                     _write_result(writer, node, targets[node.index])
-        if number == len(layout.chunks) - 1 and not pieces:
-            for node in (one for index, one in results.items() if index not in computed):
-                _write_result(writer, node, targets[node.index])
+        if number == len(chunks) - 1 and not pieces:
+            for node, pointer, at in passed_on:
+                _write_result(writer, node, [(pointer, at)])
         if alone:
             if whole is not None:
                 _pack(writer, whole.lanes)
             return [_as_function(name, writer)]
         parts.append(_as_chunk(f"{name}.{number}", writer))
     for piece in pieces:
-        writer = Writer(places, needs, frozenset(), options.runs)
-        for node, target in piece:
-            _write_result(writer, node, [target])
-        parts.append(_as_chunk(f"{name}.{len(parts)}", writer))
+        parts.append(_write_copies(f"{name}.{len(parts)}", piece, places, needs, options.runs))
     parts.append(_write_calls(name, len(parts), options.runs))
     return parts
+
+
+def _write_loop(
+    name: str,
+    loop: Loop,
+    places: Mapping[int, tuple[str, Position]],
+    targets: Mapping[int, Sequence[tuple[str, int]]],
+    needs: Needs,
+    runs: int,
+) -> str:
+    """Write a loop as a function of its own: its first stretch, with places that move from stretch to stretch."""
+    read = {row[0].index: _moving([places[one.index] for one in row]) for row in loop.read}
+    rows = {row[0].index: row for row in rows_of(loop)}
+    writer = Writer(read, needs, frozenset(), runs)
+    for unit in loop.stretches[0]:
+        _write_unit(writer, Solver({}), unit)
+        for node in unit:
+            row = rows[node.index]
+            if node.index in places:
+                writer.store(writer.value(node), *_moving([places[one.index] for one in row]))
+            if node.index in targets:
+                several = zip(*(targets[one.index] for one in row), strict=True)
+                _write_result(writer, node, [_moving(one) for one in several])
+    return _as_loop(name, writer, len(loop.stretches))
+
+
+def _moving(places: Sequence[tuple[str, Position]]) -> tuple[str, Position]:
+    """Return the array in which all of some places lie, and where."""
+    return places[0][0], Strided(tuple(at for _, at in places if isinstance(at, int)))
+
+
+Copy = tuple[Expression, str, int]
+"""A value that is given or constant, and the place of an array to which it goes."""
+
+
+def _pieces(copies: Sequence[Copy], places: Mapping[int, tuple[str, Position]]) -> list[list[Copy]]:
+    """Return copies cut into pieces, each between two arrays or not too long."""
+    pieces: list[list[Copy]] = []
+    kind: object = None
+    for node, pointer, at in copies:
+        found = (places[node.index][0], pointer) if node.index in places else None
+        if not pieces or found != kind or (kind is None and len(pieces[-1]) == _STORES):
+            pieces.append([])
+        pieces[-1].append((node, pointer, at))
+        kind = found
+    return pieces
+
+
+def _write_copies(
+    name: str, copies: Sequence[Copy], places: Mapping[int, tuple[str, Position]], needs: Needs, runs: int
+) -> str:
+    """Write copies as a function of its own: between two arrays as a loop."""
+    first, pointer, _ = copies[0]
+    if len(copies) > 1 and first.index in places:
+        inside = {first.index: _moving([places[node.index] for node, _, _ in copies])}
+        writer = Writer(inside, needs, frozenset(), runs)
+        _write_result(writer, first, [(pointer, Strided(tuple(at for _, _, at in copies)))])
+        return _as_loop(name, writer, len(copies))
+    writer = Writer(places, needs, frozenset(), runs)
+    for node, pointer, at in copies:
+        _write_result(writer, node, [(pointer, at)])
+    return _as_chunk(name, writer)
 
 
 def _write_unit(writer: Writer, solver: Solver, unit: Unit) -> None:
@@ -209,7 +278,7 @@ def _pointers(writer: Writer) -> list[str]:
     return lines
 
 
-def _write_result(writer: Writer, node: Expression, targets: Sequence[tuple[str, int]]) -> None:
+def _write_result(writer: Writer, node: Expression, targets: Sequence[tuple[str, Position]]) -> None:
     value = writer.value(node)
     for pointer, position in targets:
         writer.store(value, pointer, position)
@@ -221,6 +290,7 @@ def _pack(writer: Writer, lanes: int) -> None:
     kind = f"<{lanes} x double>"
     vectors: dict[tuple[str, int], dict[int, str]] = {}
     for value, pointer, position in writer.kept:
+        assert isinstance(position, int)  # no loop is held back
         vectors.setdefault((pointer, position // lanes), {})[position % lanes] = value
     for (pointer, block), values in vectors.items():
         vector = "zeroinitializer"
@@ -235,6 +305,22 @@ def _as_chunk(name: str, writer: Writer) -> str:
     checked = writer.checked()
     start = [f"define internal {writer.kind} @{name}({_ARGUMENTS}) #0 {{", *_pointers(writer)]
     return "\n".join([*start, *writer.lines, f"  ret {writer.kind} {checked}", "}"])
+
+
+def _as_loop(name: str, writer: Writer, count: int) -> str:
+    """Return a chunk as a function that does it so many times, and returns the sum of all results."""
+    kind, lines = writer.kind, [f"define internal {writer.kind} @{name}({_ARGUMENTS}) #0 {{", "entry:"]
+    checked = writer.checked()
+    lines += [
+        *_pointers(writer),
+        "  br label %stretch",
+        "stretch:",
+        "  %k = phi i64 [ 0, %entry ], [ %next, %stretch ]",
+    ]
+    lines.append(f"  %before = phi {kind} [ {spread(0.0, writer.runs)}, %entry ], [ %after, %stretch ]")
+    lines += [*writer.lines, f"  %after = fadd {kind} %before, {checked}", "  %next = add i64 %k, 1"]
+    lines += [f"  %goes.on = icmp ult i64 %next, {count}", "  br i1 %goes.on, label %stretch, label %end"]
+    return "\n".join([*lines, "end:", f"  ret {kind} %after", "}"])
 
 
 def _as_function(name: str, writer: Writer) -> str:
@@ -297,4 +383,7 @@ def _declarations(needs: Needs, runs: int) -> list[str]:
         lines.append(f"declare {kind} @{own_name(name)}({given}) #0")
     for position, (_, count) in enumerate(needs.externals):
         lines.append(f"declare double @external.{position}({', '.join(['double'] * count)}) #0")
+    for entries, name in needs.tables.items():
+        numbers = ", ".join(f"i32 {one}" for one in entries)
+        lines.append(f"{name} = internal constant [{len(entries)} x i32] [{numbers}]")
     return [*lines, "attributes #0 = { nounwind }", "!0 = !{}"]

@@ -48,6 +48,29 @@ def spread(value: float, runs: int) -> str:
     return one if runs == 1 else f"<{', '.join([f'double {one}'] * runs)}>"
 
 
+@dataclass(frozen=True)
+class Strided:
+    """A place in an array that is another in each stretch of a loop.
+
+    Attributes
+    ----------
+    places
+        Where it is in each stretch.
+    """
+
+    places: tuple[int, ...]
+
+    @property
+    def step(self) -> int | None:
+        """By how much it moves from each stretch to the next; None where that is not the same."""
+        first, step = self.places[0], self.places[1] - self.places[0]
+        return step if self.places == tuple(first + step * k for k in range(len(self.places))) else None
+
+
+Position = int | Strided
+"""A place in an array."""
+
+
 @dataclass
 class Needs:
     """What the functions of a module call.
@@ -60,11 +83,14 @@ class Needs:
         The functions in Python, each with its number of arguments and its position among them.
     elimination
         Whether there is a linear system that is not eliminated in registers.
+    tables
+        Where values lie that a loop cannot count.
     """
 
     functions: set[str] = field(default_factory=set)
     externals: dict[tuple[ExternalFunction, int], int] = field(default_factory=dict)
     elimination: bool = False
+    tables: dict[tuple[int, ...], str] = field(default_factory=dict)
 
 
 @dataclass
@@ -97,7 +123,7 @@ class Writer:
         What goes to the arrays that are held: a value, the name of the pointer and the position.
     """
 
-    places: Mapping[int, tuple[str, int]]
+    places: Mapping[int, tuple[str, Position]]
     needs: Needs
     held: frozenset[str] = frozenset()
     runs: int = 1
@@ -107,7 +133,7 @@ class Writer:
     pointers: set[str] = field(default_factory=set)
     waves: bool = False
     calls: bool = False
-    kept: list[tuple[str, str, int]] = field(default_factory=list)
+    kept: list[tuple[str, str, Position]] = field(default_factory=list)
     _checks: list[str] = field(default_factory=list)
     _count: int = 0
 
@@ -137,19 +163,32 @@ class Writer:
         self.lines.append(f"  {name} = {instruction}")
         return name
 
-    def address(self, pointer: str, position: int) -> str:
+    def address(self, pointer: str, position: Position) -> str:
         """Return the address of one number of an array."""
         self.pointers.add(pointer)
         if position == 0:
             return f"%{pointer}"
-        return self.put(f"getelementptr double, ptr %{pointer}, i64 {position * self.runs}")
+        at = position * self.runs if isinstance(position, int) else self._place(position)
+        return self.put(f"getelementptr double, ptr %{pointer}, i64 {at}")
 
-    def load(self, pointer: str, position: int) -> str:
+    def _place(self, position: Strided) -> str:
+        """Return a place in the stretch ``%k`` of a loop."""
+        step, first = position.step, position.places[0] * self.runs
+        if step == 0:
+            return str(first)
+        if step is not None:
+            return self.put(f"add i64 {self.put(f'mul i64 %k, {step * self.runs}')}, {first}")
+        places = tuple(one * self.runs for one in position.places)
+        table = self.needs.tables.setdefault(places, f"@places.{len(self.needs.tables)}")
+        entry = self.put(f"getelementptr i32, ptr {table}, i64 %k")
+        return self.put(f"zext i32 {self.put(f'load i32, ptr {entry}, !invariant.load !0')} to i64")
+
+    def load(self, pointer: str, position: Position) -> str:
         """Read one number of an array."""
         fixed = ", !invariant.load !0" if pointer != "scratch" else ""
         return self.put(f"load {self.kind}, ptr {self.address(pointer, position)}, align 8{fixed}")
 
-    def store(self, value: str, pointer: str, position: int) -> None:
+    def store(self, value: str, pointer: str, position: Position) -> None:
         """Write one number of an array."""
         if pointer in self.held:
             self.kept.append((value, pointer, position))
