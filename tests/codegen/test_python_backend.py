@@ -6,6 +6,8 @@ from hypothesis import given, settings, strategies as st
 
 from atwood import expr as ex
 from atwood.codegen import compile_program
+from atwood.codegen.python import backend
+from atwood.codegen.python.walk import WALKS
 from atwood.errors import KernelEvaluationError
 
 _OPERATIONS = (
@@ -61,12 +63,19 @@ def test_kernels_agree_with_the_interpreter(recipe, samples):
     scalar = compile_program(program).bind([p, q])
     several = compile_program(program, vectorized=True).bind([p, q])
     arrays = several(t[None], np.array([x, y]), np.empty((0, 3)))
+    given = t[None], np.array([x, y]), np.empty((0, 3))
+    with np.errstate(all="ignore"):
+        generated = several.compiled.main(several.prologue_values, *given)
+    for walked, compiled in zip(arrays, generated, strict=True):
+        for row, value in zip(walked, compiled, strict=True):
+            np.testing.assert_array_equal(row, value)
     for k in range(3):
         at = {"t": t[k], "x": x[k], "y": y[k], "p": p, "q": q}
         expected = ex.evaluate(program.results, at)
         if not np.all(np.isfinite(expected)):
             continue
         first, second = scalar([float(t[k])], np.array([x[k], y[k]]), ())
+        assert (first, second) == scalar.compiled.main(scalar.prologue_values, [t[k]], [x[k], y[k]], [])
         np.testing.assert_allclose([*first, *second], expected, rtol=1e-9, atol=1e-10)
         np.testing.assert_allclose(np.concatenate(arrays)[:, k], expected, rtol=1e-9, atol=1e-10)
 
@@ -160,6 +169,23 @@ def test_prologue_runs_once_for_each_binding():
     kernel = make(lambda x, p: [ex.external(function, p) * x]).bind([4.0])
     assert [kernel([1.0]), kernel([2.0])] == [([2.0],), ([4.0],)]
     assert calls == [4.0]
+
+
+@pytest.mark.parametrize("vectorized", [False, True])
+def test_code_is_written_for_what_runs_more_than_a_few_times(vectorized, monkeypatch):
+    written = []
+    execute = backend._execute
+    monkeypatch.setattr(backend, "_execute", lambda *given: (written.append(given[0]), execute(*given))[1])
+    graph = ex.Graph()
+    x, p = graph.symbol("x"), graph.symbol("p")
+    outputs = (ex.OutputGroup("value", (ex.sin(x) * ex.exp(p),)),)
+    program = ex.Program("often", (ex.InputGroup("x", (x,)),), (p,), outputs)
+    kernel = compile_program(program, vectorized=vectorized).bind([0.3])
+    found = [kernel(np.array([0.7]))[0][0] for _ in range(WALKS)]
+    assert not written
+    found += [kernel(np.array([0.7]))[0][0] for _ in range(2)]
+    assert written == ["kernel"]
+    assert len({np.asarray(one).item() for one in found}) == 1
 
 
 def test_a_long_and_deep_program_compiles():

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 
 import atwood_library as lib
 from atwood import Scene, sweep
+from atwood.codegen.python import backend as python_backend
 from atwood.pipeline import assemble, simulate
 
 from ..helpers.runs import FORMS
@@ -51,6 +52,12 @@ CASES: dict[str, tuple[Callable[[], Scene], dict[str, float]]] = {
     "two blades": (lambda: on_blades(2), {"link.angle": 0.3, "link.position.x": 0.2, "link.velocity.x": 0.4}),
     "cart": (cart, {"back.contact.displacement": 0.5, "back.bearing.angle": 1.0, "front.bearing.angle": -0.4}),
 }
+
+
+@pytest.fixture(autouse=True)
+def compiled_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compile programs in Python at their first call, so that what is compiled later is new."""
+    monkeypatch.setattr(python_backend, "WALKS", 0)
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -34,6 +34,12 @@ from atwood_library.scenes import SCENES, Atwood, Chain, DoublePendulum
 from ..helpers.runs import GENERAL
 
 
+@pytest.fixture(autouse=True)
+def compiled_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compile programs in Python at their first call, so that what is compiled later is new."""
+    monkeypatch.setattr(python_backend, "WALKS", 0)
+
+
 @contextmanager
 def counting(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, int]]:
     """Count what is compiled or loaded, programs that are made, and graphs of expressions."""

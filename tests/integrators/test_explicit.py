@@ -20,8 +20,13 @@ from atwood.integrators.explicit_session import ExplicitSession
 from atwood.integrators.methods.dormand_prince import TABLEAU
 from atwood.integrators.protocol import Budget, ExplicitProblem, SolverOptions, Status
 from atwood.pipeline import assemble
-from atwood.simulation.initialization.start import find_start
-from atwood.simulation.problem.explicit_scene import explicit_problem
+from atwood.simulation.initialization.start import find_start, settle
+from atwood.simulation.problem.explicit_scene import (
+    explicit_problem,
+    own_rates_on_constraints,
+    values_on_constraints,
+)
+from atwood.simulation.problem.preparation import make_problem
 from atwood_library.scenes import SCENES, Chain
 
 from .embedded_reference import ReferenceStepper
@@ -469,6 +474,37 @@ def test_sessions_with_compiled_rates_share_nothing() -> None:
         last = a.advance(float(t)), b.advance(float(t))
     assert_array_equal(last[0].y, alone.y)
     assert_array_equal(last[1].y, alone.y)
+
+
+@pytest.mark.parametrize("name", ["four-bar", "chain"])
+def test_code_that_took_less_to_make_is_left_at_any_step(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Machine code of LLVM's quickest level and of a higher one give the same bits, after any step."""
+    monkeypatch.setenv("ATWOOD_CACHE", "0")
+    assembly = assemble(SCENES[name](), form="dae")
+    start = find_start(assembly)
+    assembly, q, u = settle(assembly, start, assembly.other_mode)
+    plan, y = make_problem(assembly, 0.0, q, u, start.length, 1.0), np.concatenate([q, u])
+    made = own_rates_on_constraints(plan, 0.0, y)
+    assert made is not None
+    code, _ = made
+    quick, better = code._built, code._better
+    assert better is not None
+    best, values = better(), values_on_constraints(plan)
+
+    def ended(before: float) -> list[Any]:
+        code._built, code._better, code._cost = quick, lambda: best, math.inf
+        problem = ExplicitProblem(len(y), pendulum, compiled=code.bind(values))
+        stepper = CompiledStepper(problem, tight(1e-8), TABLEAU)
+        assert stepper.start(0.0, y)
+        function = stepper._count("function")
+        for step in range(55):
+            code._cost = math.inf if step < before else 0.0
+            stepper.run(math.inf, 1)
+        assert (stepper._count("function") == function) == (before == math.inf)
+        return [stepper.state()[0], *stepper.state()[1]]
+
+    alone = ended(math.inf)
+    assert all(ended(before) == alone for before in range(50))
 
 
 def test_scenes_with_constraints_left_have_no_explicit_problem() -> None:

@@ -94,6 +94,10 @@ class Cache:
             os.utime(path)
         return content
 
+    def has(self, key: str) -> bool:
+        """Return whether there is an entry, whole or not."""
+        return self._path(key).exists()
+
     def write(self, key: str, content: bytes) -> bool:
         """Add an entry, and return whether that worked.
 

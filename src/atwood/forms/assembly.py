@@ -338,7 +338,7 @@ class Assembly:
             equations = self.own_equations if kept is None else keep_constraints(self.own_equations, kept)
             name = f"{self.flat.name} ({self.form})"
             if self.form == "reduced":
-                found = reduced_form(name, equations, self.parameters, self.rows, dependent, speeds)
+                found = reduced_form(name, equations, self.parameters, lambda: self.rows, dependent, speeds)
             else:
                 found = dae_form(
                     name, equations, self.parameters, self.level, partial(as_by_hand, equations, self.parameters)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from contextlib import AbstractContextManager
-from functools import cached_property, partial, reduce
+from functools import cached_property, reduce
 from operator import add
 from typing import Any, Literal
 
@@ -30,6 +30,7 @@ from atwood.expr import (
 )
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.dynamics.equations import Equations
+from atwood.stages import stage
 
 Level = Literal["", "ggl", "index1", "index1-projected"]
 
@@ -42,18 +43,16 @@ class FormProgram:
     ----------
     form, level
         Which form it is; the level is empty for the reduced form.
-    residual
-        Program of (t, y, yp) with F.
+    write
+        Makes `residual`.
     derive
-        Makes its Jacobian; see `derivative`.
+        Makes its Jacobian from it; see `derivative`.
     coordinates, speeds
         Number of coordinates and of speeds.
     multipliers
         Number of multipliers of constraint forces.
     extra
         Number of further multipliers, which keep positions on the constraints.
-    algebraic
-        Unknowns whose derivative does not appear.
     independent
         With loops in the reduced form: the kinematic rows that are kept (see `rows_along_speeds`): the coordinates, or
         what moves with the speeds, that are integrated; the others follow from them.
@@ -61,28 +60,42 @@ class FormProgram:
 
     form: Literal["reduced", "dae"]
     level: Level
-    residual: Program
-    derive: Callable[[], Derivative]
+    write: Callable[[], Program]
+    derive: Callable[[Program], Derivative]
     coordinates: int
     speeds: int
     multipliers: int
     extra: int
-    algebraic: tuple[int, ...]
     independent: tuple[int, ...]
 
     @cached_property
+    def residual(self) -> Program:
+        """The program of (t, y, yp) with F, made when it is first asked for: explicit methods need none."""
+        return self.write()
+
+    @cached_property
     def derivative(self) -> Derivative:
-        """The Jacobian ``dF/dy + cj dF/dy'``, made when it is first asked for: explicit methods need none."""
-        return self.derive()
+        """The Jacobian ``dF/dy + cj dF/dy'``, made when it is first asked for."""
+        return self.derive(self.residual)
+
+    @cached_property
+    def algebraic(self) -> tuple[int, ...]:
+        """The unknowns whose derivative does not appear."""
+        appearing = set(self.residual.nodes)
+        return tuple(i for i, rate in enumerate(self.residual.inputs[2].symbols) if rate not in appearing)
 
     def with_lock(self, lock: AbstractContextManager[Any]) -> FormProgram:
-        """Return the same with a lock that is held while the Jacobian is made."""
+        """Return the same with a lock that is held while residual and Jacobian are made."""
 
-        def derive() -> Derivative:
-            with lock:
+        def write() -> Program:
+            with lock, stage("equations"):
+                return self.residual
+
+        def derive(_: Program) -> Derivative:
+            with lock, stage("equations"):
                 return self.derivative
 
-        return replace(self, derive=derive)
+        return replace(self, write=write, derive=derive)
 
     @property
     def jacobian(self) -> Program:
@@ -200,32 +213,32 @@ def make_form_program(
     level: Level,
     equations: Equations,
     parameters: Collection[Expression],
-    residual: Sequence[Expression],
+    rows: Callable[[], Sequence[Expression]],
     multipliers: Sequence[Expression] = (),
     extra: Sequence[Expression] = (),
     independent: Sequence[int] = (),
 ) -> FormProgram:
-    """Put a residual into programs, with its Jacobian by forward derivatives."""
-    graph = equations.graph
-    rates = rate_symbols(equations)
-    y = (*equations.coordinates, *equations.speeds, *multipliers, *extra)
-    idle = tuple(graph.symbol(f"rate of {s.name}") for s in (*multipliers, *extra))
-    yp = (*rates, *equations.accelerations, *idle)
-    appearing = set(live(residual))
-    groups = (InputGroup("t", (equations.time,)), InputGroup("y", y), InputGroup("yp", yp))
-    known = tuple(parameters)
+    """Put a residual, whose rows are made when it is asked for, into programs, with its Jacobian."""
+
+    def write() -> Program:
+        symbol = equations.graph.symbol
+        idle = tuple(symbol(f"rate of {s.name}") for s in (*multipliers, *extra))
+        y = (*equations.coordinates, *equations.speeds, *multipliers, *extra)
+        yp = (*rate_symbols(equations), *equations.accelerations, *idle)
+        groups = (InputGroup("t", (equations.time,)), InputGroup("y", y), InputGroup("yp", yp))
+        return Program(f"{name} residual", groups, tuple(parameters), (OutputGroup("residual", tuple(rows())),))
+
     # With loops, rows are chosen anew along a run, by functions that are written entry by entry.
     by_columns = form == "reduced" and not independent
     return FormProgram(
         form,
         level,
-        Program(f"{name} residual", groups, known, (OutputGroup("residual", tuple(residual)),)),
-        partial(derive, f"{name} Jacobian", tuple(residual), groups, known, by_columns),
+        write,
+        lambda residual: derive(f"{name} Jacobian", residual, by_columns),
         len(equations.coordinates),
         len(equations.speeds),
         len(multipliers),
         len(extra),
-        tuple(i for i, rate in enumerate(yp) if rate not in appearing),
         tuple(independent),
     )
 
@@ -275,16 +288,11 @@ def directions(symbols: Sequence[Expression]) -> InputGroup:
     return InputGroup("direction", tuple(s.graph.symbol(f"direction:{s.name}") for s in symbols))
 
 
-def derive(
-    name: str,
-    residual: Sequence[Expression],
-    groups: tuple[InputGroup, ...],
-    parameters: tuple[Expression, ...],
-    may_go_by_columns: bool,
-) -> Derivative:
+def derive(name: str, program: Program, may_go_by_columns: bool) -> Derivative:
     """Return the Jacobian of a residual."""
+    groups, parameters, residual = program.inputs, program.parameters, program.results
     _, (_, y), (_, yp) = groups
-    graph = y[0].graph if y else parameters[0].graph
+    graph = program.graph
     cj = graph.symbol("cj")
     inputs = (*groups, InputGroup("cj", (cj,)))
     wrt: list[dict[Expression, Expression | float]] = [{a: 1.0, b: cj} for a, b in zip(y, yp, strict=True)]

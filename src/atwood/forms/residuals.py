@@ -12,7 +12,8 @@ In the dae form constraints stay, with one Lagrange multiplier each.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import cast
 
 import numpy as np
 
@@ -49,24 +50,31 @@ def reduced_form(
     name: str,
     equations: Equations,
     parameters: Collection[Expression],
-    rows: Sequence[Expression],
+    rows: Callable[[], Sequence[Expression]],
     dependent: Sequence[int] = (),
     dependent_speeds: Sequence[int] | None = None,
 ) -> FormProgram:
-    """Return the reduced form of a scene."""
+    """Return the reduced form of a scene.
+
+    What makes its equations of motion is called when the residual is made; where there are loops every method reads
+    them.
+    """
     if not equations.constraints:
-        residual = [*kinematic_rows(equations), *rows]
-        return make_form_program(name, "reduced", "", equations, parameters, residual)
-    kinematic = rows_along_speeds(equations)
+        return make_form_program(
+            name, "reduced", "", equations, parameters, lambda: [*kinematic_rows(equations), *rows()]
+        )
+    balances, kinematic = rows(), rows_along_speeds(equations)
     independent = _others(kinematic, dependent)
     given = sorted(dependent if dependent_speeds is None else dependent_speeds)
-    projected = _project(equations, rows, given, _others(equations.speeds, given))
-    residual = [
-        *(kinematic[i] for i in independent),
-        *(either_sign(one.value) for one in equations.constraints if one.value is not None),
-        *projected,
-        *(either_sign(one.rate) for one in equations.constraints),
-    ]
+
+    def residual() -> list[Expression]:
+        return [
+            *(kinematic[i] for i in independent),
+            *(either_sign(one.value) for one in equations.constraints if one.value is not None),
+            *_project(equations, balances, given, _others(equations.speeds, given)),
+            *(either_sign(one.rate) for one in equations.constraints),
+        ]
+
     return make_form_program(name, "reduced", "", equations, parameters, residual, independent=independent)
 
 
@@ -196,21 +204,27 @@ def dae_form(
     if level not in LEVELS:
         raise UsageError(f"there is no level {level!r} of the dae form", advice=suggestion(level, LEVELS))
     multipliers = equations.multipliers
-    rows = _smooth_at_zero(equations.rows_with_multipliers, multipliers) or equations.rows
-    dynamic = [r - f for r, f in zip(rows, equations.constraint_rows, strict=True)]
-    if not multipliers:
-        return make_form_program(name, "dae", "ggl", equations, parameters, tidy(kinematic_rows(equations) + dynamic))
-    if level == "ggl":
-        kinematic, extra = _shifted(equations)
-        values = [one.value for one in equations.constraints if one.value is not None]
-        held = values + [one.rate for one in equations.constraints]
-    else:
-        kinematic, extra = kinematic_rows(equations), ()
-        held = [one.second for one in equations.constraints]
-    held = [either_sign(one) for one in held]
-    chosen: Level = "ggl" if level == "ggl" else ("index1" if level == "index1" else "index1-projected")
-    residual = tidy(kinematic + dynamic + held)
-    return make_form_program(name, "dae", chosen, equations, parameters, residual, multipliers, extra)
+    chosen: Level = "ggl" if level == "ggl" or not multipliers else cast("Level", level)
+    constraints = equations.constraints
+    extra = {
+        one.multiplier: equations.graph.symbol(f"mu:{one.multiplier.name}")
+        for one in (constraints if chosen == "ggl" else ())
+        if one.value is not None
+    }
+
+    def residual() -> list[Expression]:
+        rows = _smooth_at_zero(equations.rows_with_multipliers, multipliers) or equations.rows
+        dynamic = [r - f for r, f in zip(rows, equations.constraint_rows, strict=True)]
+        if chosen == "ggl":
+            kinematic = _shifted(equations, extra) if multipliers else kinematic_rows(equations)
+            values = [one.value for one in constraints if one.value is not None]
+            held = values + [one.rate for one in constraints]
+        else:
+            kinematic = kinematic_rows(equations)
+            held = [one.second for one in constraints]
+        return tidy(kinematic + dynamic + [either_sign(one) for one in held])
+
+    return make_form_program(name, "dae", chosen, equations, parameters, residual, multipliers, tuple(extra.values()))
 
 
 def _smooth_at_zero(rows: Sequence[Expression], multipliers: Sequence[Expression]) -> list[Expression]:
@@ -226,16 +240,10 @@ def _smooth_at_zero(rows: Sequence[Expression], multipliers: Sequence[Expression
     return substitute(list(rows), guarded) if guarded else list(rows)
 
 
-def _shifted(equations: Equations) -> tuple[list[Expression], tuple[Expression, ...]]:
-    """Return the kinematic rows that keep positions on the constraints, and the multipliers that do so."""
-    symbols: dict[Expression, Expression] = {
-        one.multiplier: equations.graph.symbol(f"mu:{one.multiplier.name}")
-        if one.value is not None
-        else equations.graph.zero
-        for one in equations.constraints
-    }
-    shift = substitute(list(equations.constraint_rows), symbols)
-    return kinematic_rows(equations, shift=shift), tuple(s for s in symbols.values() if s.is_symbol)
+def _shifted(equations: Equations, extra: Mapping[Expression, Expression]) -> list[Expression]:
+    """Return the kinematic rows that keep positions on the constraints by multipliers in the place of others."""
+    symbols = {one.multiplier: extra.get(one.multiplier, equations.graph.zero) for one in equations.constraints}
+    return kinematic_rows(equations, shift=substitute(list(equations.constraint_rows), symbols))
 
 
 def keep_constraints(equations: Equations, kept: Sequence[int]) -> Equations:

@@ -35,7 +35,7 @@ from atwood.codegen.routines import own_name
 from atwood.errors import KernelEvaluationError, UnsupportedError
 from atwood.expr.core.operations import ExternalFunction
 from atwood.expr.core.program import Program
-from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.stages import stage
 
 if TYPE_CHECKING:
@@ -87,6 +87,9 @@ _SMALL = 20_000
 
 _BRIEF = 500
 """The same for programs that are run for short stretches, between which far more is done."""
+
+_HARDER = 5e-5
+"""Seconds that LLVM takes longer for a node above its quickest level."""
 
 
 class Failures(threading.local):
@@ -174,6 +177,40 @@ def build_code(
     """Compile programs, or take them from the cache."""
     with stage("code"):
         return within_time(lambda: build_now(parts, options, exports, routines, cached))
+
+
+@dataclass(frozen=True)
+class Tiers:
+    """Programs as machine code that is made quickly, and as what is made of them once they have run for long.
+
+    Attributes
+    ----------
+    quick
+        The code to begin with.
+    better
+        Makes code of the same values, to the bit, with the same arrays; None where the quick one is the best.
+    cost
+        How long that takes, about, s.
+    """
+
+    quick: Built
+    better: Callable[[], Built] | None
+    cost: float
+
+
+def build_tiers(parts: Sequence[Part], is_brief: bool, exports: Sequence[str], routines: RoutineSource) -> Tiers:
+    """Compile programs of some size quickly, unless the cache has what is made of them where they run for long."""
+    options, size = default_options(parts, is_brief), sum(part.program.size for part in parts)
+    best = functools.partial(build_code, parts, options, exports=exports, routines=routines)
+    if size <= _BRIEF or not options.level or _is_cached(parts, options, routines):
+        return Tiers(best(), None, 0.0)
+    quick = build_code(parts, replace(options, level=0), exports=exports, routines=routines)
+    return Tiers(quick, best, _HARDER * size)
+
+
+def _is_cached(parts: Sequence[Part], options: CodeOptions, routines: RoutineSource) -> bool:
+    store = default_cache()
+    return store is not None and store.has(_key(parts, options, routines))
 
 
 def build_now(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, lru_cache
 from types import CodeType
 from typing import Any
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from atwood.clock import check_time
 from atwood.codegen.python.source import Flavour, write_function
+from atwood.codegen.python.walk import WALKS, operations_of, walk
 from atwood.errors import KernelEvaluationError
 from atwood.expr.core import elementary
 from atwood.expr.core.analysis import evaluate, live
@@ -80,8 +81,8 @@ class CompiledProgram:
             )
         if self.vectorized:
             with np.errstate(all="ignore"):
-                return BoundKernel(self, values, list(self._prologue(list(values))[0]))
-        return BoundKernel(self, values, list(self._prologue(values.tolist())[0]))
+                return BoundKernel(self, values, self._known(list(values)))
+        return BoundKernel(self, values, self._known(values.tolist()))
 
     @cached_property
     def source(self) -> str:
@@ -93,6 +94,44 @@ class CompiledProgram:
         """The function of the prologue values and the input groups."""
         return self._function("vectorized" if self.vectorized else "fast")
 
+    def run(self, known: Sequence[Any], *groups: Any) -> tuple[list[Any], ...]:
+        """Return what `main` does of the prologue values and the input groups."""
+        program = self.program
+        if self._is_compiled("main"):
+            return self.main(known, *groups)
+        given = [program.prologue, *(group.symbols for group in program.inputs)]
+        values: dict[int, Any] = {}
+        for symbols, several in zip(given, (known, *groups), strict=True):
+            values.update(zip((one.index for one in symbols), several, strict=True))
+        walk(self._between, values, _OPERATIONS["vectorized" if self.vectorized else "fast"])
+        return tuple([values[one.index] for one in group.expressions] for group in program.outputs)
+
+    def _known(self, parameters: Sequence[Any]) -> list[Any]:
+        """Return the prologue values."""
+        program = self.program
+        if self._is_compiled("_prologue"):
+            return list(self._prologue(parameters)[0])
+        values = {one.index: value for one, value in zip(program.parameters, parameters, strict=True)}
+        walk(live(program.prologue), values, _OPERATIONS["vectorized" if self.vectorized else "careful"])
+        return [values[one.index] for one in program.prologue]
+
+    def _is_compiled(self, name: str) -> bool:
+        """Return whether a function is compiled, or is to be: it has run a few times, or calls what walks would not."""
+        return name in vars(self) or self._has_externals or next(self._walks[name], None) is None
+
+    @cached_property
+    def _walks(self) -> dict[str, Iterator[int]]:
+        return {"main": iter(range(WALKS)), "_prologue": iter(range(WALKS))}
+
+    @cached_property
+    def _has_externals(self) -> bool:
+        return any(node.operation == "external" for node in self.program.nodes)
+
+    @cached_property
+    def _between(self) -> list[Expression]:
+        """What is computed in every call, arguments before users."""
+        return _between(self.program.nodes, self.program.prologue, self.program.results)
+
     @cached_property
     def careful(self) -> Callable[..., tuple[list[Any], ...]]:
         """The same function, with nan and infinities where the fast one raises."""
@@ -101,8 +140,7 @@ class CompiledProgram:
     def _written(self, flavour: Flavour) -> tuple[str, list[object]]:
         program = self.program
         given = [program.prologue, *(group.symbols for group in program.inputs)]
-        nodes = _between(program.nodes, program.prologue, program.results)
-        return write_function("kernel", flavour, given, nodes, [group.expressions for group in program.outputs])
+        return write_function("kernel", flavour, given, self._between, [group.expressions for group in program.outputs])
 
     def _function(self, flavour: Flavour) -> Callable[..., tuple[list[Any], ...]]:
         with stage("code"):
@@ -160,7 +198,7 @@ class BoundKernel:
         try:
             if self._has_gaps:
                 return self._call_carefully(lists)
-            return compiled.main(self.prologue_values, *lists)
+            return compiled.run(self.prologue_values, *lists)
         except (ArithmeticError, ValueError):
             self._check_sizes(lists)
             return self._call_carefully(lists)
@@ -210,7 +248,7 @@ class BoundKernel:
         shapes = [array.shape[1:] for array in (*arrays, self.parameter_values)]
         (samples,) = np.broadcast_shapes(*shapes) or (1,)
         with np.errstate(all="ignore"):
-            results = self.compiled.main(self.prologue_values, *arrays)
+            results = self.compiled.run(self.prologue_values, *arrays)
         filled = [np.empty((len(values), samples)) for values in results]
         for target, values in zip(filled, results, strict=True):
             for row, value in enumerate(values):
@@ -294,3 +332,6 @@ _NAMESPACES: dict[Flavour, dict[str, Any]] = {
     | {**elementary.ON_ARRAYS, "solve": _solve_samples},
 }
 """What the names in generated code mean."""
+
+_OPERATIONS = {flavour: operations_of(flavour, names) for flavour, names in _NAMESPACES.items()}
+"""What the operations mean where a program is walked through."""

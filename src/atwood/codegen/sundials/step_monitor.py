@@ -213,7 +213,9 @@ def compile_monitor(program: Program, speeds: int, size: int, places: tuple[Arra
     shape = Shape(inputs[1], speeds, size, outputs[0], len(rows), len(lists["product"]))
     part = Part("held", program)
     routines = RoutineSource("codegen.sundials.step_monitor", (), (shape,))
-    built = build_code([part], default_options([part]), exports=["look", "drive", "fill"], routines=routines)
+    built = build_code(
+        [part], default_options([part], is_brief=True), exports=["look", "drive", "fill"], routines=routines
+    )
     return MonitorCode(program, shape, lists, built)
 
 

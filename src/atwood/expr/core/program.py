@@ -149,24 +149,25 @@ def _check_symbols(program: str, group: OutputGroup, listed: Iterable[Expression
             )
 
 
-def _hash(*parts: object) -> str:
-    from hashlib import sha256
-
-    return sha256(repr(parts).encode()).hexdigest()
-
-
 def _digest(program: Program) -> str:
     """Return the hash of a program from those of its nodes, each made from its arguments' hashes."""
-    known: dict[int, str] = {}
+    from hashlib import blake2b
+
+    known: dict[int, bytes] = {}
     for node in (*live([*program.parameters, *(s for group in program.inputs for s in group[1])]), *program.nodes):
         arguments = [known[argument.index] for argument in node.arguments]
         if node.operation in COMMUTATIVE:
             arguments.sort()
         payload = node.payload.name if node.operation == "external" else node.payload
-        known[node.index] = _hash(node.operation, payload, arguments)
-    return _hash(
-        program.name,
-        [(group[0], [known[symbol.index] for symbol in group[1]]) for group in program.inputs],
-        [known[parameter.index] for parameter in program.parameters],
-        [(group[0], [known[output.index] for output in group[1]]) for group in program.outputs],
-    )
+        said = f"{node.operation} {len(arguments)} {payload!r} ".encode()
+        known[node.index] = blake2b(said + b"".join(arguments), digest_size=_SIZE).digest()
+    groups = [
+        [(group[0], [known[one.index] for one in group[1]]) for group in several]
+        for several in (program.inputs, program.outputs)
+    ]
+    whole = program.name, groups, [known[parameter.index] for parameter in program.parameters]
+    return blake2b(repr(whole).encode(), digest_size=32).hexdigest()
+
+
+_SIZE = 32
+"""Bytes of the hash of a node: no two nodes that differ have the same one."""

@@ -10,17 +10,20 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import field
-from heapq import heappop, heappush
+from heapq import heapify, heappop, heappush
+from itertools import combinations
 from typing import TypeAlias
 
 from atwood.expr.core import algebra
-from atwood.expr.core.analysis import count_operations
+from atwood.expr.core.analysis import count_operations, live, varying
 from atwood.expr.core.graph import Expression, Graph
+from atwood.expr.core.operations import UNCOUNTED
 from atwood.expr.simplify.polynomial import (
     Atom,
     Coefficient,
     Effort,
     Expansion,
+    Monomial,
     Polynomial,
     TooLargeError,
     Wave,
@@ -100,12 +103,24 @@ def _mix(
     """Return the best candidate with single rows from others, where that is cheaper still."""
     if len(best) * len(found) * lowest > _MIXING_EFFORT:
         return best
-    for row in range(len(best)):
-        for version in dict.fromkeys(candidate[row] for candidate in found):
-            trial = [*best[:row], version, *best[row + 1 :]]
-            price = cost(trial, parameters)
+    versions = [list(dict.fromkeys(candidate[row] for candidate in found)) for row in range(len(best))]
+    every = live([one for several in versions for one in several])
+    needed = varying(every, parameters)
+    weights = {
+        node.index: _WEIGHTS.get(node.operation, _OTHER_WEIGHT)
+        for node in every
+        if node.index in needed and node.operation not in UNCOUNTED
+    }
+    counted = {
+        one: {node.index for node in live([one]) if node.index in weights} for several in versions for one in several
+    }
+    for row, several in enumerate(versions):
+        others = set[int]().union(*(counted[one] for k, one in enumerate(best) if k != row))
+        rest = sum(map(weights.__getitem__, others))
+        for version in several:
+            price = rest + sum(map(weights.__getitem__, counted[version] - others))
             if price < lowest:
-                best, lowest = trial, price
+                best, lowest = [*best[:row], version, *best[row + 1 :]], price
     return best
 
 
@@ -127,6 +142,7 @@ def _candidates(
             return
     if sum(map(len, expansion.rows)) > 2 * lowest:
         return
+    written: dict[frozenset[tuple[Monomial, float]], tuple[int, Expression]] = {}
     for normal_form in _normal_forms(expansion, limit):
         terms = sum(len(polynomial) for polynomial in normal_form)
         if terms > 10 * limit or terms - len(rows) >= lowest:
@@ -135,9 +151,8 @@ def _candidates(
             expansion.spend(_WRITTEN * sum(map(volume, normal_form)))
         except TooLargeError:
             return
-        graph = rows[0].graph
         for single_angles in (False, True):
-            emitter = Emitter(graph, expansion, single_angles)
+            emitter = Emitter(rows[0].graph, expansion, single_angles, written)
             split = [terms_of(emitter, polynomial) for polynomial in normal_form]
             yield from _written(emitter, split)
 
@@ -169,9 +184,10 @@ def _normal_forms(expansion: Expansion, limit: int) -> Iterator[list[Polynomial]
             yield made
 
 
-Factor: TypeAlias = tuple[int, int]
-"""The rank of a factor (coefficients, waves, values, products, inverses) and its number."""
+Factor: TypeAlias = int
+"""The rank of a factor (coefficients, waves, values, products, inverses), times `_RANK`, and its number."""
 
+_RANK = 1 << 40
 _COEFFICIENT, _WAVE, _VALUE, _PRODUCT, _INVERSE = range(5)
 
 
@@ -203,16 +219,24 @@ class Emitter:
         The atoms of the polynomials.
     single_angles
         Whether sines and cosines of combinations are made from those of single angles, by the addition theorems.
+    written
+        Coefficients that have been written: a sign, and an expression.
+    meanings
+        What each factor stands for.
+    atoms
+        The factor of each atom that has been met, by its number.
     """
 
     graph: Graph
     expansion: Expansion
     single_angles: bool
+    written: dict[frozenset[tuple[Monomial, float]], tuple[int, Expression]] = field(default_factory=dict)
     meanings: dict[Factor, Expression] = field(default_factory=dict)
+    atoms: dict[int, Factor] = field(default_factory=dict)
 
     def factor(self, rank: int, expression: Expression) -> Factor:
         """Return the factor of an expression."""
-        found = (rank, expression.index)
+        found = rank * _RANK + expression.index
         self.meanings[found] = expression
         return found
 
@@ -221,14 +245,20 @@ def terms_of(emitter: Emitter, polynomial: Polynomial) -> list[Term]:
     """Return the terms of a polynomial, with one expression for each coefficient and as few minus signs as may be."""
     terms: list[Term] = []
     for monomial in sorted(polynomial):
-        sign, coefficient = _coefficient(emitter, polynomial[monomial])
+        of_parameters = polynomial[monomial]
+        key = frozenset(of_parameters.items())
+        if key not in emitter.written:
+            emitter.written[key] = _coefficient(emitter, of_parameters)
+        sign, coefficient = emitter.written[key]
         factors = [] if coefficient is emitter.graph.one else [emitter.factor(_COEFFICIENT, coefficient)]
         for number, exponent in monomial:
-            factors += [_atom_factor(emitter, emitter.expansion.atoms[number])] * exponent
+            if number not in emitter.atoms:
+                emitter.atoms[number] = _atom_factor(emitter, emitter.expansion.atoms[number])
+            factors += [emitter.atoms[number]] * exponent
         terms.append(Term(sign, tuple(sorted(factors))))
     if terms and all(term.sign < 0 for term in terms):
         for position, term in enumerate(terms):
-            if term.factors and term.factors[0][0] == _COEFFICIENT:
+            if term.factors and term.factors[0] // _RANK == _COEFFICIENT:
                 opposite = algebra.negate(emitter.meanings[term.factors[0]])
                 factors = [emitter.factor(_COEFFICIENT, opposite), *term.factors[1:]]
                 terms[position] = Term(1, tuple(sorted(factors)))
@@ -293,40 +323,47 @@ def share_products(emitter: Emitter, rows: Sequence[Sequence[Term]]) -> list[lis
     The pair that occurs most often goes first, coefficients before values among equals.
     """
     terms = [list(term.factors) for row in rows for term in row]
+    pairs = [_pairs(factors) for factors in terms]
     where: dict[tuple[Factor, Factor], set[int]] = {}
-
-    queue: list[tuple[int, tuple[Factor, Factor]]] = []
-
-    def record(position: int, present: bool) -> None:
-        for pair in _pairs(terms[position]):
-            if present:
-                where.setdefault(pair, set()).add(position)
-            else:
-                where[pair].discard(position)
-            if len(where[pair]) > 1:
-                heappush(queue, (-len(where[pair]), pair))
-
-    for position in range(len(terms)):
-        record(position, True)
+    for position, found in enumerate(pairs):
+        for pair in found:
+            where.setdefault(pair, set()).add(position)
+    queue = [(-len(positions), pair) for pair, positions in where.items() if len(positions) > 1]
+    heapify(queue)
     while queue:
         count, best = heappop(queue)
-        if len(where[best]) != -count:
-            continue  # an entry from before the count changed
+        positions = where[best]
+        if len(positions) != -count:  # it was counted before others took their factors
+            if len(positions) > 1:
+                heappush(queue, (-len(positions), best))
+            continue
         product = emitter.factor(_PRODUCT, _product(emitter, best))
-        for position in sorted(where[best]):
-            record(position, False)
+        grown = {best}  # where its factors are squares it is still there
+        for position in sorted(positions):
+            factors = terms[position]
             for factor in best:
-                terms[position].remove(factor)
-            terms[position].append(product)
-            terms[position].sort()
-            record(position, True)
+                factors.remove(factor)
+            factors.append(product)
+            factors.sort()
+            before, pairs[position] = pairs[position], _pairs(factors)
+            for pair in before - pairs[position]:
+                where[pair].discard(position)
+            for pair in pairs[position] - before:
+                where.setdefault(pair, set()).add(position)
+                grown.add(pair)
+        for pair in grown:
+            if len(where[pair]) > 1:
+                heappush(queue, (-len(where[pair]), pair))
     remaining = iter(terms)
     return [[Term(term.sign, tuple(next(remaining))) for term in row] for row in rows]
 
 
 def _pairs(factors: Sequence[Factor]) -> set[tuple[Factor, Factor]]:
-    """Return the pairs of factors of a term, without those of two inverses."""
-    return {(a, b) for i, a in enumerate(factors) for b in factors[i + 1 :] if not a[0] == b[0] == _INVERSE}
+    """Return the pairs of factors of a term, which are sorted, without those of two inverses."""
+    found = set(combinations(factors, 2))
+    if factors and factors[-1] // _RANK == _INVERSE:
+        return {pair for pair in found if pair[0] // _RANK != _INVERSE}
+    return found
 
 
 def _product(emitter: Emitter, factors: Sequence[Factor]) -> Expression:
@@ -334,13 +371,14 @@ def _product(emitter: Emitter, factors: Sequence[Factor]) -> Expression:
     graph = emitter.graph
     head, values = graph.one, graph.one
     for factor in factors:
-        if factor[0] in (_COEFFICIENT, _WAVE, _PRODUCT):
+        rank = factor // _RANK
+        if rank in (_COEFFICIENT, _WAVE, _PRODUCT):
             head = algebra.multiply(head, emitter.meanings[factor])
-        elif factor[0] == _VALUE:
+        elif rank == _VALUE:
             values = algebra.multiply(values, emitter.meanings[factor])
     result = algebra.multiply(head, values)
     for factor in factors:
-        if factor[0] == _INVERSE:
+        if factor // _RANK == _INVERSE:
             result = algebra.divide(result, emitter.meanings[factor])
     return result
 
@@ -360,7 +398,7 @@ def _plain(emitter: Emitter, terms: Sequence[Term]) -> tuple[int, Expression]:
 def _nested(emitter: Emitter, terms: Sequence[Term]) -> tuple[int, Expression]:
     """Return a sum by Horner's scheme, up to its sign."""
     counts = Counter(factor for term in terms for factor in set(term.factors))
-    best = min(counts, key=lambda factor: (-counts[factor], -factor[0], factor), default=None)
+    best = min(counts, key=lambda factor: (-counts[factor], -(factor // _RANK), factor), default=None)
     if best is None or counts[best] < 2:
         return _plain(emitter, terms)
     inner: list[Term] = []
@@ -374,7 +412,7 @@ def _nested(emitter: Emitter, terms: Sequence[Term]) -> tuple[int, Expression]:
             rest.append(term)
     sign, value = _nested(emitter, inner)
     taken = emitter.meanings[best]
-    product = algebra.divide(value, taken) if best[0] == _INVERSE else algebra.multiply(value, taken)
+    product = algebra.divide(value, taken) if best // _RANK == _INVERSE else algebra.multiply(value, taken)
     if not rest:
         return sign, product
     return _signed_sum([(sign, product), _nested(emitter, rest)])

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import ctypes
+import threading
 from collections.abc import Callable
+from contextlib import suppress
 from ctypes import c_void_p
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from atwood.codegen.llvm.build import RoutineSource, build_code, default_options
+from atwood.arrays import FloatArray
+from atwood.clock import TimeIsUp
+from atwood.codegen.llvm.build import RoutineSource, build_tiers
 from atwood.codegen.llvm.module import Part
 from atwood.codegen.routines import ADDRESS, CODE, NUMBER, Routine, call_kernel, place_of
 from atwood.errors import UnsupportedError
@@ -98,7 +102,9 @@ class CompiledAccelerations:
         self._room = q + 2 * u if projects else 0
         routines = rates_source(q, u, given, projects)
         exports = ["rates", "project"] if projects else ["rates"]
-        self._built = build_code(parts, default_options(parts, is_brief), exports=exports, routines=routines)
+        tiers = build_tiers(parts, is_brief, exports, routines)
+        self._built, self._better, self._cost = tiers.quick, tiers.better, tiers.cost
+        self._lock = threading.Lock()
         self._prologues = [
             ctypes.CFUNCTYPE(None, *[c_void_p] * 3)(self._built.code.addresses[f"{name}_prologue"])
             for name in self._programs
@@ -127,11 +133,42 @@ class CompiledAccelerations:
         scratch = data + 8 * head
         pointers = [place for one in places for place in (one, scratch)]
         own[:head].view(np.uint64)[:] = [*pointers, data + 8 * room][:head]
-        addresses, keep = self._built.code.addresses, (self._built, own)
-        project = addresses["project"] if projects and self._room else 0
-        rates = CompiledRates(addresses["rates"], data, keep, project, data + 16 if project else 0)
-        prologues = tuple(addresses[f"{name}_prologue"] for name in self._programs)
+        rates = self._at(data, own, projects)
+        prologues = tuple(self._built.code.addresses[f"{name}_prologue"] for name in self._programs)
         return OwnRates(rates, prologues, places[0], scratch, tuple(places))
+
+    def _at(self, data: int, own: FloatArray, projects: bool) -> CompiledRates:
+        """Return the present code with the data of a session."""
+        built, quick = self._built, self._better is not None
+        project = built.code.addresses["project"] if projects and self._room else 0
+
+        def faster(seconds: float) -> CompiledRates | None:
+            self._spend(seconds)
+            return None if self._built is built else self._at(data, own, projects)
+
+        return CompiledRates(
+            built.code.addresses["rates"],
+            data,
+            (built, own),
+            project,
+            data + 16 if project else 0,
+            faster if quick else None,
+        )
+
+    def _spend(self, seconds: float) -> None:
+        """Take note that it has run; compile what is faster once it has run for as long as that takes."""
+        self._cost -= seconds
+        if self._cost <= 0.0:
+            with suppress(TimeIsUp):
+                self.at_its_best()
+
+    def at_its_best(self) -> CompiledAccelerations:
+        """Return this with the code that suits many runs, or a long one."""
+        with self._lock:
+            better, self._better = self._better, None
+            if better is not None:
+                self._built = better()
+        return self
 
     def fill(self, own: OwnRates, parameter_values: ArrayLike) -> None:
         """Give rates of a session their parameters."""

@@ -9,6 +9,7 @@ Memory of a session of an embedded pair: what routines and Python agree on.
 from __future__ import annotations
 
 import ctypes
+import time
 from collections.abc import Callable, Mapping
 from ctypes import c_double, c_int, c_int64, c_void_p
 from functools import partial
@@ -123,7 +124,7 @@ class CompiledStepper(NativeStepper):
         guard = problem.guard
         self._calls_python = problem.compiled is None or (guard is not None and not guard.function)
         rates = self._in_python(problem) if problem.compiled is None else problem.compiled()
-        self._keep = rates.keep
+        self._rates, self._keep = rates, rates.keep
         n, padded = problem.size, -(-problem.size // WIDTH) * WIDTH
         # All memory is one piece, since looking up an address takes longer than a step: the table, fields, and outputs.
         begin = pair.rows["all"] * padded
@@ -146,6 +147,18 @@ class CompiledStepper(NativeStepper):
         self._outputs = first, first + 8 * n
         self._routines = _routines(pair)
         self._functions = self._routines.functions
+
+    def _go_on(self, last: int, function: str, *arguments: int) -> int | None:
+        """Take steps; where these have taken long, the next ones are taken by faster code with the same bits."""
+        if self._rates.faster is None:
+            return super()._go_on(last, function, *arguments)
+        began = time.perf_counter()
+        code = super()._go_on(last, function, *arguments)
+        better = self._rates.faster(time.perf_counter() - began)
+        if better is not None:
+            self._rates, self._keep = better, (self._keep, better.keep)
+            self._set(function=better.function, project=better.project)
+        return code
 
     def batch_places(self) -> BatchPlaces:
         """Return the addresses with which many runs can be made in one call."""

@@ -20,6 +20,7 @@ from atwood.expr.core.program import Program
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import replace
+from atwood.mechanics.dynamics.equations import Equations
 from atwood.model.declare.component import bind
 from atwood.model.local.parts import LocalPart
 from atwood.model.values.space import Vector
@@ -91,7 +92,7 @@ def _make_problem(
     accelerations, _ = solve_balance(now, kept, t)
     share, moving = seen_from_afar(assembly, q, u, length, span)
     scales = find_scales(assembly, length, moving, accelerations, sizes, span)
-    not_compilable = find_not_compilable(assembly, program.residual)
+    not_compilable = find_not_compilable(assembly)
     parts = assembly, balance, finding, scales, sizes, coordinate_sizes, program, *dependent
     return SceneProblem(*parts, not_compilable=not_compilable, relative_share=share)
 
@@ -126,8 +127,11 @@ _NOT_COMPILABLE: Key[str] = Key("what cannot be compiled")
 _PLAIN = ("potential", "dissipation", "force", "inertia", "lagrangian", "derivative")
 
 
-def find_not_compilable(assembly: Assembly, program: Program) -> str:
-    """Return what keeps a program from being compiled, with the component and the law; empty if nothing does."""
+def find_not_compilable(assembly: Assembly, program: Program | None = None) -> str:
+    """Return what keeps a program, or the scene's equations, from being compiled, with the component and the law.
+
+    It is empty if nothing does.
+    """
     return assembly.shared.get(_NOT_COMPILABLE, lambda: _describe(assembly, program), program)
 
 
@@ -146,8 +150,9 @@ def _is_obstacle(node: Expression) -> bool:
     return node.operation == "external" or not has_code(node.operation)
 
 
-def _describe(assembly: Assembly, program: Program) -> str:
-    kinds = {node.operation: node for node in program.nodes}
+def _describe(assembly: Assembly, program: Program | None) -> str:
+    nodes = live(_written(assembly.own_equations)) if program is None else program.nodes
+    kinds = {node.operation: node for node in nodes}
     obstacle = next((node for node in kinds.values() if _is_obstacle(node)), None)
     if obstacle is None:
         return ""
@@ -157,6 +162,14 @@ def _describe(assembly: Assembly, program: Program) -> str:
                 if _is_obstacle(node):
                     return f"{path}.{law} {_reason(node)}"
     return f"an equation {_reason(obstacle)}"
+
+
+def _written(equations: Equations) -> Iterator[Expression]:
+    """Yield all that equations are made of."""
+    yield from equations.rows_with_multipliers or equations.rows
+    yield from (*equations.rates, *equations.constraint_rows)
+    for one in equations.constraints:
+        yield from (each for each in (one.value, one.rate) if each is not None)
 
 
 def _reason(node: Expression) -> str:

@@ -203,7 +203,7 @@ def find_way(request: SweepRequest) -> tuple[Way | None, str]:
 
 def open_places(motion: Motion, method: Method, options: RunOptions, values: FloatArray) -> BatchPlaces:
     """Open a session of a method, for one thread, and return where a batch finds what it needs of it."""
-    own = compiled_rates(motion.assembly, motion.program).open()
+    own = compiled_rates(motion.assembly, motion.program).at_its_best().open()
     task = task_of(motion, method, options, values, own)
     assert method.batch is not None
     places = method.batch(task)
