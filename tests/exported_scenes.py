@@ -36,11 +36,11 @@ def compiler() -> str | None:
 
 def built(scene: Any, folder: Path, form: str | None = None, flags: list[str] = FLAGS) -> Path:
     """Return the program that prints the motion of a scene."""
-    _, source, main = export_c(scene, folder, form=form)
+    sources = [one for one in export_c(scene, folder, form=form) if one.suffix == ".c"]
     found = compiler()
     assert found is not None
     done = subprocess.run(
-        [found, *flags, str(source), str(main), "-lm", "-o", str(folder / "motion")], capture_output=True, text=True
+        [found, *flags, *sources, "-lm", "-o", str(folder / "motion")], capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr[:4000]
     return folder / "motion"

@@ -381,7 +381,7 @@ static int broken(const scene *s)
 static double without_margin(scene *s, double t)
 {
     const double since = t - s->began, later = 1e-6 * since;
-    double now[EVENTS], least = INFINITY, most = -INFINITY;
+    double now[EVENTS] = {0.0}, least = INFINITY, most = -INFINITY;
     int i, k, clear = since > 0.0;
     for (i = 0; i < EVENTS; i++) {
         if (s->fired[i] && s->shifts[i].f == 0.0) clear = 0;
@@ -520,7 +520,15 @@ static int alter(scene *s, double t, int event)
         double guess[COORDINATES + 1];
         const int code = struck(s, t, q, u);
         if (code == 1) return say(s, FAILED, "an impact, in which something has no value");
-        if (code == 2) return say(s, FAILED, "an impact, in which a constraint would have to act against its one side");
+        if (code == 2) {
+            s->leads = side_leads[s->side];
+            s->hits = 1;
+            if (s->leads == -1) {
+                return say(s, FAILED, "an impact, in which a constraint would have to act against its one side");
+            }
+            log_event(s, t, side_sources[s->side], scene_EVENT, 0.0);
+            return s->leads >= 0 ? CHANGES : say(s, STOPPED, "an impact, which ends the motion");
+        }
         for (i = 0; i < COORDINATES; i++) guess[i] = s->state[i];
         if (state_of(s, t, guess, q, u, s->state) != READY) return FAILED;
     }
@@ -575,7 +583,10 @@ static int happen(scene *s, int i)
     log_event(s, s->time, i, scene_EVENT, 0.0);
     if (event_action[i] == ENDS) return say(s, STOPPED, event_messages[i]);
     if (event_action[i] == UPDATES_STATES) return alter(s, s->time, i);
-    return event_action[i] == LEADS ? CHANGES : say(s, READY, "");
+    if (event_action[i] != LEADS) return say(s, READY, "");
+    s->leads = event_leads[i];
+    s->hits = event_impact[i];
+    return CHANGES;
 }
 #endif
 
@@ -804,7 +815,8 @@ int scene_set_parameter(scene *s, int number, double value)
     if (!(value - value == 0.0 && scene_parameters[number].low <= value && value <= scene_parameters[number].high)) {
         return say(s, REFUSED, "a parameter cannot have this value");
     }
-    s->values[parameter_places[number]].f = value;
+    if (parameter_places[number] >= 0) s->values[parameter_places[number]].f = value; /* a mode may not have it */
+    s->is_evaluated = 0;
     return READY;
 }
 

@@ -30,8 +30,8 @@ def export_c(
     """Write a scene as C99: a source, its header, and a program that prints the motion.
 
     The source has all that a motion needs: the equations, the explicit method of order 8(5,3) with its choice of steps
-    and its dense output, steps of one length, the projection onto constraints, events, contacts and updates. It
-    allocates nothing, keeps all in one struct, and calls ``sqrt``, ``fabs`` and ``floor`` of the C library alone:
+    and its dense output, steps of one length, the projection onto constraints, events, contacts, updates and modes.
+    It allocates nothing, keeps all in one struct, and calls ``sqrt``, ``fabs`` and ``floor`` of the C library alone:
     other functions are those of Atwood, so that a motion has the same bits wherever sums and products do, which
     contraction must not change (``-ffp-contract=off``, with gcc).
 
@@ -49,13 +49,12 @@ def export_c(
     Returns
     -------
     list[Path]
-        The header, the source and ``main.c``.
+        The header, the source and ``main.c``, and headers and sources of modes, if there are several.
 
     Raises
     ------
     UnsupportedError
-        If the scene needs what has no counterpart in C: functions in Python, changes of the mode, laws that compare
-        what moves.
+        If the scene needs what has no counterpart in C: functions in Python, laws that compare what moves.
     ParameterError
         If there is no such quantity.
     UsageError
@@ -69,7 +68,7 @@ def export_c(
         raise UsageError(
             f"this folder cannot be made ({error.strerror or error})", where=str(target), advice="Give another one."
         ) from error
-    files = {f"{text.name}.h": text.header, f"{text.name}.c": text.source, "main.c": text.main}
+    files = {f"{text.name}.h": text.header, f"{text.name}.c": text.source, "main.c": text.main, **text.modes}
     for name, one in files.items():
         write_atomically(target / name, partial(Path.write_text, data=one, encoding="utf-8"))
     return [target / name for name in files]

@@ -117,8 +117,8 @@ static int masses_at(scene *s, double t, const double *q, const double *u)
 }
 
 /* Velocities after a plastic impact: the nearest admissible ones in the metric of the masses.  Returns 1 where something
- * has no value, and 2 where a constraint would have to act against its one side; it is then in s->constraint, and which
- * of its sides is in s->side. */
+ * has no value, and 2 where a constraint would have to act against its one side; it is then in s->constraint, and its
+ * number among all sides in s->side. */
 static int struck(scene *s, double t, const double *q, double *u)
 {
     double *const masses = s->masses, *const rows = s->rows_of_impact, *const right = s->right, *const x = s->unknowns;

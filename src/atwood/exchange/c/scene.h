@@ -57,7 +57,7 @@ typedef struct scene {
     double event_time;
     /* What the engine remembers. */
     double began, searched, coming, found, changed;
-    int coming_kind, is_evaluated, is_new, changes, side;
+    int coming_kind, is_evaluated, is_new, changes, side, leads, hits;
     /* memory */
 } scene;
 

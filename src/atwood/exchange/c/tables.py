@@ -25,22 +25,20 @@ def tables_of(mode: ModeText, parameters: Sequence[dict[str, Any]], sizes: dict[
     span = mode.flat.t_end - mode.flat.t_start
     until = data["schedule"]["end"]
     lines = [
-        f"const double scene_start_time = {literal(mode.flat.t_start)};",
-        f"const double scene_end_time = {literal(mode.flat.t_end)};",
         array("values", data["values"]),
         array("start_state", data["state"]),
         array("tolerances", data["tolerances"]),
         f"static const double relative_share = {literal(data['relative'])};",
         f"static const double horizon = {literal(span if span > 0 else 1.0)};",
         f"static const double known_until = {literal(math.inf if until is None else until)};",
-        array("parameter_places", [data["numbers"][one["path"]] for one in parameters], "int"),
+        array("parameter_places", [data["numbers"].get(one["path"], -1) for one in parameters], "int"),
     ]
     if sizes["JUDGES"]:
         lines.append(array("judged_by", data["judged"]))
     if sizes["TURNS"]:
         lines.append(array("turn_starts", accumulate(map(len, data["turns"]), initial=0), "int"))
         lines.append(array("turn_places", [i for turn in data["turns"] for i in turn], "int"))
-    if sizes["CONSTRAINTS"] or sizes["PASSAGE"]:
+    if sizes["CONSTRAINTS"] or sizes.get("HAS_MAXIMAL") or sizes.get("SIGNS"):
         lines.append(array("sizes", data["sizes"]))
     if sizes["CONSTRAINTS"] or sizes["CONTACTS"]:
         lines.append(f"static const double time_scale = {literal(data['time'])};")
@@ -62,10 +60,27 @@ def tables_of(mode: ModeText, parameters: Sequence[dict[str, Any]], sizes: dict[
         lines += _updates(data)
         lines += _lists("event_updates", [one["updates"] for one in data["events"]], "update_firsts")
     if sizes["PASSAGE"]:
-        lines += _passage(data["passage"], sizes)
-    lines.append(_texts("const char *const scene_sources", sources(mode)))
-    lines.append(_texts("const char *const scene_kinds", KINDS))
-    names = [*data["coordinates"], *data["speeds"]]
+        lines += _passage(data["passage"], sizes, sources(mode))
+    if data["modes_of_scene"] > 1:
+        lines.append(array("held_places", [data["held"][path] for path in sorted(data["held"])], "int"))
+        if sizes["SIGNS"]:
+            signs = data["passage"]["signs"]
+            lines.append(array("line_of_parts", mode.assembly.mechanism.space.line or ()))
+            lines.append(array("sign_places", [i for a, b, _ in signs for i in (a, b)], "int"))
+            lines.append(array("signs", [sign for *_, sign in signs]))
+    return [*lines, *exported_tables([mode], parameters)]
+
+
+def exported_tables(modes: Sequence[ModeText], parameters: Sequence[dict[str, Any]]) -> list[str]:
+    """Return the tables that a header tells of."""
+    mode = modes[0]
+    lines = [
+        f"const double scene_start_time = {literal(mode.flat.t_start)};",
+        f"const double scene_end_time = {literal(mode.flat.t_end)};",
+        _texts("const char *const scene_sources", [law for one in modes for law in sources(one)]),
+        _texts("const char *const scene_kinds", KINDS),
+    ]
+    names = [*mode.data["coordinates"], *mode.data["speeds"]]
     described = [("states", [(one["name"], one["unit"]) for one in names])]
     described.append(("quantities", [(one.path, one.unit) for one in mode.known]))
     for key, ones in described:
@@ -94,7 +109,7 @@ def action_of(event: dict[str, Any]) -> int:
         return UPDATES
     if event["target"] in ("", UPDATE):
         return NOTED
-    return ENDS if event["target"] == "stop" else LEADS
+    return LEADS if event["leads"] >= 0 or "contact" in event else ENDS
 
 
 def _events(data: dict[str, Any], sizes: dict[str, int]) -> list[str]:
@@ -102,6 +117,8 @@ def _events(data: dict[str, Any], sizes: dict[str, int]) -> list[str]:
     lines = [array(f"event_{name}", [one[name] for one in events]) for name in ("small", "direction")]
     lines.append(array("event_noted", [int(one["noted"]) for one in events], "int"))
     lines.append(array("event_action", map(action_of, events), "int"))
+    lines.append(array("event_leads", [one["leads"] for one in events], "int"))
+    lines.append(array("event_impact", [int(one["impact"]) for one in events], "int"))
     texts = [f"{one['part']}: {one['message']}" for one in events]
     lines.append(_texts("static const char *const event_messages", texts))
     waves = [f(1 + 2.4 * i) for f in (math.cos, math.sin) for i in range(sizes["SIZE"])]
@@ -159,8 +176,9 @@ def _updates(data: dict[str, Any]) -> list[str]:
     ]
 
 
-def _passage(passage: dict[str, Any], sizes: dict[str, int]) -> list[str]:
+def _passage(passage: dict[str, Any], sizes: dict[str, int], known: Sequence[str]) -> list[str]:
     sides = [(i, float(sign)) for i, each in enumerate(passage["refused"]) for sign, _ in each]
+    by = [one for each in passage["refused"] for _, one in each]
     laws = list(dict.fromkeys(map(tuple, passage["laws"])))
     first = sizes["EVENTS"] + sizes["CONTACTS"]
     lines = [
@@ -170,6 +188,8 @@ def _passage(passage: dict[str, Any], sizes: dict[str, int]) -> list[str]:
         *_places(("body_slope_rows", "body_slope_columns"), passage["slopes_of_constraints"]),
     ]
     if sizes["SWITCHES"]:
+        lines.append(array("side_leads", [-2 if one["target"] == "stop" else one["leads"] for one in by], "int"))
+        lines.append(array("side_sources", [known.index(f"{one['part']}.{one['law']}") for one in by], "int"))
         lines.append(array("body_laws", [first + laws.index(tuple(one)) for one in passage["laws"]], "int"))
     if "slopes" in passage:
         lines += _places(("place_rows", "place_columns"), passage["slopes"])

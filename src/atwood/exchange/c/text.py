@@ -7,13 +7,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib.resources import files
 from typing import Any
 
-from atwood.codegen.c.printer import BITS, HEAD, WORDS, print_routines, reached
+from atwood.codegen.c.printer import BITS, HEAD, print_routines, reached
 from atwood.codegen.c.program import functions_of, print_program
 from atwood.codegen.functions import write_routines as write_functions
 from atwood.codegen.llvm.linear_systems import write_elimination
 from atwood.codegen.routines import Routine
 from atwood.errors import UnsupportedError
-from atwood.exchange.c.tables import ENDS, KINDS, LEADS, NOTED, UPDATES, action_of, sources, tables_of
+from atwood.exchange.c.modes import header_of_modes, header_with, mode_after, source_of_modes, with_declarations
+from atwood.exchange.c.tables import ENDS, LEADS, NOTED, UPDATES, sources, tables_of
 from atwood.expr.core.program import Program
 from atwood.forms.assembly import Assembly
 from atwood.integrators import set_routines as sets
@@ -36,7 +37,7 @@ from atwood.plotting.live.start import add_tangent
 _CALLED = {"constraints": "held"}
 """Programs that C calls otherwise, since a routine of the method has their name."""
 
-_ASKED = "constraints", "quantities", "loads", "contacts", "maximal", "impact", "tangent"
+_ASKED = "constraints", "quantities", "loads", "contacts", "maximal", "impact", "tangent", "places"
 """Programs of (t, q, u) and more that the engine calls itself, beside updates."""
 
 _LOGGED = 64
@@ -59,8 +60,12 @@ class SceneText:
         Its name in C, with which all names of the header begin.
     header, source, main
         The files.
+    modes
+        Files of modes by their names, if there are several.
     mode
-        What was printed.
+        What was printed; the first mode.
+    size
+        The number of states, in the mode that has most.
     parameters
         What can be changed, as `atwood.plotting.live.parameters.live_parameters` describes it.
     start_time, end_time
@@ -71,7 +76,9 @@ class SceneText:
     header: str
     source: str
     main: str
+    modes: dict[str, str]
     mode: ModeText
+    size: int
     parameters: Sequence[dict[str, Any]]
     start_time: float
     end_time: float
@@ -102,31 +109,39 @@ def scene_text(
     """
     modes, _ = live_modes(assembly, quantities=quantities)
     mode = modes[0]
-    _refuse(mode, len(modes))
-    if "passage" in mode.data:
-        add_tangent(mode)
+    for one in modes:
+        if "sides" in one.data:
+            raise UnsupportedError("a law that compares what moves is not exported", where=mode.flat.name)
+        if "passage" in one.data:
+            add_tangent(one)
+        one.data["modes_of_scene"] = len(modes)
+        sides = [by for each in one.data.get("passage", {}).get("refused", ()) for _, by in each]
+        for event in (*one.data["events"], *sides):
+            event["leads"] = mode_after(one, event, modes)
     name, parameters = c_name(assembly.flat.name), live_parameters(mode.assembly)
-    beside = more(mode) if more else {}
+    beside = more(mode) if more and len(modes) == 1 else {}
+    texts = [(_header(one, parameters, beside), _source(one, parameters, beside)) for one in modes]
+    header, source = texts[0]
+    of_modes: dict[str, str] = {}
+    if len(modes) > 1:
+        for k, (own_header, own_source) in enumerate(texts):
+            own = f"{name}_mode{k}"
+            of_modes[f"{own}.h"] = with_name(with_declarations(own_header), own)
+            of_modes[f"{own}.c"] = with_name(own_source, own)
+        header = header_of_modes(_template("scene.h"), modes, _counts(modes, parameters))
+        source = source_of_modes(_template("modes.c"), modes, parameters)
     return SceneText(
         name,
-        with_name(_header(mode, parameters, beside), name),
-        with_name(_source(mode, parameters, beside), name),
+        with_name(header, name),
+        with_name(source, name),
         with_name(_template("main.c"), name),
+        of_modes,
         mode,
+        max(len(one.data["state"]) for one in modes),
         parameters,
         mode.flat.t_start,
         mode.flat.t_end,
     )
-
-
-def _refuse(mode: ModeText, modes: int) -> None:
-    """Say what C does not follow."""
-    if "sides" in mode.data:
-        raise UnsupportedError("a law that compares what moves is not exported", where=mode.flat.name)
-    for event in mode.data["events"]:
-        if modes > 1 and action_of(event) == LEADS and "contact" not in event:
-            where = f"{event['part']}.{event['law']}"
-            raise UnsupportedError(f"an event that leads to the mode {event['target']!r} is not exported", where=where)
 
 
 def c_name(name: str) -> str:
@@ -151,7 +166,8 @@ def _programs(mode: ModeText) -> dict[str, Program]:
     known = mode.programs
     names = ["kernel", "nearer", "judge", "events", "constraints", "quantities", "loads", "contacts"]
     names += [one for one in known if one.startswith("update_")]
-    names += ["maximal", "impact", "tangent"] if "passage" in mode.data else []
+    if "passage" in mode.data:
+        names += ["maximal", "impact", "tangent", *(["places"] if mode.data["passage"]["signs"] else [])]
     found = {one: known[own] for one in names if (own := _CALLED.get(one, one)) in known}
     if not mode.data["constraints"]:
         found.pop("constraints", None)
@@ -194,6 +210,7 @@ def _sizes_of_changes(data: dict[str, Any], programs: dict[str, Program]) -> dic
     found = {"UPDATES": len(updates.get("laws", ())), "MOMENTS": len(updates.get("times", ()))}
     found |= {"CONTACTS": len(contacts.get("keys", ())), "PASSAGE": int(bool(passage))}
     found["SWITCHES"] = int(bool(passage) and passage["switches"])
+    found["HELD_VALUES"] = len(data["held"])
     if contacts:
         found |= {"CONTACT_ROWS": contacts["size"], "PATTERN": len(contacts["pattern"]) // 2}
         found |= {"UNITS": len(sets.UNITS), "ENTRY": len(sets.ENTRY)}
@@ -206,7 +223,7 @@ def _sizes_of_changes(data: dict[str, Any], programs: dict[str, Program]) -> dic
         found |= {"HAS_MAXIMAL": int("maximal" in programs), "ONE_SIDES": sum(map(len, passage["refused"]))}
         found |= {"PLACE_SLOPES": len(passage.get("slopes", [()])[0]), "ALONG": len(passage["along"])}
         found |= {"TURNED": len(passage["turned"]), "HAS_TANGENT": int("tangent" in programs)}
-        found |= {"TANGENTS": len(data.get("tangent", [()])[0])}
+        found |= {"TANGENTS": len(data.get("tangent", [()])[0]), "SIGNS": len(passage["signs"])}
     return found
 
 
@@ -216,14 +233,19 @@ def _sizes_of_changes(data: dict[str, Any], programs: dict[str, Program]) -> dic
 def _header(mode: ModeText, parameters: Sequence[dict[str, Any]], beside: dict[str, Program]) -> str:
     programs = _programs(mode)
     sizes = _sizes(mode, programs)
-    text = _template("scene.h")
-    counts = {"STATES": sizes["SIZE"], "PARAMETERS": len(parameters), "QUANTITIES": len(mode.known)}
-    counts |= {"COORDINATES": sizes["COORDINATES"]}
-    counts |= {"SOURCES": len(sources(mode)), "LOGGED": _LOGGED}
-    lines = "\n".join(f"#define scene_{key} {one}" for key, one in counts.items())
-    lines += f"\nenum {{ {', '.join(f'scene_{one.upper()}' for one in KINDS)} }};"
-    text = text.replace("/* counts */", lines).replace("/* word */", WORDS.replace("word", "scene_word"))
-    return text.replace("    /* memory */", "\n".join(f"    {one};" for one in _memory(programs | beside, sizes)))
+    return header_with(_template("scene.h"), _counts([mode], parameters), _memory(programs | beside, sizes))
+
+
+def _counts(modes: Sequence[ModeText], parameters: Sequence[dict[str, Any]]) -> dict[str, int]:
+    data = modes[0].data
+    return {
+        "STATES": max(len(one.data["state"]) for one in modes),
+        "PARAMETERS": len(parameters),
+        "QUANTITIES": len(modes[0].known),
+        "COORDINATES": len(data["coordinates"]),
+        "SOURCES": sum(len(sources(one)) for one in modes),
+        "LOGGED": _LOGGED,
+    }
 
 
 def _memory(programs: dict[str, Program], sizes: dict[str, int]) -> list[str]:
@@ -310,6 +332,7 @@ def _source(mode: ModeText, parameters: Sequence[dict[str, Any]], beside: dict[s
         *([_updating(programs)] if sizes["UPDATES"] else []),
         _filling(programs),
         _engine(sizes),
+        *([_template("mode.c")] if mode.data["modes_of_scene"] > 1 else []),
     ]
     return "\n".join(parts)
 

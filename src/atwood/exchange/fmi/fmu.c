@@ -5,6 +5,23 @@
 
 /* inputs */
 
+#if MODES
+static void link_memory(scene *s)
+{
+    refresh_links(s);
+}
+
+static void in_piece(scene *s, double t)
+{
+    refresh(s, t);
+}
+
+static void fill(scene *s)
+{
+    refresh(s, s->time);
+}
+#endif
+
 #if defined(_WIN32)
 #define EXPORT __declspec(dllexport)
 #elif defined(__GNUC__)

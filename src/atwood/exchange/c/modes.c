@@ -1,0 +1,99 @@
+/* A scene with modes: each has a source of its own, and what is asked goes to the mode that the scene is in. */
+#include "scene.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { READY = scene_READY, STOPPED = scene_STOPPED, FAILED = scene_FAILED, REFUSED = scene_REFUSED };
+enum { BEGIN, GO_ON, EVALUATE, RATES };
+
+#define MODES 1
+#define SIZE scene_STATES
+#define EVENTS 0
+#define CHANGES (-2) /* a mode ends, and another one begins */
+
+/* tables */
+static int say(scene *s, int status, const char *text)
+{
+    s->status = status;
+    s->text = text;
+    return status;
+}
+
+static void log_event(scene *s, double time, int source, int kind, double speed)
+{
+    scene_happening *const one = s->log + s->happened % scene_LOGGED;
+    one->time = time;
+    one->speed = speed;
+    one->source = source;
+    one->kind = kind;
+    s->happened++;
+}
+
+/* modes */
+/* Go on through changes of the mode. */
+static int settle(scene *s, int status)
+{
+    while (status == CHANGES) {
+        s->changes = s->time - s->changed <= 1e-9 * fabs(scene_end_time - scene_start_time) ? s->changes + 1 : 0;
+        s->changed = s->time;
+        status = s->changes > 50 ? say(s, FAILED, "the mode changes without end") : change(s);
+    }
+    s->status = status;
+    return status;
+}
+
+static int begin_at(scene *s, double t, const double *state, int is_start)
+{
+    s->time = t;
+    s->is_new = is_start;
+    memmove(s->state, state, sizeof s->state);
+    return settle(s, ask(s, BEGIN, t, NULL));
+}
+
+int scene_begin(scene *s)
+{
+    const int is_start = s->is_new;
+    if (is_start) s->happened = 0;
+    s->changes = 0;
+    refresh(s, s->time);
+    return begin_at(s, s->time, s->state, is_start);
+}
+
+int scene_advance(scene *s, double time)
+{
+    int status;
+    if (s->status == FAILED || s->status == scene_AT_SINGULARITY || s->status == STOPPED) return s->status;
+    do {
+        status = ask(s, GO_ON, time, NULL);
+        if (status != CHANGES) return s->status = status;
+        status = settle(s, status);
+    } while (status == READY);
+    return status;
+}
+
+int scene_evaluate(scene *s, double *quantities)
+{
+    return ask(s, EVALUATE, s->time, quantities);
+}
+
+int scene_rates(scene *s, double *rates)
+{
+    return ask(s, RATES, s->time, rates);
+}
+
+int scene_set_parameter(scene *s, int number, double value)
+{
+    const scene_parameter_of *const one = scene_parameters + number;
+    if (!(value - value == 0.0 && one->low <= value && value <= one->high)) {
+        return say(s, REFUSED, "a parameter cannot have this value");
+    }
+    set_in_modes(s, number, value);
+    return READY;
+}
+
+void scene_copy(scene *target, const scene *source)
+{
+    memmove(target, source, sizeof *target);
+    refresh_links(target);
+}
