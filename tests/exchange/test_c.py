@@ -2,12 +2,13 @@
 
 import json
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from atwood import Scene, assemble, export_c, simulate
+from atwood import Scene, assemble, export_c, export_fmu, floor, sign, simulate
 from atwood.cli import main
 from atwood.errors import ParameterError, UnsupportedError, UsageError
 from atwood.exchange.c.tables import quoted
@@ -17,6 +18,10 @@ from atwood_library import Drive, Ground, PointMass, Rod
 from atwood_library.scenes import SCENES
 
 from ..exported_scenes import FLAGS, apart, built, compiler, happened, printed
+from ..library.test_tables import hoisted
+from ..plotting.test_live import slack_string
+from ..simulation.contacts.test_drive_trains import lossy_train
+from ..simulation.test_sides import band, moving
 
 needs_a_compiler = pytest.mark.skipif(compiler() is None, reason="there is no C compiler")
 SAMPLE = ("double-pendulum", "reduced"), ("four-bar", "dae"), ("rolling-disc", "reduced")
@@ -37,19 +42,39 @@ def test_motions_are_those_of_simulate(name: str, form: str, tmp_path: Path) -> 
         assert states[0] == states[2] != "0", equal
 
 
+HAPPENING: dict[str, tuple[Callable[[], Scene], str, int]] = {
+    "contacts": (SCENES["clutches"], "reduced", 8),
+    "updates": (SCENES["cart-pole"], "reduced", 0),
+    "modes": (slack_string, "dae", 2),
+    "an update that strikes, and a mode": (lambda: hoisted("plane"), "reduced", 2),
+    "a side": (lambda: moving(band(1e-3)), "reduced", 0),
+    "floors": (lambda: moving(lambda x, v: 0.1 * floor(3.0 * x)), "dae", 0),
+}
+
+
 @needs_a_compiler
-@pytest.mark.parametrize("name", ["clutches", "cart-pole"])
+@pytest.mark.parametrize("name", HAPPENING)
 def test_what_happens_in_c_is_what_happens_in_runs(name: str, tmp_path: Path) -> None:
-    scene = SCENES[name]()
-    program = built(scene, tmp_path, "reduced", QUICK)
-    result = simulate(scene, rtol=1e-11, t_end=1.2, outputs=np.linspace(0.0, 1.2, 5), solver="explicit")
-    worst, where, _ = apart(printed(program, 1.2, 1e-11, 5), result, assemble(scene))
+    scene, form, count = HAPPENING[name]
+    span = 4.0 if form == "dae" and name == "floors" else 1.6
+    program = built(scene(), tmp_path, form, QUICK)
+    outputs = np.linspace(0.0, span, 6)
+    result = simulate(scene(), form=form, rtol=1e-11, t_end=span, outputs=outputs, solver="explicit")
+    worst, where, _ = apart(printed(program, span, 1e-11, 6), result, assemble(scene(), form=form))
     assert worst <= 1e-9, where
     known = sorted((one.kind, f"{one.part}.{one.law}", one.time) for one in result.events)
-    found = sorted(happened(program, 1.2, 1e-11))
+    found = sorted(happened(program, span, 1e-11))
     assert [one[:2] for one in found] == [one[:2] for one in known]
     assert [one[2] for one in found] == pytest.approx([one[2] for one in known], abs=1e-12)
-    assert len(found) == (8 if name == "clutches" else 0)
+    assert len(found) == count
+
+
+@needs_a_compiler
+def test_a_motion_that_stays_on_a_switch_ends_with_a_word(tmp_path: Path) -> None:
+    program = built(moving(lambda x, v: -0.3 * sign(v)), tmp_path, "reduced", QUICK)
+    done = subprocess.run([program, "5", "1e-9", "2"], capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "stays where a law switches" in done.stderr
 
 
 @needs_a_compiler
@@ -124,10 +149,11 @@ int main(void)
     assert a == pytest.approx(simulate(scene, rtol=1e-12, t_end=1.0, outputs=[0.0, 1.0])["rod1.angle"][-1], abs=1e-9)
 
 
-@pytest.mark.parametrize("name", ["trebuchet"])
-def test_what_has_no_counterpart_is_refused_by_name(name: str, tmp_path: Path) -> None:
-    with pytest.raises(UnsupportedError, match="it is not exported"):
-        export_c(SCENES[name](), tmp_path)
+def test_what_has_no_counterpart_is_refused_by_name(tmp_path: Path) -> None:
+    with pytest.raises(UnsupportedError, match=r"it is not exported: the limit of gear\."):
+        export_c(lossy_train(bearing=True), tmp_path)
+    with pytest.raises(UnsupportedError, match="not exported"):
+        export_fmu(lossy_train(bearing=True), tmp_path / "a.fmu")
 
 
 def test_wrong_paths_and_folders_are_refused(tmp_path: Path) -> None:

@@ -13,9 +13,11 @@ import pytest
 
 from atwood import export_fmu, simulate
 from atwood.cli import main
-from atwood.errors import UnsupportedError, UsageError
+from atwood.errors import UsageError
 from atwood.exchange.fmi import build
 from atwood_library.scenes import SCENES
+
+from ..plotting.test_live import slack_string
 
 needs_a_compiler = pytest.mark.skipif(build.find_compiler() is None, reason="there is no C compiler")
 
@@ -204,8 +206,25 @@ def test_what_cannot_be_is_refused(tmp_path: Path) -> None:
         export_fmu(scene, tmp_path / "a.fmu", fmi=2, platform=["aarch64-linux"])
     with pytest.raises(UsageError, match="fmi cannot be 4"):
         export_fmu(scene, tmp_path / "a.fmu", fmi=4)
-    with pytest.raises(UnsupportedError, match="not exported"):
-        export_fmu(SCENES["trebuchet"](), tmp_path / "a.fmu")
+
+
+@needs_a_compiler
+def test_a_scene_with_modes_is_for_co_simulation_and_its_states_are_kept(tmp_path: Path) -> None:
+    made = export_fmu(slack_string(), tmp_path / "a.fmu", output=["bob.position.x", "rope.tension"])
+    assert (made.kinds, made.reason) == (("co-simulation",), "each of its modes has states of its own")
+    unit = Unit(made.file, "CoSimulation")
+    unit.step(0.0, 0.7)
+    kept = c_void_p()
+    unit.call("GetFMUState", byref(kept))
+    unit.step(0.7, 0.9)
+    there = unit.get("bob.position.x", "rope.tension")
+    unit.call("SetFMUState", kept)
+    unit.call("FreeFMUState", byref(kept))
+    unit.step(0.7, 0.9)
+    assert unit.get("bob.position.x", "rope.tension") == there
+    known = simulate(slack_string(), rtol=1e-12, t_end=1.6, outputs=[0.0, 1.6], solver="explicit")
+    assert len(known.events) == 2
+    assert there == [pytest.approx(known[one][-1], abs=1e-6) for one in ("bob.position.x", "rope.tension")]
 
 
 @needs_a_compiler

@@ -342,6 +342,7 @@ static int at(scene *s, double t)
 
 #if EVENTS
 /* contacts */
+/* sides */
 /* Take the signs of events at a start; those that start at zero have a margin to pass, in the direction that counts. */
 static int listen(scene *s, double t)
 {
@@ -351,6 +352,9 @@ static int listen(scene *s, double t)
     for (i = 0; i < EVENTS; i++) {
         const double small = event_small[i] * s->rtol, now = s->event_y[i].f;
         s->shifts[i].f = !event_noted[i] && fabs(now) <= small ? -event_direction[i] * small : 0.0;
+#if SIDES
+        if (event_side[i] >= 0 && now <= 0.0) s->shifts[i].f = 2.0 * fabs(now) + 1e-300;
+#endif
         s->rows[EVENTS * SEARCHED_given + i].f = s->fired[i] ? 2.0 : 0.0;
         s->rows[EVENTS * SEARCHED_direction + i].f = event_direction[i];
         s->rows[EVENTS * SEARCHED_sign + i].f = 0.0;
@@ -486,7 +490,7 @@ static int alter(scene *s, double t, int event)
 #if SWITCHES
     double *const q = s->places, *const u = s->velocities, *const was = s->was, *const now = s->now;
     double fastest, faster = 0.0;
-    int i, has_impact = 0;
+    int i, has_impact = 0, told = -1;
     if (bodies_of(s, t, s->state, q, u) != 0) return say(s, FAILED, "the bodies have no place");
     fastest = misses(s, t, q, u, was, was + BODY_CONSTRAINTS);
 #endif
@@ -509,13 +513,8 @@ static int alter(scene *s, double t, int event)
         s->constraint = i;
         return say(s, FAILED, "a motion that is prescribed jumps, and no position can");
     }
-    for (i = BODY_CONSTRAINTS; i < 2 * BODY_CONSTRAINTS; i++) {
-        if (fabs(now[i] - was[i]) <= 1e-9 * fmax(fastest, faster)) continue;
-        if (!has_impact || body_laws[i - BODY_CONSTRAINTS] != body_laws[i - BODY_CONSTRAINTS - 1]) {
-            log_event(s, t, body_laws[i - BODY_CONSTRAINTS], scene_IMPACT, 0.0);
-        }
-        has_impact = 1;
-    }
+    fastest = 1e-9 * fmax(fastest, faster);
+    for (i = BODY_CONSTRAINTS; i < 2 * BODY_CONSTRAINTS; i++) has_impact |= fabs(now[i] - was[i]) > fastest;
     if (has_impact) {
         double guess[COORDINATES + 1];
         const int code = struck(s, t, q, u);
@@ -528,6 +527,10 @@ static int alter(scene *s, double t, int event)
             }
             log_event(s, t, side_sources[s->side], scene_EVENT, 0.0);
             return s->leads >= 0 ? CHANGES : say(s, STOPPED, "an impact, which ends the motion");
+        }
+        for (i = BODY_CONSTRAINTS; i < 2 * BODY_CONSTRAINTS; i++) {
+            const int law = body_laws[i - BODY_CONSTRAINTS];
+            if (fabs(now[i] - was[i]) > fastest && law != told) log_event(s, t, told = law, scene_IMPACT, 0.0);
         }
         for (i = 0; i < COORDINATES; i++) guess[i] = s->state[i];
         if (state_of(s, t, guess, q, u, s->state) != READY) return FAILED;
@@ -606,6 +609,11 @@ static int begin_at(scene *s, double t, const double *state, int is_start)
 #if CONTACTS
         if (resolve_contacts(s, t, is_start) != READY) return FAILED;
 #endif
+#if SIDES
+        for (i = 0; i < SIZE; i++) s->state[i] = s->y[i].f;
+        if (!take_sides_from(s, t)) return say(s, FAILED, "the motion stays where a law switches, which C does not follow");
+        for (i = 0; i < SIZE; i++) s->y[i].f = s->state[i];
+#endif
         if (begin_mode(s, t) != READY) return FAILED;
         (void)is_start;
         is_start = 0;
@@ -651,15 +659,25 @@ static int pass(scene *s)
 #endif
 #if EVENTS
     {
-        int i, leads = -1;
+        int i, leads = -1, passes = 0;
         take(s, s->coming, s->event_y);
         for (i = 0; i < EVENTS; i++) {
-            if (s->fired[i] && event_action[i] != NOTED && leads < 0) leads = i;
+            if (s->fired[i] && event_action[i] != NOTED && event_action[i] != PASSES && leads < 0) leads = i;
         }
+#if SIDES
+        for (i = 0; i < EVENTS; i++) {
+            if (!s->fired[i] || event_side[i] < 0) continue;
+            s->passed_sides[event_side[i]] = passes = 1;
+        }
+#endif
         for (i = 0; i < EVENTS; i++) {
             if (s->fired[i] && event_action[i] == NOTED) happen(s, i);
         }
         if (leads >= 0) return begin_again(s, happen(s, leads));
+        if (passes) {
+            memset(s->fired, 0, sizeof s->fired);
+            return begin_again(s, AGAIN);
+        }
         watch(s);
     }
 #endif

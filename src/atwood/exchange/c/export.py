@@ -54,7 +54,8 @@ def export_c(
     Raises
     ------
     UnsupportedError
-        If the scene needs what has no counterpart in C: functions in Python, laws that compare what moves.
+        If the scene needs what has no counterpart in C: functions in Python, contacts beside
+        modes, three coordinates of an orientation.
     ParameterError
         If there is no such quantity.
     UsageError

@@ -11,9 +11,13 @@ from atwood.codegen.c.printer import literal
 from atwood.integrators import set_routines as sets
 from atwood.mechanics.outputs.event_functions import CLOSES, RESTS, RUNS, UPDATE
 from atwood.plotting.live.mode import ModeText
+from atwood.simulation.events.sides import SIDE
 
-NOTED, ENDS, UPDATES, LEADS = range(4)
-"""What an event leads to: nothing, the end, other states, or another mode."""
+NOTED, ENDS, UPDATES, LEADS, PASSES = range(5)
+"""What an event leads to: nothing, the end, other states, another mode, or the other side of what a law compares."""
+
+SIDE_KINDS = ("less", "less_equal", "nonzero", "sign", "floor")
+"""Kinds of relations of what moves."""
 
 KINDS = ("event", "impact", "rests", "closes", "opens", "reverses", "sticks", "slips")
 """What happens, as results name it."""
@@ -40,7 +44,9 @@ def tables_of(mode: ModeText, parameters: Sequence[dict[str, Any]], sizes: dict[
         lines.append(array("turn_places", [i for turn in data["turns"] for i in turn], "int"))
     if sizes["CONSTRAINTS"] or sizes.get("HAS_MAXIMAL") or sizes.get("SIGNS"):
         lines.append(array("sizes", data["sizes"]))
-    if sizes["CONSTRAINTS"] or sizes["CONTACTS"]:
+    if sizes["SIDES"]:
+        lines.append(array("side_kinds", [SIDE_KINDS.index(one) for one in data["sides"]["kinds"]], "int"))
+    if sizes["CONSTRAINTS"] or sizes["CONTACTS"] or sizes["SIDES"]:
         lines.append(f"static const double time_scale = {literal(data['time'])};")
     if sizes["CONSTRAINTS"]:
         lines += _places(("slope_rows", "slope_columns"), data["slopes"])
@@ -109,6 +115,8 @@ def action_of(event: dict[str, Any]) -> int:
         return UPDATES
     if event["target"] in ("", UPDATE):
         return NOTED
+    if event["target"] == SIDE:
+        return PASSES
     return LEADS if event["leads"] >= 0 or "contact" in event else ENDS
 
 
@@ -123,6 +131,9 @@ def _events(data: dict[str, Any], sizes: dict[str, int]) -> list[str]:
     lines.append(_texts("static const char *const event_messages", texts))
     waves = [f(1 + 2.4 * i) for f in (math.cos, math.sin) for i in range(sizes["SIZE"])]
     lines.append(array("turns", waves))
+    if sizes["SIDES"]:
+        sides = [int(one["law"]) if one["target"] == SIDE else -1 for one in events]
+        lines.append(array("event_side", sides, "int"))
     if sizes["CONTACTS"]:
         units, found = data["contacts"]["units"], [one.get("contact", (-1, 0)) for one in events]
         lines.append(array("event_contact", [k for k, _ in found], "int"))

@@ -12,9 +12,8 @@ from atwood.codegen.c.program import functions_of, print_program
 from atwood.codegen.functions import write_routines as write_functions
 from atwood.codegen.llvm.linear_systems import write_elimination
 from atwood.codegen.routines import Routine
-from atwood.errors import UnsupportedError
 from atwood.exchange.c.modes import header_of_modes, header_with, mode_after, source_of_modes, with_declarations
-from atwood.exchange.c.tables import ENDS, LEADS, NOTED, UPDATES, sources, tables_of
+from atwood.exchange.c.tables import ENDS, LEADS, NOTED, PASSES, SIDE_KINDS, UPDATES, sources, tables_of
 from atwood.expr.core.program import Program
 from atwood.forms.assembly import Assembly
 from atwood.integrators import set_routines as sets
@@ -37,7 +36,7 @@ from atwood.plotting.live.start import add_tangent
 _CALLED = {"constraints": "held"}
 """Programs that C calls otherwise, since a routine of the method has their name."""
 
-_ASKED = "constraints", "quantities", "loads", "contacts", "maximal", "impact", "tangent", "places"
+_ASKED = "constraints", "quantities", "loads", "contacts", "sides", "maximal", "impact", "tangent", "places"
 """Programs of (t, q, u) and more that the engine calls itself, beside updates."""
 
 _LOGGED = 64
@@ -110,8 +109,6 @@ def scene_text(
     modes, _ = live_modes(assembly, quantities=quantities)
     mode = modes[0]
     for one in modes:
-        if "sides" in one.data:
-            raise UnsupportedError("a law that compares what moves is not exported", where=mode.flat.name)
         if "passage" in one.data:
             add_tangent(one)
         one.data["modes_of_scene"] = len(modes)
@@ -154,7 +151,7 @@ def c_name(name: str) -> str:
 
 def with_name(text: str, name: str) -> str:
     """Return a text in which names of the header begin with that of the scene."""
-    return re.sub(r'(?<=")scene(?=\.h")|\bscene(?=_[A-Za-z])|\bscene\b(?=[ ;*)])', name, text)
+    return re.sub(r'(?<=")scene(?=\.[ch]")|\bscene(?=_[A-Za-z])|\bscene\b(?=[ ;*)])', name, text)
 
 
 def _template(name: str) -> str:
@@ -164,7 +161,7 @@ def _template(name: str) -> str:
 def _programs(mode: ModeText) -> dict[str, Program]:
     """Return the programs that a motion needs, by their names in C."""
     known = mode.programs
-    names = ["kernel", "nearer", "judge", "events", "constraints", "quantities", "loads", "contacts"]
+    names = ["kernel", "nearer", "judge", "events", "constraints", "quantities", "loads", "contacts", "sides"]
     names += [one for one in known if one.startswith("update_")]
     if "passage" in mode.data:
         names += ["maximal", "impact", "tangent", *(["places"] if mode.data["passage"]["signs"] else [])]
@@ -210,6 +207,8 @@ def _sizes_of_changes(data: dict[str, Any], programs: dict[str, Program]) -> dic
     found = {"UPDATES": len(updates.get("laws", ())), "MOMENTS": len(updates.get("times", ()))}
     found |= {"CONTACTS": len(contacts.get("keys", ())), "PASSAGE": int(bool(passage))}
     found["SWITCHES"] = int(bool(passage) and passage["switches"])
+    sides = data.get("sides", {"kinds": [], "first": 0})
+    found |= {"SIDES": len(sides["kinds"]), "FIRST_SIDE": sides["first"]}
     found["HELD_VALUES"] = len(data["held"])
     if contacts:
         found |= {"CONTACT_ROWS": contacts["size"], "PATTERN": len(contacts["pattern"]) // 2}
@@ -281,6 +280,8 @@ def _memory(programs: dict[str, Program], sizes: dict[str, int]) -> list[str]:
         lines += ["double held_last, held_largest", f"double held_most[{max(sizes['KEPT'], 1)}]"]
     if sizes["CONTACTS"]:
         lines += [f"double triggers[{sizes['CONTACTS']}]", f"int calm[{max(events, 1)}]"]
+    if sizes["SIDES"]:
+        lines.append(f"int passed_sides[{sizes['SIDES']}]")
     if sizes["UPDATES"]:
         most = max((len(one.results) for name, one in programs.items() if name.startswith("update_")), default=1)
         lines.append(f"double set_by_update[{max(most, 1)}]")
@@ -321,7 +322,8 @@ def _source(mode: ModeText, parameters: Sequence[dict[str, Any]], beside: dict[s
         _numbered("ROW", TABLEAU.rows),
         *([_numbered("SOUGHT", SEARCH_FIELDS), _numbered("SEARCHED", SEARCH_ROWS)] if sizes["EVENTS"] else []),
         *([_numbered("SET", sets.FIELDS), _numbered("UNIT", sets.UNITS)] if sizes["CONTACTS"] else []),
-        f"enum {{ NOTED = {NOTED}, ENDS = {ENDS}, UPDATES_STATES = {UPDATES}, LEADS = {LEADS} }};",
+        f"enum {{ NOTED = {NOTED}, ENDS = {ENDS}, UPDATES_STATES = {UPDATES}, LEADS = {LEADS}, PASSES = {PASSES} }};",
+        *([_numbered("", [one.upper() for one in SIDE_KINDS])] if sizes["SIDES"] else []),
         "",
         *bits,
         *(_declared(name) for name in every),
@@ -367,7 +369,8 @@ def _routines(programs: dict[str, Program], sizes: dict[str, int], printed: Sequ
 
 def _numbered(prefix: str, names: Mapping[str, object]) -> str:
     numbers = names.items() if names is TABLEAU.rows else ((one, k) for k, one in enumerate(names))
-    texts = [f"{prefix}_{str(name).replace(' ', '_')} = {number}" for name, number in numbers]
+    before = f"{prefix}_" if prefix else ""
+    texts = [f"{before}{str(name).replace(' ', '_')} = {number}" for name, number in numbers]
     return f"enum {{ {', '.join(texts)} }};"
 
 
@@ -418,7 +421,7 @@ def _updating(programs: dict[str, Program]) -> str:
 def _engine(sizes: dict[str, int]) -> str:
     """Return the engine, with what passes through all bodies and what meets contacts where there are any."""
     text = _template("engine.c")
-    for name in ("contacts", "passage"):
+    for name in ("contacts", "sides", "passage"):
         text = text.replace(f"/* {name} */\n", _template(f"{name}.c") if sizes[name.upper()] else "")
     return text
 

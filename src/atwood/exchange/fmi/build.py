@@ -63,7 +63,7 @@ def place_of(name: str, target: str, version: int) -> str:
     return f"binaries/{folder}/{name}{_ENDINGS[system]}"
 
 
-def compiled(name: str, sources: Mapping[str, str], main: str, target: str) -> bytes | None:
+def compiled(name: str, sources: Mapping[str, str], units: Sequence[str], target: str) -> bytes | None:
     """Return the binary of an FMU for a platform; None where no compiler for it is found.
 
     Raises
@@ -81,12 +81,12 @@ def compiled(name: str, sources: Mapping[str, str], main: str, target: str) -> b
             Path(folder, file).write_text(text, encoding="utf-8")
         made = f"{name}{_ENDINGS[system]}"
         if Path(words[0]).stem.lower() == "cl":
-            command = [*words, "/nologo", "/O2", "/fp:precise", "/LD", main, f"/Fe{made}"]
+            command = [*words, "/nologo", "/O2", "/fp:precise", "/LD", *units, f"/Fe{made}"]
         else:
             shared = ["-dynamiclib"] if system == "darwin" and own else ["-shared"]
             flags = ["-O2", "-std=c99", "-ffp-contract=off", "-fvisibility=hidden", "-Werror=implicit"]
             of_unix, library = ([], []) if system == "windows" else (["-fPIC"], ["-lm"])
-            command = [*words, *flags, *of_unix, *shared, main, "-o", made, *library]
+            command = [*words, *flags, *of_unix, *shared, *units, "-o", made, *library]
         _run(command, folder)
         return Path(folder, made).read_bytes()
 

@@ -11,6 +11,9 @@ from atwood.exchange.fmi.equations import Dependencies
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.values.units import parse_unit
 
+Depends = dict[int, list[int]] | None
+"""On which value references rates and quantities depend, by their own; None where that is not known."""
+
 
 @dataclass(frozen=True)
 class Variable:
@@ -43,11 +46,14 @@ class Variable:
 
 
 def variables_of(text: SceneText, watched: bool) -> list[Variable]:
-    """Return the variables of a scene; a quantity that is a state stands once, and what events watch last."""
+    """Return the variables of a scene; a quantity that is a state stands once, and what events watch last.
+
+    States of a scene with modes are none: another mode may have others.
+    """
     data = text.mode.data
-    states = [*data["coordinates"], *data["speeds"]]
+    states = [] if text.modes else [*data["coordinates"], *data["speeds"]]
     shown = {one.path for one in text.mode.known}
-    size = len(states)
+    size = text.size
     made = [Variable("time", "s", 0, "independent", "continuous")]
     for k, one in enumerate(states):
         causality = "output" if one["name"] in shown else "local"
@@ -112,14 +118,14 @@ def units_xml(variables: Iterable[Variable]) -> list[str]:
     return [*lines, "</UnitDefinitions>"]
 
 
-def description_2(
-    text: SceneText, token: str, variables: Sequence[Variable], depends: dict[int, list[int]], both: bool
-) -> str:
+def description_2(text: SceneText, token: str, variables: Sequence[Variable], depends: Depends, both: bool) -> str:
     """Return the modelDescription.xml of FMI 2.0."""
     place = {one.reference: k for k, one in enumerate(variables, 1)}
     can = {"modelIdentifier": text.name, "canGetAndSetFMUstate": "true", "canSerializeFMUstate": "true"}
     derives = {"providesDirectionalDerivative": "true"} if both else {}
-    sources = '<SourceFiles><File name="fmi2.c"/></SourceFiles>'
+    units = ["fmi2.c", *(one for one in text.modes if one.endswith(".c"))]
+    named = "".join(f"<File{_attributes({'name': one})}/>" for one in units)
+    sources = f"<SourceFiles>{named}</SourceFiles>"
     steps = {"canHandleVariableCommunicationStepSize": "true"}
     lines = ['<?xml version="1.0" encoding="UTF-8"?>']
     events = len(text.mode.data["events"]) if both else None
@@ -152,9 +158,7 @@ def description_2(
     return "\n".join([*lines, "</ModelStructure>", "</fmiModelDescription>"]) + "\n"
 
 
-def description_3(
-    text: SceneText, token: str, variables: Sequence[Variable], depends: dict[int, list[int]], both: bool
-) -> str:
+def description_3(text: SceneText, token: str, variables: Sequence[Variable], depends: Depends, both: bool) -> str:
     """Return the modelDescription.xml of FMI 3.0."""
     same = {one.reference: one.reference for one in variables}
     can = {"modelIdentifier": text.name, "canGetAndSetFMUState": "true", "canSerializeFMUState": "true"}
@@ -188,8 +192,10 @@ def description_3(
     return "\n".join([*lines, "</ModelStructure>", "</fmiModelDescription>"]) + "\n"
 
 
-def _named(depends: dict[int, list[int]], one: Variable, place: dict[int, int]) -> str:
-    """Return the list of what a variable depends on; a state depends on itself."""
+def _named(depends: Depends, one: Variable, place: dict[int, int]) -> str | None:
+    """Return the list of what a variable depends on, where it is known; a state depends on itself."""
+    if depends is None:
+        return None
     return " ".join(str(place[each]) for each in depends.get(one.reference, [one.reference]))
 
 
@@ -207,11 +213,12 @@ def _experiment(text: SceneText) -> str:
 
 def build_xml(text: SceneText) -> str:
     """Return the buildDescription.xml of FMI 3.0."""
+    modes = "".join(f'\n<SourceFile name="{one}"/>' for one in text.modes if one.endswith(".c"))
     return f"""<?xml version="1.0" encoding="UTF-8"?>
 <fmiBuildDescription fmiVersion="3.0">
 <BuildConfiguration modelIdentifier="{text.name}" description="C99 without libraries but that of C.">
 <SourceFileSet name="all" language="C99" compilerOptions="-std=c99 -ffp-contract=off">
-<SourceFile name="fmi3.c"/>
+<SourceFile name="fmi3.c"/>{modes}
 </SourceFileSet>
 <Library name="m" external="true"/>
 </BuildConfiguration>

@@ -121,39 +121,46 @@ def export_fmu(
     check_directory(target)
     text = exported(scene, form, output, _tangents)
     inputs = _inputs(text.mode)
-    reason = _why_alone(text.mode)
+    reason = _why_alone(text)
     both = not reason
     sources = _sources(text, fmi, inputs)
     token = "{" + hashlib.sha256("".join(sources.values()).encode()).hexdigest()[:32] + "}"
     main = f"fmi{fmi}.c"
     sources[main] = f'#define TOKEN "{token}"\n{sources[main]}'
     variables = variables_of(text, both and fmi == 3)
-    depends = structure(text, dependencies(text.mode, inputs), inputs)
+    depends = None if text.modes else structure(text, dependencies(text.mode, inputs), inputs)
     description = (description_3 if fmi == 3 else description_2)(text, token, variables, depends, both)
     content: dict[str, str | bytes] = {"modelDescription.xml": description}
     content |= {f"sources/{name}": one for name, one in sources.items()}
     if fmi == 3:
         content["sources/buildDescription.xml"] = build_xml(text)
-    binaries = _binaries(text.name, sources, main, fmi, platform)
+    units = [main, *(one for one in text.modes if one.endswith(".c"))]
+    binaries = _binaries(text.name, sources, units, fmi, platform)
     content |= {place_of(text.name, one, fmi): binary for one, binary in binaries.items()}
     write_atomically(target, lambda part: _pack(part, content))
     kinds = ("model exchange", "co-simulation") if both else ("co-simulation",)
     return ExportedFMU(target, kinds, tuple(binaries), reason)
 
 
-def _why_alone(mode: ModeText) -> str:
+def _why_alone(text: SceneText) -> str:
     """Return why a scene is for co-simulation alone; empty where it is for model exchange, too."""
+    return "each of its modes has states of its own" if text.modes else _why_kept(text.mode)
+
+
+def _why_kept(mode: ModeText) -> str:
     if "nearer" in mode.programs:
         return "its states depend on each other, which steps keep so"
     if "contacts" in mode.data:
         return "gaps and slips hold by turns, which steps find"
+    if "sides" in mode.data:
+        return "its laws compare what moves, on whose sides steps keep"
     if any(event["updates"] for event in mode.data["events"]):
         return "its events set states, which steps find"
     return ""
 
 
 def _tangents(mode: ModeText) -> dict[str, Program]:
-    return {} if _why_alone(mode) else tangent_programs(mode, _inputs(mode))
+    return {} if _why_kept(mode) else tangent_programs(mode, _inputs(mode))
 
 
 def _inputs(mode: ModeText) -> list[int]:
@@ -167,18 +174,19 @@ def _sources(text: SceneText, fmi: int, inputs: Sequence[int]) -> dict[str, str]
     room = files("atwood.exchange.fmi")
     of_parameters = [text.mode.data["numbers"][one["path"]] for one in text.parameters]
     numbers = ", ".join(str(of_parameters.index(one)) for one in inputs) or "0"
-    why = _why_alone(text.mode)
+    why = _why_alone(text)
     table = f"#define INPUTS {len(inputs)}\n#define EXCHANGES {int(not why)}\n#define ALONE {quoted(why)}\n"
     if not why:
         table += f"static const int input_numbers[] = {{{numbers}}};\n"
     shared = room.joinpath("fmu.c").read_text(encoding="utf-8").replace("/* inputs */\n", table)
-    shared = with_name(shared.replace('"scene.c"', f'"{text.name}.c"'), text.name)
+    shared = with_name(shared, text.name)
     own = room.joinpath(f"fmi{fmi}.c").read_text(encoding="utf-8")
-    return {f"{text.name}.h": text.header, f"{text.name}.c": text.source, "fmu.c": shared, f"fmi{fmi}.c": own}
+    scene = {f"{text.name}.h": text.header, f"{text.name}.c": text.source, **text.modes}
+    return {**scene, "fmu.c": shared, f"fmi{fmi}.c": own}
 
 
 def _binaries(
-    name: str, sources: dict[str, str], main: str, fmi: int, platform: Sequence[str] | None
+    name: str, sources: dict[str, str], units: Sequence[str], fmi: int, platform: Sequence[str] | None
 ) -> dict[str, bytes]:
     """Return the binaries by platform."""
     own = own_platform()
@@ -186,7 +194,7 @@ def _binaries(
     found: dict[str, bytes] = {}
     for one in wanted:
         place_of(name, one, fmi)
-        binary = compiled(name, sources, main, one)
+        binary = compiled(name, sources, units, one)
         if binary is not None:
             found[one] = binary
         elif platform is not None:
