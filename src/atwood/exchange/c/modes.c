@@ -7,7 +7,6 @@
 enum { READY = scene_READY, STOPPED = scene_STOPPED, FAILED = scene_FAILED, REFUSED = scene_REFUSED };
 enum { BEGIN, GO_ON, EVALUATE, RATES };
 
-#define MODES 1
 #define SIZE scene_STATES
 #define EVENTS 0
 #define CHANGES (-2) /* a mode ends, and another one begins */
@@ -31,6 +30,65 @@ static void log_event(scene *s, double time, int source, int kind, double speed)
 }
 
 /* modes */
+static int ask(scene *s, int request, double t, double *values)
+{
+    switch (s->mode) {
+    case KK: return ask_KK(s, request, t, values); /* each mode */
+    default: return say(s, FAILED, "there is no such mode");
+    }
+}
+
+static int change(scene *s)
+{
+    int has_impact, next = -1;
+    switch (s->mode) {
+    case KK: next = scene_modeKK_leads(&s->inKK, &has_impact); break; /* each mode */
+    default: break;
+    }
+    switch (s->mode * MODES + next) {
+    case AA * MODES + BB: return change_AA_BB(s); /* each change */
+    default: return say(s, FAILED, "there is no such mode");
+    }
+}
+
+static void refresh(scene *s, double t)
+{
+    scene_modeKK_refresh(&s->inKK, t); /* each mode */
+}
+
+static void refresh_links(scene *s)
+{
+    scene_modeKK_copy(&s->inKK, &s->inKK); /* each mode */
+}
+
+static void set_in_modes(scene *s, int number, double value)
+{
+    scene_modeKK_set_parameter(&s->inKK, number, value); /* each mode */
+}
+
+void scene_default(scene *s)
+{
+    memset(s, 0, sizeof *s);
+    s->rtol = 1e-8;
+    s->is_new = 1;
+    s->time = scene_start_time;
+    scene_modeKK_default(&s->inKK); /* each mode */
+    memcpy(s->state, s->in0.state, sizeof s->in0.state);
+}
+
+double scene_parameter(const scene *s, int number)
+{
+    return scene_mode0_parameter(&s->in0, number);
+}
+
+void scene_energies(scene *s, double *kinetic, double *potential)
+{
+    switch (s->mode) {
+    case KK: scene_modeKK_energies(&s->inKK, kinetic, potential); break; /* each mode */
+    default: break;
+    }
+}
+
 /* Go on through changes of the mode. */
 static int settle(scene *s, int status)
 {

@@ -18,85 +18,6 @@ int scene_enter(scene *s, double t, const double *guess, const double *q, double
 int scene_is_sided(scene *s);
 """
 
-_ASKED = """static void take_KK(scene *s, int status)
-{
-    const scene_modeKK *const m = &s->inKK;
-    int k;
-    s->time = m->time;
-    memcpy(s->state, m->state, sizeof m->state);
-    s->text = m->text;
-    s->constraint = m->constraint;
-    for (k = m->happened > scene_LOGGED ? m->happened - scene_LOGGED : 0; k < m->happened; k++) {
-        const scene_modeKK_happening *const one = m->log + k % scene_LOGGED;
-        log_event(s, one->time, OFFSET + one->source, one->kind, one->speed);
-        s->event = OFFSET + m->event;
-        s->event_time = m->event_time;
-    }
-    s->status = status;
-}
-
-static void give_KK(scene *s)
-{
-    scene_modeKK *const m = &s->inKK;
-    m->rtol = s->rtol;
-    m->atol = s->atol;
-    m->longest = s->longest;
-    m->step = s->step;
-    m->happened = 0;
-}
-
-static int ask_KK(scene *s, int request, double t, double *values)
-{
-    scene_modeKK *const m = &s->inKK;
-    int k, status;
-    give_KK(s);
-    if (m->time != s->time || memcmp(m->state, s->state, sizeof m->state) != 0) {
-        m->time = s->time;
-        memcpy(m->state, s->state, sizeof m->state);
-        m->is_evaluated = 0;
-    }
-    if (request == BEGIN) {
-        m->is_new = s->is_new;
-        status = scene_modeKK_begin(m);
-    } else if (request == GO_ON) {
-        status = scene_modeKK_advance(m, t);
-    } else if (request == RATES) {
-        return scene_modeKK_rates(m, values);
-    } else {
-        status = scene_modeKK_evaluate(m, s->of_mode);
-        for (k = 0; k < scene_QUANTITIES; k++) {
-            values[k] = quantities_in_KK[k] >= 0 ? s->of_mode[quantities_in_KK[k]] : (double)NAN;
-        }
-        return status;
-    }
-    take_KK(s, status);
-    return status;
-}
-"""
-
-_CHANGE = """static int change_AA_BB(scene *s)
-{
-    scene_modeAA *const m = &s->inAA;
-    scene_modeBB *const o = &s->inBB;
-    double guess[scene_modeBB_COORDINATES + 1], q[BODIES], u[BODIES], held[HELD];
-    int i, has_impact, status;
-    scene_modeAA_leads(m, &has_impact);
-    if (scene_modeAA_leave(m, q, u, held) != 0) return say(s, FAILED, "the bodies have no place");
-    scene_modeAA_evaluate(m, s->of_mode);
-    for (i = 0; i < scene_modeBB_COORDINATES; i++) {
-        const int place = guess_AA_BB[i];
-        guess[i] = place < 0 ? reference_AA_BB[i] : place < scene_modeAA_STATES ? m->state[place]
-                 : s->of_mode[place - scene_modeAA_STATES];
-    }
-    s->mode = BB;
-    give_BB(s);
-    status = scene_modeBB_enter(o, m->time, guess, q, u, held, has_impact);
-    take_BB(s, status);
-    if (status == READY && !scene_modeBB_is_sided(o)) return say(s, FAILED, "parts have changed sides on their line");
-    return status;
-}
-"""
-
 
 def mode_after(mode: ModeText, event: dict[str, Any], modes: Sequence[ModeText]) -> int:
     """Return the number of the mode that an event leads to; -1 for none."""
@@ -126,23 +47,38 @@ def header_of_modes(template: str, modes: Sequence[ModeText], counts: dict[str, 
     return header_with(template, counts, memory).replace("#include <stdint.h>", f"#include <stdint.h>\n\n{own}")
 
 
-def source_of_modes(template: str, modes: Sequence[ModeText], parameters: Sequence[dict[str, Any]]) -> str:
-    """Return the source of a scene with modes."""
+def source_of_modes(templates: Sequence[str], modes: Sequence[ModeText], parameters: Sequence[dict[str, Any]]) -> str:
+    """Return the source of a scene with modes, from the templates of the whole, of a mode and of a change."""
+    template, ask, change = templates
     offset, texts = 0, []
-    tables = exported_tables(modes, parameters)
+    most = max(max(one.data["passage"]["counts"]) for one in modes)
+    counts = {"MODES": len(modes), "BODIES": most + 1, "HELD": len(modes[0].data["held"]) + 1}
+    tables = [*(f"#define {key} {one}" for key, one in counts.items()), *exported_tables(modes, parameters)]
     for k, mode in enumerate(modes):
         numbers = {one.path: i for i, one in enumerate(mode.known)}
         tables.append(array(f"quantities_in_{k}", [numbers.get(one.path, -1) for one in modes[0].known], "int"))
-        texts.append(_ASKED.replace("KK", str(k)).replace("OFFSET", str(offset)))
+        texts.append(ask.replace("KK", str(k)).replace("OFFSET", str(offset)))
         offset += len(sources(mode))
     pairs = [(a, b) for a in range(len(modes)) for b in sorted(set(_leads(modes[a])))]
-    most = max(max(one.data["passage"]["counts"]) for one in modes)
     for a, b in pairs:
         tables += _guesses(modes[a], modes[b], f"{a}_{b}")
-        text = _CHANGE.replace("AA", str(a)).replace("BB", str(b))
-        texts.append(text.replace("BODIES", str(most + 1)).replace("HELD", str(len(modes[0].data["held"]) + 1)))
-    texts.append(_dispatched(len(modes), pairs))
-    return template.replace("/* tables */", "\n".join(tables)).replace("/* modes */", "\n".join(texts))
+        texts.append(change.replace("AA", str(a)).replace("BB", str(b)))
+    text = _repeated(template, "mode", [{"KK": str(k)} for k in range(len(modes))])
+    text = _repeated(text, "change", [{"AA": str(a), "BB": str(b)} for a, b in pairs])
+    return text.replace("/* tables */", "\n".join(tables)).replace("/* modes */", "\n".join(texts))
+
+
+def _repeated(text: str, what: str, names: Sequence[dict[str, str]]) -> str:
+    """Return a text with the lines that are marked so once for each."""
+    lines = []
+    for line in text.split("\n"):
+        own, mark, _ = line.partition(f" /* each {what} */")
+        for name in names if mark else ({},):
+            one = own
+            for key, value in name.items():
+                one = one.replace(key, value)
+            lines.append(one)
+    return "\n".join(lines)
 
 
 def _leads(mode: ModeText) -> Iterator[int]:
@@ -159,71 +95,3 @@ def _guesses(before: ModeText, after: ModeText, name: str) -> list[str]:
         array(f"guess_{name}", places, "int"),
         array(f"reference_{name}", after.data["passage"]["reference"]),
     ]
-
-
-def _dispatched(count: int, pairs: Sequence[tuple[int, int]]) -> str:
-    """Return the functions that find the mode."""
-
-    def each(text: str) -> str:
-        return "\n".join(text.replace("KK", str(k)) for k in range(count))
-
-    changes = "\n".join(f"    case {a * count + b}: return change_{a}_{b}(s);" for a, b in pairs)
-    return f"""static int ask(scene *s, int request, double t, double *values)
-{{
-    switch (s->mode) {{
-{each("    case KK: return ask_KK(s, request, t, values);")}
-    default: return say(s, FAILED, "there is no such mode");
-    }}
-}}
-
-static int change(scene *s)
-{{
-    int has_impact, next = -1;
-    switch (s->mode) {{
-{each("    case KK: next = scene_modeKK_leads(&s->inKK, &has_impact); break;")}
-    default: break;
-    }}
-    switch (s->mode * {count} + next) {{
-{changes}
-    default: return say(s, FAILED, "there is no such mode");
-    }}
-}}
-
-static void refresh(scene *s, double t)
-{{
-{each("    scene_modeKK_refresh(&s->inKK, t);")}
-}}
-
-static void refresh_links(scene *s)
-{{
-{each("    scene_modeKK_copy(&s->inKK, &s->inKK);")}
-}}
-
-static void set_in_modes(scene *s, int number, double value)
-{{
-{each("    scene_modeKK_set_parameter(&s->inKK, number, value);")}
-}}
-
-void scene_default(scene *s)
-{{
-    memset(s, 0, sizeof *s);
-    s->rtol = 1e-8;
-    s->is_new = 1;
-    s->time = scene_start_time;
-{each("    scene_modeKK_default(&s->inKK);")}
-    memcpy(s->state, s->in0.state, sizeof s->in0.state);
-}}
-
-double scene_parameter(const scene *s, int number)
-{{
-    return scene_mode0_parameter(&s->in0, number);
-}}
-
-void scene_energies(scene *s, double *kinetic, double *potential)
-{{
-    switch (s->mode) {{
-{each("    case KK: scene_modeKK_energies(&s->inKK, kinetic, potential); break;")}
-    default: break;
-    }}
-}}
-"""

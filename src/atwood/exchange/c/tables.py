@@ -87,7 +87,8 @@ def exported_tables(modes: Sequence[ModeText], parameters: Sequence[dict[str, An
         _texts("const char *const scene_kinds", KINDS),
     ]
     names = [*mode.data["coordinates"], *mode.data["speeds"]]
-    described = [("states", [(one["name"], one["unit"]) for one in names])]
+    more = max(len(one.data["state"]) for one in modes) - len(names)  # of a mode that has more
+    described = [("states", [*((one["name"], one["unit"]) for one in names), *([("", "")] * more)])]
     described.append(("quantities", [(one.path, one.unit) for one in mode.known]))
     for key, ones in described:
         rows = ",\n".join(f"    {{{quoted(path)}, {quoted(unit)}}}" for path, unit in ones) or '    {"", ""}'

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from importlib.resources import files
 from typing import Any
 
@@ -126,7 +126,7 @@ def scene_text(
             of_modes[f"{own}.h"] = with_name(with_declarations(own_header), own)
             of_modes[f"{own}.c"] = with_name(own_source, own)
         header = header_of_modes(_template("scene.h"), modes, _counts(modes, parameters))
-        source = source_of_modes(_template("modes.c"), modes, parameters)
+        source = source_of_modes([*map(_template, ("modes.c", "ask.c", "change.c"))], modes, parameters)
     return SceneText(
         name,
         with_name(header, name),
@@ -367,8 +367,8 @@ def _routines(programs: dict[str, Program], sizes: dict[str, int], printed: Sequ
     return reached([*functions, *known], roots)
 
 
-def _numbered(prefix: str, names: Mapping[str, object]) -> str:
-    numbers = names.items() if names is TABLEAU.rows else ((one, k) for k, one in enumerate(names))
+def _numbered(prefix: str, names: Iterable[str]) -> str:
+    numbers = TABLEAU.rows.items() if names is TABLEAU.rows else ((one, k) for k, one in enumerate(names))
     before = f"{prefix}_" if prefix else ""
     texts = [f"{before}{str(name).replace(' ', '_')} = {number}" for name, number in numbers]
     return f"enum {{ {', '.join(texts)} }};"
