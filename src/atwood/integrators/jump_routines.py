@@ -36,14 +36,23 @@ def write_routines(coordinates: int, speeds: int) -> list[Routine]:
     with r.count(gaps) as i:
         picks[i] = 0.0
     picks[row] = 1.0
-    inputs = [place_of(r, t), y, y.at(coordinates), picks]
-    with r.when(call_kernel(r, "kernel", inputs, m.derived, m.scratch, [room]) != 0):
-        r.give(1)
+    _strike(r, m, t, y, coordinates, picks)
     before, after, response, impulse = (room.at(size + gaps * k) for k in range(4))
     slow, gains = m.table[search.count * TABLE.index("slow") + one], before[row] + after[row] > after[row] * _MORE
     with r.when(~((before[row] + slow < 0.0) & (after[row] > slow)) | gains):
         r.give(1)
     _leave_series(r, m, t, response)
+    # Times are rounded, and always past the zero: the impact is made there, and what follows takes up the rest.
+    late = r.least(r.most((search.row("known")[one] - m.shift[one]) / before[row], 0.0), search.after - search.before)
+    there = search.shifted
+    with r.count(size) as i:
+        there[i] = y[i] - late * search.yp[i]
+    _strike(r, m, t - late, there, coordinates, picks)
+    with r.when(r.call(m.rates, t, room, there, m.rates_data) != 0):
+        r.give(1)
+    r.copy(search.yp, there, size)
+    with r.count(size) as i:
+        room[i] = room[i] + late * there[i]
     entry = m.log.at(m.logged * (len(ENTRY) + 2 * size))
     for k, value in enumerate((t, one.number(), m.parts[row], impulse[0], before[row], after[row])):
         entry[k] = value
@@ -54,6 +63,13 @@ def write_routines(coordinates: int, speeds: int) -> list[Routine]:
     _watch_again(r, m, search, one, t)
     r.give(0)
     return [r]
+
+
+def _strike(r: Routine, m: Record, t: Value, y: Value, coordinates: int, picks: Value) -> None:
+    """Make an impact at a state."""
+    inputs = [place_of(r, t), y, y.at(coordinates), picks]
+    with r.when(call_kernel(r, "kernel", inputs, m.derived, m.scratch, [m.room]) != 0):
+        r.give(1)
 
 
 def _alone(r: Routine, m: Record, search: Search) -> Value:

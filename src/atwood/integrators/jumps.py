@@ -22,9 +22,11 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from atwood.codegen.sundials.events import EventData
+    from atwood.integrators.protocol import CompiledRates
 
 FIELDS: dict[str, Kind] = {
     **dict.fromkeys(("derived", "scratch", "shift", "seen", "table", "parts", "moved", "room", "log"), ADDRESS),
+    **dict.fromkeys(("rates", "rates_data"), ADDRESS),
     "left": NUMBER,
     **dict.fromkeys(("gaps", "log_stride", "logged", "capacity"), INTEGER),
 }
@@ -98,11 +100,11 @@ class Jumps:
     ----------
     code
         What they are.
-    events
-        The events at which they happen.
+    events, rates
+        The events at which they happen, and the rates in between.
     """
 
-    def __init__(self, code: JumpCode, events: EventData) -> None:
+    def __init__(self, code: JumpCode, events: EventData, rates: CompiledRates) -> None:
         self.code, self._size, count = code, code.coordinates + code.speeds, events.count
         self._stride = len(ENTRY) + 2 * self._size
         self._room = ROOM // self._stride
@@ -119,12 +121,13 @@ class Jumps:
         memory = np.zeros(int(ends[-1]))
         pieces = np.split(memory, ends[:-1])
         self._numbers, self._derived, _, table, self._parts, _, _, log = pieces
-        self._integers, self._keep = self._numbers.view(np.int64), (memory, events)
+        self._integers, self._keep = self._numbers.view(np.int64), (memory, events, rates)
         self._table, self._log = table.reshape(len(TABLE), count), log.reshape(-1, self._stride)
         places = (one.ctypes.data for one in pieces[1:])
         names = ("derived", "scratch", "table", "parts", "moved", "room", "log")
         self._set(**dict(zip(names, places, strict=True)), gaps=code.gaps, log_stride=self._stride)
         self._set(shift=events.arrays[1].ctypes.data, seen=events.memory.ctypes.data)
+        self._set(rates=rates.function, rates_data=rates.data)
         self.function, self.data = code.built.code.addresses["jump"], self._numbers.ctypes.data
 
     def _set(self, **fields: int) -> None:

@@ -39,15 +39,15 @@ def _triggers() -> Routine:
 
 
 def _sharpen() -> Routine:
-    """Find by how much later than zero an event was seen that had a margin to pass, and take the state back to it."""
+    """Find by how much an event was seen after its zero, whose time it takes where it had a margin to pass.
+
+    Other times are rounded, and always past the zero.
+    """
     r, m, search, _ = _open("sharpen")
     time, y, yp, found, shift, size = search.root, search.y, search.yp, search.row("found"), m.shift, search.size
     now, before, since = search.row("lower"), search.row("upper"), time - m.began
-    m.late = 0.0
-    all_ = r.variable(since > 0.0, BOOLEAN)
-    with r.count(search.count) as i, r.when(found[i] != 0.0):
-        all_.now = all_.now & (shift[i] != 0.0)
-    with r.when(~all_.now):
+    m.late, m.now, m.then = 0.0, time, time
+    with r.when(~(since > 0.0)):
         r.give(0)
     short, shifted = since * SHORT, search.shifted
     with r.count(size) as j:
@@ -55,15 +55,22 @@ def _sharpen() -> Routine:
     r.call(search.events, time, y, yp, now, search.data)
     r.call(search.events, time - short, shifted, yp, before, search.data)
     least, most = r.variable(1e300), r.variable(-1e300)
+    all_, armed, plain = (r.variable(True, BOOLEAN) for _ in range(3))
     with r.count(search.count) as i, r.when(found[i] != 0.0):
-        value = now[i] - shift[i]
+        margin = shift[i]
+        value = now[i] - margin
         rate = (now[i] - before[i]) / short
-        clear = (rate * shift[i] < 0.0) & (r.size(value) < since * LONGEST * r.size(rate))
-        all_.now = all_.now & clear
+        armed.now, plain.now = armed.now & (margin != 0.0), plain.now & (margin == 0.0)
+        clear = r.choose(margin == 0.0, value * rate, 0.0 - rate * margin) > 0.0
+        all_.now = all_.now & clear & (r.size(value) < since * LONGEST * r.size(rate))
         late = value / rate
         least.now, most.now = r.least(late, least.now), r.most(late, most.now)
-    with r.when(all_.now & (most.now <= least.now * ALIKE)):
+    with r.when(all_.now & armed.now & (most.now <= least.now * ALIKE)):
         m.late = least.now
+        m.now, m.then = time - least.now, time - least.now
+    with r.when(all_.now & plain.now):
+        m.late = r.least(least.now, search.after - search.before)
+        m.then = time - m.late
     r.give(0)
     return r
 
@@ -101,7 +108,7 @@ def _meet() -> Routine:
         r.give(0)
     r.call("take_states", r.arguments[0], states)
     r.copy(near, y, size)
-    with r.when(r.call(m.project, m.now, near, m.project_data) != 0):
+    with r.when(r.call(m.project, m.then, near, m.project_data) != 0):
         r.give(1)
     r.copy(y, near, sets.coordinates)
     r.give(0)
@@ -156,7 +163,7 @@ def _log() -> Routine:
                 past[j] = past[j + 2]
             sets.known = PAST - 1
         last = past.at(sets.known * 2)
-        last[0], last[1] = m.now, sets.unit("part")[struck]
+        last[0], last[1] = m.then, sets.unit("part")[struck]
         sets.known = sets.known + 1
     r.give(0)
     return r
@@ -172,12 +179,10 @@ def _jump() -> Routine:
     r.copy(m.margins, m.shift, search.count)
     r.call("take_triggers", place, locator)
     r.call("sharpen", place, locator)
-    m.now = t - m.late
     with r.count(size) as j:
-        y[j] = search.y[j] - m.late * search.yp[j]
-    r.copy(m.before, y, size)
+        y[j], m.before[j] = search.y[j] - m.late * search.yp[j], search.y[j] - (t - m.now) * search.yp[j]
     sets.ahead, sets.rough = m.ahead, m.rough
-    with r.when(r.call("resolve", m.sets, m.now, r.value(0, INTEGER), r.value(1, INTEGER)) != 0):
+    with r.when(r.call("resolve", m.sets, m.then, r.value(0, INTEGER), r.value(1, INTEGER)) != 0):
         _back(r, m, search)
     some = r.variable(False, BOOLEAN)
     with r.count(count) as k:
@@ -187,6 +192,11 @@ def _jump() -> Routine:
     with r.when(r.call("meet_closed", place, locator) != 0):
         _back(r, m, search)
     r.call("take_states", place, states)
+    with r.when(r.call(m.rates, m.now, y, m.near, m.rates_data) != 0):
+        _back(r, m, search)
+    rest = m.late - (t - m.now)
+    with r.count(size) as j:
+        y[j] = y[j] + rest * m.near[j]
     with r.when(r.call("arm", place, locator) != 0):
         _back(r, m, search)
     r.call("log_jump", place, locator)

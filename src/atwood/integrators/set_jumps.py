@@ -31,11 +31,13 @@ _PROGRAMS = tuple(f"{name}_{what}" for name in ("kernel", "nearer", "event") for
 JUMP: dict[str, Kind] = {
     **dict.fromkeys(("sets", "table", "shift", "margins", "seen", "states", "near", "before", "values"), ADDRESS),
     **dict.fromkeys(("places", "log", "project", "project_data", "scratch", "event_scratch", *_PROGRAMS), ADDRESS),
-    **dict.fromkeys(("now", "late", "began", "shortest", "ahead", "rough", "time"), NUMBER),
+    **dict.fromkeys(("rates", "rates_data"), ADDRESS),
+    **dict.fromkeys(("now", "then", "late", "began", "shortest", "ahead", "rough", "time"), NUMBER),
     **dict.fromkeys(("events", "size", "stride", "logged", "capacity", "stays"), INTEGER),
 }
-"""The memory of changes. `late` is how much after `now` an event was seen, `began` when the set did, `shortest` how
-long one lasts at least, `time` that of the scene, `stays` whether all may open."""
+"""The memory of changes. `late` is by how much an event was seen after its zero, `then` the time of that zero,
+`now` that of the event, which is later where only rounding made it late, `began` when the set did, `shortest` how long
+one lasts at least, `time` that of the scene, `stays` whether all may open."""
 
 EVENTS = ("unit", "code", "small", "placed")
 """Of each event: whose it is, what happens, what is zero but for errors, and whether it is that of a gap on places."""
@@ -214,6 +216,7 @@ class SetJumps(Jumps):
         self._put("own", {name: at[name] for name in named} | {"shift": events.arrays[1].ctypes.data})
         self._put("own", {"seen": events.memory.ctypes.data, "event_derived": events.arrays[0].ctypes.data})
         self._put("own", dict(zip(("event_prologue", "event_scratch"), events.prologue, strict=True)))
+        self._put("own", {"rates": rates.function, "rates_data": rates.data})
         self._put("own", {"project": rates.project, "project_data": rates.project_data, "scratch": scratch})
         for name, prologue, place in zip(("kernel", "nearer"), prologues, kept, strict=True):
             self._put("own", {f"{name}_prologue": prologue, f"{name}_derived": place})

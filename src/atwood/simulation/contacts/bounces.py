@@ -13,6 +13,7 @@ from atwood.arrays import FloatArray
 from atwood.codegen.sundials.events import EventData
 from atwood.forms.loose import is_loose
 from atwood.integrators.jumps import JumpLog, Jumps
+from atwood.integrators.protocol import CompiledRates
 from atwood.mechanics.dynamics.equations import ContactRow
 from atwood.mechanics.outputs.event_functions import CLOSES
 from atwood.model.values.units import ALONG
@@ -41,7 +42,9 @@ def has_plain_impacts(plan: SceneProblem) -> bool:
     return not (always or holds) and bool(_plain(plan))
 
 
-def bounces_of(plan: SceneProblem, probe: EventProbe, t: float, y: FloatArray, events: EventData) -> Jumps | None:
+def bounces_of(
+    plan: SceneProblem, probe: EventProbe, t: float, y: FloatArray, events: EventData, rates: CompiledRates
+) -> Jumps | None:
     """Return the impacts of a session; None where there are none that can be made so.
 
     Nothing but gaps on places may be watched.
@@ -50,7 +53,7 @@ def bounces_of(plan: SceneProblem, probe: EventProbe, t: float, y: FloatArray, e
     if is_watched or not is_loose(plan.assembly) or not has_plain_impacts(plan):
         return None
     code = impact_code(plan, t, y, _gaps(plan))
-    return None if code is None else Jumps(code, events)
+    return None if code is None else Jumps(code, events, rates)
 
 
 def fill_bounces(

@@ -650,6 +650,7 @@ def resolve(
     one_by_one: bool = False,
     impacts: Sequence[tuple[float, str]] = (),
     is_start: bool = False,
+    told: float | None = None,
 ) -> Changed:
     """Return what becomes of gaps and slips at a moment.
 
@@ -671,9 +672,12 @@ def resolve(
         Time and part of the impacts before, in order.
     is_start
         Whether the run begins here.
+    told
+        The time that events are told of, s, where rounding made it another one.
     """
     t, q, u = state
     moment = _Moment(ContactValues(assembly, t, q, u, length), scales, relative, triggers)
+    moment.t = t if told is None else told
     before = moment.values.u
     left = moment.left_of(impacts, longest_left(relative, scales))
     if is_start:

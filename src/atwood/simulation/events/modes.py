@@ -17,7 +17,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.loose import has_touched, is_loose, loosened
 from atwood.forms.quantities import known_program
-from atwood.integrators.event_location import ALIKE, LONGEST, PASSED, SHORT, TINY
+from atwood.integrators.event_location import ALIKE, LONGEST, PASSED, ROUNDING, SHORT, TINY
 from atwood.integrators.protocol import StepResult
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.outputs.event_functions import (
@@ -449,12 +449,36 @@ def without_margin(
     since = step.t - began
     if not fired or not all(shift[fired]) or not since > 0.0:
         return step
-    margins, short = shift[fired], SHORT * since
-    now, before = (values(step.t - t, step.y - t * step.yp)[fired] - margins for t in (0.0, short))
-    rates = (now - before) / short
+    margins = shift[fired]
+    now, rates = _passing(values, step, fired, SHORT * since)
+    now = now - margins
     if np.any(rates * margins >= 0.0) or not np.all(np.abs(now) < LONGEST * since * np.abs(rates)):
         return step
     earlier = float(np.min(now / rates))  # equal ones happen at once
     if not np.max(now / rates) <= ALIKE * earlier:
         return step
     return replace(step, t=step.t - earlier, y=step.y - earlier * step.yp)
+
+
+def seen_late(
+    values: Callable[[float, FloatArray], FloatArray], shift: FloatArray, step: StepResult, began: float
+) -> float:
+    """Return how long after their zeros events without a margin were seen, s.
+
+    Times are rounded, and always past them.
+    """
+    fired, since = [i for i, sign in enumerate(step.events) if sign], step.t - began
+    if not fired or any(shift[fired]) or not since > 0.0:
+        return 0.0
+    now, rates = _passing(values, step, fired, SHORT * since)
+    if not np.all(now * rates > 0.0):
+        return 0.0
+    return min(float(np.min(now / rates)), 4.0 * ROUNDING * (abs(step.t) + since))
+
+
+def _passing(
+    values: Callable[[float, FloatArray], FloatArray], step: StepResult, fired: list[int], short: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return values of events, and their rates over a short time before."""
+    now, before = (values(step.t - t, step.y - t * step.yp)[fired] for t in (0.0, short))
+    return now, (now - before) / short

@@ -23,7 +23,7 @@ from atwood.forms.constrained import ConstrainedProgram, constrained_program, im
 from atwood.forms.loose import has_touched, is_loose, loose_equations
 from atwood.forms.quantities import to_maximal
 from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
-from atwood.integrators.protocol import MET, STEPS, CompiledRates, ExplicitProblem, Values
+from atwood.integrators.protocol import MET, RATES, STEPS, CompiledRates, ExplicitProblem, Values
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.topology.graph import connected_groups
 
@@ -213,6 +213,19 @@ def nearest_place(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) ->
     values = values_on_constraints(plan)
     nearer = plan.assembly.compiled(program_on_constraints(plan, t, y).projection).bind(values)
     return _projected(nearer, t, y, len(q))[: len(q)]
+
+
+def rates_on_constraints(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
+    """Return the rates of coordinates and speeds on the constraints."""
+    y = np.concatenate([q, u])
+    program, values, found = program_on_constraints(plan, t, y), values_on_constraints(plan), np.empty_like(y)
+    compiled = _compiled_on_constraints(plan, program, values)
+    if compiled is None:
+        found[:] = first_order(plan.assembly.compiled(program.accelerations).bind(values), len(q))(t, y)
+    else:
+        rates = compiled()
+        RATES(rates.function)(t, y.ctypes.data, found.ctypes.data, rates.data)
+    return found
 
 
 def program_on_constraints(plan: SceneProblem, t: float, y: FloatArray) -> ConstrainedProgram:

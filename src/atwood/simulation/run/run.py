@@ -170,6 +170,7 @@ class Walk:
         self.plan: SceneProblem | None = None
         self.ended: EventRecord | None = None
         self._unsettled: tuple[EventRecord, ...] | None = ()
+        self._late: tuple[float, FloatArray] | None = None
         self._impacts: list[tuple[float, str]] = []
         self.probe: EventProbe | None = None
         self.choice: Choice
@@ -356,20 +357,24 @@ class Walk:
 
     def _settled(self, plan: SceneProblem) -> SceneProblem:
         """Return a plan with the states that gaps and slips have from now on, after impacts if there are any."""
-        triggers, self._unsettled = self._unsettled, None
+        (triggers, late), self._unsettled, self._late = (self._unsettled, self._late), None, None
         if triggers is None or not plan.assembly.own_equations.contacts:
             return plan
         from atwood.simulation.contacts.changes import check_start, resolve
-        from atwood.simulation.problem.explicit_scene import nearest_place
+        from atwood.simulation.problem.explicit_scene import nearest_place, rates_on_constraints
 
         options, is_start = self.options, not self.segments
         if not self.options.looks_for_events:
             if is_start:
                 check_start(plan.assembly, (self.t, self.q, self.u), self.start.length, plan.scales)
             return plan
+        t, split, rest = self.t, plan.program.split, 0.0
+        if late is not None:  # what happens does so at the zero of the event, and goes on from there
+            rest, (q, u) = late[0], split(late[1])
+            t, self.q, self.u = t - rest, self.q - rest * q, self.u - rest * u
         changed = resolve(
             self.assembly,
-            (self.t, self.q, self.u),
+            (t, self.q, self.u),
             self.start.length,
             plan.scales,
             options.relative_tolerance,
@@ -377,6 +382,7 @@ class Walk:
             options.impacts == "one_by_one",
             self._impacts,
             is_start,
+            self.t,
         )
         events = list(changed.events)
         self._kept.changes += 1
@@ -386,10 +392,14 @@ class Walk:
         self.u, self.held = changed.speeds, changed.held
         if changed.touching and not is_start:  # what is found to be closed is so to rounding
             met = self._sides.like(self.assembly.with_held(changed.touching), plan)
-            self.q = nearest_place(plan.in_piece(met), self.t, self.q, self.u)
+            self.q = nearest_place(plan.in_piece(met), t, self.q, self.u)
         self.assembly = self.assembly.with_held(self.held)
         self.probe, self._plans, self._handed = None, {}, ()
-        return plan.in_piece(self._sides.like(self.assembly, plan))
+        made = plan.in_piece(self._sides.like(self.assembly, plan))
+        if rest:
+            q, u = split(rates_on_constraints(made, self.t, self.q, self.u))
+            self.q, self.u = self.q + rest * q, self.u + rest * u
+        return made
 
     def _remember(self, events: Sequence[EventRecord | ToldLater]) -> None:
         """Remember the impacts among some events."""
@@ -499,6 +509,7 @@ class Walk:
         if event.target in CONTACT:
             self.q, self.u, self.probe = q, u, None
             self._unsettled = tuple(one for one in (event, *outcome.together) if one.target in CONTACT)
+            self._late = outcome.late
         elif event.target in (UPDATE, SIDE):
             self.q, self.u, self.probe = q, u, self.probe if event.target == UPDATE else None
         else:

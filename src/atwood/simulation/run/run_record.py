@@ -213,6 +213,8 @@ class Outcome:
         The discrete states at its end, if it has some.
     passed
         The moments that it went through, if there are any.
+    late
+        How long after its zero an event was seen, s, and the rates of the state there; None where that is not known.
     """
 
     t: float
@@ -228,6 +230,7 @@ class Outcome:
     sides: tuple[int, ...] = ()
     held: tuple[float, ...] | None = None
     passed: Passed | None = None
+    late: tuple[float, FloatArray] | None = None
 
 
 def goes_on(outcome: Outcome, end: float) -> bool:

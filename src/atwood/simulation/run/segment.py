@@ -19,6 +19,7 @@ from atwood.integrators.methods import AUTO, Method
 from atwood.integrators.protocol import Budget, Statistics, Status, StepResult
 from atwood.integrators.session import Session
 from atwood.lazy_dataclasses import replace
+from atwood.mechanics.outputs.event_functions import CONTACT
 from atwood.simulation.dynamics.numerical_failure import (
     find_undefined_value,
     is_numerical,
@@ -29,7 +30,7 @@ from atwood.simulation.dynamics.orientation_coordinates import (
     COORDINATE_SWITCH,
 )
 from atwood.simulation.dynamics.redundancy import RankFinding
-from atwood.simulation.events.modes import EventProbe, EventRecord, ToldLater, without_margin
+from atwood.simulation.events.modes import EventProbe, EventRecord, ToldLater, seen_late, without_margin
 from atwood.simulation.events.sides import SIDE
 from atwood.simulation.problem.preparation import pack_state
 from atwood.simulation.problem.problem import SceneProblem
@@ -231,7 +232,8 @@ class _Runner:
             return self._ended(self.segment.end, "finished", "")
         if step_result.status is Status.EVENT:
             probe, split = self.segment.probe, self.segment.plan.program.split
-            step_result = without_margin(lambda t, y: probe.values(t, *split(y)), probe.shift, step_result, self.began)
+            at_event = (lambda t, y: probe.values(t, *split(y))), probe.shift
+            step_result = without_margin(*at_event, step_result, self.began)
             self.recorder.rewind(step_result.t)
             event, *together = self.segment.probe.changing(step_result)
             end = self.segment.end
@@ -247,8 +249,11 @@ class _Runner:
                     bool(np.any(segment.samples.shown[segment.samples.times == step_result.t])),
                 )
             sides = self.segment.probe.changed_sides(step_result)
+            late = None
+            if event.target in CONTACT and not self.method.is_implicit:
+                late = seen_late(*at_event, step_result, self.began), step_result.yp
             ended = self._ended(step_result.t, "event", "")
-            return replace(ended, event=event, together=tuple(together), sides=sides)
+            return replace(ended, event=event, together=tuple(together), sides=sides, late=late)
         if step_result.t > self.recorder.end:
             self.recorder.take(step_result.t, step_result.y, True)
         if step_result.status is Status.TIME_LIMIT:

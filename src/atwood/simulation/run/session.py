@@ -424,7 +424,7 @@ def _open_on_constraints(
         from atwood.simulation.contacts.compiled import sets_of
 
         alone = None if request.options.impacts == "one_by_one" else own[1]
-        found = bounces_of(plan, probe, t, y, explicit.compiled_events)
+        found = bounces_of(plan, probe, t, y, explicit.compiled_events, own[1].rates)
         if found is None and alone is not None:
             found = sets_of(plan, probe, t, y, explicit.compiled_events, alone)
         explicit = replace(explicit, jumps=found)
