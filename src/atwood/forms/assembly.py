@@ -58,8 +58,9 @@ _OBSERVABLES: Key[Mapping[str, Observable]] = Key("quantities")
 _START_OBSERVABLES: Key[Mapping[str, Observable]] = Key("quantities of the start")
 
 _SETS: Key[dict[tuple[float, ...], Assembly]] = Key("the same with other discrete states")
+_PIECES: Key[dict[tuple[float, ...], Assembly]] = Key("the same with other relations of functions of time")
 _MOST_SETS = 64
-"""So many sets of values of discrete states are remembered."""
+"""So many sets of values of discrete states, or of relations, are remembered."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,8 +207,8 @@ class Assembly:
         return dict(zip(self.parameters, self.parameter_values.tolist(), strict=True))
 
     def with_relations(self, values: Iterable[float]) -> Assembly:
-        """Return the same in another piece of a run, with the same programs."""
-        return replace(self, given_relations=tuple(map(float, values)))
+        """Return the same in another piece of a run, with the same programs; equal ones are one."""
+        return self._other(_PIECES, "given_relations", tuple(map(float, values)))
 
     @property
     def discrete_states(self) -> tuple[DiscreteState, ...]:
@@ -229,13 +230,17 @@ class Assembly:
 
     def with_held(self, values: Sequence[float]) -> Assembly:
         """Return the same with other values of the discrete states, with the same programs; equal ones are one."""
-        known, held = self.kept.get(_SETS, dict), tuple(values)
-        if held not in known:
+        return self._other(_SETS, "held", tuple(values))
+
+    def _other(self, key: Key[dict[tuple[float, ...], Assembly]], field: str, values: tuple[float, ...]) -> Assembly:
+        """Return the same with other values of one kind, each made once as long as there are not too many."""
+        known = self.kept.get(key, dict)
+        if values not in known:
             if len(known) >= _MOST_SETS:
                 known.clear()
-            made = known[held] = replace(self, held=held)
-            made.kept.get(_SETS, lambda: known)
-        return known[held]
+            made = known[values] = replace(self, **{field: values})
+            made.kept.get(key, lambda: known)
+        return known[values]
 
     @cached_property
     def parameters(self) -> tuple[Expression, ...]:
