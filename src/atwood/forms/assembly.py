@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import field
 from functools import cached_property, partial
 from importlib import import_module
@@ -208,7 +208,8 @@ class Assembly:
 
     def with_relations(self, values: Iterable[float]) -> Assembly:
         """Return the same in another piece of a run, with the same programs; equal ones are one."""
-        return self._other(_PIECES, "given_relations", tuple(map(float, values)))
+        given = tuple(map(float, values))
+        return self._other(_PIECES, given, lambda: replace(self, given_relations=given))
 
     @property
     def discrete_states(self) -> tuple[DiscreteState, ...]:
@@ -230,15 +231,18 @@ class Assembly:
 
     def with_held(self, values: Sequence[float]) -> Assembly:
         """Return the same with other values of the discrete states, with the same programs; equal ones are one."""
-        return self._other(_SETS, "held", tuple(values))
+        held = tuple(values)
+        return self._other(_SETS, held, lambda: replace(self, held=held))
 
-    def _other(self, key: Key[dict[tuple[float, ...], Assembly]], field: str, values: tuple[float, ...]) -> Assembly:
+    def _other(
+        self, key: Key[dict[tuple[float, ...], Assembly]], values: tuple[float, ...], make: Callable[[], Assembly]
+    ) -> Assembly:
         """Return the same with other values of one kind, each made once as long as there are not too many."""
         known = self.kept.get(key, dict)
         if values not in known:
             if len(known) >= _MOST_SETS:
                 known.clear()
-            made = known[values] = replace(self, **{field: values})
+            made = known[values] = make()
             made.kept.get(key, lambda: known)
         return known[values]
 

@@ -63,6 +63,11 @@ class Kept:
         self._made[key] = about, made
         return made
 
+    def take(self, key: Key[T]) -> T | None:
+        """Return what was last made under a key, which then is the caller's alone; None if nothing was."""
+        found: T | None = self._made.pop(key, (None, None))[1]
+        return found
+
     def known(self, key: Key[T]) -> T | None:
         """Return what was last made under a key; None if nothing was."""
         found: T | None = self._made.get(key, (None, None))[1]

@@ -235,7 +235,7 @@ class ExplicitSession(SteppingSession):
     def sample(self, times: FloatArray) -> tuple[FloatArray, FloatArray, StepResult]:
         """Go on through many times at once, as far as nothing stops it."""
         times = np.ascontiguousarray(times, dtype=np.float64)
-        if not (len(times) and self._here[0] <= times[0] and times[-1] < inf and np.all(np.diff(times) >= 0.0)):
+        if not (len(times) and self._here[0] <= times[0] and times[-1] < inf and (times[1:] >= times[:-1]).all()):
             raise UsageError(f"cannot sample from t = {self._here[0]:.9g} at these times: they must rise from there")
         values, rates = np.empty((len(times), self._size)), np.empty((len(times), self._size))
         filled, stopped = 0, None

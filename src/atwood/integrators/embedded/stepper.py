@@ -221,7 +221,7 @@ class CompiledStepper(NativeStepper):
 
     def set_monitor(self, monitor: StepMonitor) -> bool:
         """Let the motion be looked at, and come back with `Outcome.NOTICED` where something is seen."""
-        self._keep = (self._keep, monitor)
+        self._monitor = monitor
         self._set(jump=0)  # what looks at the motion starts anew at each event
         self._set(watch=monitor.look, watch_data=monitor.data, due=monitor.due_at)
         return True
@@ -245,6 +245,7 @@ class CompiledStepper(NativeStepper):
         if absolute is not None:
             self._arrays[self._rows["absolute"], : self._size] = np.maximum(absolute, np.finfo(float).tiny)
         self._set(**dict.fromkeys(names_of(Counts), 0), horizon=horizon, longest=self._options.max_step or inf)
+        self._set(watch=0, seen=0)
 
     def begin_of_step(self) -> float:
         """Return the time at the begin of the last step."""

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from atwood.arrays import BoolArray, FloatArray
+from atwood.codegen import BoundKernel
 from atwood.expr import Program, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
@@ -171,6 +172,9 @@ class _Needs:
     accelerations: bool
 
 
+_NOTHING = _Needs(False, False)
+
+
 def _find_needs(assembly: Assembly, event_functions: Sequence[EventFunction]) -> _Needs:
     symbols, accelerations = [one.symbol for one in assembly.reactions], assembly.own_equations.accelerations
     return _Needs(
@@ -234,26 +238,28 @@ class EventProbe:
         self.assembly = assembly = plan.assembly
         self._about = conditions, is_loose(assembly)
         self.event_functions = (*condition_functions(assembly, conditions), *find_event_functions(assembly))
+        self.shift = self._sides = np.zeros(0)
+        self.needs = _NOTHING
+        self.reactions: ReactionSolver | None = None
+        self.kernel: BoundKernel | None = None
+        self.broken: EventFunction | None = None
+        if self.event_functions:
+            self._look(t, q, u, tolerance)
+
+    def _look(self, t: float, q: FloatArray, u: FloatArray, tolerance: float) -> None:
+        """See where the events are at the start of the mode."""
+        plan, assembly = self.plan, self.assembly
         self.needs = assembly.shared.get(_NEEDS, lambda: _find_needs(assembly, self.event_functions), self._about)
         state = t, q.tobytes(), u.tobytes()
-        self.reactions = (
-            assembly.kept.get(_REACTIONS, lambda: ReactionSolver(assembly, t, q, u), *state)
-            if self.needs.reactions
-            else None
-        )
-        self.kernel = (
-            assembly.kernel(
-                known_program(assembly, _EVENTS, lambda: [one.value for one in self.event_functions], self._about)
-            )
-            if self.event_functions
-            else None
+        if self.needs.reactions:
+            self.reactions = assembly.kept.get(_REACTIONS, lambda: ReactionSolver(assembly, t, q, u), *state)
+        self.kernel = assembly.kernel(
+            known_program(assembly, _EVENTS, lambda: [one.value for one in self.event_functions], self._about)
         )
         small = np.array([MARGIN * tolerance * plan.scales.of(one.unit) for one in self.event_functions])
         self.shift = np.zeros(len(small))
         about = *state, plan.finding.kept, self._about
-        values = (
-            assembly.kept.get(_AT_START, lambda: self.values(t, q, u), *about) if self.event_functions else np.zeros(0)
-        )
+        values = assembly.kept.get(_AT_START, lambda: self.values(t, q, u), *about)
         happened, self.shift = margins_at_start(self.event_functions, values, small)
         self._sides = np.where(np.abs(values) > small, np.sign(values), 0.0)
         sided = np.array([one.target == SIDE for one in self.event_functions], dtype=np.bool_)
@@ -307,6 +313,8 @@ class EventProbe:
 
         Relations of what moves are read anew: where one has changed, its difference begins at zero.
         """
+        if not self.event_functions:
+            return
         if len(handed) != len(self.event_functions):  # other relations are watched from here on
             handed = (0,) * len(self.event_functions) if handed else ()
         found = zip(handed, self._sides.tolist(), self.event_functions, strict=bool(handed))

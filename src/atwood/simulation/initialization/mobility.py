@@ -29,6 +29,7 @@ from atwood.tolerances import tolerances
 _SHOWN = 4
 
 _PRESCRIBED: Key[Program] = Key("prescribed")
+_MOVES: Key[None] = Key("whether something can move")
 
 
 @dataclass(frozen=True)
@@ -101,6 +102,10 @@ def find_immobile(assembly: Assembly, freedom: int, start: Start) -> Immobile | 
 
 def refuse_immobile(assembly: Assembly, freedom: int, start: Start) -> None:
     """Raise if nothing can move, and nothing is driven or may let go later: this is seldom what was meant."""
+    assembly.kept.get(_MOVES, lambda: _refuse_immobile(assembly, freedom, start), freedom)
+
+
+def _refuse_immobile(assembly: Assembly, freedom: int, start: Start) -> None:
     if all(_only_holds(part.component) for part in assembly.flat.parts.values()):
         raise TopologyError(
             "there is nothing in it but what is fixed in the world",

@@ -153,7 +153,7 @@ class Walk:
         self.samples, self.again = samples, again
         self._schedules: dict[Shared, Schedule] = {}
         self._plans: dict[tuple[tuple[float, ...], tuple[float, ...] | None], SceneProblem] = {}
-        self._kept, self._sides = KeptSession(), SidesOfRun(options)
+        self._kept, self._sides = KeptSession(assembly), SidesOfRun(options)
         self.segments: list[Stretch] = []
         self.events: list[EventRecord | ToldLater] = []
         self.choices: list[Choice] = []
@@ -178,7 +178,9 @@ class Walk:
     def go(self) -> Run:
         """Go from mode to mode to the end; whatever stops it on the way takes along what came before."""
         try:
-            return self._go()
+            made = self._go()
+            self._kept.hand_back()
+            return made
         except TimeIsUp:  # while the scene was prepared in another mode
             return self.run_so_far("time_limit", self.options.out_of_time(self.t))
         except AtwoodError as error:

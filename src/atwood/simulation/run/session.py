@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from dataclasses import field
+from operator import is_
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
+from atwood.forms.caches import Key
 from atwood.forms.loose import is_loose
 from atwood.integrators.explicit_session import ExplicitSession, OnStiff
 from atwood.integrators.ida.guarded_residual import GuardedResidual
@@ -240,33 +241,69 @@ def _with_events(problem: ImplicitProblem, probe: EventProbe) -> ImplicitProblem
     return replace(problem, events=found.function(), native=native)
 
 
-@dataclass(eq=False)
+_SESSIONS: Key[list[Opened]] = Key("sessions of explicit methods")
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """A session that can be begun again.
+
+    Attributes
+    ----------
+    objects, values
+        What it was opened with: compared by identity, and as values.
+    session
+        The session.
+    fill
+        Gives its functions the parameters of a request.
+    """
+
+    objects: tuple[object, ...]
+    values: tuple[object, ...]
+    session: ExplicitSession
+    fill: Filling
+
+
 class KeptSession:
-    """The sessions of an explicit method, which a run begins again where only values of parameters have changed.
+    """The sessions of an explicit method, which are begun again where only values of parameters have changed.
 
     So a run that stops at sample times opens one session, not one for each, and a run with contacts one for where
-    something touches and one for where nothing does. What they were opened with is compared by identity: a run has one
-    object of each as long as these stay what they are.
+    something touches and one for where nothing does; and the next run of the assembly goes on with them. One run at a
+    time has them.
+
+    Parameters
+    ----------
+    assembly
+        The scene of the run; None where its sessions are its own.
 
     Attributes
     ----------
     kept
-        What sessions were opened with, the sessions, and what gives their functions the parameters of a request.
+        The sessions.
     impacts
         Times and parts of the impacts so far, to which steps may add; None where each is looked at.
     is_undisturbed
         Whether there are no gaps and slips, or nothing is to happen at them.
     """
 
-    kept: list[tuple[tuple[object, ...], ExplicitSession, Filling]] = field(default_factory=list)
     impacts: list[tuple[float, str]] | None = None
     is_undisturbed: bool = True
     changes: int = 0
     shortest: float = 0.0
 
+    def __init__(self, assembly: Assembly | None = None) -> None:
+        self._assembly = assembly
+        self.kept: list[Opened] = (None if assembly is None else assembly.kept.take(_SESSIONS)) or []
+
+    def hand_back(self) -> None:
+        """Leave the sessions to the next run; not those whose log of jumps is still read."""
+        free = [one for one in self.kept if one.fill.problem.jumps is None]
+        if self._assembly is not None and free:
+            self._assembly.kept.get(_SESSIONS, lambda: free)
+
     def jumps(self, assembly: Assembly) -> bool:
         """Whether steps are to make impacts, or changes of a set of contacts, by themselves."""
-        if self.impacts is None:
+        if self.impacts is None or not assembly.own_equations.contacts:
             return False
         from atwood.simulation.contacts.compiled import FEW_ROWS  # few scenes have any
 
@@ -275,32 +312,39 @@ class KeptSession:
 
     def filling_of(self, session: Session | None) -> Filling | None:
         """Return what gives a session its parameters; None where it is not kept."""
-        return next((fill for _, one, fill in self.kept if one is session), None)
+        return next((one.fill for one in self.kept if one.session is session), None)
 
     def begin_again(
         self, request: SolverRequest, method: Method, t: float, y: FloatArray, on_stiff: OnStiff | None
     ) -> ExplicitSession | None:
         """Return the session at the start of another segment; None where none was opened for it."""
-        wanted = _opened_with(request, method, on_stiff) if self.kept else ()
-        for opened_with, session, fill in self.kept:
-            if all(one is other for one, other in zip(opened_with, wanted, strict=True)):
-                fill(request)
-                signs = request.probe.handed
+        objects, values = _opened_with(request, method, on_stiff) if self.kept else ((), ())
+        for one in self.kept:
+            if all(map(is_, one.objects, objects)) and one.values == values:
+                one.fill(request)
+                session, signs = one.session, request.probe.handed
                 session.begin_again(t, y, request.horizon(t), request.budget, on_stiff, request.end, signs=signs)
                 return session
         return None
 
-    def keep(self, opened_with: tuple[object, ...], session: Session, fill: Filling) -> None:
+    def keep(
+        self, request: SolverRequest, method: Method, on_stiff: OnStiff | None, session: Session, fill: Filling
+    ) -> None:
         """Keep a session for what comes next, with the one before it."""
         assert isinstance(session, ExplicitSession)
-        self.kept[:] = [*self.kept[-1:], (opened_with, session, fill)]
+        self.kept[:] = [*self.kept[-1:], Opened(*_opened_with(request, method, on_stiff), session, fill)]
 
 
-def _opened_with(request: SolverRequest, method: Method, on_stiff: OnStiff | None) -> tuple[object, ...]:
-    plan = request.plan
-    scene = plan.assembly.shared, is_loose(plan.assembly), request.probe.code(for_ida=False)
-    made = plan.program, request.options, plan.scales, plan.sizes, plan.finding
-    return method, *scene, *made, on_stiff is None, request.kept.jumps(plan.assembly), request.kept.is_undisturbed
+def _opened_with(
+    request: SolverRequest, method: Method, on_stiff: OnStiff | None
+) -> tuple[tuple[object, ...], tuple[object, ...]]:
+    """Return what sessions are told apart by, as objects and as values."""
+    plan, options = request.plan, request.options
+    scene = plan.assembly.shared, request.probe.code(for_ida=False)
+    steps = options.relative_tolerance, options.absolute_tolerance, options.first_step, options.max_step, options.order
+    asked = options.step, options.max_order, options.impacts, options.nominal, options.conditions
+    told = is_loose(plan.assembly), on_stiff is None, request.kept.jumps(plan.assembly), request.kept.is_undisturbed
+    return (method, *scene, plan.program, plan.scales, plan.sizes, plan.finding), (steps, asked, told)
 
 
 def _can_be_kept(problem: ExplicitProblem, method: Method) -> bool:
@@ -337,7 +381,7 @@ def _open_tree(request: SolverRequest, method: Method, t: float, y: FloatArray, 
     )
     opened = method.open(task)
     if fill is not None:
-        kept.keep(_opened_with(request, method, on_stiff), opened, fill)
+        kept.keep(request, method, on_stiff, opened, fill)
     return opened
 
 
@@ -436,7 +480,7 @@ def _open_on_constraints(
     task = Task(settings, t, y, budget=request.budget, end=request.end, on_stiff=on_stiff, explicit=explicit)
     opened = method.open(task)
     if fill is not None:
-        kept.keep(_opened_with(request, method, on_stiff), opened, fill)
+        kept.keep(request, method, on_stiff, opened, fill)
     return opened
 
 
