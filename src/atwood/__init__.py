@@ -164,6 +164,7 @@ if TYPE_CHECKING:
         LongComparison as LongComparison,
         compare_long as compare_long,
     )
+    from atwood.study.optimal.optimize import Optimum as Optimum, optimize as optimize
     from atwood.study.sensitivities.fit import Fit as Fit, fit as fit
     from atwood.study.sensitivities.sensitivities import (
         Sensitivities as Sensitivities,
@@ -317,6 +318,7 @@ _ROOMS = {
     "atwood.result.result": ("Result",),
     "atwood.exchange.environments.environment": ("Environment",),
     "atwood.study": ("Comparison", "ComparisonRow", "SobolIndices", "Sweep", "compare", "load_sweep", "sweep"),
+    "atwood.study.optimal.optimize": ("Optimum", "optimize"),
     "atwood.study.sensitivities.fit": ("Fit", "fit"),
     "atwood.study.sensitivities.sensitivities": ("Sensitivities", "sensitivities"),
     "atwood.study.comparison.long_runs": ("LongComparison", "compare_long"),

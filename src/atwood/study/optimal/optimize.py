@@ -1,0 +1,450 @@
+"""Inputs with which a motion costs least."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from atwood.arguments import ANYTHING, BY_PATH, number, one_of, optional, takes, whole
+from atwood.arrays import FloatArray
+from atwood.errors import SolveError, UnsupportedError, UsageError
+from atwood.expr import Expression, substitute
+from atwood.forms.assembly import Assembly
+from atwood.lazy_dataclasses import dataclass, replace
+from atwood.model.compose.composite import Model
+from atwood.model.values.units import parse_quantity, parse_unit
+from atwood.numerics.matrices import least_norm
+from atwood.pipeline import SCENE, refuse_contacts, simulate, smooth_assembly_of
+from atwood.result.result import Result
+from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales, scene_length
+from atwood.simulation.problem.arguments import FORM
+from atwood.study.optimal.collocation import POINTS, Collocation, Task
+from atwood.study.optimal.interior_point import Found, least
+from atwood.study.optimal.points import PointFunctions
+from atwood.study.sensitivities.augmented import Augmented
+from atwood.study.sensitivities.inputs import HELD, LINEAR, Driven, with_inputs
+from atwood.study.sensitivities.quantities import written
+from atwood.table import Shown, Table, table
+
+_ROUNDS = 8
+"""A mesh is refined so often at most."""
+
+_WIDEST = 0.1
+"""Intervals whose error is estimated as this share of the largest are halved."""
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum(Shown):
+    """Inputs with which a motion costs least, near by.
+
+    Attributes
+    ----------
+    result
+        The run with these inputs, as `atwood.simulate` makes it.
+    inputs
+        Times and values of each input at the nodes, in SI units, by path.
+    cost
+        What was to be least.
+    duration
+        How long the motion takes, s.
+    error
+        By how much the end of the run differs from that of the collocation, in the scene's sizes and times.
+    intervals, steps
+        Of the last mesh; of the method, on all meshes.
+    """
+
+    result: Result = field(repr=False)
+    inputs: dict[str, tuple[FloatArray, FloatArray]]
+    cost: float
+    duration: float
+    error: float
+    intervals: int
+    steps: int
+
+    def tables(self) -> Sequence[Table]:
+        """Return what was found, and the inputs."""
+        facts = [
+            ("cost", f"{self.cost:.12g}"),
+            ("duration", f"{self.duration:.9g} s"),
+            ("intervals", str(self.intervals)),
+            ("error of the end", f"{self.error:.2g}"),
+        ]
+        title = f"Least cost of {self.result.assembly.flat.name}"
+        rows = [
+            (path, values[0], float(np.min(values)), float(np.max(values)), values[-1])
+            for path, (_, values) in self.inputs.items()
+        ]
+        return [
+            table(("", ""), facts, title=title),
+            table(("input", "at the start", "least", "largest", "at the end"), rows),
+        ]
+
+
+class _Seen(Mapping[str, Any]):
+    """What an objective is made of: quantities and inputs by path, and ``"time"``, as expressions."""
+
+    def __init__(self, known: Mapping[str, Expression], find: Callable[[str], Expression], assembly: Assembly) -> None:
+        self._known, self._find, self._assembly = known, find, assembly
+
+    def __getitem__(self, path: str) -> Any:
+        return self._known[path] if path in self._known else self._find(path)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter((*self._known, *self._assembly.observables))
+
+    def __len__(self) -> int:
+        return len(self._known) + len(self._assembly.observables)
+
+
+@takes(
+    scene=SCENE,
+    objective=ANYTHING,
+    inputs=ANYTHING,
+    end=optional(BY_PATH),
+    bounds=optional(BY_PATH),
+    at_end=ANYTHING,
+    t_end=ANYTHING,
+    guess=optional(BY_PATH),
+    between=one_of((LINEAR, HELD)),
+    intervals=whole("a number of intervals", 2, 10_000),
+    form=optional(FORM),
+    tolerance=number("a tolerance between 0 and 1", above=0.0, below=1.0),
+)
+def optimize(
+    scene: Model | Assembly,
+    objective: Callable[[Mapping[str, Any]], Any] | str,
+    *,
+    inputs: Mapping[str, Any] | Iterable[str],
+    end: Mapping[str, Any] | None = None,
+    bounds: Mapping[str, Any] | None = None,
+    at_end: Callable[[Mapping[str, Any]], Any] | None = None,
+    t_end: Any = None,
+    guess: Mapping[str, Any] | None = None,
+    between: str = LINEAR,
+    intervals: int = 20,
+    form: str | None = None,
+    tolerance: float = 1e-7,
+) -> Optimum:
+    """Return the inputs with which a motion costs least.
+
+    States at Gauss's points and inputs at nodes are unknowns, the equations of motion are equations between them
+    (direct collocation), and all derivatives are those of the scene's expressions. The mesh is refined until
+    `atwood.simulate` with these inputs ends in the same state.
+
+    Parameters
+    ----------
+    scene
+        A smooth scene, or an assembly of it, with its start.
+    objective
+        A function of what is seen, whose integral over the motion is to be least: a mapping of quantities and inputs
+        by path, and ``"time"``, in plain arithmetic, as ``lambda seen: seen["push.value"] ** 2``. Or ``"time"``.
+    inputs
+        Inputs (signals) by path, each with its least and its largest value, or None: ``{"push.value": (-10, 10)}``;
+        or paths alone.
+    end
+        What is to hold at the end: quantities by path with a value, or the least and the largest.
+    bounds
+        The least and the largest value of quantities along the motion, by path; they hold at the nodes.
+    at_end
+        A function as `objective` is, whose value at the end is added to the cost.
+    t_end
+        When the motion ends, s; or the earliest and the latest such time; the scene's own end when not given.
+    guess
+        Inputs to begin from, by path: a number, or rows of time and value.
+    between
+        What an input is between two nodes: ``"linear"`` or ``"held"``.
+    intervals
+        Of the first mesh.
+    form
+        See `atwood.simulate`.
+    tolerance
+        By how much the end of the run may differ from that of the collocation, in the scene's sizes and times.
+
+    Returns
+    -------
+    Optimum
+        The inputs, what they cost, and the run with them.
+
+    Raises
+    ------
+    UsageError
+        If a path is none, or a range is empty.
+    SolveError
+        If no motion meets all conditions, or none is found, or an event happens on the way.
+    """
+    assembly = smooth_assembly_of(scene, form=form)
+    begin = assembly.flat.t_start
+    paths = dict(inputs) if isinstance(inputs, Mapping) else dict.fromkeys(inputs)
+    if not paths:
+        raise UsageError("no inputs are given that could be chosen", where=assembly.flat.name)
+    span = _duration(assembly, t_end)
+    nodes: dict[str, Any] = dict.fromkeys(paths, 0.0) | dict(guess or {})
+    unknown = sorted(set(nodes) - set(paths))
+    if unknown:
+        raise UsageError("it is no input that is to be chosen", where=unknown[0], advice="Give it with inputs=, too.")
+    first = begin + span[1]
+    rows = {path: one if np.ndim(one) else [(begin, one), (first, one)] for path, one in nodes.items()}
+    driven, made = with_inputs(assembly, rows, LINEAR, first)
+    refuse_contacts(driven)
+    _refuse_blocks(driven, made)
+    task = _task(driven, made, objective, at_end, end or {}, bounds or {}, paths, span)
+    task = replace(task, is_held=between == HELD)
+    return _refined(assembly, task, made, intervals, tolerance)
+
+
+def _duration(assembly: Assembly, t_end: Any) -> tuple[float, float]:
+    """Return the least and the largest duration, s."""
+    begin, where = assembly.flat.t_start, "t_end"
+    given = assembly.flat.t_end if t_end is None else t_end
+    low, high = given if isinstance(given, (tuple, list)) and len(given) == 2 else (given, given)
+    found = tuple(_number(one, "s", where) - begin for one in (low, high))
+    if not 0.0 < found[0] <= found[1] < np.inf:
+        raise UsageError(f"there is no time from {found[0]:g} s to {found[1]:g} s after the start", where=where)
+    return found[0], found[1]
+
+
+def _number(value: Any, unit: str, where: str) -> float:
+    if isinstance(value, str):
+        return parse_quantity(value, parse_unit(unit or "1"), where)
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or np.isnan(value):
+        raise UsageError(f"{value!r} is no number", where=where, advice="Give a number, or text with a unit.")
+    return float(value)
+
+
+def _ranges(given: Mapping[str, Any], units: Mapping[str, str]) -> FloatArray:
+    """Return the least and the largest value of each path, shape (paths, 2)."""
+    found = np.empty((len(given), 2))
+    for k, (path, one) in enumerate(given.items()):
+        if one is None:
+            found[k] = -np.inf, np.inf
+            continue
+        pair = one if isinstance(one, (tuple, list)) and len(one) == 2 else (one, one)
+        found[k] = [_number(value, units[path], path) for value in pair]
+        if not found[k, 0] <= found[k, 1]:
+            raise UsageError(f"its range from {found[k, 0]:g} to {found[k, 1]:g} is empty", where=path)
+    return found
+
+
+def _refuse_blocks(assembly: Assembly, made: Sequence[Driven]) -> None:
+    """Refuse what changes at moments of its own."""
+    own = {one.part for one in made}
+    other = next((one.path for one in assembly.discrete_states if one.path.rpartition(".")[0] not in own), None)
+    if other is not None:
+        raise UnsupportedError(
+            "its values change at moments, between which a motion is not smooth",
+            where=other,
+            advice="Leave that part out, or put a law in its place that has no such moments.",
+        )
+
+
+def _task(
+    assembly: Assembly,
+    made: Sequence[Driven],
+    objective: Callable[[Mapping[str, Any]], Any] | str,
+    at_end: Callable[[Mapping[str, Any]], Any] | None,
+    end: Mapping[str, Any],
+    bounds: Mapping[str, Any],
+    inputs: Mapping[str, Any],
+    span: tuple[float, float],
+) -> Task:
+    """Return what is to be least, with all functions and their derivatives."""
+    begin = assembly.flat.t_start
+    segment = simulate(assembly, t_end=begin + 1e-3 * span[0], outputs=2).run.segments[0]
+    plan, state = segment.plan, np.concatenate([segment.coordinates[:, 0], segment.speeds[:, 0]])
+    equations = plan.assembly.own_equations
+    augmented = Augmented(plan, begin, state, np.zeros((0, len(plan.assembly.parameters))))
+    rates, symbols, known = _rates(augmented, made)
+
+    def find(path: str) -> Expression:
+        return substitute(list(written(plan, (path,), begin, state)), known)[0]
+
+    drive = dict(zip((one.path for one in made), symbols, strict=True))
+    seen = _Seen({**drive, "time": equations.time}, find, plan.assembly)
+    graph = equations.graph
+    units = {
+        path: plan.assembly.observables[path].unit for path in (*end, *bounds) if path in plan.assembly.observables
+    }
+    units |= {one.path: one.unit for one in made}
+
+    def cost(function: Any, what: str) -> Expression:
+        made = graph.one if isinstance(function, str) else graph.zero if function is None else function(seen)
+        if not isinstance(made, (int, float, Expression)):
+            raise UsageError(f"it returned {made!r}", where=what, advice="Return one number in plain arithmetic.")
+        return graph.convert(made)
+
+    if not callable(objective) and objective != "time":
+        raise UsageError(f"{objective!r} is no objective", advice="Give a function of what is seen, or 'time'.")
+    groups = (equations.time,), equations.coordinates, equations.speeds, symbols
+    parameters = augmented.plain.accelerations.parameters
+    make = partial(PointFunctions, plan.assembly, parameters, augmented.values, groups)
+    motion = make([*rates, cost(objective, "objective")])
+    ends, along = ([seen[path] for path in some] for some in (end, bounds))
+    length = scene_length(assembly)
+    sizes = np.concatenate([one(equations, length) for one in (coordinate_scales, motion_scales)])
+    time = span[1]
+    sizes[len(equations.coordinates) :] /= time
+    task = Task(
+        motion,
+        make([*ends, cost(at_end, "at_end")]),
+        make(along),
+        _ranges(end, units),
+        _ranges(bounds, units),
+        _ranges(inputs, units),
+        state,
+        begin,
+        span,
+        (sizes, np.ones(len(made)), span[1]),
+    )
+    return replace(task, sizes=(sizes, _input_sizes(task, made, time), span[1]))
+
+
+def _input_sizes(task: Task, made: Sequence[Driven], time: float) -> FloatArray:
+    """Return sizes of inputs: what changes a speed by its size within the scene's time."""
+    n, m, sizes = len(task.start), len(made), task.sizes[0]
+    point = np.concatenate([task.start, [one.values[0] for one in made], [task.begin]])[None, :]
+    slopes = np.abs(task.motion.slopes(point).toarray()[:n, n : n + m]) * time / sizes[:, None]
+    effect = slopes.max(axis=0, initial=0.0)
+    idle = np.flatnonzero(effect == 0.0)
+    if len(idle):
+        raise UsageError("it does nothing at the start", where=made[idle[0]].path, advice="Start a little beside.")
+    return np.asarray(1.0 / effect)
+
+
+def _rates(
+    augmented: Augmented, made: Sequence[Driven]
+) -> tuple[list[Expression], tuple[Expression, ...], dict[Expression, Expression | float]]:
+    """Return rates of coordinates and speeds, symbols of the inputs, and what takes the place of their pieces."""
+    assembly, plain = augmented.plan.assembly, augmented.plain
+    graph = assembly.own_equations.graph
+    held = {one.path: one.symbol for one in assembly.discrete_states}
+    symbols = tuple(graph.symbol(f"input:{one.path}") for one in made)
+    known: dict[Expression, Expression | float] = {}
+    for one, symbol in zip(made, symbols, strict=True):
+        first, value, slope = (held[f"{one.part}.piece[{i}]"] for i in range(3))
+        known |= {first: 0.0, value: symbol, slope: 0.0}
+    u = plain.accelerations.inputs[2].symbols
+    rates = [e for group in plain.accelerations.outputs for e in group.expressions]
+    rates = rates if len(plain.accelerations.outputs) == 2 else [*u, *rates]
+    return substitute(rates, known), symbols, known
+
+
+def _refined(assembly: Assembly, task: Task, made: Sequence[Driven], intervals: int, tolerance: float) -> Optimum:
+    """Return the optimum on a mesh on which the run agrees with the collocation."""
+    problem = Collocation(task, np.linspace(0.0, 1.0, intervals + 1))
+    every, steps = _guessed(problem, made), 0
+    for _ in range(_ROUNDS):
+        mesh = problem.mesh
+        found = _solved(problem, every, assembly)
+        every, steps = problem.full(found.x), steps + found.steps
+        states, _, inputs, (span,), *_ = problem.parts(every)
+        times = task.begin + span * mesh
+        nodes = {one.path: (times, inputs[:, k]) for k, one in enumerate(made)}
+        rows = {path: np.column_stack(pair) for path, pair in nodes.items()}
+        between = HELD if task.is_held else LINEAR
+        result = simulate(with_inputs(assembly, rows, between, times[-1])[0], t_end=times[-1], rtol=1e-11)
+        if result.events:
+            event = result.events[0]
+            raise SolveError(
+                f"at t = {event.time:.9g} s something happens ({event.kind}), and the motion is not smooth",
+                where=event.part,
+                advice="Bound the motion so that it does not come there.",
+            )
+        last = result.run.segments[-1]
+        end = np.concatenate([last.coordinates[:, -1], last.speeds[:, -1]])
+        error = float(np.max(np.abs(end - states[-1]) / task.sizes[0]))
+        if error <= tolerance:
+            cost = problem.values(found.x)[0] * problem.cost_size
+            return Optimum(result, nodes, cost, float(span), error, len(mesh) - 1, steps)
+        before, problem = problem, Collocation(task, _halved(problem, every))
+        every = _moved(before, problem, every)
+    raise SolveError(
+        f"on {len(mesh) - 1} intervals the run still ends {error:.2g} of the scene's sizes beside the collocation",
+        where=assembly.flat.name,
+        advice="Ask for a larger tolerance, or bound the inputs.",
+    )
+
+
+def _solved(problem: Collocation, every: FloatArray, assembly: Assembly) -> Found:
+    """Return the least cost on a mesh."""
+    x = problem.free(every)
+    diagonal = problem.bends(x, np.zeros(problem.linear.shape[0] + problem.slacks.shape[0])).diagonal()
+    gradient, _ = problem.slopes(x)
+    size = max(float(np.max(np.abs(one), initial=0.0)) for one in (gradient, diagonal))
+    problem.cost_size = size or 1.0
+    found = least(problem, x)
+    if found.message:
+        raise SolveError(
+            f"no motion was found ({found.message}; its conditions are missed by {found.miss:.2g})",
+            where=assembly.flat.name,
+            advice="See whether what is to hold at the end can be reached; give a guess, or more intervals.",
+        )
+    return found
+
+
+def _guessed(problem: Collocation, made: Sequence[Driven]) -> FloatArray:
+    """Return the unknowns to begin with: straight from the start to what is to hold at the end, with given inputs."""
+    task, mesh = problem.task, problem.mesh
+    span = 0.5 * (task.duration[0] + task.duration[1])
+    shares = [(np.array(one.times) - task.begin) / task.duration[1] for one in made]
+    inputs = np.array([np.interp(mesh, share, one.values) for share, one in zip(shares, made, strict=True)]).T
+    share = np.concatenate([mesh, (mesh[:-1, None] + np.diff(mesh)[:, None] * problem.nodes).ravel()])
+    states = task.start + share[:, None] * (_goal(task, inputs[-1], span) - task.start)
+    return _with_slacks(problem, np.concatenate([states.ravel(), inputs.ravel(), [span]]))
+
+
+def _goal(task: Task, inputs: FloatArray, span: float) -> FloatArray:
+    """Return a state near the start in which holds what is to hold at the end; the start where none is found."""
+    state, n = task.start.copy(), len(task.start)
+    for _ in range(30):
+        point = np.concatenate([state, inputs, [task.begin + span]])[None, :]
+        values = task.ends.values(point)[0, :-1]
+        miss = np.clip(values, *task.targets.T) - values
+        if np.max(np.abs(miss), initial=0.0) <= 1e-9 * (1.0 + np.max(np.abs(values), initial=0.0)):
+            return state
+        slopes = task.ends.slopes(point).toarray()[:-1, :n] * task.sizes[0]
+        state = state + task.sizes[0] * least_norm(slopes, miss)
+    return task.start
+
+
+def _with_slacks(problem: Collocation, main: FloatArray) -> FloatArray:
+    every = np.concatenate([main, np.zeros(problem.total - len(main))])
+    every = problem.full(problem.free(every))
+    along = problem.task.along.values(problem.points(problem.at_nodes, every)).ravel()
+    ends = problem.task.ends.values(problem.points(problem.at_end, every))[0, :-1]
+    every[len(main) :] = np.concatenate([along, ends])
+    return every
+
+
+def _moved(before: Collocation, problem: Collocation, every: FloatArray) -> FloatArray:
+    """Return unknowns on another mesh, along the polynomials of the one before."""
+    states, inner, inputs, span, *_ = before.parts(every)
+    wanted = (problem.mesh[:-1, None] + np.diff(problem.mesh)[:, None] * problem.nodes).ravel()
+    points = np.concatenate([problem.mesh, wanted])
+    at = np.clip(np.searchsorted(before.mesh, points, side="right") - 1, 0, before.count - 1)
+    local = (points - before.mesh[at]) / np.diff(before.mesh)[at]
+    known = np.concatenate([[0.0], before.nodes, [1.0]])
+    powers = np.arange(len(known))
+    weights = local[:, None] ** powers @ np.linalg.inv(known[:, None] ** powers)
+    values = np.concatenate([states[:-1, None], inner, states[1:, None]], axis=1)[at]
+    found = np.einsum("pk,pkn->pn", weights, values)
+    driven = np.array([np.interp(problem.mesh, before.mesh, one) for one in inputs.T]).T
+    return _with_slacks(problem, np.concatenate([found.ravel(), driven.ravel(), span]))
+
+
+def _halved(problem: Collocation, every: FloatArray) -> FloatArray:
+    """Return a mesh in which the intervals with the largest errors are halved.
+
+    The rates are compared with the polynomial through all of their points but one.
+    """
+    points = problem.points(problem.inside, every)
+    rates = problem.task.motion.values(points)[:, :-1].reshape(problem.count, POINTS, problem.n)
+    differences = np.array([1.0 / np.prod(x - np.delete(problem.nodes, k)) for k, x in enumerate(problem.nodes)])
+    off = np.abs(np.einsum("k,ikn->in", differences, rates)) / problem.task.sizes[0]
+    sizes = np.max(off, axis=1) * np.diff(problem.mesh)
+    worst = np.flatnonzero(sizes >= _WIDEST * np.max(sizes))
+    middles = 0.5 * (problem.mesh[worst] + problem.mesh[worst + 1])
+    return np.sort(np.concatenate([problem.mesh, middles]))
