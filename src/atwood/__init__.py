@@ -166,6 +166,11 @@ if TYPE_CHECKING:
     )
     from atwood.study.optimal.optimize import Optimum as Optimum, optimize as optimize
     from atwood.study.sensitivities.fit import Fit as Fit, fit as fit
+    from atwood.study.sensitivities.frameworks import (
+        RunFunction as RunFunction,
+        as_jax as as_jax,
+        as_torch as as_torch,
+    )
     from atwood.study.sensitivities.sensitivities import (
         Sensitivities as Sensitivities,
         sensitivities as sensitivities,
@@ -320,6 +325,7 @@ _ROOMS = {
     "atwood.study": ("Comparison", "ComparisonRow", "SobolIndices", "Sweep", "compare", "load_sweep", "sweep"),
     "atwood.study.optimal.optimize": ("Optimum", "optimize"),
     "atwood.study.sensitivities.fit": ("Fit", "fit"),
+    "atwood.study.sensitivities.frameworks": ("RunFunction", "as_jax", "as_torch"),
     "atwood.study.sensitivities.sensitivities": ("Sensitivities", "sensitivities"),
     "atwood.study.comparison.long_runs": ("LongComparison", "compare_long"),
     "atwood.theory.action": (
