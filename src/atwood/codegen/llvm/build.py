@@ -82,7 +82,10 @@ def once(make: Callable[P, T]) -> Callable[P, T]:
 _PROLOGUE = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)
 
 _SMALL = 20_000
-"""Beyond so many nodes LLVM's quickest level is used: it takes a sixth of the time, for code that is a tenth slower."""
+"""Beyond so many nodes LLVM's quickest level is used: it takes a sixth of the time, for code that is a tenth slower.
+
+Where loops leave no more lines than these, the level is at least one.
+"""
 
 
 _BRIEF = 500
@@ -240,7 +243,8 @@ def build_now(
         from atwood.codegen.llvm.printer import print_routines
 
         text = f"{text}\n{print_routines(written)}"
-    code = compile_text(text, options.level, has_variables=bool(written))
+    is_short = module.has_loops and text.count("\n") <= _SMALL
+    code = compile_text(text, max(options.level, 1) if is_short else options.level, has_variables=bool(written))
     failures = Failures() if module.externals else None
     callbacks = _callbacks(module, failures) if failures is not None else {}
     addresses = {name: ctypes.cast(call, ctypes.c_void_p).value or 0 for name, call in callbacks.items()}

@@ -86,6 +86,8 @@ class ModuleText:
         The functions in Python that it calls, as ``external.0`` and so on, each with its number of arguments.
     eliminates
         Whether it calls the routines of `atwood.codegen.llvm.linear_systems`, which are not in it.
+    has_loops
+        Whether operations that repeat are written once.
     """
 
     text: str
@@ -93,6 +95,7 @@ class ModuleText:
     functions: tuple[str, ...]
     externals: tuple[tuple[ExternalFunction, int], ...]
     eliminates: bool
+    has_loops: bool
 
 
 @dataclass(frozen=True)
@@ -125,13 +128,14 @@ def write_module(programs: Sequence[Part], options: CodeOptions) -> ModuleText:
     """Write the two functions of each program."""
     needs = Needs()
     parts: list[str] = []
-    scratch = 0
+    scratch, has_loops = 0, False
     for part in programs:
         name, program = part.name, part.program
         bodies = ((name, main_body(program, part.positions)), (f"{name}_values", prologue_body(program)))
         for function, body in bodies:
             layout = lay_out_in_loops(body, options.longest_chunk, options.least_in_loops)
             scratch = max(scratch, layout.scratch)
+            has_loops |= any(isinstance(one, Loop) for one in layout.chunks)
             try:
                 whole = part if function == name and len(layout.chunks) == 1 else None
                 parts.extend(_write_function(function, body, layout, options, needs, whole))
@@ -145,6 +149,7 @@ def write_module(programs: Sequence[Part], options: CodeOptions) -> ModuleText:
         tuple(sorted(needs.functions)),
         tuple(needs.externals),
         needs.elimination,
+        has_loops,
     )
 
 
@@ -198,20 +203,38 @@ def _write_loop(
     needs: Needs,
     runs: int,
 ) -> str:
-    """Write a loop as a function of its own: its first stretch, with places that move from stretch to stretch."""
-    read = {row[0].index: _moving([places[one.index] for one in row]) for row in loop.read}
-    rows = {row[0].index: row for row in rows_of(loop)}
-    writer = Writer(read, needs, frozenset(), runs)
+    """Write a loop as a function of its own: its first stretch, with places that move from stretch to stretch.
+
+    What a stretch reads of the one before stays in a register.
+    """
+    made = {row[0].index: row for row in rows_of(loop)}
+    before = {tuple(one.index for one in row[:-1]): row[0] for row in made.values()}
+    writer = Writer({}, needs, frozenset(), runs)
+    read: dict[int, tuple[str, Position]] = {}
+    carried: list[tuple[str, str, Expression]] = []
+    for first, *others in loop.read:
+        made_before = before.get(tuple(one.index for one in others))
+        if made_before is None:
+            read[first.index] = _moving([places[one.index] for one in (first, *others)])
+        else:
+            name_of_it = f"%carried{len(carried)}"
+            carried.append((name_of_it, writer.load(*places[first.index]), made_before))
+            writer.values[first.index] = name_of_it
+    start, writer.lines, writer.places = writer.lines, [], read
     for unit in loop.stretches[0]:
         _write_unit(writer, Solver({}), unit)
         for node in unit:
-            row = rows[node.index]
+            row = made[node.index]
             if node.index in places:
                 writer.store(writer.value(node), *_moving([places[one.index] for one in row]))
             if node.index in targets:
                 several = zip(*(targets[one.index] for one in row), strict=True)
                 _write_result(writer, node, [_moving(one) for one in several])
-    return _as_loop(name, writer, len(loop.stretches))
+    phis = [
+        f"  {here} = phi {writer.kind} [ {first}, %entry ], [ {writer.value(node)}, %stretch ]"
+        for here, first, node in carried
+    ]
+    return _as_loop(name, writer, len(loop.stretches), start, phis)
 
 
 def _moving(places: Sequence[tuple[str, Position]]) -> tuple[str, Position]:
@@ -307,16 +330,11 @@ def _as_chunk(name: str, writer: Writer) -> str:
     return "\n".join([*start, *writer.lines, f"  ret {writer.kind} {checked}", "}"])
 
 
-def _as_loop(name: str, writer: Writer, count: int) -> str:
+def _as_loop(name: str, writer: Writer, count: int, start: Sequence[str] = (), phis: Sequence[str] = ()) -> str:
     """Return a chunk as a function that does it so many times, and returns the sum of all results."""
-    kind, lines = writer.kind, [f"define internal {writer.kind} @{name}({_ARGUMENTS}) #0 {{", "entry:"]
-    checked = writer.checked()
-    lines += [
-        *_pointers(writer),
-        "  br label %stretch",
-        "stretch:",
-        "  %k = phi i64 [ 0, %entry ], [ %next, %stretch ]",
-    ]
+    kind, checked = writer.kind, writer.checked()
+    lines = [f"define internal {kind} @{name}({_ARGUMENTS}) #0 {{", "entry:", *_pointers(writer), *start]
+    lines += ["  br label %stretch", "stretch:", "  %k = phi i64 [ 0, %entry ], [ %next, %stretch ]", *phis]
     lines.append(f"  %before = phi {kind} [ {spread(0.0, writer.runs)}, %entry ], [ %after, %stretch ]")
     lines += [*writer.lines, f"  %after = fadd {kind} %before, {checked}", "  %next = add i64 %k, 1"]
     lines += [f"  %goes.on = icmp ult i64 %next, {count}", "  br i1 %goes.on, label %stretch, label %end"]
