@@ -7,22 +7,25 @@ proportion to the length of a function.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import partial
 
 from atwood.codegen.c.printer import literal
-from atwood.codegen.llvm.layout import Body, Layout, Unit, lay_out, main_body, matrix_key, prologue_body
+from atwood.codegen.chunks import (
+    CHOICES,
+    FUNCTIONS,
+    ChunkWriter,
+    places_of,
+    print_bodies,
+    write_chunks,
+)
+from atwood.codegen.llvm.layout import Body, main_body, prologue_body
 from atwood.codegen.llvm.text import OWN_FUNCTIONS
-from atwood.codegen.routines import own_name
 from atwood.errors import UnsupportedError
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.program import Program
 
-_LONGEST = 500
-"""Operations in one function."""
-
 _SIGNS = {"add": "+", "sub": "-", "mul": "*", "div": "/", "less": "<", "less_equal": "<="}
-_CHOICES = {"minimum": "<=", "maximum": ">="}
-_FUNCTIONS = {one: own_name(one) for one in OWN_FUNCTIONS}
-_FUNCTIONS |= {"sqrt": "sqrt", "floor": "floor", "absolute": "fabs"}
+_FUNCTIONS = FUNCTIONS | {"sqrt": "sqrt", "floor": "floor", "absolute": "fabs"}
 
 
 def functions_of(programs: Iterable[Program]) -> list[str]:
@@ -40,11 +43,7 @@ def print_program(name: str, program: Program) -> tuple[str, int]:
     UnsupportedError
         If the program calls functions in Python.
     """
-    try:
-        main, first = _print(name, main_body(program))
-        prologue, second = _print(f"{name}_values", prologue_body(program))
-    except UnsupportedError as error:
-        raise UnsupportedError(error.message, where=program.name) from None
+    texts, scratch = print_bodies(program, _print, name, (main_body(program), prologue_body(program)))
     calls = f"""static void {name}_prologue(word *parameters, word *derived, word *scratch)
 {{
 word inputs[1], outputs[1];
@@ -53,36 +52,14 @@ outputs[0].p = derived;
 {name}_values(inputs, NULL, scratch, outputs);
 }}
 """
-    return "\n".join([main, prologue, calls]), max(first, second)
+    return "\n".join([*texts, calls]), scratch
 
 
 def _print(name: str, body: Body) -> tuple[str, int]:
-    layout = lay_out(body, _LONGEST)
-    systems = {matrix_key(unit[0]) for chunk in layout.chunks for unit in chunk if unit[0].operation == "solve"}
-    regions, used = dict(layout.regions), layout.scratch
-    for key in sorted(systems - set(regions)):
-        size = round(len(key) ** 0.5)
-        regions[key], used = used, used + size * (size + 2)
-    places = {node.index: f"{pointer}[{k}].f" for pointer, nodes in body.given for k, node in enumerate(nodes)}
-    places |= {index: f"scratch[{slot}].f" for index, slot in layout.slots.items()}
-    targets: dict[int, list[str]] = {}
-    results = {node.index: node for node, _, _ in body.results}
-    for node, pointer, position in body.results:
-        targets.setdefault(node.index, []).append(f"{pointer}[{position}].f")
-    computed = {node.index for chunk in layout.chunks for unit in chunk for node in unit}
-    passed = [node for index, node in results.items() if index not in computed]
-    factorised: set[tuple[int, ...]] = set()
-    parts = []
-    for number, chunk in enumerate(layout.chunks):
-        writer = _Writer(places, layout, regions, factorised)
-        for unit in chunk:
-            writer.unit(unit, targets)
-        if number == len(layout.chunks) - 1:
-            for node in passed:
-                writer.store(node, targets[node.index])
-        parts.append("\n".join([*writer.lines, f"return {writer.checked()};"]))
-    given = {pointer for pointer, _ in body.given if pointer != "derived"}
-    return _joined(name, parts, sorted(given | {one for _, one, _ in body.results})), used
+    places = places_of(body, lambda pointer, k: f"{pointer}[{k}].f")
+    written = write_chunks(places, partial(_Writer, places))
+    parts = ["\n".join([*one.lines, f"return {' + '.join(one.sums) or '0.0'};"]) for one in written]
+    return _joined(name, parts, places.pointers), places.scratch
 
 
 def _joined(name: str, parts: Sequence[str], pointers: Sequence[str]) -> str:
@@ -100,61 +77,28 @@ def _joined(name: str, parts: Sequence[str], pointers: Sequence[str]) -> str:
     return "\n".join([*functions, f"{head}\n{{\n{body}\n}}\n"])
 
 
-class _Writer:
-    """What has been written of one chunk of operations."""
+class _Writer(ChunkWriter):
+    """What has been written of one chunk of operations; every value has a name."""
 
-    def __init__(
-        self,
-        places: dict[int, str],
-        layout: Layout,
-        regions: dict[tuple[int, ...], int],
-        factorised: set[tuple[int, ...]],
-    ) -> None:
-        self.places, self.slots = places, layout.slots
-        self.regions, self.factorised = regions, factorised
-        self.lines: list[str] = []
-        self.known: set[int] = set()
-        self.sums: list[str] = []
+    declares = "const double"
 
-    def unit(self, unit: Unit, targets: dict[int, list[str]]) -> None:
-        """Write operations that stay together, and store what others need of them."""
-        first = unit[0]
-        is_wave = len(unit) == 2 and unit[1].operation != "component"
-        if first.operation == "solve":
-            self._solve(first, unit[1:])
-        elif is_wave:
-            self.lines.append(f"word w{first.index}[2];")
-            argument = self._text(first.arguments[0])
-            self.lines.append(f"own_sin_cos({argument}, w{first.index}, w{first.index} + 1);")
-        for node in unit:
-            if is_wave:
-                self._keep(node, f"w{first.index}[{0 if node.operation == 'sin' else 1}].f")
-            elif node.operation not in ("solve", "component"):
-                self._keep(node, self._expression(node, [self._text(one) for one in node.arguments]))
-            if node.index in self.slots:
-                self.lines.append(f"scratch[{self.slots[node.index]}].f = v{node.index};")
-            if node.index in targets and node.operation != "solve":
-                self.store(node, targets[node.index])
+    def cell(self, place: int) -> str:
+        return f"scratch[{place}].f"
 
-    def store(self, node: Expression, targets: Sequence[str]) -> None:
-        """Store a result, and take it into the sum that shows whether all are finite."""
-        text = self._text(node)
-        self.lines += [f"{one} = {text};" for one in targets]
-        self.sums.append(text)
+    def waves(self, argument: Expression) -> dict[str, str]:
+        name = f"w{len(self.lines)}"
+        text = self.value(argument)
+        self.lines += [f"word {name}[2];", f"own_sin_cos({text}, {name}, {name} + 1);"]
+        return {"sin": f"{name}[0].f", "cos": f"{name}[1].f"}
 
-    def checked(self) -> str:
-        """Return the sum of all results, which is finite only if they are."""
-        return " + ".join(self.sums) or "0.0"
+    def node(self, node: Expression) -> None:
+        self.keep(node, self._expression(node, [self.value(one) for one in node.arguments]))
 
-    def _keep(self, node: Expression, text: str) -> None:
-        self.lines.append(f"const double v{node.index} = {text};")
-        self.known.add(node.index)
-
-    def _text(self, node: Expression) -> str:
+    def value(self, node: Expression) -> str:
         if node.operation == "constant":
             return literal(float(node.payload))
-        if node.index not in self.known:
-            self._keep(node, self.places[node.index])
+        if node.index not in self.texts:
+            self.keep(node, self.places.known[node.index])
         return f"v{node.index}"
 
     def _expression(self, node: Expression, parts: list[str]) -> str:
@@ -163,8 +107,8 @@ class _Writer:
             return f"{parts[0]} {_SIGNS[operation]} {parts[1]}"
         if operation in _FUNCTIONS:
             return f"{_FUNCTIONS[operation]}({', '.join(parts)})"
-        if operation in _CHOICES:
-            return f"{parts[0]} {_CHOICES[operation]} {parts[1]} ? {parts[0]} : {parts[1]}"
+        if operation in CHOICES:
+            return f"{parts[0]} {CHOICES[operation]} {parts[1]} ? {parts[0]} : {parts[1]}"
         match operation:
             case "neg":
                 return f"-{parts[0]}"
@@ -177,20 +121,3 @@ class _Writer:
             case "logical_not":
                 return f"{parts[0]} == 0.0"
         raise UnsupportedError(f"there is no C for the operation {operation} in {node!r}")
-
-    def _solve(self, node: Expression, unknowns: Sequence[Expression]) -> None:
-        """Write a linear system; systems with the same matrix share its factors."""
-        size, key = node.payload, matrix_key(node)
-        start = self.regions[key]
-        entries, right = node.arguments[: size * size], node.arguments[size * size :]
-        pivots, side = start + size * size, start + size * (size + 1)
-        if key not in self.factorised:
-            self.factorised.add(key)
-            texts = [self._text(one) for one in entries]
-            self.lines += [f"scratch[{start + k}].f = {text};" for k, text in enumerate(texts)]
-            self.lines.append(f"factorise({size}, scratch + {start}, scratch + {pivots});")
-        texts = [self._text(one) for one in right]
-        self.lines += [f"scratch[{side + k}].f = {text};" for k, text in enumerate(texts)]
-        self.lines.append(f"substitute({size}, scratch + {start}, scratch + {pivots}, scratch + {side});")
-        for one in unknowns:
-            self._keep(one, f"scratch[{side + one.payload}].f")

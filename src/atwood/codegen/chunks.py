@@ -1,0 +1,198 @@
+"""Programs in languages that are compiled elsewhere: what the printers of C and of JavaScript have in common.
+
+A long program is cut into functions that hand values on through the scratch array; see `atwood.codegen.llvm.layout`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+
+from atwood.codegen.llvm.layout import Body, Layout, MatrixKey, Unit, lay_out, matrix_key
+from atwood.codegen.llvm.text import OWN_FUNCTIONS
+from atwood.codegen.routines import own_name
+from atwood.errors import UnsupportedError
+from atwood.expr.core.graph import Expression
+from atwood.expr.core.program import Program
+from atwood.lazy_dataclasses import dataclass
+
+_LONGEST = 500
+"""Operations in one function."""
+
+FUNCTIONS = {one: own_name(one) for one in OWN_FUNCTIONS}
+CHOICES = {"minimum": "<=", "maximum": ">="}
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Where a body finds what it reads, and puts what it computes.
+
+    Attributes
+    ----------
+    layout
+        The body in chunks.
+    regions
+        Where the factors of a matrix begin in the scratch array, whatever its size.
+    scratch
+        The length of that array.
+    known
+        The text of each value that is given, or handed on.
+    targets
+        Texts of the places of each result.
+    passed
+        Results that are given.
+    pointers
+        Arrays beside those of derived values and scratch, in order.
+    """
+
+    layout: Layout
+    regions: dict[MatrixKey, int]
+    scratch: int
+    known: dict[int, str]
+    targets: dict[int, list[str]]
+    passed: list[Expression]
+    pointers: list[str]
+
+
+def places_of(body: Body, at: Callable[[str, int], str]) -> Places:
+    """Return where everything is of a body; ``at`` writes an element of an array."""
+    layout = lay_out(body, _LONGEST)
+    systems = {matrix_key(unit[0]) for chunk in layout.chunks for unit in chunk if unit[0].operation == "solve"}
+    regions, used = dict(layout.regions), layout.scratch
+    for key in sorted(systems - set(regions)):
+        size = round(len(key) ** 0.5)
+        regions[key], used = used, used + size * (size + 2)
+    known = {node.index: at(pointer, k) for pointer, nodes in body.given for k, node in enumerate(nodes)}
+    known |= {index: at("scratch", slot) for index, slot in layout.slots.items()}
+    targets: dict[int, list[str]] = {}
+    results = {node.index: node for node, _, _ in body.results}
+    for node, pointer, position in body.results:
+        targets.setdefault(node.index, []).append(at(pointer, position))
+    computed = {node.index for chunk in layout.chunks for unit in chunk for node in unit}
+    passed = [node for index, node in results.items() if index not in computed]
+    given = {pointer for pointer, _ in body.given if pointer != "derived"}
+    pointers = sorted(given | {one for _, one, _ in body.results})
+    return Places(layout, regions, used, known, targets, passed, pointers)
+
+
+class ChunkWriter(ABC):
+    """What has been written of one chunk of operations.
+
+    Texts are those of values, with the operations in them; ``declares`` begins the declaration of one with a name.
+    """
+
+    declares: str
+
+    def __init__(self, places: Places, chunk: Sequence[Unit], factorised: set[MatrixKey]) -> None:
+        self.places, self.chunk, self.factorised = places, chunk, factorised
+        self.lines: list[str] = []
+        self.sums: list[str] = []
+        self.texts: dict[int, tuple[str, int]] = {}
+
+    @abstractmethod
+    def cell(self, place: int) -> str:
+        """Return an element of the scratch array."""
+
+    @abstractmethod
+    def waves(self, argument: Expression) -> dict[str, str]:
+        """Write a sine and a cosine, and return where they are."""
+
+    @abstractmethod
+    def node(self, node: Expression) -> None:
+        """Write an operation."""
+
+    @abstractmethod
+    def value(self, node: Expression) -> str:
+        """Return the text of a value that is used once."""
+
+    def keep(self, node: Expression, text: str) -> None:
+        """Give a value a name."""
+        self.lines.append(f"{self.declares} v{node.index} = {text};")
+        self.texts[node.index] = f"v{node.index}", 0
+
+    def name(self, node: Expression) -> str:
+        """Return a name, a number or a place for a value."""
+        text = self.value(node)
+        if self.texts.get(node.index, ("", 0))[1]:
+            self.keep(node, text)
+            return f"v{node.index}"
+        return text
+
+    def unit(self, unit: Unit) -> None:
+        """Write operations that stay together, and store what others need of them."""
+        first = unit[0]
+        if first.operation == "solve":
+            start = self.solve(first)
+            for one in unit[1:]:
+                self.keep(one, self.cell(start + one.payload))
+        is_wave = len(unit) == 2 and unit[1].operation != "component"
+        waves = self.waves(first.arguments[0]) if is_wave else {}
+        for node in unit:
+            if waves:
+                self.keep(node, waves[node.operation])
+            elif node.operation not in ("solve", "component"):
+                self.node(node)
+            if node.operation != "solve":
+                self.hand_on(node)
+
+    def store(self, node: Expression) -> None:
+        """Store a result, and take it into the sum that shows whether all are finite."""
+        text = self.name(node)
+        self.lines += [f"{one} = {text};" for one in self.places.targets[node.index]]
+        self.sums.append(text)
+
+    def hand_on(self, node: Expression) -> None:
+        """Store what later chunks need, and results."""
+        if node.index in self.places.layout.slots:
+            self.lines.append(f"{self.cell(self.places.layout.slots[node.index])} = {self.name(node)};")
+        if node.index in self.places.targets:
+            self.store(node)
+
+    def solve(self, node: Expression) -> int:
+        """Write a linear system, and return where its unknowns are; systems with the same matrix share its factors."""
+        size, key = node.payload, matrix_key(node)
+        start = self.places.regions[key]
+        entries, right = node.arguments[: size * size], node.arguments[size * size :]
+        pivots, side = start + size * size, start + size * (size + 1)
+        if key not in self.factorised:
+            self.factorised.add(key)
+            self._fill(start, entries)
+            self.lines.append(f"factorise({size}, scratch + {start}, scratch + {pivots});")
+        self._fill(side, right)
+        self.lines.append(f"substitute({size}, scratch + {start}, scratch + {pivots}, scratch + {side});")
+        return int(side)
+
+    def _fill(self, start: int, values: Sequence[Expression]) -> None:
+        texts = [self.value(one) for one in values]
+        self.lines += [f"{self.cell(start + k)} = {text};" for k, text in enumerate(texts)]
+
+
+def write_chunks(places: Places, begin: Callable[[Sequence[Unit], set[MatrixKey]], ChunkWriter]) -> list[ChunkWriter]:
+    """Return what was written of each chunk, by writers that are made for them."""
+    factorised: set[MatrixKey] = set()
+    writers = []
+    for chunk in places.layout.chunks:
+        writer = begin(chunk, factorised)
+        for unit in chunk:
+            writer.unit(unit)
+        writers.append(writer)
+    for node in places.passed:
+        writers[-1].store(node)
+    return writers
+
+
+def print_bodies(
+    program: Program, write: Callable[[str, Body], tuple[str, int]], name: str, bodies: tuple[Body, Body]
+) -> tuple[list[str], int]:
+    """Return the functions of a program and of what is computed once a run, and the scratch that they need.
+
+    Raises
+    ------
+    UnsupportedError
+        If the program calls functions in Python.
+    """
+    try:
+        found = write(name, bodies[0]), write(f"{name}_values", bodies[1])
+    except UnsupportedError as error:
+        raise UnsupportedError(error.message, where=program.name) from None
+    return [one for one, _ in found], max(scratch for _, scratch in found)
