@@ -180,9 +180,9 @@ def _sources(text: SceneText, fmi: int, inputs: Sequence[int]) -> dict[str, str]
         table += f"static const int input_numbers[] = {{{numbers}}};\n"
     shared = room.joinpath("fmu.c").read_text(encoding="utf-8").replace("/* inputs */\n", table)
     shared = with_name(shared, text.name)
-    own = room.joinpath(f"fmi{fmi}.c").read_text(encoding="utf-8")
+    both, own = (room.joinpath(name).read_text(encoding="utf-8") for name in ("fmi.c", f"fmi{fmi}.c"))
     scene = {f"{text.name}.h": text.header, f"{text.name}.c": text.source, **text.modes}
-    return {**scene, "fmu.c": shared, f"fmi{fmi}.c": own}
+    return {**scene, "fmu.c": shared, "fmi.c": both, f"fmi{fmi}.c": own}
 
 
 def _binaries(

@@ -69,8 +69,6 @@ EXPORT handle fmi3InstantiateScheduledExecution(const char *name, const char *to
     return NULL;
 }
 
-EXPORT void fmi3FreeInstance(handle o) { free(o); }
-
 EXPORT status3 fmi3EnterInitializationMode(handle o, bool has_tolerance, double tolerance, double start, bool has_end,
                                            double end)
 {
@@ -78,14 +76,11 @@ EXPORT status3 fmi3EnterInitializationMode(handle o, bool has_tolerance, double 
     return done(set_up((instance *)o, has_tolerance, tolerance, start));
 }
 
-EXPORT status3 fmi3ExitInitializationMode(handle o) { return done(begin_motion((instance *)o)); }
 EXPORT status3 fmi3EnterEventMode(handle o) { (void)o; return OK; }
 EXPORT status3 fmi3EnterStepMode(handle o) { (void)o; return OK; }
-EXPORT status3 fmi3Terminate(handle o) { (void)o; return OK; }
 EXPORT status3 fmi3EnterConfigurationMode(handle o) { (void)o; return OK; }
 EXPORT status3 fmi3ExitConfigurationMode(handle o) { (void)o; return OK; }
 EXPORT status3 fmi3EvaluateDiscreteStates(handle o) { (void)o; return OK; }
-EXPORT status3 fmi3Reset(handle o) { reset_instance((instance *)o); return OK; }
 
 EXPORT status3 fmi3GetFloat64(handle o, const reference r[], size_t n, double values[], size_t m)
 {
@@ -198,55 +193,6 @@ EXPORT status3 fmi3GetVariableDependencies(handle o, reference r, size_t of_depe
     return ERROR;
 }
 
-EXPORT status3 fmi3GetFMUState(handle o, void **kept)
-{
-    if (*kept == NULL) *kept = calloc(1, sizeof(instance));
-    if (*kept == NULL) return ERROR;
-    copy_instance((instance *)*kept, (instance *)o);
-    return OK;
-}
-
-EXPORT status3 fmi3SetFMUState(handle o, void *kept)
-{
-    if (kept == NULL) return ERROR;
-    copy_instance((instance *)o, (instance *)kept);
-    return OK;
-}
-
-EXPORT status3 fmi3FreeFMUState(handle o, void **kept)
-{
-    (void)o;
-    free(*kept);
-    *kept = NULL;
-    return OK;
-}
-
-EXPORT status3 fmi3SerializedFMUStateSize(handle o, void *kept, size_t *size)
-{
-    (void)o; (void)kept;
-    *size = sizeof(instance);
-    return OK;
-}
-
-EXPORT status3 fmi3SerializeFMUState(handle o, void *kept, byte bytes[], size_t size)
-{
-    (void)o;
-    if (size != sizeof(instance)) return ERROR;
-    memcpy(bytes, kept, size);
-    return OK;
-}
-
-EXPORT status3 fmi3DeserializeFMUState(handle o, const byte bytes[], size_t size, void **kept)
-{
-    (void)o;
-    if (size != sizeof(instance)) return ERROR;
-    if (*kept == NULL) *kept = calloc(1, sizeof(instance));
-    if (*kept == NULL) return ERROR;
-    memcpy(*kept, bytes, size);
-    link_memory(&((instance *)*kept)->s);
-    return OK;
-}
-
 EXPORT status3 fmi3GetOutputDerivatives(handle o, const reference r[], size_t n, const int32_t orders[],
                                         double values[], size_t m)
 {
@@ -273,97 +219,19 @@ EXPORT status3 fmi3DoStep(handle o, double time, double length, bool keeps, bool
 EXPORT status3 fmi3GetNumberOfContinuousStates(handle o, size_t *n) { (void)o; *n = SIZE; return OK; }
 EXPORT status3 fmi3GetNumberOfEventIndicators(handle o, size_t *n) { (void)o; *n = EVENTS; return OK; }
 
-#if !EXCHANGES
-#define ONLY_CO_SIMULATION(...) (void)o, __VA_ARGS__, ERROR
-EXPORT status3 fmi3EnterContinuousTimeMode(handle o) { (void)o; return ERROR; }
-EXPORT status3 fmi3SetTime(handle o, double time) { return ONLY_CO_SIMULATION((void)time); }
-EXPORT status3 fmi3SetContinuousStates(handle o, const double x[], size_t n)
-{
-    return ONLY_CO_SIMULATION((void)x, (void)n);
-}
-EXPORT status3 fmi3GetContinuousStates(handle o, double x[], size_t n) { return ONLY_CO_SIMULATION((void)x, (void)n); }
-EXPORT status3 fmi3GetContinuousStateDerivatives(handle o, double x[], size_t n)
-{
-    return ONLY_CO_SIMULATION((void)x, (void)n);
-}
-EXPORT status3 fmi3GetEventIndicators(handle o, double x[], size_t n) { return ONLY_CO_SIMULATION((void)x, (void)n); }
-EXPORT status3 fmi3GetNominalsOfContinuousStates(handle o, double x[], size_t n)
-{
-    return ONLY_CO_SIMULATION((void)x, (void)n);
-}
-EXPORT status3 fmi3CompletedIntegratorStep(handle o, bool keeps, bool *has_event, bool *ends)
-{
-    return ONLY_CO_SIMULATION((void)keeps, (void)has_event, (void)ends);
-}
-EXPORT status3 fmi3UpdateDiscreteStates(handle o, bool *again, bool *ends, bool *nominals, bool *values, bool *is_next,
-                                        double *next)
-{
-    (void)o; (void)next;
-    *again = *ends = *nominals = *values = *is_next = false;
-    return OK;
-}
-EXPORT status3 fmi3GetDirectionalDerivative(handle o, const reference unknowns[], size_t n, const reference knowns[],
-                                            size_t m, const double seed[], size_t k, double found[], size_t l)
-{
-    return ONLY_CO_SIMULATION((void)unknowns, (void)n, (void)knowns, (void)m, (void)seed, (void)k, (void)found, (void)l);
-}
-EXPORT status3 fmi3GetAdjointDerivative(handle o, const reference unknowns[], size_t n, const reference knowns[],
-                                        size_t m, const double seed[], size_t k, double found[], size_t l)
-{
-    return ONLY_CO_SIMULATION((void)unknowns, (void)n, (void)knowns, (void)m, (void)seed, (void)k, (void)found, (void)l);
-}
-#else
-EXPORT status3 fmi3EnterContinuousTimeMode(handle o) { (void)o; return OK; }
-EXPORT status3 fmi3SetTime(handle o, double time) { take_time((instance *)o, time); return OK; }
-
-EXPORT status3 fmi3SetContinuousStates(handle o, const double x[], size_t n)
-{
-    if (n != SIZE) return ERROR;
-    memcpy(((instance *)o)->s.state, x, n * sizeof(double));
-    ((instance *)o)->is_read = 0;
-    return OK;
-}
-
-EXPORT status3 fmi3GetContinuousStates(handle o, double x[], size_t n)
-{
-    if (n != SIZE) return ERROR;
-    memcpy(x, ((instance *)o)->s.state, n * sizeof(double));
-    return OK;
-}
-
-EXPORT status3 fmi3GetContinuousStateDerivatives(handle o, double x[], size_t n)
-{
-    if (n != SIZE || !read_values((instance *)o)) return ERROR;
-    memcpy(x, ((instance *)o)->rates, n * sizeof(double));
-    return OK;
-}
-
-EXPORT status3 fmi3GetEventIndicators(handle o, double x[], size_t n)
-{
-    return n == EVENTS ? done(indicators((instance *)o, x)) : ERROR;
-}
-
-EXPORT status3 fmi3GetNominalsOfContinuousStates(handle o, double x[], size_t n)
-{
-    size_t k;
-    (void)o;
-    for (k = 0; k < n && k < SIZE; k++) x[k] = tolerances[k] > 0.0 ? tolerances[k] : 1.0;
-    return n == SIZE ? OK : ERROR;
-}
-
 EXPORT status3 fmi3CompletedIntegratorStep(handle o, bool keeps, bool *has_event, bool *ends)
 {
     (void)keeps;
     *has_event = wants_event((instance *)o) != 0;
     *ends = false;
-    return OK;
+    return EXCHANGES ? OK : ERROR;
 }
 
 EXPORT status3 fmi3UpdateDiscreteStates(handle o, bool *again, bool *ends, bool *nominals, bool *values, bool *is_next,
                                         double *next)
 {
-    int stops, changes, has_next;
-    if (!update_discrete((instance *)o, &stops, &changes, &has_next, next)) return ERROR;
+    int stops = 0, changes = 0, has_next = 0;
+    if (EXCHANGES && !update_discrete((instance *)o, &stops, &changes, &has_next, next)) return ERROR;
     *again = *nominals = false;
     *ends = stops != 0;
     *values = changes != 0;
@@ -399,4 +267,7 @@ EXPORT status3 fmi3GetAdjointDerivative(handle o, const reference unknowns[], si
 {
     return k == n && l == m ? done(adjoint((instance *)o, unknowns, n, knowns, m, seed, found)) : ERROR;
 }
-#endif
+
+#define F(NAME) fmi3##NAME
+typedef status3 status;
+#include "fmi.c"

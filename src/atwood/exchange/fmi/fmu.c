@@ -89,6 +89,16 @@ static void copy_instance(instance *target, const instance *source)
     link_memory(&target->s);
 }
 
+/* Bytes that another process wrote have its addresses. */
+static void forget_addresses(instance *o)
+{
+    link_memory(&o->s);
+    o->s.text = "";
+    o->tell = NULL;
+    o->environment = NULL;
+    o->log = NULL;
+}
+
 /* Read rates and quantities at the time and state there are. */
 static int read_values(instance *o)
 {
@@ -341,5 +351,37 @@ static int derivatives(instance *o, const unsigned *unknowns, size_t n, const un
     if (!directional(o, direction, of_rates, of_quantities)) return 0;
     for (k = 0; k < n; k++) found[k] = along(unknowns[k], direction, of_rates, of_quantities);
     return 1;
+}
+
+static void take_nominals(double *x)
+{
+    int i;
+    for (i = 0; i < SIZE; i++) x[i] = tolerances[i] > 0.0 ? tolerances[i] : 1.0;
+}
+#else
+/* A unit for co-simulation alone has no such functions. */
+static int update_discrete(instance *o, int *ends, int *changes, int *is_next, double *next)
+{
+    (void)o; (void)next;
+    *ends = *changes = *is_next = 0;
+    return 0;
+}
+
+static int wants_event(const instance *o)
+{
+    (void)o;
+    return 0;
+}
+
+static int derivatives(instance *o, const unsigned *unknowns, size_t n, const unsigned *knowns, size_t m,
+                       const double *seed, double *found)
+{
+    (void)o; (void)unknowns; (void)n; (void)knowns; (void)m; (void)seed; (void)found;
+    return 0;
+}
+
+static void take_nominals(double *x)
+{
+    (void)x;
 }
 #endif
