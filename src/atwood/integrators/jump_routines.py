@@ -22,11 +22,12 @@ _TINY = 1e-300
 """Makes zero positive."""
 
 
-def write_routines(coordinates: int, speeds: int) -> list[Routine]:
+def write_routines() -> list[Routine]:
     """Return the routine: the state at an event becomes that after it, and 0 is returned; or 1, and nothing changes."""
     r = Routine("jump", {"place": ADDRESS, "locator": ADDRESS, "t": NUMBER}, exported=True)
     place, locator, t = r.arguments
-    m, search, size = Record(place, FIELDS), Search(locator, LOCATOR), coordinates + speeds
+    m, search = Record(place, FIELDS), Search(locator, LOCATOR)
+    size = m.coordinates + m.speeds
     one = _alone(r, m, search)
     row = r.truncated(m.table[one])
     with r.when(row < 0):
@@ -36,7 +37,7 @@ def write_routines(coordinates: int, speeds: int) -> list[Routine]:
     with r.count(gaps) as i:
         picks[i] = 0.0
     picks[row] = 1.0
-    _strike(r, m, t, y, coordinates, picks)
+    _strike(r, m, t, y, picks)
     before, after, response, impulse = (room.at(size + gaps * k) for k in range(4))
     slow, gains = m.table[search.count * TABLE.index("slow") + one], before[row] + after[row] > after[row] * _MORE
     with r.when(~((before[row] + slow < 0.0) & (after[row] > slow)) | gains):
@@ -47,28 +48,28 @@ def write_routines(coordinates: int, speeds: int) -> list[Routine]:
     there = search.shifted
     with r.count(size) as i:
         there[i] = y[i] - late * search.yp[i]
-    _strike(r, m, t - late, there, coordinates, picks)
+    _strike(r, m, t - late, there, picks)
     with r.when(r.call(m.rates, t, room, there, m.rates_data) != 0):
         r.give(1)
     r.copy(search.yp, there, size)
     with r.count(size) as i:
         room[i] = room[i] + late * there[i]
-    entry = m.log.at(m.logged * (len(ENTRY) + 2 * size))
+    entry = m.log.at(m.logged * m.log_stride)
     for k, value in enumerate((t, one.number(), m.parts[row], impulse[0], before[row], after[row])):
         entry[k] = value
     r.copy(entry.at(len(ENTRY)), y, size)
     r.copy(y, room, size)
-    r.copy(entry.at(len(ENTRY) + size), y, size)
+    r.copy(entry.at(size + len(ENTRY)), y, size)
     m.logged = m.logged + 1
     _watch_again(r, m, search, one, t)
     r.give(0)
     return [r]
 
 
-def _strike(r: Routine, m: Record, t: Value, y: Value, coordinates: int, picks: Value) -> None:
+def _strike(r: Routine, m: Record, t: Value, y: Value, picks: Value) -> None:
     """Make an impact at a state."""
-    inputs = [place_of(r, t), y, y.at(coordinates), picks]
-    with r.when(call_kernel(r, "kernel", inputs, m.derived, m.scratch, [m.room]) != 0):
+    inputs = [place_of(r, t), y, y.at(m.coordinates), picks]
+    with r.when(call_kernel(r, m.program, inputs, m.derived, m.scratch, [m.room]) != 0):
         r.give(1)
 
 

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from atwood.arrays import FloatArray
-from atwood.codegen.llvm.build import RoutineSource, build_code, default_options
-from atwood.codegen.llvm.module import Part
+from atwood.codegen.llvm.build import Built, RoutineSource, build_code, default_options, once
+from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Kind
 from atwood.expr.core.program import Program
 
@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from atwood.integrators.protocol import CompiledRates
 
 FIELDS: dict[str, Kind] = {
-    **dict.fromkeys(("derived", "scratch", "shift", "seen", "table", "parts", "moved", "room", "log"), ADDRESS),
-    **dict.fromkeys(("rates", "rates_data"), ADDRESS),
+    **dict.fromkeys(("program", "derived", "scratch", "shift", "seen", "table", "parts"), ADDRESS),
+    **dict.fromkeys(("moved", "room", "log", "rates", "rates_data"), ADDRESS),
     "left": NUMBER,
-    **dict.fromkeys(("gaps", "log_stride", "logged", "capacity"), INTEGER),
+    **dict.fromkeys(("coordinates", "speeds", "gaps", "log_stride", "logged", "capacity"), INTEGER),
 }
 """The memory of jumps; `left` is how long they may go on, s, if each is a share of the time before it."""
 
@@ -75,6 +75,13 @@ class JumpLog:
         ]
 
 
+@once
+def _routines() -> Built:
+    files = tuple(f"integrators/{name}.py" for name in ("compiled_location", "event_routines", "jumps"))
+    source = RoutineSource("integrators.jump_routines", files)
+    return build_code([], CodeOptions(level=2), exports=("jump",), routines=source)
+
+
 class JumpCode:
     """Jumps as machine code, for any parameter values.
 
@@ -88,9 +95,7 @@ class JumpCode:
         self.program = program
         _, self.coordinates, self.speeds, self.gaps = (len(group.symbols) for group in program.inputs)
         part = Part("kernel", program)
-        files = tuple(f"integrators/{name}.py" for name in ("compiled_location", "event_routines", "jumps"))
-        routines = RoutineSource("integrators.jump_routines", files, (self.coordinates, self.speeds))
-        self.built = build_code([part], default_options([part]), exports=["jump"], routines=routines)
+        self.built, self.routines = build_code([part], default_options([part])), _routines()
 
 
 class Jumps:
@@ -126,9 +131,10 @@ class Jumps:
         places = (one.ctypes.data for one in pieces[1:])
         names = ("derived", "scratch", "table", "parts", "moved", "room", "log")
         self._set(**dict(zip(names, places, strict=True)), gaps=code.gaps, log_stride=self._stride)
+        self._set(coordinates=code.coordinates, speeds=code.speeds, program=code.built.code.addresses["kernel"])
         self._set(shift=events.arrays[1].ctypes.data, seen=events.memory.ctypes.data)
         self._set(rates=rates.function, rates_data=rates.data)
-        self.function, self.data = code.built.code.addresses["jump"], self._numbers.ctypes.data
+        self.function, self.data = code.routines.code.addresses["jump"], self._numbers.ctypes.data
 
     def _set(self, **fields: int) -> None:
         for name, value in fields.items():

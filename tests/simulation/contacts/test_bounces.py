@@ -144,7 +144,7 @@ def test_impacts_without_python_are_those_with_it(
 
     quick, few = run()
     monkeypatch.setattr(session, "_MANY_IMPACTS", math.inf)
-    monkeypatch.setattr(session, "_MANY_CHANGES", math.inf)
+    monkeypatch.setattr(session, "MANY_CHANGES", math.inf)
     monkeypatch.setattr(compiled, "FEW_ROWS", 0)
     slow, many = run()
     assert [(one.part, one.kind) for one in quick.events] == [(one.part, one.kind) for one in slow.events]

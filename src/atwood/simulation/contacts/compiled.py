@@ -142,14 +142,16 @@ def changes_in_steps(plan: SceneProblem) -> bool:
     return len(layout.contacts) <= _MOST_ROWS and all(len(rows) == 1 for rows in layout.units)
 
 
-def kept_whole(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> SceneProblem:
+def kept_whole(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray, stops: bool) -> SceneProblem:
     """Return a plan with the programs for all states, if these are short and its steps can change sets by themselves.
 
     Then they need not stop where the last contact opens, and where the first one closes. Impacts that need no set are
-    quicker with the programs for none.
+    quicker with the programs for none, unless there have been many stops, as where they accumulate.
     """
     assembly = plan.assembly
-    if not is_loose(assembly) or len(assembly.own_equations.contacts) > FEW_ROWS or has_plain_impacts(plan):
+    if not is_loose(assembly) or len(assembly.own_equations.contacts) > FEW_ROWS:
+        return plan
+    if has_plain_impacts(plan) and not stops:
         return plan
     if not changes_in_steps(plan) or why_in_python(assembly):
         return plan

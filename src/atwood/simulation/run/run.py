@@ -47,7 +47,7 @@ from atwood.simulation.run.run_record import (
     shortest_mode,
 )
 from atwood.simulation.run.segment import run_segment
-from atwood.simulation.run.session import KeptSession
+from atwood.simulation.run.session import MANY_CHANGES, KeptSession
 from atwood.simulation.run.sides_of_run import SidesOfRun
 from atwood.simulation.run.stall_diagnosis import allowed, failed
 from atwood.stages import stage
@@ -351,7 +351,7 @@ class Walk:
             return plan
         from atwood.simulation.contacts.compiled import kept_whole
 
-        whole = kept_whole(plan, self.t, self.q, self.u)
+        whole = kept_whole(plan, self.t, self.q, self.u, self._kept.changes > MANY_CHANGES)
         if whole is plan or not self._kept.jumps(whole.assembly):
             return plan
         self.probe = None

@@ -54,7 +54,7 @@ if TYPE_CHECKING:
 _MANY_IMPACTS = 3
 """From so many on it pays to compile what an impact does."""
 
-_MANY_CHANGES = 6
+MANY_CHANGES = 6
 """The same of the change of a set of contacts."""
 
 OF_CONTACTS = 0.01
@@ -307,8 +307,8 @@ class KeptSession:
             return False
         from atwood.simulation.contacts.compiled import FEW_ROWS  # few scenes have any
 
-        many = len(self.impacts) >= _MANY_IMPACTS or self.changes >= _MANY_CHANGES
-        return many or (not is_loose(assembly) and len(assembly.own_equations.contacts) <= FEW_ROWS)
+        many = len(self.impacts) >= _MANY_IMPACTS or self.changes >= MANY_CHANGES
+        return many or len(assembly.own_equations.contacts) <= FEW_ROWS
 
     def filling_of(self, session: Session | None) -> Filling | None:
         """Return what gives a session its parameters; None where it is not kept."""
