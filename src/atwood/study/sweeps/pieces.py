@@ -19,7 +19,7 @@ Take: TypeAlias = Callable[[NDArray[np.intp], Records], object]
 _FIRST, _GROWTH = 64, 8
 """Runs of the first piece, before any time is known, and how many times larger than the one before a piece may be."""
 
-_LEAST_SECONDS = 0.05
+_LEAST_SECONDS = 0.2
 """Pieces of the end are smaller, so that all workers end at about one time, but none takes less."""
 
 
