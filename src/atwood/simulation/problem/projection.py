@@ -8,7 +8,7 @@ safe where constraints nearly depend on each other.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -38,12 +38,18 @@ _STEPS = 12
 _EXACT = 1e-14
 """States that miss all constraints by less, in the units of their rows, are left as they are: formulas gave them."""
 
+_FAR = 1e-11
+"""What moves by more of the sizes to meet the constraints has missed them."""
+
 _FEW, _MANY = 12, 100
 """Of so many entries for each state the largest is found one after another."""
 
 _CHUNK = 4_000_000
 """Numbers in the matrices that are worked on at once."""
 
+
+Misses: TypeAlias = Callable[[], FloatArray]
+"""Gives by how much states miss the constraints on position and velocity, shape (2, states)."""
 
 Nearest: TypeAlias = Callable[[FloatArray, FloatArray], NDArray[np.bool_] | None]
 """Takes states, one row each, onto the constraints, and says for which it could; None where it can for none."""
@@ -57,15 +63,15 @@ class Projected:
     ----------
     coordinates, speeds
         Shape (number, states).
-    held
-        By how much the states missed the constraints on position and velocity before, shape (2, states).
+    misses
+        Gives by how much the states missed the constraints on position and velocity before, shape (2, states).
     doubtful
         Which states have to be looked at one by one.
     """
 
     coordinates: FloatArray
     speeds: FloatArray
-    held: FloatArray
+    misses: Misses
     doubtful: NDArray[np.bool_]
 
 
@@ -126,10 +132,10 @@ def project_states(
     if len(parts) == 1:
         return parts[0]
     joined = (
-        np.concatenate([getattr(one, name) for one in parts], axis=-1)
-        for name in ("coordinates", "speeds", "held", "doubtful")
+        np.concatenate([getattr(one, name) for one in parts], axis=-1) for name in ("coordinates", "speeds", "doubtful")
     )
-    return Projected(*joined)
+    near, moving, doubtful = joined
+    return Projected(near, moving, lambda: np.concatenate([one.misses() for one in parts], axis=1), doubtful)
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,20 +254,23 @@ def _project(
     sizes = plan.sizes[:, None]
     kinematic_map, holding = plan.balance.kinematic_map, plan.balance.holding(list(plan.finding.kept))
     q, speeds = kinematic_map.normalized(q.copy()), (u / sizes).T
+    met = None if nearest is None else _met_quickly(plan, t, q, u, nearest)
+    if met is not None:
+        return met
     found = None if nearest is None else _taken(plan, t, q, u, nearest)
     if found is None:
         now = constraints_at(plan, t, q, u)
         held = _largest(now, speeds)
     else:
         held, near, moving, done = found
-    if np.all(held[0] <= _EXACT) and np.all(held[1] * plan.scales.time <= _EXACT):
-        return Projected(q, u.copy(), held, np.zeros(len(t), dtype=bool))
+    if _are_exact(plan, held):
+        return Projected(q, u.copy(), lambda: held, np.zeros(len(t), dtype=bool))
     if found is not None:
         doubtful = np.zeros(len(t), dtype=bool)
         if not done.all():
             rest = _project(plan, t[~done], q[:, ~done], u[:, ~done])
             near[:, ~done], moving[:, ~done], doubtful[~done] = rest.coordinates, rest.speeds, rest.doubtful
-        return Projected(near, moving, held, doubtful)
+        return Projected(near, moving, lambda: held, doubtful)
     last = np.full(len(t), np.inf)
     active = np.ones(len(t), dtype=bool)
     for _ in range(_STEPS):
@@ -278,7 +287,38 @@ def _project(
         speeds = speeds - solve(now.rate(speeds))
     left = _largest(now, speeds) * np.array([[1.0], [plan.scales.time]])
     doubtful = active | ~np.all(left <= 10.0 * tolerances.MET, axis=0)
-    return Projected(q, sizes * speeds.T, held, doubtful)
+    return Projected(q, sizes * speeds.T, lambda: held, doubtful)
+
+
+def _are_exact(plan: SceneProblem, held: FloatArray) -> bool:
+    """Return whether all states are left as they are."""
+    return bool(np.all(held[0] <= _EXACT) and np.all(held[1] * plan.scales.time <= _EXACT))
+
+
+def _met_quickly(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray, nearest: Nearest) -> Projected | None:
+    """Return what machine code finds, if that moves by next to nothing where it is taken onto the constraints again.
+
+    A row in units of its largest entry misses no more than the sum of what its unknowns move by to meet it. None where
+    that does not tell, or all may be exact.
+    """
+    if plan.finding.redundant or plan.assembly.own_equations.contacts:
+        return None
+    own = np.ascontiguousarray(np.concatenate([q, u]).T)
+    rows = own.copy()
+    met = nearest(t, rows)
+    again = rows.copy()
+    if met is None or not met.all() or not nearest(t, again).all():  # type: ignore[union-attr]
+        return None
+    sizes = np.concatenate([plan.coordinate_sizes, plan.sizes / plan.scales.time])
+    if not 2.0 * len(sizes) * np.max(np.abs(again - rows) / sizes) <= tolerances.MET:
+        return None
+    moved = np.max(np.abs(rows - own) / sizes, axis=1)
+    one = slice(int(np.argmax(moved)), int(np.argmax(moved)) + 1)
+    if moved[one] <= _FAR and _are_exact(plan, misses_of(plan, t[one], q[:, one], u[:, one])):
+        return None
+    near, moving = (part.copy() for part in plan.program.split(rows.T))
+    near = plan.balance.kinematic_map.normalized(near)
+    return Projected(near, moving, partial(misses_of, plan, t, q, u), np.zeros(len(t), dtype=bool))
 
 
 def _taken(

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import cache, partial
 from itertools import chain, pairwise
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, made_of
 from atwood.simulation.problem.problem import SceneProblem
-from atwood.simulation.problem.projection import Nearest, misses_of, project_safely, project_states
+from atwood.simulation.problem.projection import Misses, Nearest, misses_of, project_safely, project_states
 
 if TYPE_CHECKING:
     from atwood.integrators.time_stepping.session import Change
@@ -50,8 +51,8 @@ class SegmentRecord:
         (number, samples).
     shown
         Which samples are outputs.
-    held
-        By how much the solver's own states missed the constraints on position and velocity, shape (2, samples).
+    misses
+        Gives `held`, which is worked out when somebody asks.
     singular_crossings
         Singular positions that it passed through.
     after_time_event
@@ -66,10 +67,18 @@ class SegmentRecord:
     coordinates: FloatArray
     speeds: FloatArray
     shown: NDArray[np.bool_]
-    held: FloatArray
+    misses: Misses
     singular_crossings: tuple[SingularCrossing, ...] = ()
     after_time_event: bool = False
     lost: FloatArray | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "misses": partial(np.asarray, self.held)}
+
+    @property
+    def held(self) -> FloatArray:
+        """By how much the solver's own states missed the constraints on position and velocity, shape (2, samples)."""
+        return self.misses()
 
     @property
     def assembly(self) -> Assembly:
@@ -85,7 +94,7 @@ class Stretch:
     ----------
     plan, impact, after_time_event
         As of the first record.
-    time, coordinates, speeds, shown, held, singular_crossings, lost
+    time, coordinates, speeds, shown, misses, singular_crossings, lost
         As of `SegmentRecord`, for all records.
     starts
         Numbers of the samples that begin a record.
@@ -102,7 +111,7 @@ class Stretch:
     coordinates: FloatArray
     speeds: FloatArray
     shown: NDArray[np.bool_]
-    held: FloatArray
+    misses: Misses
     singular_crossings: tuple[SingularCrossing, ...]
     starts: NDArray[np.int_]
     changes: Sequence[Callable[[], Sequence[Change]]]
@@ -126,7 +135,7 @@ class Stretch:
                 coordinates=self.coordinates[:, each],
                 speeds=self.speeds[:, each],
                 shown=self.shown[each],
-                held=self.held[:, each],
+                misses=partial(_columns, self.misses, each),
                 singular_crossings=self.singular_crossings,
                 lost=None if self.lost is None else self.lost[each],
                 after_time_event=self.after_time_event if first == 0 else is_moment,
@@ -143,19 +152,20 @@ class Stretch:
 
 @dataclass(frozen=True, eq=False)
 class _Block:
-    """Samples that are done: shapes (samples,), (number, samples) and (2, samples)."""
+    """Samples that are done: shapes (samples,), (number, samples); what gives (2, samples)."""
 
     time: FloatArray
     q: FloatArray
     u: FloatArray
     shown: NDArray[np.bool_]
-    held: FloatArray
+    misses: Misses
 
     def without_last(self) -> _Block:
         return self.first(len(self.time) - 1)
 
     def first(self, count: int) -> _Block:
-        return _Block(self.time[:count], self.q[:, :count], self.u[:, :count], self.shown[:count], self.held[:, :count])
+        misses = partial(_columns, self.misses, slice(count))
+        return _Block(self.time[:count], self.q[:, :count], self.u[:, :count], self.shown[:count], misses)
 
 
 class Recorder:
@@ -277,7 +287,7 @@ class Recorder:
         if len(t):
             q, u, _ = crossing.path.at(t)
             q = self.plan.balance.kinematic_map.normalized(q)
-            self._add(_Block(t, q, u, shown.copy(), misses_of(self.plan, t, q, u)))
+            self._add(_Block(t, q, u, shown.copy(), partial(misses_of, self.plan, t, q, u)))
 
     def note(self, singular_crossings: Sequence[SingularCrossing]) -> None:
         """Record crossings that the solver made by itself; states on their ways are those of the paths."""
@@ -309,11 +319,11 @@ class Recorder:
             rest = _cut(waiting, count) if count is not None and count < len(waiting[0]) else None
             self._finish(*_cut(waiting, stop=count), [] if rest is None else [rest])
 
-    def last(self) -> tuple[float, FloatArray, FloatArray, FloatArray]:
-        """Return time, coordinates and speeds of the last sample, and by how much the constraints were missed."""
+    def last(self) -> tuple[float, FloatArray, FloatArray, Misses]:
+        """Return time, coordinates and speeds of the last sample, and what gives misses of constraints up to it."""
         self.settle()
         block = self._samples[0][-1]
-        return float(block.time[-1]), block.q[:, -1], block.u[:, -1], block.held[:, -1]
+        return float(block.time[-1]), block.q[:, -1], block.u[:, -1], block.misses
 
     def close(self) -> float:
         """Show the last sample, and return its time; what there is no time left to project is dropped."""
@@ -336,7 +346,8 @@ class Recorder:
         """Return what was recorded."""
         self.settle()
         blocks = self._samples[0]
-        q, u, held = (np.concatenate([getattr(one, name) for one in blocks], axis=1) for name in ("q", "u", "held"))
+        q, u = (np.concatenate([getattr(one, name) for one in blocks], axis=1) for name in ("q", "u"))
+        misses = cache(lambda: np.concatenate([one.misses() for one in blocks], axis=1))
         time, shown = (np.concatenate([getattr(one, name) for one in blocks]) for name in ("time", "shown"))
         # A path may lead over a place behind the end, or behind an event.
         crossings = tuple(one for one in self.singular_crossings if one.path is None or one.time <= time[-1])
@@ -346,19 +357,19 @@ class Recorder:
             starts = starts[starts < len(time)]
         lost = None if self.loss_until is None else self.loss_until(time)
         rest = crossings, starts, tuple(self._changes), lost, self._plan_at
-        return Stretch(self.plan, impact, after_time_event, time, q, u, shown, held, *rest)
+        return Stretch(self.plan, impact, after_time_event, time, q, u, shown, misses, *rest)
 
     def _finish(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_], waiting: Sequence[_States] = ()) -> None:
         q, u = (part.copy() for part in self.plan.program.split(y.T))
         q = self.plan.balance.kinematic_map.normalized(q)
         if not self.plan.balance.constraints:
-            self._add(_Block(t, q, u, shown, np.zeros((2, len(t)))), waiting)
+            self._add(_Block(t, q, u, shown, partial(np.zeros, (2, len(t)))), waiting)
             return
         made = project_states(self.plan, t, q, u, self.nearest)
         if not self.plan.is_projected:
-            self._add(_Block(t, q, u, shown, made.held), waiting)
+            self._add(_Block(t, q, u, shown, made.misses), waiting)
             return
-        block = _Block(t, made.coordinates, made.speeds, shown, made.held)
+        block = _Block(t, made.coordinates, made.speeds, shown, made.misses)
         for i in np.flatnonzero(made.doubtful):
             try:
                 block.q[:, i], block.u[:, i] = project_safely(self.plan, float(t[i]), q[:, i], u[:, i])
@@ -370,6 +381,10 @@ class Recorder:
     def _add(self, block: _Block, waiting: Sequence[_States] = ()) -> None:
         blocks = self._samples[0]
         self._samples = ((*blocks, block) if len(block.time) else blocks, list(waiting))
+
+
+def _columns(misses: Misses, each: slice) -> FloatArray:
+    return misses()[:, each]
 
 
 def _count(pending: Sequence[_States]) -> int:

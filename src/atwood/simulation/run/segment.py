@@ -607,8 +607,8 @@ class _Runner:
         needs_normalization = plan.balance.kinematic_map.needs_normalization(plan.program.split(step_result.y)[0])
         if plan.program.level != "index1-projected" and not needs_normalization:
             return
-        _, q, u, held = self.recorder.last()
-        drift = max(float(held[0]), float(held[1]) * plan.scales.time)  # of places, and of speeds
+        _, q, u, misses = self.recorder.last()
+        drift = float(np.max(misses()[:, -1] * [1.0, plan.scales.time]))  # of places, and of speeds
         if needs_normalization or drift > 100.0 * self.segment.options.relative_tolerance:
             session.reinitialize(step_result.t, *pack_state(plan, step_result.t, q, u))
 

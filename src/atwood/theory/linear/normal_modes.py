@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import field
+from functools import partial
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -421,7 +422,7 @@ def mode_motion(
         speeds=np.gradient(coordinates, times, axis=1) if linear.equations.rates == linear.equations.speeds
         else np.zeros((len(still), frames)),
         shown=np.ones(frames, dtype=bool),
-        held=np.zeros((2, frames)),
+        misses=partial(np.zeros, (2, frames)),
     )  # fmt: skip
     return Result(replace(begun, stretches=(segment,)))
 
