@@ -284,7 +284,7 @@ def test_outputs_taken_onto_constraints_by_machine_code_are_the_nearest_states(s
     assert bool(missed) == bool(plan.balance.constraints)
     for one in (by_code, mixed):
         assert not one.doubtful.any()
-        assert_allclose(one.held, plain.held, rtol=1e-12)
+        assert_allclose(one.misses(), plain.misses(), rtol=1e-12)
         miss = (one.coordinates - plain.coordinates) / plan.coordinate_sizes[:, None]
         assert np.max(np.abs(miss), initial=0.0) < 1e-7  # of second order in how far they were taken
         assert np.max(misses_of(plan, t, one.coordinates, one.speeds), initial=0.0) < 1e-11
