@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from collections.abc import Callable
 
 import numpy as np
@@ -60,6 +61,14 @@ def on_a_floor() -> tuple[Scene, float]:
     scene.connect(m.point, floor.point)
     scene.start.update({"m.position.x": 0.0, "m.position.z": 0.6, "m.velocity.x": 0.0, "m.velocity.z": 0.0})
     return scene, 2.0
+
+
+def on_a_rough_floor() -> tuple[Scene, float]:
+    """It bounces with friction, and comes to rest after 4.2 s."""
+    scene, end = on_a_floor()
+    scene["floor"].friction, scene["floor"].restitution = 0.1, 0.8
+    scene.start["m.velocity.x"] = 0.5
+    return scene, 2.0 * end
 
 
 def on_a_belt() -> tuple[Scene, float]:
@@ -128,7 +137,9 @@ def test_an_impact_of_what_began_at_zero_has_no_margin(monkeypatch: pytest.Monke
 
 
 @pytest.mark.parametrize("form", ["reduced", "dae"])
-@pytest.mark.parametrize("make", [in_a_box, in_a_circle, with_play, on_a_floor, on_a_belt, between_walls, clutched])
+@pytest.mark.parametrize(
+    "make", [in_a_box, in_a_circle, with_play, on_a_floor, on_a_rough_floor, on_a_belt, between_walls, clutched]
+)
 def test_impacts_without_python_are_those_with_it(
     make: Callable[[], tuple[Scene, float]], form: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -157,8 +168,28 @@ def test_impacts_without_python_are_those_with_it(
         )
     # Bodies that are held are looked at at each impact.
     assert few < 0.7 * many or (make is with_play and form == "dae")
+    if make in (in_a_box, on_a_rough_floor, on_a_belt, clutched):
+        assert few == 1  # the start
     assert len(quick.run.segments) == len(slow.run.segments)
     for one, other in zip(quick.run.segments, slow.run.segments, strict=True):
         assert (one.impact, len(one.time)) == (other.impact, len(other.time))
         assert one.coordinates == pytest.approx(other.coordinates, abs=1e-10)
         assert one.speeds == pytest.approx(other.speeds, abs=1e-10)
+
+
+@pytest.mark.parametrize("make", [in_a_box, on_a_rough_floor, on_a_belt])
+def test_events_that_are_made_when_asked_for_are_those_of_their_run(make: Callable[[], tuple[Scene, float]]) -> None:
+    """An assembly goes on with its sessions, whose memory the next run overwrites."""
+    scene, end = make()
+    assembly = aw.assemble(scene)
+    first = simulate(assembly, t_end=end, outputs=5, rtol=1e-10)
+    again = simulate(assembly, t_end=0.7 * end, outputs=5, rtol=1e-10)
+    loaded = pickle.loads(pickle.dumps(simulate(assembly, t_end=end, outputs=5, rtol=1e-10)))
+    alone = simulate(make()[0], t_end=end, outputs=5, rtol=1e-10)
+    for one in (first, loaded):
+        assert one.events == alone.events
+        assert len(one.run.segments) == len(alone.run.segments)
+        assert all(np.array_equal(one[name], alone[name]) for name in alone)
+    before = [event for event in alone.events if event.time <= 0.7 * end]
+    assert [event.kind for event in again.events] == [event.kind for event in before]
+    assert [event.time for event in again.events] == pytest.approx([event.time for event in before], abs=1e-11)

@@ -296,10 +296,9 @@ class KeptSession:
         self.kept: list[Opened] = (None if assembly is None else assembly.kept.take(_SESSIONS)) or []
 
     def hand_back(self) -> None:
-        """Leave the sessions to the next run; not those whose log of jumps is still read."""
-        free = [one for one in self.kept if one.fill.problem.jumps is None]
-        if self._assembly is not None and free:
-            self._assembly.kept.get(_SESSIONS, lambda: free)
+        """Leave the sessions to the next run; logs of their jumps have been copied."""
+        if self._assembly is not None and self.kept:
+            self._assembly.kept.get(_SESSIONS, lambda: self.kept)
 
     def jumps(self, assembly: Assembly) -> bool:
         """Whether steps are to make impacts, or changes of a set of contacts, by themselves."""
