@@ -191,7 +191,7 @@ def _set_apart(assembly: Assembly) -> set[int]:
 
 def _still() -> Column:
     """Return a column that changes no parameter."""
-    return Column("", "1", True, 0.0, 1.0, _refuse, "", True)
+    return Column("", "1", True, 0.0, 1.0, _refuse, frozenset(), True)
 
 
 def _refuse(share: float) -> Assembly:

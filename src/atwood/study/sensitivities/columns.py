@@ -56,8 +56,8 @@ class Column:
         What a change of it is measured by: the parameter itself, or for starts a size of the scene.
     near
         Gives the scene with the value moved by a share of the scale.
-    symbol
-        The name of the parameter of the equations that it is, and no other follows; empty where that is not known.
+    symbols
+        The names of the parameters of the equations that it is, and no other follows; empty where that is not known.
     leaves_start
         Whether the start does not depend on it for certain.
     """
@@ -68,7 +68,7 @@ class Column:
     value: float
     scale: float
     near: Callable[[float], Assembly]
-    symbol: str
+    symbols: frozenset[str]
     leaves_start: bool
 
     def start(self, state: tuple[FloatArray, FloatArray], length: float) -> FloatArray:
@@ -90,6 +90,8 @@ class Column:
                 )
             return found
 
+        if all(np.array_equal(there(share), here) for share in (SHARES[0], -SHARES[1])):
+            return np.zeros(len(here))
         return extrapolated(there)
 
 
@@ -151,9 +153,9 @@ def _parameter(assembly: Assembly, path: str, reads: Callable[[], frozenset[str]
     def near(share: float) -> Assembly:
         return _other(assembly, path, {path: number + share * scale}, {}, whole)
 
-    symbol = "" if number == 0.0 or whole else _own_symbol(assembly, path)
-    if symbol:
-        return Column(path, unit, False, number, scale, near, symbol, symbol not in reads())
+    is_own = number != 0.0 and not whole and _is_own(assembly, path)
+    if is_own:
+        return Column(path, unit, False, number, scale, near, frozenset([path]), path not in reads())
     found = near(SHARES[0])
     if found.shared is not assembly.shared or found.why_new:
         zero = "it is exactly zero, and the equations are made without it"
@@ -164,14 +166,25 @@ def _parameter(assembly: Assembly, path: str, reads: Callable[[], frozenset[str]
             if number == 0.0
             else "Leave it out; a sweep runs the scene with other values of it.",
         )
-    return Column(path, unit, False, number, scale, near, "", False)
+    symbols = _handed_on(assembly, found, number, number + SHARES[0] * scale)
+    is_kept = (found.flat.start, found.flat.guess) == (assembly.flat.start, assembly.flat.guess)
+    leaves_start = bool(symbols) and is_kept and not symbols & reads()
+    return Column(path, unit, False, number, scale, near, symbols, leaves_start)
 
 
-def _own_symbol(assembly: Assembly, path: str) -> str:
-    """Return the name of the parameter of the equations that a value of a leaf is; nothing else is made of that."""
+def _is_own(assembly: Assembly, path: str) -> bool:
+    """Return whether a value of a leaf is a parameter of the equations; nothing else is made of that."""
     leaf = path.rpartition(".")[0]
     is_own = leaf in assembly.flat.parts and any(one.name == path for one in assembly.parameters)
-    return path if is_own and not assembly.mechanism.constants else ""
+    return is_own and not assembly.mechanism.constants
+
+
+def _handed_on(assembly: Assembly, near: Assembly, value: float, moved: float) -> frozenset[str]:
+    """Return the parameters of the equations that a value is handed on to as it is; none if any is made of it."""
+    here, there = assembly.parameter_values, near.parameter_values
+    changed = np.flatnonzero(here != there)
+    is_same = np.all(here[changed] == value) and np.all(there[changed] == moved)
+    return frozenset(assembly.parameters[k].name for k in changed) if is_same else frozenset()
 
 
 def _read_by_start(assembly: Assembly) -> frozenset[str]:
@@ -219,7 +232,7 @@ def _start_value(assembly: Assembly, start: Start, path: str) -> Column:
     near = cache(lambda share: _other(assembly, path, {}, {path: value + share * scale}))
     if near(SHARES[0]).shared is not assembly.shared:
         raise UsageError("it shapes the equations", where=path, advice="Leave it out; a sweep can vary it.")
-    return Column(path, unit, True, value, scale, near, "", False)
+    return Column(path, unit, True, value, scale, near, frozenset(), False)
 
 
 def _observed(assembly: Assembly, start: Start, path: str) -> float:

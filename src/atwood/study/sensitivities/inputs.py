@@ -103,7 +103,7 @@ class Driven:
         """Return one for each node."""
         size = max(map(abs, self.values)) or 1.0
         return [
-            NodeColumn(self.name(k), self.unit, True, value, size, _refuse, "", True, self, k)
+            NodeColumn(self.name(k), self.unit, True, value, size, _refuse, frozenset(), True, self, k)
             for k, value in enumerate(self.values)
         ]
 

@@ -23,6 +23,7 @@ from atwood.study.sensitivities.changes import Beside, Change, Leg, WatchedWalk
 from atwood.study.sensitivities.columns import SHARES, Column, extrapolated
 from atwood.study.sensitivities.inputs import NodeColumn
 from atwood.study.sensitivities.quantities import derivatives, written
+from atwood.study.sensitivities.starts import exact_changes
 
 _AGREES = 1e3
 """So many tolerances may lie between a motion with derivatives and the run; its own errors grow like the columns."""
@@ -118,11 +119,15 @@ class Passage:
 
     def _at_start(self) -> tuple[FloatArray, FloatArray]:
         """Return derivatives of the state and of discrete states where the first stretch begins."""
-        moved = np.array([one.start(own_state(self.first, self.start), self.start.length) for one in self.columns])
+        here, length = own_state(self.first, self.start), self.start.length
+        seeds = np.array([self._parameters(self.first, one) for one in self.columns])
+        known = exact_changes(self.first, self.start, self.columns, seeds)
+        pairs = zip(known, self.columns, strict=True)
+        moved = np.array([column.start(here, length) if one is None else one for one, column in pairs])
         held = np.zeros((len(self.columns), len(self.first.discrete_states)))
         if held.size:
             held = np.array([self._held_at_start(one) for one in self.columns])
-        state, still = np.concatenate(own_state(self.first, self.start)), np.zeros(len(self.columns))
+        state, still = np.concatenate(here), np.zeros(len(self.columns))
         for change in self.legs[0].changes:
             moved, held, state = self._changed(change, self.start.time, state, moved, held, still)
         return moved, held
@@ -175,9 +180,11 @@ class Passage:
         return self._changes[about][0]
 
     def _changes_in(self, now: Assembly, column: Column) -> FloatArray:
+        if column.is_start:
+            return np.zeros(len(now.parameters))
+        if column.symbols and now.shared is self.first.shared:
+            return np.array([column.scale * (one.name in column.symbols) for one in now.parameters])
         here = now.parameter_values
-        if column.symbol and now.shared is self.first.shared:
-            return np.array([column.scale * (one.name == column.symbol) for one in now.parameters])
         near = self._beside(now, column, SHARES[0]).parameter_values
         moved, to = near != here, column.value + SHARES[0] * column.scale
         if np.all(here[moved] == column.value) and np.all(near[moved] == to):  # it is handed on as it is
