@@ -14,12 +14,11 @@ from atwood.errors import ParameterError, UnsupportedError, UsageError
 from atwood.exchange.c.tables import quoted
 from atwood.exchange.c.text import c_name
 from atwood.functions import select
-from atwood_library import Drive, Ground, PointMass, Rod
+from atwood_library import Drive, Ground, Link, PointMass, RigidBody, Rod, Rope
 from atwood_library.scenes import SCENES
 
 from ..exported_scenes import FLAGS, apart, built, compiler, happened, printed
 from ..library.test_tables import hoisted
-from ..plotting.test_live import slack_string
 from ..simulation.contacts.test_drive_trains import lossy_train
 from ..simulation.test_sides import band, moving
 
@@ -42,10 +41,23 @@ def test_motions_are_those_of_simulate(name: str, form: str, tmp_path: Path) -> 
         assert states[0] == states[2] != "0", equal
 
 
+def body_on_a_string() -> Scene:
+    """Return a body in space whose string goes slack and comes taut again."""
+    scene = Scene(space="space", t_end=1.5)
+    ground, rope = scene.add("ground", Ground()), scene.add("rope", Rope(length=1.0, when_slack="slack"))
+    arm, body = scene.add("arm", Link(length=0.3)), scene.add("body", RigidBody(mass=1.0, moments=(0.1, 0.2, 0.25)))
+    for a, b in ((ground.frame, rope.a), (rope.b, arm.a), (arm.b, body.frame)):
+        scene.connect(a, b)
+    scene.start.update({"body.position.x": 0.0, "body.position.y": 0.1, "body.velocity.x": 5.0, "body.velocity.y": 0.5})
+    scene.start.update({f"body.spin.{axis}": one for axis, one in zip("xyz", (1.0, 0.3, 0.2), strict=True)})
+    scene.guess["body.position.z"] = -1.2
+    return scene
+
+
 HAPPENING: dict[str, tuple[Callable[[], Scene], str, int]] = {
     "contacts": (SCENES["clutches"], "reduced", 8),
     "updates": (SCENES["cart-pole"], "reduced", 0),
-    "modes": (slack_string, "dae", 2),
+    "modes of a body that turns": (body_on_a_string, "reduced", 2),
     "an update that strikes, and a mode": (lambda: hoisted("plane"), "reduced", 2),
     "a side": (lambda: moving(band(1e-3)), "reduced", 0),
     "floors": (lambda: moving(lambda x, v: 0.1 * floor(3.0 * x)), "dae", 0),
@@ -67,6 +79,23 @@ def test_what_happens_in_c_is_what_happens_in_runs(name: str, tmp_path: Path) ->
     assert [one[:2] for one in found] == [one[:2] for one in known]
     assert [one[2] for one in found] == pytest.approx([one[2] for one in known], abs=1e-12)
     assert len(found) == count
+
+
+@needs_a_compiler
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+def test_the_start_is_found_for_other_values(form: str, tmp_path: Path) -> None:
+    scene = SCENES["four-bar"]()
+    program = built(scene, tmp_path, form, QUICK)
+    scene.set("coupler.length", 2.4)
+    scene.set("rocker.length", 2.1)
+    result = simulate(scene, form=form, rtol=1e-11, t_end=0.5, outputs=[0.0, 0.5], solver="explicit")
+    found = printed(program, 0.5, 1e-11, 2, "--set", "coupler.length=2.4", "--set", "rocker.length=2.1")
+    worst, where, _ = apart(found, result, assemble(scene, form=form))
+    assert worst <= 1e-9, where
+    for text, why in (("coupler.length=9", "the start cannot be met"), ("coupler.lenght=2", "no such parameter")):
+        done = subprocess.run([program, "1", "1e-9", "2", "--set", text], capture_output=True, text=True)
+        assert done.returncode != 0
+        assert why in done.stderr
 
 
 @needs_a_compiler

@@ -447,7 +447,9 @@ static void watch(scene *s)
     s->searched = s->coming_kind == READY ? until : s->found;
 }
 
+/* leastnorm */
 /* passage */
+/* start */
 #if UPDATES
 /* What updates make of the state, one after the other; 0 where one has no value. */
 static int update(scene *s, const int *list, int count, const int *known)
@@ -740,6 +742,9 @@ int scene_begin(scene *s)
     i = s->is_new;
     s->is_new = 0;
     if (i) s->happened = 0;
+#if STARTS
+    if (i && find_start(s) != READY) return FAILED;
+#endif
     s->changes = 0;
     return begin_at(s, s->time, s->state, i);
 }

@@ -1,5 +1,5 @@
-/* ./a.out END RTOL OUTPUTS [--step H] [--output PATH ...] [--events]: the motion as CSV, with the time and quantities by
- * path.  --events adds a column with what has happened since the row before: kind, source, time, speed of approach. */
+/* ./a.out END RTOL OUTPUTS [--set PATH=VALUE ...] [--step H] [--output PATH ...] [--events]: the motion as CSV, with the
+ * time and quantities by path.  --set gives parameters other values, which the start is found for.  --events adds a column with what has happened since the row before: kind, source, time, speed of approach. */
 #include "scene.h"
 
 #include <stdio.h>
@@ -22,6 +22,21 @@ static int find(const char *path)
     return -1;
 }
 
+static int set(scene *s, const char *text)
+{
+    const char *const sign = strchr(text, '=');
+    double value;
+    int k;
+    if (sign == NULL || !number(sign + 1, &value)) return 0;
+    for (k = 0; k < scene_PARAMETERS; k++) {
+        const char *const path = scene_parameters[k].path;
+        if (strlen(path) == (size_t)(sign - text) && strncmp(path, text, strlen(path)) == 0) {
+            return scene_set_parameter(s, k, value) == scene_READY;
+        }
+    }
+    return 0;
+}
+
 static void print_events(const scene *s, int told)
 {
     int k;
@@ -41,7 +56,7 @@ int main(int count, char **given)
     int k, i, chosen = 0, status, told = 0, shows_events = 0;
     if (count < 4 || !number(given[1], &end) || !number(given[2], &rtol) || !number(given[3], &outputs)
         || !(rtol > 0.0) || !(outputs >= 2.0 && outputs <= 1e9)) {
-        fprintf(stderr, "usage: %s END RTOL OUTPUTS [--step H] [--output PATH ...] [--events]\n", given[0]);
+        fprintf(stderr, "usage: %s END RTOL OUTPUTS [--set PATH=VALUE ...] [--step H] [--output PATH ...] [--events]\n", given[0]);
         return 2;
     }
     scene_default(&s);
@@ -51,6 +66,11 @@ int main(int count, char **given)
             shows_events = 1;
             k--;
             continue;
+        }
+        if (k + 1 < count && strcmp(given[k], "--set") == 0) {
+            if (set(&s, given[k + 1])) continue;
+            fprintf(stderr, "%s: there is no such parameter, or it cannot have this value\n", given[k + 1]);
+            return 2;
         }
         if (k + 1 < count && strcmp(given[k], "--step") == 0 && number(given[k + 1], &s.step) && s.step > 0.0) continue;
         if (k + 1 < count && strcmp(given[k], "--output") == 0 && chosen < scene_QUANTITIES) {

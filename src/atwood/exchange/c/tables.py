@@ -67,6 +67,10 @@ def tables_of(mode: ModeText, parameters: Sequence[dict[str, Any]], sizes: dict[
         lines += _lists("event_updates", [one["updates"] for one in data["events"]], "update_firsts")
     if sizes["PASSAGE"]:
         lines += _passage(data["passage"], sizes, sources(mode))
+    if sizes["HAS_TANGENT"]:
+        lines += _places(("tangent_rows", "tangent_columns"), data["tangent"])
+    if sizes["STARTS"]:
+        lines += _start(data["start"], mode.flat.t_start)
     if data["modes_of_scene"] > 1:
         lines.append(array("held_places", [data["held"][path] for path in sorted(data["held"])], "int"))
         if sizes["SIGNS"]:
@@ -186,6 +190,25 @@ def _updates(data: dict[str, Any]) -> list[str]:
         array("update_is_held", [int(kind == "held") for kind, _ in every], "int"),
         array("update_places", [i for _, i in every], "int"),
     ]
+
+
+def _start(start: dict[str, Any], t: float) -> list[str]:
+    turns = list(accumulate(map(len, start["turns"]), initial=0))
+    lines = [
+        f"static const double start_moment = {literal(t)};",
+        array("start_reference", start["reference"]),
+        array("start_place", start["place"]),
+        array("start_sizes", start["sizes"]),
+        array("start_turns", [i for turn in start["turns"] for i in turn], "int"),
+        array("start_turn_firsts", turns, "int"),
+    ]
+    for name, own in (("places", "place"), ("speeds", "speed")):
+        level = start[name]
+        lines.append(array(f"{name}_wanted", [one["value"] for one in level["targets"]]))
+        for kind in ("fixed", "wrapped", "direct"):
+            lines.append(array(f"{name}_{kind}", [one[kind] for one in level["targets"]], "int"))
+        lines += _places((f"{own}_slope_rows", f"{own}_slope_columns"), level["slopes"])
+    return lines
 
 
 def _passage(passage: dict[str, Any], sizes: dict[str, int], known: Sequence[str]) -> list[str]:

@@ -31,13 +31,13 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.plotting.live.mode import ModeText
 from atwood.plotting.live.parameters import live_parameters
 from atwood.plotting.live.program import live_modes
-from atwood.plotting.live.start import add_tangent
+from atwood.plotting.live.start import add_start, add_tangent
 
 _CALLED = {"constraints": "held"}
 """Programs that C calls otherwise, since a routine of the method has their name."""
 
 _ASKED = "constraints", "quantities", "loads", "contacts", "sides", "maximal", "impact", "tangent", "places"
-"""Programs of (t, q, u) and more that the engine calls itself, beside updates."""
+"""Programs of (t, q, u) and more that the engine calls itself, beside updates and those of the start."""
 
 _LOGGED = 64
 """Events that are remembered."""
@@ -106,10 +106,11 @@ def scene_text(
     AtwoodError
         If the scene cannot be assembled, or has no start.
     """
-    modes, _ = live_modes(assembly, quantities=quantities)
+    modes, start = live_modes(assembly, quantities=quantities)
     mode = modes[0]
+    mode.data["start"] = add_start(mode, start)
     for one in modes:
-        if "passage" in one.data:
+        if "passage" in one.data or one.data.get("start"):
             add_tangent(one)
         one.data["modes_of_scene"] = len(modes)
         sides = [by for each in one.data.get("passage", {}).get("refused", ()) for _, by in each]
@@ -162,9 +163,10 @@ def _programs(mode: ModeText) -> dict[str, Program]:
     """Return the programs that a motion needs, by their names in C."""
     known = mode.programs
     names = ["kernel", "nearer", "judge", "events", "constraints", "quantities", "loads", "contacts", "sides"]
-    names += [one for one in known if one.startswith("update_")]
+    names += [one for one in known if one.startswith(("update_", "start_"))]
+    names += ["tangent"] if mode.data.get("start") or "maximal" in known else []
     if "passage" in mode.data:
-        names += ["maximal", "impact", "tangent", *(["places"] if mode.data["passage"]["signs"] else [])]
+        names += ["maximal", "impact", *(["places"] if mode.data["passage"]["signs"] else [])]
     found = {one: known[own] for one in names if (own := _CALLED.get(one, one)) in known}
     if not mode.data["constraints"]:
         found.pop("constraints", None)
@@ -221,9 +223,23 @@ def _sizes_of_changes(data: dict[str, Any], programs: dict[str, Program]) -> dic
         found |= {"BODY_SLOPES": len(passage["slopes_of_constraints"][0])}
         found |= {"HAS_MAXIMAL": int("maximal" in programs), "ONE_SIDES": sum(map(len, passage["refused"]))}
         found |= {"PLACE_SLOPES": len(passage.get("slopes", [()])[0]), "ALONG": len(passage["along"])}
-        found |= {"TURNED": len(passage["turned"]), "HAS_TANGENT": int("tangent" in programs)}
-        found |= {"TANGENTS": len(data.get("tangent", [()])[0]), "SIGNS": len(passage["signs"])}
-    return found
+        found |= {"TURNED": len(passage["turned"]), "SIGNS": len(passage["signs"])}
+    found |= {"HAS_TANGENT": int("tangent" in programs), "TANGENTS": len(data.get("tangent", [()])[0])}
+    return found | _sizes_of_start(data, programs)
+
+
+def _sizes_of_start(data: dict[str, Any], programs: dict[str, Program]) -> dict[str, int]:
+    start = data.get("start")
+    found = {"STARTS": int(bool(start)), "LEASTNORM": int(bool(start) or "passage" in data)}
+    if not start:
+        return found | {"START_COORDINATES": len(data["coordinates"])}
+    n, m = start["counts"]
+    found |= {"START_COORDINATES": n, "START_SPEEDS": m, "START_TURNS": len(start["turns"])}
+    for name, slopes in (("PLACE", "PLACE_SLOPES_OF_START"), ("SPEED", "SPEED_SLOPES")):
+        level = start[f"{name.lower()}s"]
+        found |= {f"{name}_CONSTRAINTS": level["constraints"], f"{name}_TARGETS": len(level["targets"])}
+        found[slopes] = len(level["slopes"][0])
+    return found | {"START_IS_MAXIMAL": int("start_maximal" in programs)}
 
 
 # -- header ---------------------------------------------------------------------------------------------------------
@@ -285,6 +301,11 @@ def _memory(programs: dict[str, Program], sizes: dict[str, int]) -> list[str]:
     if sizes["UPDATES"]:
         most = max((len(one.results) for name, one in programs.items() if name.startswith("update_")), default=1)
         lines.append(f"double set_by_update[{max(most, 1)}]")
+    if sizes["STARTS"]:
+        n, m = sizes["START_COORDINATES"], sizes["START_SPEEDS"]
+        rows = max(sizes[f"{name}_CONSTRAINTS"] + sizes[f"{name}_TARGETS"] for name in ("PLACE", "SPEED"))
+        lines += [f"scene_word start_y[{n + m}]", f"int row_of_condition[{rows + 1}]"]
+        lines += [f"double rows_of_start[{rows * m + 1}], misses_of_start[{rows + 1}], step_of_start[{m + 1}]"]
     if sizes["PASSAGE"]:
         m, held = sizes["BODY_SPEEDS"], sizes["BODY_CONSTRAINTS"]
         numbers = {"masses": m * m, "slopes": held * m, "rows_of_impact": max((m + held) ** 2, m * sizes["SPEEDS"])}
@@ -295,7 +316,7 @@ def _memory(programs: dict[str, Program], sizes: dict[str, int]) -> list[str]:
 
 
 def _is_asked(name: str) -> bool:
-    return name in _ASKED or name.startswith("update_")
+    return name in _ASKED or name.startswith(("update_", "start_"))
 
 
 # -- source ---------------------------------------------------------------------------------------------------------
@@ -381,13 +402,14 @@ def _declared(name: str) -> str:
 def _asking(name: str, program: Program) -> str:
     """Return the function that calls a program of (t, q, u) and perhaps of the accelerations."""
     outputs = "\n".join(f"    out[{k}].p = s->{name}_{k};" for k in range(len(program.outputs)))
+    kind = "BODY_" if name == "impact" else "START_" if name.startswith(("start_", "tangent")) else ""
     return f"""static int call_{name}(scene *s, double t, word *y, word *a)
 {{
     word in[4], out[{len(program.outputs)}], moment;
     moment.f = t;
     in[0].p = &moment;
     in[1].p = y;
-    in[2].p = y + {"BODY_" if name == "impact" else ""}COORDINATES;
+    in[2].p = y + {kind}COORDINATES;
     in[3].p = a;
 {outputs}
     return {name}(in, s->{name}_derived, s->scratch, out);
@@ -421,8 +443,8 @@ def _updating(programs: dict[str, Program]) -> str:
 def _engine(sizes: dict[str, int]) -> str:
     """Return the engine, with what passes through all bodies and what meets contacts where there are any."""
     text = _template("engine.c")
-    for name in ("contacts", "sides", "passage"):
-        text = text.replace(f"/* {name} */\n", _template(f"{name}.c") if sizes[name.upper()] else "")
+    for name, size in {"contacts": "", "sides": "", "leastnorm": "", "passage": "", "start": "STARTS"}.items():
+        text = text.replace(f"/* {name} */\n", _template(f"{name}.c") if sizes[size or name.upper()] else "")
     return text
 
 

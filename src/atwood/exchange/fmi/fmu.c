@@ -196,6 +196,9 @@ static int begin_motion(instance *o)
     int status;
     o->is_new = 0;
     if (o->is_model_exchange) {
+#if STARTS
+        if (find_start(&o->s) != READY) return tell_failure(o, o->s.text);
+#endif
         in_piece(&o->s, o->s.time);
 #if UPDATES
         if (!sample(&o->s, o->s.time)) return tell_failure(o, "an update has no value");
