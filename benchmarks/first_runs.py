@@ -25,7 +25,7 @@ from typing import Any
 SPAN = 0.01
 """Seconds of motion: all that is seen is the way to the first result."""
 
-BEFORE = ("double-pendulum", "slider-crank", "spherical-pendulum", "atwood", "bouncing-ball")
+BEFORE = ("double-pendulum", "slider-crank", "spherical-pendulum", "atwood", "stick-slip")
 """What was run before, in both forms; those of them that are measured follow others."""
 
 FORMS = ("reduced", "dae")

@@ -1,5 +1,6 @@
 """Derivations that are kept on disk: what their names say, and that what they give is what would be derived."""
 
+import gc
 import os
 import shutil
 import subprocess
@@ -197,3 +198,23 @@ def test_the_key_changes_with_versions_and_code(monkeypatch):
         patch.setattr(caches, "hash_of_sources", lambda: "other")
         assert key(scene()) != before
     assert key(scene()) == before
+
+
+@pytest.mark.parametrize("enabled", [True, False])
+def test_collecting_of_cycles_is_as_it_was_after_deriving(enabled):
+    key, seen = caches.Key("a test"), []
+
+    def fail():
+        seen.append(gc.isenabled())
+        raise UnsupportedError("what is derived fails")
+
+    before = gc.isenabled()
+    try:
+        gc.enable() if enabled else gc.disable()
+        for _ in range(2):
+            with pytest.raises(UnsupportedError):
+                caches.Shared().get(key, lambda: caches.Shared().get(key, fail))
+            assert gc.isenabled() == enabled
+    finally:
+        gc.enable() if before else gc.disable()
+    assert seen == [False, False]

@@ -8,12 +8,14 @@ is kept there are the nodes themselves in their order, so that the graph is afte
 
 from __future__ import annotations
 
+import gc
 import marshal
 import pickle
 import platform
 import sys
 import threading
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache
 from hashlib import sha256
 from io import BytesIO
@@ -29,6 +31,18 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.stages import stage
 
 T = TypeVar("T")
+
+
+@contextmanager
+def _without_collection() -> Iterator[None]:
+    """Leave cycles of objects alone: graphs of expressions have none, and to look for them is a sixth of deriving."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
 
 
 class Key(Generic[T]):
@@ -105,7 +119,7 @@ class Shared:
         try:
             found: T = self._made[place]
         except KeyError:
-            with self.lock, stage("equations"):
+            with self.lock, stage("equations"), _without_collection():
                 if place not in self._made:
                     self._made[place] = make()
                 found = self._made[place]
@@ -171,7 +185,7 @@ def derivation_key(what: str, graph: Graph, read: object) -> str | None:
     """Return the name of an entry; None where functions of Python are in the graph, whose code no name tells."""
     if len(graph) > _LARGEST:
         return None
-    nodes, described = _written(graph.recorded(0)), _described(read)
+    nodes, described = _written(graph.plain()), _described(read)
     if nodes is None or described is None:
         return None
     versions = (sys.version, sys.platform, platform.machine())

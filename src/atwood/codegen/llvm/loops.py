@@ -75,7 +75,8 @@ def find_loops(
     found: list[Chunk] = []
     straight: list[Unit] = []
     taken = 0
-    for start, length, period in _repeated(_signs(units, known)):
+    runs = _repeated(_signs(units, known)) if _repeated(_kinds(units)) else []
+    for start, length, period in runs:
         straight += units[taken:start]
         stretches = [tuple(units[at : at + period]) for at in range(start, start + length - period + 1, period)]
         taken = start + len(stretches) * period
@@ -93,6 +94,12 @@ def find_loops(
             first = end
     straight += units[taken:]
     return [*found, tuple(straight)] if straight or not found else found
+
+
+def _kinds(units: Sequence[Unit]) -> NDArray[np.int64]:
+    """Return a number for each operation that tells what it does: where these do not repeat, nothing does."""
+    numbers: dict[str, int] = {}
+    return np.array([numbers.setdefault(unit[0].operation, len(numbers)) for unit in units], dtype=np.int64)
 
 
 def _signs(units: Sequence[Unit], known: Mapping[int, tuple[str, int]]) -> NDArray[np.int64]:

@@ -25,16 +25,19 @@ def live(outputs: Iterable[Expression | float]) -> list[Expression]:
         Expressions of one graph; numbers among them are passed over.
     """
     check_time()
-    found: dict[int, Expression] = {}
     stack = [output for output in outputs if isinstance(output, Expression)]
     for output in stack:
         if output.graph is not stack[0].graph:
             raise AtwoodError("the outputs belong to different graphs")
+    found = {output.index: output for output in stack}
+    stack = list(found.values())
     while stack:
-        node = stack.pop()
-        if node.index not in found:
-            found[node.index] = node
-            stack.extend(node.arguments)
+        for node in stack.pop().arguments:
+            index = node.index
+            if index not in found:
+                found[index] = node
+                if node.arguments:
+                    stack.append(node)
     return [found[index] for index in sorted(found)]
 
 

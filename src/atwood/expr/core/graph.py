@@ -293,6 +293,17 @@ class Graph:
             return value
         return self.constant(value)
 
+    def plain(self) -> tuple[list[Any], ...]:
+        """Return all that tells this graph from another: operations, arguments, payloads, and whether parametric."""
+        nodes = self.nodes
+        return (
+            [node.operation for node in nodes],
+            [len(node.arguments) for node in nodes],
+            [argument.index for node in nodes for argument in node.arguments],
+            [node.payload for node in nodes],
+            [node.is_parametric for node in nodes],
+        )
+
     def recorded(self, start: int) -> list[tuple[Any, ...]]:
         """Return what makes the nodes from a place on: operation, places of arguments, payload, whether parametric."""
         return [
@@ -320,7 +331,11 @@ class Graph:
     ) -> Expression:
         if not len(self.nodes) % _LOOK:
             check_time()
-        known = is_parameter or operation == "constant" or (bool(arguments) and all(a.is_parametric for a in arguments))
+        known = is_parameter or operation == "constant" or bool(arguments)
+        for argument in arguments:
+            if not argument.is_parametric:
+                known = False
+                break
         created = Expression(self, operation, arguments, payload, len(self.nodes), known)
         self._table[key] = created
         self.nodes.append(created)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from functools import cached_property
 from typing import NamedTuple
 
@@ -86,9 +85,20 @@ class Program:
             if symbol in listed:
                 raise AtwoodError(f"the symbol {symbol.name} is listed twice", where=self.name)
             listed.add(symbol)
-        for group in self.outputs:
-            _check_symbols(self.name, group, listed)
-        live([*listed, *self.results])
+        for node in self.nodes:
+            if node.operation == "symbol" and node not in listed:
+                raise self._unknown(node)
+        if any(symbol.graph is not self.graph for symbol in listed):
+            raise AtwoodError("its inputs and outputs belong to different graphs", where=self.name)
+
+    def _unknown(self, symbol: Expression) -> AtwoodError:
+        """Return the error that says which outputs depend on a symbol that is not listed."""
+        group = next(group for group in self.outputs if symbol in live(group[1]))
+        return AtwoodError(
+            f"the output group {group[0]} depends on the symbol {symbol.name}, which is no input or parameter",
+            where=self.name,
+            advice="Add the symbol to the inputs or parameters, or substitute it.",
+        )
 
     @property
     def results(self) -> tuple[Expression, ...]:
@@ -138,29 +148,21 @@ class Program:
         return _digest(self)
 
 
-def _check_symbols(program: str, group: OutputGroup, listed: Iterable[Expression]) -> None:
-    known = set(listed)
-    for node in live(group[1]):
-        if node.operation == "symbol" and node not in known:
-            raise AtwoodError(
-                f"the output group {group[0]} depends on the symbol {node.name}, which is no input or parameter",
-                where=program,
-                advice="Add the symbol to the inputs or parameters, or substitute it.",
-            )
-
-
 def _digest(program: Program) -> str:
     """Return the hash of a program from those of its nodes, each made from its arguments' hashes."""
     from hashlib import blake2b
 
     known: dict[int, bytes] = {}
+    said: dict[tuple[str, int, object], bytes] = {}
     for node in (*live([*program.parameters, *(s for group in program.inputs for s in group[1])]), *program.nodes):
         arguments = [known[argument.index] for argument in node.arguments]
         if node.operation in COMMUTATIVE:
             arguments.sort()
         payload = node.payload.name if node.operation == "external" else node.payload
-        said = f"{node.operation} {len(arguments)} {payload!r} ".encode()
-        known[node.index] = blake2b(said + b"".join(arguments), digest_size=_SIZE).digest()
+        kind = node.operation, len(arguments), payload
+        if kind not in said:
+            said[kind] = repr(kind).encode()
+        known[node.index] = blake2b(said[kind] + b"".join(arguments), digest_size=_SIZE).digest()
     groups = [
         [(group[0], [known[one.index] for one in group[1]]) for group in several]
         for several in (program.inputs, program.outputs)
