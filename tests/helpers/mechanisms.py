@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from atwood import Scene
+from atwood import Component, Scene
 from atwood_library import Ground, Link, Pivot, PointMass, Rod, Rope
 
 
@@ -19,10 +19,11 @@ def pendulum(**settings: Any) -> Scene:
 
 
 def pendulum_on_a_string(**settings: Any) -> Scene:
-    """Return a bob on a rope of length 1 below the ground; it starts at the bottom."""
-    rope_settings = settings.pop("rope", {})
+    """Return a bob below the ground on a rope, given by its settings or as a part; it starts at the bottom."""
+    given = settings.pop("rope", {})
     scene = Scene(**{"t_end": 2.0, **settings})
-    ground, rope = scene.add("ground", Ground()), scene.add("rope", Rope(**{"length": 1.0, **rope_settings}))
+    rope = given if isinstance(given, Component) else Rope(**{"length": 1.0, **given})
+    ground, rope = scene.add("ground", Ground()), scene.add("rope", rope)
     bob = scene.add("bob", PointMass())
     scene.connect(ground.frame, rope.a)
     scene.connect(rope.b, bob.point)

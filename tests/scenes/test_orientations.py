@@ -11,6 +11,7 @@ from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.initialization.start import find_start
 
 from ..helpers.runs import FORMS, prepare
+from ..helpers.tethers import Tether
 
 
 def linkage() -> Scene:
@@ -59,7 +60,7 @@ def caught() -> Scene:
     ground, far = scene.add("ground", lib.Ground()), scene.add("far", lib.Ground(position=(-1.0, 0.3, 0.2)))
     ball, tip = scene.add("ball", lib.Spherical()), scene.add("tip", lib.Weld(displacement=(0.0, 0.0, -1.0)))
     body = scene.add("body", lib.RigidBody(mass=1.0, center=(0.05, 0.0, -0.5), moments=(0.1, 0.12, 0.03)))
-    rope = scene.add("rope", lib.Rope(length=1.75, starts="slack", when_slack="slack"))
+    rope = scene.add("rope", Tether(length=1.75, starts="slack"))
     for a, b in [(ground.frame, ball.a), (ball.b, body.frame), (body.frame, tip.a), (far.frame, rope.a)]:
         scene.connect(a, b)
     scene.connect(tip.b, rope.b)

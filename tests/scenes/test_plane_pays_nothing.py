@@ -112,7 +112,6 @@ RECORDED: dict[str, tuple[int, int, int, int]] = {
     "overhead-crane": (2, 16, 26, 59),
     "quarter-car": (4, 23, 8, 34),
     "cart-pole": (4, 18, 16, 43),
-    "trebuchet": (6, 37, 16, 79),
     "chaplygin-sleigh": (6, 25, 7, 19),
     "andrews-squeezer": (14, 160, 82, 488),
     "car-axis": (4, 110, 24, 138),

@@ -17,6 +17,7 @@ from atwood_library import Ground, PointMass, Spring
 from atwood_library.scenes import SCENES
 
 from ..helpers.mechanisms import pendulum_on_a_string
+from ..helpers.tethers import Tether
 
 G = 9.81
 
@@ -58,7 +59,7 @@ def bouncer(**gate: float) -> Scene:
 
 
 def over_the_top() -> Scene:
-    scene = pendulum_on_a_string(t_end=3.0, rope={"when_slack": "slack"})
+    scene = pendulum_on_a_string(t_end=3.0, rope=Tether())
     scene.start.update({"bob.position.x": 0.0, "bob.position.z": -1.0, "bob.velocity.x": math.sqrt(3.5 * G)})
     return scene
 

@@ -20,11 +20,12 @@ from atwood.simulation.initialization.start import Start, find_start, own_state
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.problem.preparation import make_problem, pack_state
 from atwood.simulation.run.run import run
-from atwood_library import Ground, Link, Pivot, PointMass, Rod, Rope
+from atwood_library import Ground, Link, Pivot, PointMass, Rod
 from atwood_library.scenes import SCENES, FourBar
 
 from ..helpers.directions import turn_directed, with_directions
 from ..helpers.runs import EVERY_FORM, FORMS, difference_quotient
+from ..helpers.tethers import Tether
 
 NAMES = ("simple-pendulum", "double-pendulum", "pendulum-on-cart", "four-bar", "slider-crank")
 LOOPS = ("four-bar", "slider-crank")
@@ -229,7 +230,7 @@ def rod_on_a_rope() -> Scene:
     ground, far = scene.add("ground", Ground()), scene.add("far", Ground(position=(-0.9, 0.0, 0.3)))
     rod, bob = scene.add("rod", Rod()), scene.add("bob", PointMass())
     pivot, link = scene.add("pivot", Pivot()), scene.add("link", Link(length=0.7, mass=0.5))
-    rope = scene.add("rope", Rope(length=1.9, starts="slack", when_slack="slack"))
+    rope = scene.add("rope", Tether(length=1.9, starts="slack"))
     scene.connect(ground.frame, rod.a)
     scene.connect(ground.frame, pivot.a)
     scene.connect(pivot.b, link.a)

@@ -152,8 +152,9 @@ def test_what_grows_without_bound_still_ends(solver: str) -> None:
 
 def test_what_came_before_a_failed_change_of_mode_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     from ..helpers.mechanisms import pendulum_on_a_string
+    from ..helpers.tethers import Tether
 
-    scene = pendulum_on_a_string(t_end=3.0, rope={"when_slack": "slack"})
+    scene = pendulum_on_a_string(t_end=3.0, rope=Tether())
     scene.start.update({"bob.position.x": 0.0, "bob.position.z": -1.0, "bob.velocity.x": math.sqrt(3.5 * 9.81)})
 
     def refuse(*_: object) -> None:

@@ -16,6 +16,7 @@ from atwood_library import Mass1D, PointMass, TranslationalGap
 from ..helpers.latches import Latch
 from ..helpers.mechanisms import pendulum_on_a_string
 from ..helpers.runs import free_scene
+from ..helpers.tethers import Tether
 from .test_sweep import assert_same, one_by_one
 
 
@@ -157,7 +158,7 @@ def test_threads_change_nothing() -> None:
 
 def test_what_needs_more_is_made_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     """A string that comes taut keeps a constraint: those runs that get there are made one by one."""
-    scene = pendulum_on_a_string(t_end=0.6, rope={"when_slack": "slack", "starts": "slack"})
+    scene = pendulum_on_a_string(t_end=0.6, rope=Tether(starts="slack"))
     scene.start.update({"bob.position.x": 0.0, "bob.position.z": 0.1, "bob.velocity.x": 0.0})
     options = {"start": {"bob.velocity.z": [0.0, 3.0, -6.0]}, "threads": 1}
     found, single = sweep(scene, **options), one_by_one(monkeypatch, scene, **options)

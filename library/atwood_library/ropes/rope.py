@@ -22,6 +22,7 @@ from atwood import (
     observable,
     parameter,
     signal,
+    unilateral,
 )
 from atwood_library.interfaces.spans import rate_of_span
 
@@ -64,13 +65,42 @@ class Rope(Component):
         stops = [self.a, *self.over, self.b]
         return [self.distance(p, q, side=None) for p, q in pairwise(stops)]
 
+    def is_gap(self) -> bool:
+        """Return whether it may be slack, and all that it touches has mass: its length is a gap then.
+
+        Else it is a constraint. What has no mass is where forces balance while a rope is slack, which is another
+        equation, and another mode.
+        """
+        ends = (self.a, *self.over, self.b)
+        return "slack" in (self.when_slack, self.starts) and not any(one.is_light for one in ends)
+
     @constraint(reaction="tension", unit="N", sign=-1.0, modes=("taut",), doc="Tension; zero when slack.")
     def fixed_length(self) -> Scalar:
-        """Return the length less the rope's own; for a single straight piece ``(r^2 - l^2)/(2 l)``."""
-        if self.on_a_line or self.pulleys:
-            return self.sum_of_spans() - self.whole_length()
+        """Return the length less the rope's own; nothing where it is a gap."""
+        return 0.0 if self.is_gap() else -self.to_spare()
+
+    @unilateral(
+        reaction="tension",
+        unit="N",
+        modes=("taut", "slack"),
+        given=("is_gap",),
+        starts="starts",
+        closes=("comes_taut", "taut", "the rope has come taut"),
+        opens=("goes_slack", "when_slack", "the rope has gone slack"),
+        doc="Tension; zero when slack.",
+    )
+    def spare(self) -> Scalar:
+        """Length that it has to spare; for a single straight piece ``(l^2 - r^2)/(2 l)``."""
+        return self.to_spare()
+
+    def to_spare(self) -> Scalar:
+        """Return the length less that of the path; a single straight piece needs no root."""
+        if self.pulleys:
+            return self.whole_length() - self.sum_of_spans()
         r, length = self.b.position - self.a.position, self.whole_length()
-        return dot(r, r) * (0.5 / length) - 0.5 * length
+        if self.on_a_line and not self.is_gap():
+            return length - self.sum_of_spans()
+        return 0.5 * length - dot(r, r) * (0.5 / length)
 
     def whole_length(self) -> Scalar:
         """Return the length from a to b with what has been let out."""
@@ -91,13 +121,13 @@ class Rope(Component):
 
     @event(modes=("taut",), direction=-1, unit="N", target="when_slack", message="the rope has gone slack")
     def goes_slack(self) -> Scalar:
-        """Return the tension."""
-        return self.reaction("tension")
+        """Return the tension; that of a gap is watched by itself."""
+        return 1.0 if self.is_gap() else self.reaction("tension")
 
     @event(modes=("slack",), direction=-1, unit="m", target="taut", message="the rope has come taut", impact=True)
     def comes_taut(self) -> Scalar:
         """Return how much rope is to spare."""
-        return self.whole_length() - self.reach()
+        return 1.0 if self.is_gap() else self.whole_length() - self.reach()
 
     @event(modes=("taut", "slack"), direction=-1, target="released", message="the rope has been let go")
     def lets_go(self) -> Scalar:

@@ -230,8 +230,11 @@ def _wrong_target(component: Component, law: Law) -> Iterator[tuple[str, str]]:
 
 def _doubled(cls: type[Component], where: str) -> Iterator[DeclarationError]:
     """Yield an error for each quantity that is reported twice: as an observable and as a reaction."""
+    pressing = [name for law in cls.contact_laws().values() for name in law.options.reactions]
     for law in cls.laws("constraint"):
         for name in law.options.reactions:
+            if name in pressing:  # where the gap is there, it is that of the gap
+                continue
             for other in cls.laws("observable"):
                 shared = [one for one in SPACES if other.holds_in(one) and law.holds_in(one) and one in cls.spaces]
                 if name == other.name and shared:

@@ -43,6 +43,7 @@ class Body:
     mass: float
     center_of_mass: Vector
     inertia: Axes
+    is_light: bool = False
 
 
 WORLD_POSE = Pose(ZERO, 0.0, IDENTITY)

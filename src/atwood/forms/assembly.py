@@ -246,6 +246,12 @@ class Assembly:
             made.kept.get(key, lambda: known)
         return known[values]
 
+    def with_held_of(self, other: Assembly) -> Assembly:
+        """Return the same with the discrete states of another mode; what is not there has its start."""
+        now = {one.path: value for one, value in zip(other.discrete_states, other.held_now, strict=True)}
+        own = zip(self.discrete_states, self.held_at_start, strict=True)
+        return self.with_held([now.get(one.path, value) for one, value in own])
+
     @cached_property
     def parameters(self) -> tuple[Expression, ...]:
         """The symbols of the parameters: discrete states after the scene's own, relations of functions of time last."""

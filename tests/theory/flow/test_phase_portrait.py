@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import atwood
-from atwood import PhasePortrait, UsageError, phase_portrait
+from atwood import PhasePortrait, UnsupportedError, UsageError, phase_portrait
 from atwood.theory.flow.plane_field import Window, curves_through
 from atwood_library import Drag
 from atwood_library.scenes import (
@@ -131,7 +131,7 @@ def test_what_has_no_portrait_is_said() -> None:
         phase_portrait(DrivenPendulum())
     with pytest.raises(UsageError, match="is no range"):
         phase_portrait(SimplePendulum(), coordinates=(1.0, -1.0))
-    with pytest.raises(UsageError, match="changes its mode where rope"):
+    with pytest.raises(UnsupportedError, match="rope: its gap"):
         phase_portrait(machine)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import atwood
 from atwood import Scene, UsageError, simulate, tangent_flow
-from atwood_library import Drag, Ground, PointMass, Rope
+from atwood_library import Drag, Ground, PointMass
 from atwood_library.scenes import (
     DoublePendulum,
     FourBar,
@@ -19,12 +19,14 @@ from atwood_library.scenes import (
     SimplePendulum,
 )
 
+from ...helpers.tethers import Tether
+
 
 def tethered() -> Scene:
     """Return a ball that is thrown on a slack rope, which stops it."""
     scene = Scene()
     ground, ball = scene.add("ground", Ground()), scene.add("ball", PointMass())
-    rope = scene.add("rope", Rope(starts="slack", when_slack="slack"))
+    rope = scene.add("rope", Tether(starts="slack"))
     scene.connect(ground.frame, rope.a)
     scene.connect(rope.b, ball.point)
     scene.start.update({"ball.position.x": 0.3, "ball.position.z": 0.0, "ball.velocity.x": 1.0})

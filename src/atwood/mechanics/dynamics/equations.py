@@ -16,8 +16,10 @@ from atwood.mechanics.dynamics.inertia import Masses, tensor_of, turned_tensor
 from atwood.mechanics.kinematics.mechanism import Constant, Decision
 from atwood.mechanics.kinematics.orientation import inertial_torque, torque_components
 from atwood.mechanics.kinematics.positions import BodyShape, Kinematics, body_point_of
+from atwood.model.declare.contact_laws import Told
 from atwood.model.declare.law_results import BodyInertia
 from atwood.model.declare.laws import Law
+from atwood.model.local.flatten import Part
 from atwood.model.local.parts import LocalConstraint, LocalPart, LocalState
 from atwood.model.values.space import cross
 from atwood.topology.orientation_coordinates import OrientationCoordinates
@@ -108,6 +110,17 @@ class ContactRow:
     def is_speed(self) -> bool:
         """Whether it is a gap at velocities, as a freewheel is."""
         return not self.is_slip and self.row.value is None
+
+    def told(self, parts: Mapping[str, Part]) -> tuple[Told | None, Told | None]:
+        """Return what is told where it closes and where it opens, with the words that its part has for it."""
+        values = parts[self.row.key[0]].values
+        words = (None, None) if self.is_slip else (self.law.options.closes, self.law.options.opens)
+        closes, opens = (said and said._replace(target=said.target_in(values)) for said in words)
+        return closes, opens
+
+    def is_closed_at_start(self, parts: Mapping[str, Part]) -> bool:
+        """Return whether it is a gap that a start is to close."""
+        return not self.is_slip and bool(self.law.options.is_closed_at_start(parts[self.row.key[0]].values))
 
     def towards(self, way: float) -> tuple[Expression, Expression]:
         """Return the limit and the static one of a slip that goes, or would go, in a direction; of a gap the second."""

@@ -289,6 +289,22 @@ class CarriedInertia:
         return total
 
     @property
+    def is_light(self) -> bool:
+        """Whether it moves and has no mass."""
+        node_of, nodes = self._network.node_of, self._body.nodes
+        heavy = {
+            node_of[path, point.name]
+            for path, local in self._locals.items()
+            for points, masses in (
+                *((one.points, [m for row in one.masses for m in row]) for one in local.point_inertias),
+                *(([one.frame], [one.mass]) for one in local.body_inertias),
+            )
+            for point in points
+            if not all(map(is_zero, masses))
+        }
+        return not self._body.is_fixed and heavy.isdisjoint(nodes)
+
+    @property
     def center_of_mass(self) -> Vector:
         """Centre of mass from the node, in its axes, m."""
         offsets, turns = self._layout

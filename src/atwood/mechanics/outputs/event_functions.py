@@ -108,10 +108,10 @@ def list_event_functions(
                     path, law.name, value, options.direction, target, options.message, options.unit, options.impact
                 )
             )
-    return (*found, *_of_contacts(equations))
+    return (*found, *_of_contacts(mechanism, equations))
 
 
-def _of_contacts(equations: Equations) -> list[EventFunction]:
+def _of_contacts(mechanism: Mechanism, equations: Equations) -> list[EventFunction]:
     """Return what tells that gaps and slips go over into another state; what cannot happen in a state is positive."""
     found: list[EventFunction] = []
     reads = [*(one.read for one in equations.contacts), *equations.multipliers]
@@ -129,7 +129,13 @@ def _of_contacts(equations: Equations) -> list[EventFunction]:
                 watch(CLOSES, rest * one.row.rate + one.mask, f"{of}/s", "it runs free no longer")
             else:
                 watch(CLOSES, rest * value + one.mask, of, "the gap closes", one.row.rate)
-            watch(OPENS, one.mask * (one.row.multiplier + one.towards(1.0)[1]) + rest, unit, "the gap opens")
+            force = one.mask * (one.row.multiplier + one.towards(1.0)[1]) + rest
+            _, told = one.told({part: mechanism.locals_[part].part})
+            if told is not None and told.target == "stop":
+                law = told.law
+                watch("stop", force, unit, told.message)
+            else:
+                watch(OPENS, force, unit, "the gap opens")
             continue
         assert one.limit is not None
         if one.row.key[2]:

@@ -197,6 +197,7 @@ def list_reactions(mechanism: Mechanism) -> tuple[Reaction, ...]:
     reported = {f".{'xyz'[i]}" for i in mechanism.space.reported_axes}
     for path, local in mechanism.locals_.items():
         held = dict.fromkeys(c.law for c in local.constraints if c.law.kind in ("unilateral", "friction"))
+        gaps = {name for law in (*held, *(one.law for one in local.contacts)) for name in law.options.reactions}
         for law in (*local.part.component.laws("constraint"), *held):
             if not law.holds_in(mechanism.space.name):
                 continue
@@ -207,6 +208,8 @@ def list_reactions(mechanism: Mechanism) -> tuple[Reaction, ...]:
                 names = tuple(f"{names[0]}.{axis}" for axis in "xyz")
             for index, name in enumerate(names):
                 if any(name.endswith(f".{axis}") for axis in "xyz") and name[-2:] not in reported:
+                    continue
+                if law not in held and name in gaps:
                     continue
                 full = f"{path}.{name}"
                 symbol, sign = graph.symbol(f"reaction:{full}"), 1.0 if law in held else options.sign

@@ -200,6 +200,11 @@ class Point(Connector):
         """Mass of the body that it is on, kg: of all parts that are rigidly joined there."""
         return self._read("body").mass
 
+    @property
+    def is_light(self) -> bool:
+        """Whether it is on something that moves and has no mass."""
+        return bool(self._read("body").is_light)
+
 
 class Frame(Point):
     """A point with an orientation, where forces and torques pass.

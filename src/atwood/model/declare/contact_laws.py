@@ -7,9 +7,9 @@ law); see F. Pfeiffer and C. Glocker, *Multibody Dynamics with Unilateral Contac
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from atwood.arguments import DOC, NAME, TEXT, each, either, number, one_of, takes
 from atwood.errors import DeclarationError, suggestion
@@ -20,6 +20,18 @@ from atwood.model.values.units import ALONG, parse_si_unit
 
 if TYPE_CHECKING:
     from atwood.model.declare.component import Component
+
+
+class Told(NamedTuple):
+    """What is told of a gap that closes or opens: the name of the event, its target, and what has happened in words."""
+
+    law: str
+    target: str
+    message: str
+
+    def target_in(self, values: Mapping[str, Any]) -> str:
+        """Return the target for some values of the parameters, one of which may say it."""
+        return str(values.get(self.target, self.target))
 
 
 @dataclass(frozen=True)
@@ -33,9 +45,16 @@ class UnilateralOptions:
     level: str
     adhesion: str
     given: tuple[str, ...]
+    closes: Told | None
+    opens: Told | None
+    starts: str
     doc: str
     modes: tuple[str, ...]
     spaces: tuple[str, ...]
+
+    def is_closed_at_start(self, values: Mapping[str, Any]) -> bool:
+        """Return whether a start is to close it, by the parameters of the part."""
+        return bool(self.starts and self.closes and values[self.starts] == self.closes.target)
 
 
 @dataclass(frozen=True)
@@ -105,9 +124,15 @@ def _where_given(function: Callable[[Any], Any], contact: Law) -> Callable[[Any]
 
     @wraps(function)
     def value(component: Component) -> Any:
-        return None if any(getattr(component, name) is None for name in names) else function(component)
+        return function(component) if all(is_given(component, name) for name in names) else None
 
     return value if names else function
+
+
+def is_given(component: Component, name: str) -> bool:
+    """Return whether a parameter has a value, or a method says so."""
+    found = getattr(component, name)
+    return bool(found()) if callable(found) else found is not None
 
 
 def _says(read: Callable[[Component], Any], doc: str) -> Callable[[Component], Any]:
@@ -132,6 +157,9 @@ def _along(unit: str, rate: str) -> str:
     return ALONG[unit] + rate
 
 
+_TOLD = each(TEXT, "a name, a target and a message", single=False)
+
+
 @takes(
     DeclarationError,
     reaction=REACTION,
@@ -142,6 +170,9 @@ def _along(unit: str, rate: str) -> str:
     level=one_of(("position", "velocity")),
     adhesion=TEXT,
     given=NAMES,
+    closes=_TOLD,
+    opens=_TOLD,
+    starts=TEXT,
     modes=NAMES,
     spaces=SPACES,
 )
@@ -155,6 +186,9 @@ def unilateral(
     level: Literal["position", "velocity"] = "position",
     adhesion: str = "",
     given: Sequence[str] = (),
+    closes: Sequence[str] = (),
+    opens: Sequence[str] = (),
+    starts: str = "",
     modes: Sequence[str] = (),
     spaces: Sequence[str] = ("line", "plane", "space"),
 ) -> Callable[[Callable[[Any], Any]], ContactLaw]:
@@ -181,15 +215,33 @@ def unilateral(
     adhesion
         Name of a method, or a parameter, that gives how much a gap bears that is pulled open; it then lets go.
     given
-        Parameters without which there is no gap: it is not there where one of them is None.
+        Parameters without which there is no gap: it is not there where one of them is None. Methods that read
+        parameters alone say by True or False whether it is there.
+    closes, opens
+        What is told where it closes and opens, if not that a gap does: the name of the event, its target and its
+        message. A target is a word, ``"stop"``, which ends the run (of `opens` alone), or the name of a choice
+        parameter that says which.
+    starts
+        Name of the choice parameter that says whether the gap starts closed: where its value is the target of
+        `closes`. The start is then one in which it is, and stays so; it may open at once.
     modes, spaces
         The modes of the component and the spaces in which it holds; all modes when empty.
     """
     share = str(restitution) if isinstance(restitution, str) else float(restitution)
     many = tuple(modes), tuple(spaces)
-    options = UnilateralOptions((reaction,), unit, share, impact_law, level, adhesion, tuple(given), doc, *many)
+    own = tuple(given), _told(closes), _told(opens), starts
+    options = UnilateralOptions((reaction,), unit, share, impact_law, level, adhesion, *own, doc, *many)
     along = _along(unit, "/s" if level == "velocity" else "")
     return lambda function: ContactLaw(function, Law("unilateral", function.__name__, options), along)
+
+
+def _told(given: Sequence[str]) -> Told | None:
+    if len(given) not in (0, 3):
+        raise DeclarationError(
+            f"what is told of a gap is a name, a target and a message, and {tuple(given)!r} is not",
+            advice="Write closes=('comes_taut', 'taut', 'the rope has come taut').",
+        )
+    return Told(*given) if given else None
 
 
 @takes(

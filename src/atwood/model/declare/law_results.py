@@ -201,6 +201,10 @@ class Carried(Protocol):
         """Mass, kg."""
 
     @property
+    def is_light(self) -> bool:
+        """Whether it moves and has no mass."""
+
+    @property
     def center_of_mass(self) -> Vector:
         """Centre of mass, m."""
 
@@ -228,6 +232,12 @@ class Asked:
     def mass(self) -> Any:
         """A symbol for the mass."""
         return self._symbol("mass")
+
+    @property
+    def is_light(self) -> bool:
+        """Whether it has no mass, which is taken not to be so as long as it is not known."""
+        self.is_read = True
+        return False
 
     @property
     def center_of_mass(self) -> Vector:

@@ -14,7 +14,7 @@ from atwood.errors import DeclarationError, UnsupportedError, suggestion
 from atwood.expr import Expression, Graph, Scalar, depends_on, jvp, sqrt
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.declare.component import Binding, bind
-from atwood.model.declare.contact_laws import FrictionOptions, state_names, value_names
+from atwood.model.declare.contact_laws import FrictionOptions, is_given, state_names, value_names
 from atwood.model.declare.law_results import call_law, finite_scalar, one_scalar
 from atwood.model.declare.laws import Law, scalars
 from atwood.model.local.flatten import Part
@@ -106,6 +106,12 @@ def local_contacts(
     return (*gaps, *slips), replace(binding, values=values, reactions={**binding.reactions, **never, **forces})
 
 
+def without_gaps(constraints: Sequence[LocalConstraint], contacts: Sequence[LocalContact]) -> list[LocalConstraint]:
+    """Return constraints without those in whose place there is a gap, whose force has their name."""
+    gaps = {one.row.reaction for one in contacts}
+    return [one for one in constraints if one.reaction not in gaps]
+
+
 def in_chosen_set(
     contacts: tuple[LocalContact, ...], states: Mapping[str, float]
 ) -> tuple[tuple[LocalContact, ...], list[LocalConstraint], list[LocalContact]]:
@@ -130,9 +136,9 @@ def _gap(
 ) -> LocalContact | None:
     bound = bind(part.component, binding)
     for name in law.options.given:
-        if name not in part.values:
+        if not hasattr(type(part.component), name):
             raise _no_name(part, law, name)
-    if any(part.values[name] is None for name in law.options.given):
+    if not all(is_given(bound, name) for name in law.options.given):
         return None
     value = _value(part, law, bound, law.name, graph)
     velocities = [symbol for one in connectors.values() for symbol in (*one.velocity, *one.spin)]

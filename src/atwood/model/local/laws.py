@@ -31,7 +31,7 @@ from atwood.model.declare.law_results import (
 )
 from atwood.model.declare.laws import Law, scalars
 from atwood.model.local.bound import ParameterTable, bind_part
-from atwood.model.local.contacts import LocalContact, in_chosen_set, local_contacts, powers
+from atwood.model.local.contacts import LocalContact, in_chosen_set, local_contacts, powers, without_gaps
 from atwood.model.local.flatten import FlatScene, Part
 from atwood.model.local.joint_coordinates import (
     JointCoordinateUse,
@@ -145,7 +145,7 @@ def _localize_part(
     binding = replace(binding, reactions=_readable_reactions(part, constraints, mode, space, graph))
     every, binding = local_contacts(part, binding, connectors, graph, laws.hold)
     contacts, held, rubbing = in_chosen_set(every, flat.contact_states)
-    acting, constraints = bind(component, binding), [*constraints, *held]
+    acting, constraints = bind(component, binding), [*without_gaps(constraints, every), *held]
     given = _forces_of(laws, acting, (*contacts, *rubbing))
     turns = turns_read(part, formulas, [*potentials, *lagrangians, *_acting(laws, flat, acting, given, formulas)])
     counted = {*counted, *(symbol.name.rpartition(".")[2] for symbol in turns)}

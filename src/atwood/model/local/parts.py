@@ -194,6 +194,12 @@ class LocalPart:
     rubs: Mapping[str, Expression] = field(default_factory=dict)
 
     @property
+    def may_hold(self) -> bool:
+        """Whether it has a gap that stands for a constraint, as that of a rope that may be slack."""
+        held = {name for law in self.part.component.laws("constraint") for name in law.options.reactions}
+        return any(one.row.reaction in held for one in self.contacts)
+
+    @property
     def asks(self) -> list[str]:
         """Connectors of which it asks for the inertia of the body that they are on, which is not known yet."""
         return [name for name, one in self.binding.motions.items() if isinstance(one.body, Asked) and one.body.is_read]

@@ -289,7 +289,25 @@ function openMode(mode, options) {
         if (way.reduce((sum, x, i) => sum + x * last[i], 0) < 0) tell(k, "reverses", `${name} reverses`);
       } else if (is && is !== was) tell(k, is === 2 ? "sticks" : "slips", `${name} ${is === 2 ? "sticks" : "goes on"}`);
     });
-    return {state: after, events: isStart ? told.filter(one => one.kind === "impact") : told};
+    if (!isStart) return {state: after, events: inOwnWords(told, before, found, t)};
+    const begun = before.map(([is, ...way], k) => [is || data.contacts.closed[k], ...way]);
+    const kept = inOwnWords(told.filter(one => one.kind === "impact"), begun, found, t);
+    return {state: after, events: kept.filter(one => one.kind !== "closes")};
+  }
+
+  // Events in which gaps that have words of their own for what happens are told of in these.
+  function inOwnWords(told, before, after, t) {
+    const {keys, words} = data.contacts;
+    words.forEach((said, k) => {
+      if (!said.some(Boolean)) return;
+      const [part, law] = keys[k], isOwn = one => one.part === part && one.law === law, [was] = before[k], [is] = after[k];
+      const at = told.findIndex(isOwn), struck = told.find(one => isOwn(one) && one.kind === "impact"), found = struck && was ? [struck] : [];
+      [!was && (is || struck), !is && (was || struck)].forEach((has, i) => {
+        if (has && said[i]) found.push({...(i === 0 && struck ? struck : {time: t, part, kind: ["closes", "opens"][i]}), ...said[i]});
+      });
+      told = [...told.slice(0, at < 0 ? told.length : at), ...found, ...told.slice(at < 0 ? told.length : at).filter(one => !isOwn(one))];
+    });
+    return told;
   }
 
   // Margins of gaps and slips at a start, and which events these keep from having happened there.
@@ -723,6 +741,8 @@ function createEngine(model, options = {}) {
       if (met.failed) return say("failed", met.failed, t);
       take(t, met.state);
       events.push(...met.events);
+      const stop = met.events.find(one => one.target === "stop");
+      if (stop) return say("stopped", `${stop.part}: ${stop.message}`, t);
     }
     if (mode.data.sides) {
       const sides = mode.settle(t, state, changed);

@@ -188,6 +188,8 @@ class ModeText:
             "rates": [f"{ALONG[one.law.options.unit]}/s" for one in layout.first],
             "units": found.units.tolist(),
             "places": places,
+            "words": [[said and said._asdict() for said in one.told(self.flat.parts)] for one in layout.first],
+            "closed": [one.is_closed_at_start(self.flat.parts) for one in layout.first],
             "size": len(layout.contacts),
             "pattern": [one for some in zip(*found.pattern, strict=True) for one in some],
         }

@@ -170,9 +170,6 @@ def live_modes(
 def _refuse(assembly: Assembly) -> None:
     """Say what keeps a scene from being live."""
     refuse_groups(assembly)
-    if assembly.modes and assembly.own_equations.contacts:
-        part, law, _ = assembly.own_equations.contacts[0].row.key
-        raise NotLiveError(f"{part}.{law} is a gap or dry friction beside modes, which pages do not resolve")
     if kinematic_map_of(assembly, assembly.form).has_singular_coordinates:
         raise NotLiveError("its orientations have three coordinates, which are switched; quaternions are live")
 

@@ -12,7 +12,7 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.plotting.live.mode import ModeText
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of, reference_coordinates
 from atwood.simulation.dynamics.scales import motion_scales
-from atwood.simulation.initialization.start import Start
+from atwood.simulation.initialization.start import Start, with_closed
 from atwood.simulation.initialization.system import Target, sort_targets
 
 
@@ -21,7 +21,7 @@ def add_start(mode: ModeText, start: Start) -> dict[str, Any] | None:
 
     None where constants of integration are read from the start: such a start stays as it is.
     """
-    assembly, equations = mode.assembly, mode.assembly.regular
+    assembly, equations = mode.assembly, with_closed(mode.assembly)
     if assembly.mechanism.constants or equations.states:
         return None
     levels = sort_targets(assembly, equations)

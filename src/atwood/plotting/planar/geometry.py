@@ -344,9 +344,9 @@ def _between(
 ) -> list[Shape]:
     """Return what a part with two ends looks like."""
     joints = list(local.joints)
-    if local.contacts:  # nothing is between what touches only now and then
+    if local.contacts and not local.may_hold:  # nothing is between what touches only now and then
         return []
-    if grooves or (local.constraints and not joints):
+    if grooves or local.may_hold or (local.constraints and not joints):
         return [Shape(path, "rope", (ends[0], *grooves, ends[1]))]
     if any(joint.law.options.rigid for joint in joints):
         return [Shape(path, "link", ends)]
@@ -371,11 +371,13 @@ def _value(mechanism: Mechanism, value: Scalar) -> float:
 
 
 def pulling(result: Result, part: str) -> NDArray[np.bool_]:
-    """Return at which output times a rope has a law in its mode: slack, or let go, it has none."""
+    """Return at which output times a rope has a law that acts: slack, or let go, it has none."""
     pieces = []
     for segment in result.run.segments:
-        local = segment.assembly.mechanism.locals_[part]
+        local, assembly = segment.assembly.mechanism.locals_[part], segment.assembly
+        held = dict(zip((one.symbol for one in assembly.discrete_states), assembly.held_now, strict=True))
         acts = bool(local.constraints or local.joints or local.potentials)
+        acts |= any(held[one.mask] for one in local.contacts)
         pieces.append(np.full(len(segment.time), acts)[segment.shown])
     return np.concatenate(pieces)
 

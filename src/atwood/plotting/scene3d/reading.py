@@ -322,8 +322,10 @@ def _lump(reading: Reading, path: str, node: int, mass: float, center: FloatArra
 def _ties(path: str, local: LocalPart, nodes: Mapping[str, int]) -> list[Tie]:
     """Return what a part that only pulls or pushes between its nodes looks like."""
     ends = tuple(dict.fromkeys(nodes.values()))
-    if local.joints or local.contacts or len(ends) < 2:
+    if local.joints or (local.contacts and not local.may_hold) or len(ends) < 2:
         return []
+    if local.may_hold:
+        return [Tie(path, "rope", ends)]
     if any(holds_distance(local, one.value) for one in local.constraints):
         return [Tie(path, "rope" if local.part.component.modes else "rod", ends)]
     kinds: list[TieKind] = []

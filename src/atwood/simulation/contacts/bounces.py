@@ -28,10 +28,10 @@ def _gaps(plan: SceneProblem) -> list[ContactRow]:
 
 
 def _plain(plan: SceneProblem) -> dict[tuple[str, str], int]:
-    """Return the numbers of the gaps without friction whose impacts are Newton's."""
+    """Return the numbers of the gaps without friction whose impacts are Newton's, and told of as such."""
     rubs = {(one.row.key[0], one.law.options.at) for one in plan.assembly.own_equations.contacts if one.is_slip}
-    keys = {one.row.key[:2]: (i, one.law.options.impact_law) for i, one in enumerate(_gaps(plan))}
-    return {key: i for key, (i, law) in keys.items() if law == "newton" and key not in rubs}
+    own = {i: (one.row.key[:2], one.law.options) for i, one in enumerate(_gaps(plan))}
+    return {key: i for i, (key, x) in own.items() if x.impact_law == "newton" and not x.closes and key not in rubs}
 
 
 def has_plain_impacts(plan: SceneProblem) -> bool:

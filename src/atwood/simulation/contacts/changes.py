@@ -560,6 +560,42 @@ def told_impact(
     return made_of(EventRecord, **own, message=said, target="", impact=True, kind="impact", struck=struck)
 
 
+def in_own_words(
+    assembly: Assembly,
+    layout: Layout,
+    t: float,
+    events: Sequence[EventRecord],
+    states: tuple[Sequence[State], Sequence[State]],
+) -> list[EventRecord]:
+    """Return events in which gaps that have words of their own for what happens are told of in these.
+
+    Parameters
+    ----------
+    assembly, layout, t
+        The scene, its gaps and slips, and the time.
+    events
+        What has happened, as of any gap.
+    states
+        Those of all gaps and slips before and after it.
+    """
+    found = list(events)
+    for one, (before, _), (after, _) in zip(layout.first, *states, strict=True):
+        words, key = one.told(assembly.flat.parts), one.row.key[:2]
+        if not any(words):
+            continue
+        own = [each for each in found if (each.part, each.law) == key]
+        struck = next((each for each in own if each.impact), None)
+        told = [] if struck is None or before == OPEN else [struck]
+        happened = (before == OPEN and (after != OPEN or struck), after == OPEN and (before != OPEN or struck))
+        for has, said, kind in zip(happened, words, ("closes", "opens"), strict=True):
+            if has and said is not None:
+                known = struck if kind == "closes" and struck else EventRecord(t, *key, "", "", False, kind)
+                told.append(replace(known, **said._asdict()))
+        place = found.index(own[0]) if own else len(found)
+        found[place:] = [*told, *(each for each in found[place:] if (each.part, each.law) != key)]
+    return found
+
+
 def _of_impulses(limits: tuple[Limits, Limits]) -> tuple[Limits, Limits]:
     """Return limits of impulses: finite forces have none, and what follows from other forces is a share of these."""
     none = np.zeros_like(limits[0].free)
@@ -688,10 +724,15 @@ def resolve(
     else:
         moment.collide(one_by_one)
     moment.settle()
+    was, now = list(moment.before), states_of(moment.layout, moment.held)
+    if is_start:
+        closed = [one.is_closed_at_start(assembly.flat.parts) for one in moment.first]
+        was = [(STICKS, one[1]) if is_closed else one for one, is_closed in zip(was, closed, strict=True)]
+    events = in_own_words(assembly, moment.layout, t, moment.events, (was, now))
     if np.array_equal(moment.u, before):
         speeds = u
     elif assembly.form == "dae":
         speeds = moment.u
     else:
         speeds = generalized_speeds(assembly, t, to_regular(assembly, q), moment.u, moment.values.sizes)
-    return Changed(speeds, tuple(moment.held), tuple(moment.events), touching)
+    return Changed(speeds, tuple(moment.held), tuple(events), touching)

@@ -24,7 +24,15 @@ from atwood.mechanics.outputs.event_functions import CLOSES, CONTACT, OPENS, RES
 from atwood.model.values.units import ALONG
 from atwood.numerics.contact_sets import STICKS, State
 from atwood.simulation.contacts.bounces import has_plain_impacts
-from atwood.simulation.contacts.changes import NEAR, longest_left, states_of, told_change, told_impact, told_rest
+from atwood.simulation.contacts.changes import (
+    NEAR,
+    in_own_words,
+    longest_left,
+    states_of,
+    told_change,
+    told_impact,
+    told_rest,
+)
 from atwood.simulation.contacts.values import Layout, layout_of
 from atwood.simulation.events.modes import MARGIN, EventProbe, EventRecord, ToldLater
 from atwood.simulation.problem.explicit_scene import light_speeds, program_on_constraints, values_on_constraints
@@ -253,6 +261,7 @@ def told_sets(log: SetLog, assembly: Assembly) -> list[Change]:
             change = told_change(one.time, layout.first[k], before[k], after)
             told += [] if change is None else [change]
         held = held_after(one, assembly)
+        told = in_own_words(assembly, layout, one.time, told, (before, states_of(layout, held)))
         found.append(Change(one.time, one.states, held, told, any(each.impact for each in told)))
     return found
 

@@ -27,7 +27,7 @@ from atwood.numerics.rank import independent_rows, open_directions, row_scales
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.closure_error import ClosureError, find_closure_errors
-from atwood.simulation.initialization.start import Start
+from atwood.simulation.initialization.start import Start, with_closed
 from atwood.simulation.initialization.system import Level, System, sort_targets
 from atwood.table import Table, table
 from atwood.tolerances import tolerances
@@ -185,7 +185,7 @@ def _met(guess: GuessMet, length: float) -> tuple[str, str]:
 
 def report_initialization(assembly: Assembly, start: Start) -> InitializationReport:
     """Find out what a start moved."""
-    equations, t = assembly.regular, start.time
+    equations, t = with_closed(assembly), start.time
     guesses = _guesses(assembly, equations, start)
     if np.array_equal(start.rough, start.coordinates):
         return InitializationReport((), guesses, (), start.length)

@@ -17,6 +17,7 @@ from atwood.forms.caches import Key
 from atwood.forms.other_values import starting
 from atwood.forms.quantities import coordinate_program, to_maximal
 from atwood.lazy_dataclasses import dataclass, replace
+from atwood.mechanics.dynamics.equations import Equations
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of, reference_coordinates
 from atwood.simulation.dynamics.numerical_failure import (
     ADVICE_AT_START,
@@ -185,7 +186,7 @@ def _solved(assembly: Assembly) -> Start:
     before = starting(assembly)
     if before is not assembly:
         return _taken_up(assembly, before, find_start(before))
-    equations, length = assembly.regular, scene_length(assembly)
+    equations, length = with_closed(assembly), scene_length(assembly)
     if not 1e-100 < length < 1e100:
         raise StartError(
             f"the extent of the scene, {length:g} m, is too large to compute with",
@@ -206,6 +207,20 @@ def _solved(assembly: Assembly) -> Start:
         raise _unworkable(assembly, t, error) from error
     free = own_names(assembly, at.free)
     return Start(t, at.coordinates, u, length, free, free_u, (*at.repeated, *repeated_u), at.rough)
+
+
+def with_closed(assembly: Assembly) -> Equations:
+    """Return the equations in which starts are found: with gaps that start closed among the constraints."""
+    equations = assembly.regular
+    closed = [one.row for one in equations.contacts if one.is_closed_at_start(assembly.flat.parts)]
+    if not closed:
+        return equations
+    locals_ = dict(equations.locals_)
+    for path, law, _ in (row.key for row in closed):
+        local = locals_[path]
+        held = (one.row for one in local.contacts if one.law.name == law)
+        locals_[path] = replace(local, constraints=(*local.constraints, *held))
+    return replace(equations, constraints=(*equations.constraints, *closed), locals_=locals_)
 
 
 def _without_value(assembly: Assembly, t: float, error: KernelEvaluationError) -> AtwoodError:

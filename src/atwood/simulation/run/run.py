@@ -237,10 +237,11 @@ class Walk:
             after_time_event = True
             self._sampled = self.t
             self._update(due)
+        if self.ended is None:
+            self.prepare()
         if self.ended is not None:
             assert self.plan is not None
             return Recorder(self.plan), Outcome(self.t, "event", "", self.statistics, (self.choice,), self.ended)
-        self.prepare()
         t, q, u = self.t, self.q, self.u
         assert self.plan is not None
         assert self.probe is not None
@@ -389,7 +390,9 @@ class Walk:
         events = list(changed.events)
         self._kept.changes += 1
         self._remember(events)
-        self.events += events if not is_start else [one for one in events if one.impact]
+        self.ended = next((one for one in events if one.target == "stop"), None)
+        told = [one for one in events if one is not self.ended]
+        self.events += told if not is_start else [one for one in told if one.impact or one.kind == "opens"]
         self.impact |= any(one.impact for one in events)
         self.u, self.held = changed.speeds, changed.held
         if changed.touching and not is_start:  # what is found to be closed is so to rounding
@@ -429,7 +432,7 @@ class Walk:
         """Return a scene with the relations of functions of time that hold in the present piece of the run."""
         schedule = self._schedule(assembly)
         found = schedule.applied(assembly, schedule.piece(self._piece_start))
-        return found.with_held(self.held) if self.held else found
+        return found.with_held_of(self.assembly) if self.held else found
 
     @property
     def _piece(self) -> tuple[tuple[float, ...], tuple[float, ...] | None]:
