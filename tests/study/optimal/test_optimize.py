@@ -9,7 +9,7 @@ from atwood import AtwoodError, Scene, SolveError, optimize
 from atwood.study.optimal import optimize as module
 from atwood.study.optimal.collocation import gauss
 from atwood.study.optimal.interior_point import least
-from atwood_library import Force, Ground, Link, Pivot, PointMass, Rod, Slider
+from atwood_library import Force, Ground, Link, Pivot, PointMass, Pulse, Rod, Slider
 from atwood_library.scenes import BouncingBall, CartPole
 
 SQUARE = {"objective": lambda seen: seen["push.value"] ** 2, "inputs": ["push.value"]}
@@ -86,7 +86,18 @@ def test_swing_up_ends_where_the_run_does():
     assert "58.8" in found.as_text()
 
 
-def test_in_a_loop_of_space_and_torque():
+def test_duration_is_chosen_too():
+    end = {"rail.displacement": 1.0, "rail.speed": 0.0, "hinge.angle": 0.5 * math.pi, "hinge.angular_velocity": 0.0}
+    about = {"inputs": {"push.value": (-20.0, 20.0)}, "end": end, "t_end": (0.5, 3.0)}
+    found = optimize(cart_pole(), lambda seen: 20.0 + seen["push.value"] ** 2, **about)
+    assert 1.0 < found.duration < 2.9
+    longer = optimize(
+        cart_pole(), lambda seen: 20.0 + seen["push.value"] ** 2, **{**about, "t_end": 1.03 * found.duration}
+    )
+    assert found.cost < longer.cost
+
+
+def test_on_constraints_in_space():
     scene = Scene(space="space", t_end=1.0)
     ground, rod = scene.add("ground", Ground()), scene.add("rod", Rod(length=1.0))
     bob, push = scene.add("bob", PointMass(mass=1.0)), scene.add("push", Force())
@@ -103,7 +114,7 @@ def problem(monkeypatch, **about):
     """Return the first problem that is solved, and unknowns beside those that it begins with."""
     taken = []
 
-    def take(problem, every, assembly):
+    def take(problem, every, *_):
         taken.append((problem, every))
         raise SolveError("taken")
 
@@ -183,6 +194,7 @@ def test_interior_point():
         ({"objective": "tim"}, "objective"),
         ({"objective": lambda seen: [seen["push.value"]]}, "one number"),
         ({"objective": lambda seen: seen["push.valu"]}, "push.valu"),
+        ({"objective": lambda seen: 1.0 / seen["rail.speed"]}, "no finite number"),
         ({"end": {"rail.place": 1.0}}, "rail.place"),
         ({"end": {"rail.displacement": "1 s"}}, "rail.displacement"),
         ({"bounds": {"rail.speed": (0.0, -1.0)}}, "empty"),
@@ -206,3 +218,12 @@ def test_refuses_what_is_not_smooth(kind, body, said):
     scene.connect(scene[body].point, more.point)
     with pytest.raises(AtwoodError, match=said):
         optimize(scene, lambda seen: seen["more.value"] ** 2, inputs=["more.value"])
+
+
+def test_refuses_functions_with_pieces():
+    scene = block()
+    pulse, other = scene.add("pulse", Pulse(amplitude=3.0, width=0.4, period=0.7)), scene.add("other", Force())
+    scene.connect(other.point, scene["block"].point)
+    scene.connect(pulse.output("value"), other.input("value"))
+    with pytest.raises(AtwoodError, match="has pieces"):
+        optimize(scene, **SQUARE, end=AT_REST)

@@ -25,7 +25,7 @@ _TINY = 1e-12
 """What keeps a matrix regular whose equations depend on each other; the solution is refined without it."""
 
 _STEPS = 500
-"""More steps are not taken, if nothing else is asked for."""
+"""More steps are not taken."""
 
 
 class Problem(Protocol):
@@ -70,14 +70,14 @@ class Found:
 class _Search:
     """The state of the method."""
 
-    def __init__(self, problem: Problem, x: FloatArray) -> None:
+    def __init__(self, problem: Problem, x: FloatArray, barrier: float) -> None:
         self.problem, low, high = problem, problem.lower, problem.upper
         room = np.where(np.isfinite(high - low), high - low, 1.0)
-        push = np.minimum(1e-2 * np.maximum(1.0, np.abs(x)), 0.1 * room)
+        push = np.minimum(0.1 * barrier * np.maximum(1.0, np.abs(x)), 0.1 * room)
         x = np.where(np.isfinite(low), np.maximum(x, low + push), x)
         self.x = np.where(np.isfinite(high), np.minimum(x, high - push), x)
         self.below, self.above = np.isfinite(low), np.isfinite(high)
-        self.barrier, self.shift = 0.1, 0.0
+        self.barrier, self.shift = barrier, 0.0
         self.duals = self.below / self._gap(self.x)[0] * self.barrier, self.above / self._gap(self.x)[1] * self.barrier
         self.f, self.c = problem.values(self.x)
         self.multipliers = np.zeros(len(self.c))
@@ -221,7 +221,7 @@ class _Search:
         self.duals = found[0], found[1]
 
 
-def least(problem: Problem, x: FloatArray, tolerance: float = 1e-10, max_steps: int = _STEPS) -> Found:
+def least(problem: Problem, x: FloatArray, tolerance: float = 1e-10, barrier: float = 0.1) -> Found:
     """Return a point where a function is least near by, under equations and bounds.
 
     Parameters
@@ -232,10 +232,10 @@ def least(problem: Problem, x: FloatArray, tolerance: float = 1e-10, max_steps: 
         Where to begin.
     tolerance
         What its conditions may miss.
-    max_steps
-        Limit of the steps.
+    barrier
+        Its parameter to begin with; small where x is near.
     """
-    one = _Search(problem, x)
+    one = _Search(problem, x, barrier)
     message, steps, miss = "", 0, np.inf
     while True:
         gradient, jacobian = problem.slopes(one.x)
@@ -245,8 +245,8 @@ def least(problem: Problem, x: FloatArray, tolerance: float = 1e-10, max_steps: 
         while one.barrier > 0.1 * tolerance and one.miss(gradient, jacobian, one.barrier) <= 10.0 * one.barrier:
             one.barrier = max(0.1 * tolerance, min(0.2 * one.barrier, one.barrier**1.5))
             one.filter = []
-        if steps >= max_steps:
-            message = f"it takes more than {max_steps} steps"
+        if steps >= _STEPS:
+            message = f"it takes more than {_STEPS} steps"
             break
         if not one.take(gradient, jacobian):
             if one.filter:  # what was refused before may lead on from here

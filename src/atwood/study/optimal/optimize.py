@@ -17,7 +17,7 @@ from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_quantity, parse_unit
-from atwood.numerics.matrices import least_norm
+from atwood.numerics.matrices import least_norm, or_one
 from atwood.pipeline import SCENE, refuse_contacts, simulate, smooth_assembly_of
 from atwood.result.result import Result
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales, scene_length
@@ -26,7 +26,7 @@ from atwood.study.optimal.collocation import POINTS, Collocation, Task
 from atwood.study.optimal.interior_point import Found, least
 from atwood.study.optimal.points import PointFunctions
 from atwood.study.sensitivities.augmented import Augmented
-from atwood.study.sensitivities.inputs import HELD, LINEAR, Driven, with_inputs
+from atwood.study.sensitivities.inputs import HELD, INPUTS, LINEAR, Driven, with_inputs
 from atwood.study.sensitivities.quantities import written
 from atwood.table import Shown, Table, table
 
@@ -103,7 +103,7 @@ class _Seen(Mapping[str, Any]):
 @takes(
     scene=SCENE,
     objective=ANYTHING,
-    inputs=ANYTHING,
+    inputs=INPUTS,
     end=optional(BY_PATH),
     bounds=optional(BY_PATH),
     at_end=ANYTHING,
@@ -190,7 +190,6 @@ def optimize(
     rows = {path: one if np.ndim(one) else [(begin, one), (first, one)] for path, one in nodes.items()}
     driven, made = with_inputs(assembly, rows, LINEAR, first)
     refuse_contacts(driven)
-    _refuse_blocks(driven, made)
     task = _task(driven, made, objective, at_end, end or {}, bounds or {}, paths, span)
     task = replace(task, is_held=between == HELD)
     return _refined(assembly, task, made, intervals, tolerance)
@@ -229,8 +228,14 @@ def _ranges(given: Mapping[str, Any], units: Mapping[str, str]) -> FloatArray:
     return found
 
 
-def _refuse_blocks(assembly: Assembly, made: Sequence[Driven]) -> None:
-    """Refuse what changes at moments of its own."""
+def _refuse_pieces(assembly: Assembly, made: Sequence[Driven]) -> None:
+    """Refuse scenes whose equations change at moments of their own, or where something passes a place."""
+    if assembly.relations or assembly.sides is not None:
+        raise UnsupportedError(
+            "a function of time, or a law that compares what moves, has pieces, and the motion is not smooth",
+            where=assembly.flat.name,
+            advice="Put a smooth function in its place, such as a tanh for a step.",
+        )
     own = {one.part for one in made}
     other = next((one.path for one in assembly.discrete_states if one.path.rpartition(".")[0] not in own), None)
     if other is not None:
@@ -255,6 +260,7 @@ def _task(
     begin = assembly.flat.t_start
     segment = simulate(assembly, t_end=begin + 1e-3 * span[0], outputs=2).run.segments[0]
     plan, state = segment.plan, np.concatenate([segment.coordinates[:, 0], segment.speeds[:, 0]])
+    _refuse_pieces(plan.assembly, made)
     equations = plan.assembly.own_equations
     augmented = Augmented(plan, begin, state, np.zeros((0, len(plan.assembly.parameters))))
     rates, symbols, known = _rates(augmented, made)
@@ -285,7 +291,7 @@ def _task(
     ends, along = ([seen[path] for path in some] for some in (end, bounds))
     length = scene_length(assembly)
     sizes = np.concatenate([one(equations, length) for one in (coordinate_scales, motion_scales)])
-    time = span[1]
+    time = span[0]
     sizes[len(equations.coordinates) :] /= time
     task = Task(
         motion,
@@ -303,15 +309,13 @@ def _task(
 
 
 def _input_sizes(task: Task, made: Sequence[Driven], time: float) -> FloatArray:
-    """Return sizes of inputs: what changes a speed by its size within the scene's time."""
+    """Return sizes of inputs: their bounds, or what changes a speed by its size within a time."""
     n, m, sizes = len(task.start), len(made), task.sizes[0]
     point = np.concatenate([task.start, [one.values[0] for one in made], [task.begin]])[None, :]
     slopes = np.abs(task.motion.slopes(point).toarray()[:n, n : n + m]) * time / sizes[:, None]
     effect = slopes.max(axis=0, initial=0.0)
-    idle = np.flatnonzero(effect == 0.0)
-    if len(idle):
-        raise UsageError("it does nothing at the start", where=made[idle[0]].path, advice="Start a little beside.")
-    return np.asarray(1.0 / effect)
+    bounds = np.where(np.all(np.isfinite(task.inputs), axis=1), np.abs(task.inputs).max(axis=1), 0.0)
+    return np.where(bounds > 0.0, bounds, 1.0 / or_one(effect))
 
 
 def _rates(
@@ -338,7 +342,7 @@ def _refined(assembly: Assembly, task: Task, made: Sequence[Driven], intervals: 
     every, steps = _guessed(problem, made), 0
     for _ in range(_ROUNDS):
         mesh = problem.mesh
-        found = _solved(problem, every, assembly)
+        found = _solved(problem, every, assembly, 1e-4 if steps else 0.1)
         every, steps = problem.full(found.x), steps + found.steps
         states, _, inputs, (span,), *_ = problem.parts(every)
         times = task.begin + span * mesh
@@ -368,14 +372,21 @@ def _refined(assembly: Assembly, task: Task, made: Sequence[Driven], intervals: 
     )
 
 
-def _solved(problem: Collocation, every: FloatArray, assembly: Assembly) -> Found:
+def _solved(problem: Collocation, every: FloatArray, assembly: Assembly, barrier: float) -> Found:
     """Return the least cost on a mesh."""
     x = problem.free(every)
+    cost, misses = problem.values(x)
+    if not (np.isfinite(cost) and np.all(np.isfinite(misses))):
+        raise SolveError(
+            "the cost, or an acceleration, is no finite number where the search begins",
+            where=assembly.flat.name,
+            advice="Give a guess of the inputs, or a cost that has a value everywhere.",
+        )
     diagonal = problem.bends(x, np.zeros(problem.linear.shape[0] + problem.slacks.shape[0])).diagonal()
     gradient, _ = problem.slopes(x)
     size = max(float(np.max(np.abs(one), initial=0.0)) for one in (gradient, diagonal))
     problem.cost_size = size or 1.0
-    found = least(problem, x)
+    found = least(problem, x, barrier=barrier)
     if found.message:
         raise SolveError(
             f"no motion was found ({found.message}; its conditions are missed by {found.miss:.2g})",

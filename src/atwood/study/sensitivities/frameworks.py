@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from atwood.arguments import ANYTHING, PATHS, one_of, optional, takes
+from atwood.arguments import PATHS, one_of, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError, UsageError
 from atwood.forms.assembly import Assembly
@@ -18,7 +18,7 @@ from atwood.result.result import Result
 from atwood.simulation.problem.arguments import FORM, OUTPUTS, RTOL, T_END
 from atwood.study.sensitivities.adjoint import Adjoint
 from atwood.study.sensitivities.columns import find_columns
-from atwood.study.sensitivities.inputs import HELD, LINEAR, Driven, with_inputs
+from atwood.study.sensitivities.inputs import HELD, INPUTS, LINEAR, Driven, with_inputs
 
 
 class RunFunction:
@@ -189,7 +189,7 @@ _KINDS: dict[str, Any] = {
     "quantities": PATHS,
     "parameters": PATHS,
     "start": PATHS,
-    "inputs": ANYTHING,
+    "inputs": INPUTS,
     "between": one_of((LINEAR, HELD)),
     "t_end": T_END,
     "outputs": OUTPUTS,

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from atwood.arguments import BY_PATH, PATHS, either
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError, suggestion
 from atwood.expr import depends_on
@@ -25,6 +26,7 @@ from atwood.pipeline import assembly_of
 from atwood.study.sensitivities.columns import Column
 
 LINEAR, HELD = "linear", "held"
+INPUTS = either(BY_PATH, PATHS)
 
 
 def _number_at(times: Sequence[float], t: float) -> int:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from atwood.arguments import ANYTHING, PATHS, one_of, optional, takes, whole
+from atwood.arguments import PATHS, one_of, optional, takes, whole
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError, UsageError
 from atwood.forms.assembly import Assembly
@@ -22,7 +22,7 @@ from atwood.result.result import Result
 from atwood.simulation.problem.arguments import FORM, OUTPUTS, RTOL, T_END
 from atwood.study.sensitivities.adjoint import Adjoint
 from atwood.study.sensitivities.columns import Column, find_columns
-from atwood.study.sensitivities.inputs import HELD, LINEAR, Driven, with_inputs
+from atwood.study.sensitivities.inputs import HELD, INPUTS, LINEAR, Driven, with_inputs
 from atwood.study.sensitivities.passage import Passage
 from atwood.table import Shown, Table, table
 
@@ -103,7 +103,7 @@ def unit_by(quantity: str, parameter: str) -> str:
     quantities=PATHS,
     parameters=PATHS,
     start=PATHS,
-    inputs=ANYTHING,
+    inputs=INPUTS,
     between=one_of((LINEAR, HELD)),
     t_end=T_END,
     outputs=OUTPUTS,
