@@ -8,7 +8,7 @@ safe where constraints nearly depend on each other.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -299,26 +299,26 @@ def _met_quickly(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray
     """Return what machine code finds, if that moves by next to nothing where it is taken onto the constraints again.
 
     A row in units of its largest entry misses no more than the sum of what its unknowns move by to meet it. None where
-    that does not tell, or all may be exact.
+    that does not tell.
     """
     if plan.finding.redundant or plan.assembly.own_equations.contacts:
         return None
     own = np.ascontiguousarray(np.concatenate([q, u]).T)
-    rows = own.copy()
+    rows, free = own.copy(), np.zeros(len(t), dtype=bool)
     met = nearest(t, rows)
-    again = rows.copy()
-    if met is None or not met.all() or not nearest(t, again).all():  # type: ignore[union-attr]
+    if met is None or not met.all():
         return None
     sizes = np.concatenate([plan.coordinate_sizes, plan.sizes / plan.scales.time])
-    if not 2.0 * len(sizes) * np.max(np.abs(again - rows) / sizes) <= tolerances.MET:
-        return None
-    moved = np.max(np.abs(rows - own) / sizes, axis=1)
-    one = slice(int(np.argmax(moved)), int(np.argmax(moved)) + 1)
-    if moved[one] <= _FAR and _are_exact(plan, misses_of(plan, t[one], q[:, one], u[:, one])):
+    misses: Misses = cache(partial(misses_of, plan, t, q, u))
+    if np.max(np.abs(rows - own) / sizes) <= _FAR and _are_exact(plan, misses()):
+        return Projected(q, u.copy(), misses, free)
+    again = rows.copy()
+    met = nearest(t, again)
+    if met is None or not met.all() or not 2 * len(sizes) * np.max(np.abs(again - rows) / sizes) <= tolerances.MET:
         return None
     near, moving = (part.copy() for part in plan.program.split(rows.T))
     near = plan.balance.kinematic_map.normalized(near)
-    return Projected(near, moving, partial(misses_of, plan, t, q, u), np.zeros(len(t), dtype=bool))
+    return Projected(near, moving, misses, free)
 
 
 def _taken(
