@@ -93,6 +93,9 @@ CAPACITY = 64
 SPANS = 4, 12
 """At least and at most so many intervals between impacts say how fast these follow each other."""
 
+LONG, BEND = 64, 0.9
+"""A sum is looked for among so many intervals, and extrapolated where changes shrink to less than this share."""
+
 EVEN = 4.0
 """Intervals of a series shrink by factors that differ by no more than this from their mean."""
 
@@ -880,10 +883,10 @@ def _series() -> Routine:
     moved = response.at(row * m.size)
     with r.count(m.size) as j:
         largest.now = r.most(r.size(moved[j]), largest.now)
-    spans, turn = r.array(SPANS[1]), r.variable(m.known, INTEGER)
+    spans, turn = r.array(LONG), r.variable(m.known, INTEGER)
     count, last, end, counts = r.variable(0, INTEGER), r.variable(t), r.variable(inf), r.variable(False, BOOLEAN)
     with r.forever() as loop:
-        with r.when((turn.now == 0) | (count.now == SPANS[1])):
+        with r.when((turn.now == 0) | (count.now == LONG)):
             r.leave(loop)
         turn.now = turn.now - 1
         time, part = past[turn.now * 2], past[turn.now * 2 + 1]
@@ -905,11 +908,14 @@ def _series() -> Routine:
     with r.count(60):  # the cube root: the mean factor of three intervals
         typical.now = typical.now - (typical.now - cube / (typical.now * typical.now)) * (1.0 / 3.0)
     even, steady = r.variable(1, INTEGER), r.variable(True, BOOLEAN)
-    with r.count(count.now, 1) as k, r.when(even.now == k):
+    long = r.variable(1, INTEGER)
+    with r.count(count.now, 1) as k:
         factor = spans[k - 1] / spans[k] / typical.now
-        is_even = (factor <= EVEN) & (factor * EVEN >= 1.0)
-        steady.now = steady.now & (~is_even | ((factor <= STEADY) & (factor * STEADY >= 1.0)))
-        even.now = r.choose(is_even, k + 1, even.now)
+        is_even, is_steady = ((factor <= by) & (factor * by >= 1.0) for by in (EVEN, STEADY))
+        counts = (even.now == k) & (k < SPANS[1])
+        steady.now = steady.now & (~(counts & is_even) | is_steady)
+        even.now = r.choose(counts & is_even, k + 1, even.now)
+        long.now = r.choose((long.now == k) & is_steady, k + 1, long.now)
     with r.when(even.now < SPANS[0]):
         r.give()
     oldest, share = spans[even.now - 1], r.variable(typical.now)
@@ -924,8 +930,30 @@ def _series() -> Routine:
     longest = r.choose(steady.now, r.choose(flattens, m.rough, m.ahead), LATER * m.ahead)
     with r.when(left < longest):
         m.ahead, m.stops, m.blur, m.pace = left, 1, NEAR_REST, NEAR_REST
+        sum_ = _sum_of_series(r, spans, long.now)
+        with r.when(r.size(sum_ - left) <= left):
+            m.ahead = sum_
     r.give()
     return r
+
+
+def _sum_of_series(r: Routine, spans: Value, count: Value) -> Value:
+    """Return how long a series goes on; see `atwood.simulation.contacts.changes.sum_of_series`."""
+    sums, since, best, nearest = r.array(LONG), r.variable(0.0), r.variable(inf), r.variable(inf)
+    with r.count(count - 1) as k:
+        span = spans[k]
+        share = span / spans[k + 1]
+        sums[k] = span * share / (1.0 - share) - since.now
+        since.now = since.now + span
+    with r.count(count - 3) as k:
+        change, before = sums[k] - sums[k + 1], sums[k + 1] - sums[k + 2]
+        bends = (change * before > 0.0) & (r.size(change) < r.size(before) * BEND)
+        sums[k] = sums[k] + r.choose(bends, change * change / (before - change), 0.0)
+    with r.count(count - 5) as k:
+        apart = r.most(r.size(sums[k] - sums[k + 1]), r.size(sums[k + 1] - sums[k + 2]))
+        with r.when(apart < nearest.now):
+            nearest.now, best.now = apart, sums[k]
+    return best.now
 
 
 def _resolve() -> Routine:

@@ -251,7 +251,7 @@ def test_a_block_rocks(form: str) -> None:
     found = times(result, "impact")
     assert found[0] == pytest.approx(0.5999358452, abs=1e-9)
     assert found[3] == pytest.approx(2.9278155896, abs=1e-9)
-    assert times(result, "rests") == [pytest.approx(8.6907773166, abs=1e-7)]
+    assert times(result, "rests") == [pytest.approx(8.6907773166, abs=1e-8)]
     assert result["m.angle"][-1] == pytest.approx(0.0, abs=1e-9)
 
 
@@ -504,11 +504,13 @@ def block_on_floor(height: float) -> Scene:
     return scene
 
 
-@pytest.mark.parametrize(("height", "rtol", "off"), [(0.0, 1e-13, 1e-6), (1e4, 1e-10, 1e-5)])
+@pytest.mark.parametrize(
+    ("height", "rtol", "off"), [(0.0, 1e-11, 2e-9), (0.0, 1e-12, 1e-9), (0.0, 1e-13, 2e-9), (1e4, 1e-10, 1e-5)]
+)
 def test_impacts_come_to_an_end_where_rounding_tells_in_their_intervals(height: float, rtol: float, off: float) -> None:
-    """A block hops by 1e-14 m at last; rounding would have it go on for ever."""
+    """A block hops by 1e-14 m at last; rounding would have it go on for ever. The sum is that of earlier intervals."""
     result = simulate(block_on_floor(height), t_end=9.0, rtol=rtol, outputs=[0.0, 9.0])
-    assert times(result, "rests") == [pytest.approx(8.6907773166, abs=off)]
+    assert times(result, "rests") == [pytest.approx(8.690777316623845, abs=off)]
 
 
 def test_impacts_at_two_ends_in_turn_are_no_series_of_one() -> None:

@@ -12,10 +12,23 @@ from itertools import combinations, islice, pairwise
 
 import numpy as np
 
-from atwood.arrays import FloatArray
+from atwood.arrays import BoolArray, FloatArray
 from atwood.errors import SolveError, StartError
 from atwood.forms.assembly import Assembly
-from atwood.integrators.set_routines import ALIKE, BEGINS, EVEN, FLATTENS, GAIN, LATER, NEAR_REST, SEEN, SPANS, STEADY
+from atwood.integrators.set_routines import (
+    ALIKE,
+    BEGINS,
+    BEND,
+    EVEN,
+    FLATTENS,
+    GAIN,
+    LATER,
+    LONG,
+    NEAR_REST,
+    SEEN,
+    SPANS,
+    STEADY,
+)
 from atwood.lazy_dataclasses import dataclass, made_of, replace
 from atwood.mechanics.dynamics.equations import ContactRow
 from atwood.mechanics.outputs.event_functions import CLOSES, OPENS, RESTS, STOPS, YIELDS
@@ -193,7 +206,7 @@ class _Moment:
             if part not in parts or time == end:
                 continue
             end = time
-            if len(spans) == SPANS[1] or (spans and last - time <= spans[-1]):
+            if len(spans) == LONG or (spans and last - time <= spans[-1]):
                 break
             spans.append(last - time)
             last = time
@@ -202,8 +215,8 @@ class _Moment:
         # Impacts that only happen to be near each other are no series: each interval shrinks about as the one before.
         ratios = np.array([after / before for after, before in pairwise(spans)])
         typical = float(np.exp(np.mean(np.log(ratios[: SPANS[0] - 1]))))
-        uneven = np.flatnonzero(np.abs(np.log(ratios / typical)) > math.log(EVEN))
-        count = int(uneven[0]) if len(uneven) else len(ratios)
+        long = _first(np.abs(np.log(ratios / typical)) > math.log(STEADY))
+        count = _first(np.abs(np.log(ratios[: SPANS[1] - 1] / typical)) > math.log(EVEN))
         if count < SPANS[0] - 1:
             return None
         share = float(np.exp(np.mean(np.log(ratios[:count]))))
@@ -213,7 +226,8 @@ class _Moment:
         if not left < (longest[1 if flattens else 0] if is_steady else LATER * longest[0]):
             return None
         self.small, self.slow = NEAR_REST * self.small, NEAR_REST * self.slow
-        return left
+        found = sum_of_series(np.array(spans[: long + 1]))
+        return found if abs(found - left) <= left else left
 
     def stop(self, left: float) -> None:
         """Stop whatever touches: impacts have accumulated, and nothing opens any more; what has stuck goes on to."""
@@ -512,6 +526,28 @@ class _Moment:
 def check_start(assembly: Assembly, state: tuple[float, FloatArray, FloatArray], length: float, scales: Scales) -> None:
     """Refuse a start inside of something; arguments as of `resolve`."""
     _Moment(ContactValues(assembly, *state, length), scales, 0.1 * tolerances.CLOSED, ()).check_start()
+
+
+def _first(is_one: BoolArray) -> int:
+    """Return how many come before the first that is one."""
+    return int(np.argmax([*is_one, True]))
+
+
+def sum_of_series(spans: FloatArray) -> float:
+    """Return how long impacts go on after the last; infinity where intervals, the last first, are too few to say.
+
+    Factors of early intervals are not yet the last one, and those of late ones are rounding. So the sum is formed from
+    each on, extrapolated by the way in which it changes (Aitken), and taken where its neighbours agree best.
+    """
+    since = np.cumsum(spans) - spans
+    shares = spans[:-1] / spans[1:]
+    sums = spans[:-1] * shares / (1.0 - shares) - since[:-1]
+    change, before = sums[:-2] - sums[1:-1], sums[1:-1] - sums[2:]
+    bends = (change * before > 0.0) & (np.abs(change) < BEND * np.abs(before))
+    sums = sums[:-2] + np.divide(change * change, before - change, out=np.zeros(len(change)), where=bends)
+    apart = np.abs(np.diff(sums))
+    worst = np.maximum(apart[:-1], apart[1:])
+    return float(sums[np.argmin(worst)]) if len(worst) else math.inf
 
 
 def longest_left(relative: float, scales: Scales) -> tuple[float, float]:
