@@ -912,9 +912,9 @@ def _series() -> Routine:
     with r.count(count.now, 1) as k:
         factor = spans[k - 1] / spans[k] / typical.now
         is_even, is_steady = ((factor <= by) & (factor * by >= 1.0) for by in (EVEN, STEADY))
-        counts = (even.now == k) & (k < SPANS[1])
-        steady.now = steady.now & (~(counts & is_even) | is_steady)
-        even.now = r.choose(counts & is_even, k + 1, even.now)
+        is_near = (even.now == k) & (k < SPANS[1])
+        steady.now = steady.now & (~(is_near & is_even) | is_steady)
+        even.now = r.choose(is_near & is_even, k + 1, even.now)
         long.now = r.choose((long.now == k) & is_steady, k + 1, long.now)
     with r.when(even.now < SPANS[0]):
         r.give()
@@ -949,6 +949,8 @@ def _sum_of_series(r: Routine, spans: Value, count: Value) -> Value:
         change, before = sums[k] - sums[k + 1], sums[k + 1] - sums[k + 2]
         bends = (change * before > 0.0) & (r.size(change) < r.size(before) * BEND)
         sums[k] = sums[k] + r.choose(bends, change * change / (before - change), 0.0)
+    with r.when(count > 3):
+        best.now = sums[0]
     with r.count(count - 5) as k:
         apart = r.most(r.size(sums[k] - sums[k + 1]), r.size(sums[k + 1] - sums[k + 2]))
         with r.when(apart < nearest.now):
@@ -969,6 +971,7 @@ def _resolve() -> Routine:
     r.copy(m.unit("closed"), m.unit("chosen"), m.count)
     with r.when(m.stops != 0):
         r.call("stop", r.arguments[0])
+        r.copy(m.unit("closed"), m.unit("stopped"), m.count)  # others may pass near by
     with r.otherwise():
         _do(r, "collide")
     _do(r, "settle_contacts", t)

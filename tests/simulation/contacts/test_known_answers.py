@@ -513,18 +513,29 @@ def test_impacts_come_to_an_end_where_rounding_tells_in_their_intervals(height: 
     assert times(result, "rests") == [pytest.approx(8.690777316623845, abs=off)]
 
 
-def test_impacts_at_two_ends_in_turn_are_no_series_of_one() -> None:
-    """A plank lands askew: its ends bounce in turn, by uneven intervals, and come to rest one after the other."""
+@pytest.mark.parametrize(
+    ("restitution", "angle", "rtol", "off"),
+    [(0.3, 0.23, 1e-7, 1e-4), (0.1, 0.15, 1e-9, 1e-7), (0.1, 0.15, 1e-10, 1e-9), (0.15, 0.23, 1e-9, 1e-7)],
+)
+def test_impacts_at_two_ends_in_turn_are_no_series_of_one(
+    restitution: float, angle: float, rtol: float, off: float
+) -> None:
+    """A plank lands askew: its ends bounce in turn, by uneven intervals, and come to rest one after the other.
+
+    With 0.1 and 0.15 rad it lands flat to 1e-6 m, where the end that still flies is no end that rests.
+    """
 
     def rests(rtol: float) -> list[float]:
         scene = Scene()
         ground, m = scene.add("ground", Ground()), scene.add("m", Box(mass=1.0, length_x=2.0, length_z=0.1))
-        contact = scene.add("c", BoxContact(length=2.0, height=0.1, restitution=0.3))
+        contact = scene.add("c", BoxContact(length=2.0, height=0.1, restitution=restitution))
         scene.connect(ground.frame, contact.plane)
         scene.connect(m.frame, contact.box)
-        scene.start["m.angle"] = 0.23
+        scene.start["m.angle"] = angle
         start_at(scene, 0.0, 0.6, 0.0, 0.0)
         scene.start["m.angular_velocity.y"] = 0.0
         return times(simulate(scene, t_end=0.6, rtol=rtol, outputs=[0.0, 0.6]), "rests")
 
-    assert rests(1e-7) == pytest.approx(rests(1e-11), abs=1e-4)
+    found, known = rests(rtol), rests(1e-11)
+    assert found == pytest.approx(known, abs=off)
+    assert found[-1] == pytest.approx(known[-1], abs=1e-3 * off if restitution < 0.2 else off)

@@ -123,6 +123,7 @@ class _Moment:
         self.slow = self.small / scales.time
         self.triggers = {(one.part, one.law): one.target for one in triggers}
         self.events: list[EventRecord] = []
+        self.resting: list[int] | None = None
 
     def trigger(self, k: int) -> str:
         """Return the target of the event of a unit; empty where it has none now."""
@@ -143,8 +144,11 @@ class _Moment:
         return bool(self.rates()[self.units[k][0]] <= self.slow[k])
 
     def all_closed(self) -> tuple[float, ...]:
-        """Return the states with every gap closed that is at zero, and nothing that rubs; empty where there is none."""
-        closed = set(self.touching)
+        """Return the states with every gap closed that is at zero, and nothing that rubs; empty where there is none.
+
+        Where impacts have accumulated these are the gaps that rest; others may pass near by.
+        """
+        closed = set(self.touching if self.resting is None else self.resting)
         if not closed:
             return ()
         found = list(self.held)
@@ -237,7 +241,7 @@ class _Moment:
         # What has just bounced much faster than the others only passes: its impacts have not come to an end.
         coming = max(0.0, *(-speed for speed in speeds.values()))
         resting = [k for k, speed in speeds.items() if speed <= max(ALIKE * coming, self.slow[k])]
-        self.slow = 1.0 / NEAR_REST * self.slow
+        self.resting, self.slow = resting, 1.0 / NEAR_REST * self.slow
         self._end_impacts(resting, still)
         self.events += [told_rest(self.t, self.first[k].row.key[:2], left) for k in resting[:1]]
 
@@ -547,7 +551,7 @@ def sum_of_series(spans: FloatArray) -> float:
     sums = sums[:-2] + np.divide(change * change, before - change, out=np.zeros(len(change)), where=bends)
     apart = np.abs(np.diff(sums))
     worst = np.maximum(apart[:-1], apart[1:])
-    return float(sums[np.argmin(worst)]) if len(worst) else math.inf
+    return float(sums[np.argmin(worst) if len(worst) else 0]) if len(sums) else math.inf
 
 
 def longest_left(relative: float, scales: Scales) -> tuple[float, float]:
@@ -754,10 +758,11 @@ def resolve(
     left = moment.left_of(impacts, longest_left(relative, scales))
     if is_start:
         moment.check_start()
-    touching = moment.all_closed()
     if left is not None:
         moment.stop(left)
+        touching = moment.all_closed()
     else:
+        touching = moment.all_closed()
         moment.collide(one_by_one)
     moment.settle()
     was, now = list(moment.before), states_of(moment.layout, moment.held)
