@@ -275,6 +275,12 @@ class Walk:
             return recorder, outcome
         record = recorder.stretch(self.impact, after_time_event)
         self.segments.append(self._sides.recorded(record, self.plan, self.assembly, bool(outcome.sides)))
+        self._follow(outcome)
+        return recorder, outcome
+
+    def _follow(self, outcome: Outcome) -> None:
+        """Take over what a stretch has changed and chosen."""
+        assert self.plan is not None
         if outcome.passed is not None:
             self._passed(outcome.passed)
         elif outcome.held is not None and outcome.held != self.held:  # sets of contacts have changed on the way
@@ -288,7 +294,6 @@ class Walk:
         if outcome.passed is not None and outcome.passed.error is not None:
             self.t = outcome.t
             raise outcome.passed.error
-        return recorder, outcome
 
     def _moments(self, schedule: Schedule) -> Ahead | None:
         """Return the moments that steps may pass by themselves from here on; None where there are none."""

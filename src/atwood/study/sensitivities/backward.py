@@ -31,7 +31,7 @@ HEAD = 5
 
 def backward_source(coordinates: int, speeds: int, given: bool, projects: bool, parameters: int) -> RoutineSource:
     """Return what writes ``record``, ``ahead`` and ``back``."""
-    files = ("integrators/protocol.py", "integrators/methods/dormand_prince.py")
+    files = ("integrators/protocol.py", "integrators/embedded/tableau.py", "integrators/methods/dormand_prince.py")
     about = (coordinates, speeds, given, projects, parameters)
     return RoutineSource("study.sensitivities.backward", files, about)
 
