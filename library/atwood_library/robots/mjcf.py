@@ -25,7 +25,7 @@ from atwood_library.robots.building import Building, add_armature, add_friction,
 from atwood_library.robots.graph import IDENTITY, Pose
 from atwood_library.robots.inertias import checked_inertia
 from atwood_library.robots.mjcf_elements import Elements, ends_of, geom_solid, read_elements, rotation_matrix, sizes_of
-from atwood_library.robots.xml import Node, name_of, number, numbers
+from atwood_library.robots.xml import XMLElement, name_of, number, numbers
 
 __all__ = ["read_mjcf"]
 
@@ -127,7 +127,7 @@ def _read_options(reading: _Reading) -> None:
         if reading.elements.compiler.get(name, "false") not in ("false", "0"):
             reading.left[f"compiler {name}"] = None
     for section in reading.elements.root:
-        if section.tag not in _SECTIONS and section.tag not in ("actuator", "equality") and len(section.inner):
+        if section.tag not in _SECTIONS and section.tag not in ("actuator", "equality") and len(section):
             kinds = dict.fromkeys(f"{section.tag} {one.tag}" for one in section)
             reading.left.update(dict.fromkeys(kinds))
 
@@ -141,7 +141,7 @@ def _read_meshes(reading: _Reading, path: Path) -> None:
             name = full.get("name") or Path(full.get("file")).stem
             scale = np.array(numbers(full, "scale", 3, (1.0, 1.0, 1.0)))
             reading.meshes[name] = str(folder / full.get("file")), scale
-            if "refpos" in full.attributes or "refquat" in full.attributes or not full.get("file"):
+            if "refpos" in full.attrib or "refquat" in full.attrib or not full.get("file"):
                 raise UnsupportedError("a mesh with a reference pose, or without a file, is not read", where=full.place)
         elif node.tag not in ("texture", "material", "hfield"):
             reading.left[f"asset {node.tag}"] = None
@@ -152,13 +152,14 @@ def _read_meshes(reading: _Reading, path: Path) -> None:
 
 def _read_bodies(reading: _Reading, ground: Frame) -> None:
     """Add the bodies from the world on; frames between them only place what they hold."""
-    world = Node("body", {"name": "world"}, reading.elements.root.place, "", reading.elements.sections("worldbody"))
-    stack: list[tuple[Node, Frame, Pose, Pose, str]] = [(world, ground, IDENTITY, IDENTITY, "main")]
+    sections = reading.elements.sections("worldbody")
+    world = XMLElement("body", {"name": "world"}, reading.elements.root.place, inner=sections)
+    stack: list[tuple[XMLElement, Frame, Pose, Pose, str]] = [(world, ground, IDENTITY, IDENTITY, "main")]
     solids: dict[str, MassProperties] = {}
     while stack:
         node, carrier, inner, outer, near = stack.pop()
         near = node.get("childclass") or near
-        for one in node.inner:
+        for one in node:
             if one.tag not in ("body", "frame"):
                 if one.tag not in _SILENT:
                     raise UnsupportedError(f"<{one.tag}> is not read, and bodies come from it", where=one.place)
@@ -184,14 +185,14 @@ def _read_bodies(reading: _Reading, ground: Frame) -> None:
             setattr(reading.bodies[name], parameter, getattr(made, parameter))
 
 
-def _compiler(reading: _Reading) -> Node:
-    return Node("compiler", reading.elements.compiler, reading.elements.root.place)
+def _compiler(reading: _Reading) -> XMLElement:
+    return XMLElement("compiler", reading.elements.compiler, reading.elements.root.place)
 
 
 def _read_body(
     reading: _Reading,
     name: str,
-    node: Node,
+    node: XMLElement,
     carrier: Frame,
     local: Pose,
     near: str,
@@ -201,7 +202,7 @@ def _read_body(
     building = reading.building
     body = reading.bodies[name] = building.add(name, RigidBody(mass=0.0))
     joints = [reading.elements.full(one, near) for one in node.findall("joint")]
-    joints += [Node(one.tag, {**one.attributes, "type": "free"}, one.place) for one in node.findall("freejoint")]
+    joints += [XMLElement(one.tag, {**one.attrib, "type": "free"}, one.place) for one in node.findall("freejoint")]
     if node.get("mocap") == "true":
         reading.left[f"mocap of body {name}, which stays"] = None
     shift = np.zeros(3)
@@ -248,13 +249,13 @@ def _weld_values(turned: Any, place: Any) -> dict[str, Any]:
     return values
 
 
-def _body_solid(reading: _Reading, name: str, node: Node, near: str) -> MassProperties:
+def _body_solid(reading: _Reading, name: str, node: XMLElement, near: str) -> MassProperties:
     """Return the mass properties of a body: what it says, or those of its geoms."""
     inertial, mode = node.findall("inertial"), reading.elements.compiler.get("inertiafromgeom", "auto")
     if inertial and mode != "true":
         one = inertial[0]
         place = np.array(numbers(one, "pos", 3))
-        if "fullinertia" in one.attributes:
+        if "fullinertia" in one.attrib:
             xx, yy, zz, xy, xz, yz = numbers(one, "fullinertia", 6)
             tensor = np.array([(xx, xy, xz), (xy, yy, yz), (xz, yz, zz)])
         else:
@@ -271,7 +272,7 @@ def _body_solid(reading: _Reading, name: str, node: Node, near: str) -> MassProp
     return combine(*found) if found else MassProperties(0.0, np.zeros(3), np.zeros((3, 3)))
 
 
-def _add_appearances(reading: _Reading, name: str, node: Node, body: RigidBody, near: str) -> None:
+def _add_appearances(reading: _Reading, name: str, node: XMLElement, body: RigidBody, near: str) -> None:
     """Add what the geoms of a body look like."""
     for count, one in enumerate(node.findall("geom"), 1):
         geom = reading.elements.full(one, near)
@@ -298,7 +299,7 @@ def _add_appearances(reading: _Reading, name: str, node: Node, body: RigidBody, 
 # -- joints ------------------------------------------------------------------------------------------------------------
 
 
-def _read_joint(reading: _Reading, label: str, joint: Node) -> Any:
+def _read_joint(reading: _Reading, label: str, joint: XMLElement) -> Any:
     """Return the part of a joint, with spring, damper and stops."""
     kind = joint.get("type", "hinge")
     if kind in ("free", "ball"):
@@ -323,7 +324,7 @@ def _read_joint(reading: _Reading, label: str, joint: Node) -> Any:
     if values["stiffness"]:
         values["natural_angle" if hinge else "natural_length"] = coordinate("springref") - reference
     limited = joint.get("limited", "auto")
-    if reading.stops is not None and "range" in joint.attributes and limited != "false":
+    if reading.stops is not None and "range" in joint.attrib and limited != "false":
         ends = numbers(joint, "range", 2)
         radian = not hinge or reading.elements.compiler.get("angle") == "radian"
         lower, upper = (one if radian else float(np.radians(one)) for one in ends)
@@ -331,7 +332,7 @@ def _read_joint(reading: _Reading, label: str, joint: Node) -> Any:
     return Pivot(axis=axis, **values) if hinge else Slider(axis=axis, **values)
 
 
-def _add_loads(reading: _Reading, label: str, joint: Node, part: Pivot | Slider) -> None:
+def _add_loads(reading: _Reading, label: str, joint: XMLElement, part: Pivot | Slider) -> None:
     if armature := number(joint, "armature", 0.0):
         add_armature(reading.building, label, part, armature)
     if (loss := number(joint, "frictionloss", 0.0)) and reading.friction:
@@ -354,7 +355,7 @@ def _read_equalities(reading: _Reading, ground: Frame) -> None:
             if not any(law[2:]):
                 add_gear(reading.building, label, part, master, (law[1], law[0]))
                 continue
-        if one.tag not in ("connect", "weld") or not one.get("body1") or "relpose" in one.attributes:
+        if one.tag not in ("connect", "weld") or not one.get("body1") or "relpose" in one.attrib:
             reading.left[f"equality {one.tag} {label}"] = None
             continue
         anchor = np.array(numbers(one, "anchor", 3, (0.0, 0.0, 0.0)))
@@ -368,14 +369,14 @@ def _read_equalities(reading: _Reading, ground: Frame) -> None:
         reading.building.scene.connect(closing.b, there)
 
 
-def _joint(reading: _Reading, node: Node, end: str) -> Pivot | Slider:
+def _joint(reading: _Reading, node: XMLElement, end: str) -> Pivot | Slider:
     part = reading.joints.get(name_of(node, end))
     if not isinstance(part, (Pivot, Slider)):
         raise UsageError(f"{node.get(end)!r} is no joint that turns or slides", where=node.place)
     return part
 
 
-def _body(reading: _Reading, node: Node, end: str, ground: Frame) -> tuple[Frame, Pose]:
+def _body(reading: _Reading, node: XMLElement, end: str, ground: Frame) -> tuple[Frame, Pose]:
     name = node.get(end)
     if name in ("", "world"):
         return ground, IDENTITY

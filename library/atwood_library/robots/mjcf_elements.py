@@ -17,7 +17,7 @@ import numpy as np
 from atwood import UsageError
 from atwood.solids import MassProperties, read_stl
 from atwood_library.robots.graph import Pose, turn_about
-from atwood_library.robots.xml import Node, number, numbers, read_xml
+from atwood_library.robots.xml import XMLElement, number, numbers, read_xml
 
 __all__ = ["Elements", "ends_of", "geom_solid", "read_elements", "rotation_matrix", "sizes_of"]
 
@@ -36,15 +36,15 @@ class Elements:
         Attributes of all ``<compiler>``.
     """
 
-    root: Node
+    root: XMLElement
     classes: dict[str, dict[str, dict[str, str]]] = field(default_factory=dict)
     compiler: dict[str, str] = field(default_factory=dict)
 
-    def sections(self, tag: str) -> list[Node]:
+    def sections(self, tag: str) -> list[XMLElement]:
         """Return what is in all sections of a kind, such as ``"worldbody"``."""
         return [node for section in self.root.findall(tag) for node in section]
 
-    def full(self, node: Node, near: str = "main", tag: str = "") -> Node:
+    def full(self, node: XMLElement, near: str = "main", tag: str = "") -> XMLElement:
         """Return an element with what its class, or that of the body around it, says where itself does not.
 
         Parameters
@@ -59,10 +59,10 @@ class Elements:
         name = node.get("class") or near
         if name not in self.classes:
             raise UsageError(f"<{node.tag}> names a default class {name!r} that there is not", where=node.place)
-        given = {**self.classes[name].get(tag or node.tag, {}), **node.attributes}
-        return Node(node.tag, given, node.place, node.text, node.inner)
+        given = {**self.classes[name].get(tag or node.tag, {}), **node.attrib}
+        return XMLElement(node.tag, given, node.place, node.text or "", node)
 
-    def angle(self, node: Node, name: str, default: float) -> float:
+    def angle(self, node: XMLElement, name: str, default: float) -> float:
         """Return an angle, rad."""
         value = number(node, name, default if self.compiler.get("angle") == "radian" else math.degrees(default))
         return value if self.compiler.get("angle") == "radian" else math.radians(value)
@@ -74,7 +74,7 @@ def read_elements(file: Path) -> Elements:
     _include(root, file.parent, {file.resolve()})
     elements = Elements(root)
     for section in root.findall("default"):
-        stack: list[tuple[Node, str]] = [(section, "")]
+        stack: list[tuple[XMLElement, str]] = [(section, "")]
         while stack:
             node, around = stack.pop()
             name = node.get("class") or "main" if not around else node.get("class")
@@ -87,19 +87,19 @@ def read_elements(file: Path) -> Elements:
                 if one.tag == "default":
                     stack.append((one, name))
                 else:
-                    known[one.tag] = {**known.get(one.tag, {}), **one.attributes}
+                    known[one.tag] = {**known.get(one.tag, {}), **one.attrib}
     elements.classes.setdefault("main", {})
     for node in root.findall("compiler"):
-        elements.compiler.update(node.attributes)
+        elements.compiler.update(node.attrib)
     return elements
 
 
-def _include(root: Node, folder: Path, seen: set[Path]) -> None:
+def _include(root: XMLElement, folder: Path, seen: set[Path]) -> None:
     """Put included files in the places of ``<include>``; each can be included once."""
     stack = [root]
     while stack:
         node = stack.pop()
-        inner: list[Node] = []
+        inner: list[XMLElement] = []
         for one in node:
             if one.tag != "include":
                 inner.append(one)
@@ -111,17 +111,17 @@ def _include(root: Node, folder: Path, seen: set[Path]) -> None:
             seen.add(path.resolve())
             held = read_xml(path, "mujoco", "mujocoinclude")
             _include(held, folder, seen)
-            inner += held.inner
-        node.inner[:] = inner
+            inner += held
+        node[:] = inner
         stack += inner
 
 
 # -- poses -------------------------------------------------------------------------------------------------------------
 
 
-def rotation_matrix(elements: Elements, node: Node) -> Any:
+def rotation_matrix(elements: Elements, node: XMLElement) -> Any:
     """Return the matrix of the orientation that an element says in one of the format's ways."""
-    given = [one for one in ("quat", "axisangle", "xyaxes", "zaxis", "euler") if one in node.attributes]
+    given = [one for one in ("quat", "axisangle", "xyaxes", "zaxis", "euler") if one in node.attrib]
     if len(given) > 1:
         raise UsageError(f"<{node.tag}> has both {given[0]!r} and {given[1]!r}", where=node.place)
     kind = given[0] if given else ""
@@ -161,9 +161,9 @@ def _z_turned(direction: Any) -> Any:
     return turn_about(axis, math.atan2(float(np.linalg.norm(axis)), float(direction[2])))
 
 
-def ends_of(elements: Elements, geom: Node) -> tuple[Pose, float | None]:
+def ends_of(elements: Elements, geom: XMLElement) -> tuple[Pose, float | None]:
     """Return the pose of a geom in its body, and half its length where ``fromto`` says it."""
-    if "fromto" not in geom.attributes:
+    if "fromto" not in geom.attrib:
         return (rotation_matrix(elements, geom), np.array(numbers(geom, "pos", 3, (0.0, 0.0, 0.0)))), None
     line = np.array(numbers(geom, "fromto", 6))
     along = line[:3] - line[3:]
@@ -175,9 +175,9 @@ def ends_of(elements: Elements, geom: Node) -> tuple[Pose, float | None]:
 # -- inertias ----------------------------------------------------------------------------------------------------------
 
 
-def sizes_of(geom: Node, half: float | None) -> tuple[str, tuple[float, ...]]:
+def sizes_of(geom: XMLElement, half: float | None) -> tuple[str, tuple[float, ...]]:
     """Return the type of a geom and its half sizes: radius and half length, or three half axes."""
-    kind = geom.get("type") or ("mesh" if "mesh" in geom.attributes else "sphere")
+    kind = geom.get("type") or ("mesh" if "mesh" in geom.attrib else "sphere")
     count = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}.get(kind, 0)
     given = numbers(geom, "size", None, ())
     if half is not None and count == 2:
@@ -189,7 +189,7 @@ def sizes_of(geom: Node, half: float | None) -> tuple[str, tuple[float, ...]]:
     return kind, given[:count]
 
 
-def geom_solid(elements: Elements, geom: Node, meshes: Mapping[str, tuple[str, Any]]) -> MassProperties | None:
+def geom_solid(elements: Elements, geom: XMLElement, meshes: Mapping[str, tuple[str, Any]]) -> MassProperties | None:
     """Return the mass properties of a geom in its body; None of what has none."""
     (turned, place), half = ends_of(elements, geom)
     kind, sizes = sizes_of(geom, half)

@@ -26,7 +26,7 @@ from atwood_library.parts.ground import Ground
 from atwood_library.parts.rigid_body import RigidBody
 from atwood_library.robots.building import Building, add_armature, add_friction, add_gear, choice, existing_file
 from atwood_library.robots.inertias import checked_inertia
-from atwood_library.robots.xml import Node, name_of, number, numbers, only, read_xml
+from atwood_library.robots.xml import XMLElement, name_of, number, numbers, only, read_xml
 
 __all__ = ["Packages", "read_urdf", "rotation_of"]
 
@@ -107,8 +107,8 @@ def read_urdf(
 # -- links and joints as a tree ----------------------------------------------------------------------------------------
 
 
-def _by_name(robot: Node, tag: str) -> dict[str, Node]:
-    found: dict[str, Node] = {}
+def _by_name(robot: XMLElement, tag: str) -> dict[str, XMLElement]:
+    found: dict[str, XMLElement] = {}
     for node in robot.findall(tag):
         name = name_of(node)
         if name in found:
@@ -117,7 +117,7 @@ def _by_name(robot: Node, tag: str) -> dict[str, Node]:
     return found
 
 
-def _end(joint: Node, end: str, links: Mapping[str, Node]) -> str:
+def _end(joint: XMLElement, end: str, links: Mapping[str, XMLElement]) -> str:
     """Return the name of the link at one end of a joint."""
     node = only(joint, end)
     if node is None:
@@ -128,7 +128,9 @@ def _end(joint: Node, end: str, links: Mapping[str, Node]) -> str:
     return name
 
 
-def _tree(robot: Node, links: Mapping[str, Node], joints: Mapping[str, Node]) -> tuple[list[str], str]:
+def _tree(
+    robot: XMLElement, links: Mapping[str, XMLElement], joints: Mapping[str, XMLElement]
+) -> tuple[list[str], str]:
     """Return the joints from the root on, and the root link."""
     above: dict[str, str] = {}
     below: dict[str, list[str]] = {name: [] for name in links}
@@ -176,7 +178,7 @@ def rotation_of(rpy: Iterable[float]) -> Any:
     )
 
 
-def _origin(node: Node) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def _origin(node: XMLElement) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return the position of an element and its roll, pitch and yaw."""
     origin = only(node, "origin")
     if origin is None:
@@ -184,7 +186,7 @@ def _origin(node: Node) -> tuple[tuple[float, ...], tuple[float, ...]]:
     return numbers(origin, "xyz", 3, _ZERO), numbers(origin, "rpy", 3, _ZERO)
 
 
-def _add_link(building: Building, name: str, link: Node, inertias: str) -> RigidBody:
+def _add_link(building: Building, name: str, link: XMLElement, inertias: str) -> RigidBody:
     inertial = only(link, "inertial")
     if inertial is None:
         return building.add(name, RigidBody(mass=0.0))
@@ -203,7 +205,7 @@ def _add_link(building: Building, name: str, link: Node, inertias: str) -> Rigid
 _ENTRIES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
-def _add_visuals(building: Building, name: str, link: Node, body: RigidBody, packages: Packages) -> None:
+def _add_visuals(building: Building, name: str, link: XMLElement, body: RigidBody, packages: Packages) -> None:
     """Add what a link looks like."""
     for count, visual in enumerate(link.findall("visual"), 1):
         geometry = only(visual, "geometry")
@@ -250,7 +252,7 @@ def _pose(position: Iterable[float], rpy: Iterable[float]) -> dict[str, Any]:
     return {"displacement": tuple(position), **(turned if any((roll, pitch, yaw)) else {})}
 
 
-def _held_at(joints: Mapping[str, Node], name: str) -> float | None:
+def _held_at(joints: Mapping[str, XMLElement], name: str) -> float | None:
     """Return the coordinate of a joint that mimics a fixed one, if only by way of others; None if it moves."""
     mimic = only(joints[name], "mimic")
     followed = None if mimic is None else joints.get(name_of(mimic, "joint"))
@@ -261,7 +263,7 @@ def _held_at(joints: Mapping[str, Node], name: str) -> float | None:
 
 
 def _add_joint(
-    building: Building, name: str, joint: Node, ends: tuple[Frame, Frame], held: float | None, stops: float | None
+    building: Building, name: str, joint: XMLElement, ends: tuple[Frame, Frame], held: float | None, stops: float | None
 ) -> Component:
     """Add a joint between two links, where it is on the first; one that is held has a coordinate that stays."""
     parent, child = ends
@@ -300,7 +302,7 @@ def _add_joint(
     return part  # type: ignore[no-any-return]
 
 
-def _limits(name: str, joint: Node, kind: str, stops: float | None) -> dict[str, float]:
+def _limits(name: str, joint: XMLElement, kind: str, stops: float | None) -> dict[str, float]:
     """Return the values of stops at the limits of a joint, and its damping."""
     dynamics, limit = only(joint, "dynamics"), only(joint, "limit")
     values = {} if dynamics is None else {"damping": number(dynamics, "damping", 0.0)}
@@ -315,7 +317,7 @@ def _limits(name: str, joint: Node, kind: str, stops: float | None) -> dict[str,
     return values
 
 
-def _add_loads(building: Building, name: str, joint: Node, made: Mapping[str, Component], friction: bool) -> None:
+def _add_loads(building: Building, name: str, joint: XMLElement, made: Mapping[str, Component], friction: bool) -> None:
     """Add what acts on the coordinate of a joint besides: dry friction, and the gear to the joint that it mimics."""
     part, dynamics, mimic = made[name], only(joint, "dynamics"), only(joint, "mimic")
     dry = 0.0 if dynamics is None else number(dynamics, "friction", 0.0)
@@ -337,7 +339,7 @@ def _add_loads(building: Building, name: str, joint: Node, made: Mapping[str, Co
     add_gear(building, f"{name}_mimic", part, master, (number(mimic, "multiplier", 1.0), number(mimic, "offset", 0.0)))
 
 
-def _check_mimics(joints: Mapping[str, Node]) -> None:
+def _check_mimics(joints: Mapping[str, XMLElement]) -> None:
     """Refuse joints that mimic themselves, if only by way of others."""
     follows = {name: mimic for name, joint in joints.items() if (mimic := only(joint, "mimic")) is not None}
     for name, mimic in follows.items():
@@ -349,7 +351,7 @@ def _check_mimics(joints: Mapping[str, Node]) -> None:
             raise UsageError(f"joint {' mimics '.join(map(repr, [*seen, name]))}", where=mimic.place)
 
 
-def _add_rotors(building: Building, robot: Node, made: Mapping[str, Component]) -> None:
+def _add_rotors(building: Building, robot: XMLElement, made: Mapping[str, Component]) -> None:
     """Add the inertia of rotors: of a reduction n it counts n^2 times about the joint."""
     for transmission in robot.findall("transmission"):
         for actuator in transmission.findall("actuator"):
@@ -366,8 +368,8 @@ def _add_rotors(building: Building, robot: Node, made: Mapping[str, Component]) 
                 add_armature(building, name_of(joint), part, _content(rotor) * ratio * ratio)
 
 
-def _content(node: Node | None) -> float:
+def _content(node: XMLElement | None) -> float:
     """Return the number between the tags of an element."""
     if node is None:
         return 0.0
-    return number(Node(node.tag, {"content": node.text}, node.place), "content")
+    return number(XMLElement(node.tag, {"content": node.text or ""}, node.place), "content")

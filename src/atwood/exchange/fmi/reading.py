@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from pathlib import Path
 from xml.etree import ElementTree
-from xml.parsers import expat
 
 from atwood.errors import UnsupportedError, UsageError
 from atwood.lazy_dataclasses import dataclass
+from atwood.xml_files import read_xml
 
 REALS = {"Real": "Real", "Float64": "Float64", "Float32": "Float32"}
 """Types of variables that are real numbers."""
@@ -96,29 +96,6 @@ class Description:
     left_out: dict[str, str]
 
 
-def parse_xml(data: bytes, where: str) -> ElementTree.Element:
-    """Return the root of an XML document, which may have neither a document type nor entities.
-
-    Raises
-    ------
-    UsageError
-        If it is no XML, or declares entities.
-    """
-    builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
-
-    def refuse(*_: object) -> None:
-        raise UsageError("its XML has a document type, in which entities could be declared", where=where)
-
-    parser.StartDoctypeDeclHandler = refuse
-    parser.StartElementHandler = lambda tag, attributes: builder.start(tag, attributes) and None
-    parser.EndElementHandler = lambda tag: builder.end(tag) and None
-    try:
-        parser.Parse(data, True)
-    except (expat.ExpatError, ValueError) as error:
-        raise UsageError(f"its modelDescription.xml is no XML ({error})", where=where) from None
-    return builder.close()
-
-
 def read_description(data: bytes, path: Path) -> Description:
     """Return what the file modelDescription.xml says.
 
@@ -129,7 +106,7 @@ def read_description(data: bytes, path: Path) -> Description:
     UnsupportedError
         If its version is neither 2 nor 3, or it offers neither model exchange nor co-simulation.
     """
-    root = parse_xml(data, str(path))
+    root = read_xml(data, f"{path}/modelDescription.xml")
     try:
         return _read(root, path)
     except (KeyError, ValueError, IndexError, OverflowError) as error:
@@ -175,7 +152,7 @@ def _read(root: ElementTree.Element, path: Path) -> Description:
         indicators = sum(len(by_node[numbers[int(one.attrib["valueReference"])]]) for one in found)
     experiment = root.find("DefaultExperiment")
     given = {} if experiment is None else experiment.attrib
-    fixed = elements["co-simulation"].get("fixedInternalStepSize") if "co-simulation" in elements else None
+    fixed = elements["co-simulation"].attrib.get("fixedInternalStepSize") if "co-simulation" in elements else None
     step = given.get("stepSize", fixed)
     has_jvp = frozenset(
         kind
