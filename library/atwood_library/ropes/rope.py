@@ -32,6 +32,8 @@ class Rope(Component):
 
     Its tension is the same everywhere, and cannot be negative. When it becomes so, the run stops there and says so,
     or, with ``when_slack="slack"``, the rope goes slack and comes taut again, with a jerk, when it is stretched out.
+    Its length is a gap then, `spare`, which explicit methods solve; where it is on what moves and has no mass, as a
+    pulley that hangs, it is a constraint with modes.
 
     A winch that lets it out or hauls it in is its input `paid_out`. Where the input `release` falls through zero, it
     lets go for good, as a sling does. Pulleys with inertia are taken up on the side of a, where the tension is then
@@ -143,17 +145,20 @@ class Rope(Component):
     )
     def reaches_pulley(self) -> Scalar:
         """Return the shortest piece; on a line, where the sides would change, it must stay positive."""
-        spans = self.spans()
-        shortest = spans[0]
-        for span in spans[1:]:
+        if not self.pulleys:
+            return self.length
+        shortest, *others = self.spans()
+        for span in others:
             shortest = minimum(shortest, span)
-        return shortest if self.pulleys else self.length
+        return shortest
 
     @observable(unit="m", doc="Length along the straight pieces from a to b.")
     def reach(self) -> Scalar:
         """Return the length of the path from a to b."""
         # On a line a rope without pulleys can come taut on either side.
-        return absolute(self.sum_of_spans()) if self.on_a_line and not self.pulleys else self.sum_of_spans()
+        if self.on_a_line and not self.pulleys:
+            return absolute(dot(self.b.position - self.a.position, self.line))
+        return self.sum_of_spans()
 
     def sum_of_spans(self) -> Scalar:
         """Return the sum of the straight pieces; on a line, signed as they start."""

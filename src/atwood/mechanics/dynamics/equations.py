@@ -113,10 +113,8 @@ class ContactRow:
 
     def told(self, parts: Mapping[str, Part]) -> tuple[Told | None, Told | None]:
         """Return what is told where it closes and where it opens, with the words that its part has for it."""
-        values = parts[self.row.key[0]].values
-        words = (None, None) if self.is_slip else (self.law.options.closes, self.law.options.opens)
-        closes, opens = (said and said._replace(target=said.target_in(values)) for said in words)
-        return closes, opens
+        closes, opens = (None, None) if self.is_slip else (self.law.options.closes, self.law.options.opens)
+        return closes, opens and opens._replace(target=opens.target_in(parts[self.row.key[0]].values))
 
     def is_closed_at_start(self, parts: Mapping[str, Part]) -> bool:
         """Return whether it is a gap that a start is to close."""

@@ -54,7 +54,7 @@ class UnilateralOptions:
 
     def is_closed_at_start(self, values: Mapping[str, Any]) -> bool:
         """Return whether a start is to close it, by the parameters of the part."""
-        return bool(self.starts and self.closes and values[self.starts] == self.closes.target)
+        return bool(self.starts and self.closes and values.get(self.starts) == self.closes.target)
 
 
 @dataclass(frozen=True)
@@ -219,7 +219,7 @@ def unilateral(
         parameters alone say by True or False whether it is there.
     closes, opens
         What is told where it closes and opens, if not that a gap does: the name of the event, its target and its
-        message. A target is a word, ``"stop"``, which ends the run (of `opens` alone), or the name of a choice
+        message. A target is a word; that of `opens` may be ``"stop"``, which ends the run, or the name of a choice
         parameter that says which.
     starts
         Name of the choice parameter that says whether the gap starts closed: where its value is the target of
@@ -230,6 +230,10 @@ def unilateral(
     share = str(restitution) if isinstance(restitution, str) else float(restitution)
     many = tuple(modes), tuple(spaces)
     own = tuple(given), _told(closes), _told(opens), starts
+    if own[1] is not None and own[1].target == "stop":
+        raise DeclarationError(
+            "a gap that closes ends no run", advice="Ask for it with until=, or declare an @event of the gap."
+        )
     options = UnilateralOptions((reaction,), unit, share, impact_law, level, adhesion, *own, doc, *many)
     along = _along(unit, "/s" if level == "velocity" else "")
     return lambda function: ContactLaw(function, Law("unilateral", function.__name__, options), along)

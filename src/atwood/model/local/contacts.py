@@ -135,7 +135,7 @@ def _gap(
     part: Part, law: Law, binding: Binding, connectors: Mapping[str, LocalConnector], graph: Graph
 ) -> LocalContact | None:
     bound = bind(part.component, binding)
-    for name in law.options.given:
+    for name in filter(None, (*law.options.given, law.options.starts)):
         if not hasattr(type(part.component), name):
             raise _no_name(part, law, name)
     if not all(is_given(bound, name) for name in law.options.given):

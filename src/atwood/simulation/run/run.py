@@ -226,19 +226,24 @@ class Walk:
             if self.t >= self.options.t_end and target != UPDATE:
                 return self._finished_run("finished", "", outcome)
 
-    def _segment(self) -> tuple[Recorder, Outcome]:
-        """Run one stretch in the present mode, until the next time event at most."""
-        options, schedule = self.options, self._schedule(self.assembly)
+    def _arrive(self, schedule: Schedule) -> bool:
+        """Pass time events and updates that are due, and make ready what comes; return whether there were any."""
         self.t = schedule.reached(self.t)
-        after_time_event = schedule.piece(self.t) != schedule.piece(self._piece_start)
-        if after_time_event:
+        has_passed = schedule.piece(self.t) != schedule.piece(self._piece_start)
+        if has_passed:
             self._pass_time_event()
         if due := self._due():
-            after_time_event = True
+            has_passed = True
             self._sampled = self.t
             self._update(due)
         if self.ended is None:
             self.prepare()
+        return has_passed
+
+    def _segment(self) -> tuple[Recorder, Outcome]:
+        """Run one stretch in the present mode, until the next time event at most."""
+        options, schedule = self.options, self._schedule(self.assembly)
+        after_time_event = self._arrive(schedule)
         if self.ended is not None:
             assert self.plan is not None
             return Recorder(self.plan), Outcome(self.t, "event", "", self.statistics, (self.choice,), self.ended)
