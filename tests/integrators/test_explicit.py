@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import DOP853
 from scipy.special import ellipj, ellipk
 
+from atwood.codegen.llvm import build
 from atwood.errors import KernelEvaluationError, StartError, UsageError
 from atwood.forms.quantities import energy_program
 from atwood.integrators import explicit_session
@@ -19,7 +20,7 @@ from atwood.integrators.embedded.stepper import CompiledStepper
 from atwood.integrators.explicit_session import ExplicitSession
 from atwood.integrators.methods.dormand_prince import TABLEAU
 from atwood.integrators.protocol import Budget, ExplicitProblem, SolverOptions, Status
-from atwood.pipeline import assemble
+from atwood.pipeline import assemble, simulate
 from atwood.simulation.initialization.start import find_start, settle
 from atwood.simulation.problem.explicit_scene import (
     explicit_problem,
@@ -492,19 +493,36 @@ def test_code_that_took_less_to_make_is_left_at_any_step(name: str, monkeypatch:
     best, values = better(), values_on_constraints(plan)
 
     def ended(before: float) -> list[Any]:
-        code._built, code._better, code._cost = quick, lambda: best, math.inf
+        code._built, code._better, code._left = quick, lambda: best, math.inf
         problem = ExplicitProblem(len(y), pendulum, compiled=code.bind(values))
         stepper = CompiledStepper(problem, tight(1e-8), TABLEAU)
         assert stepper.start(0.0, y)
         function = stepper._count("function")
         for step in range(55):
-            code._cost = math.inf if step < before else 0.0
+            code._left = math.inf if step < before else 0.0
             stepper.run(math.inf, 1)
         assert (stepper._count("function") == function) == (before == math.inf)
         return [stepper.state()[0], *stepper.state()[1]]
 
     alone = ended(math.inf)
     assert all(ended(before) == alone for before in range(50))
+
+
+def test_what_starts_often_gets_the_code_that_runs_faster(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ATWOOD_CACHE", "0")
+    assembly = assemble(SCENES["four-bar"](), form="dae")
+    levels: list[int] = []
+    compiled = build.compile_text
+    monkeypatch.setattr(
+        build, "compile_text", lambda *given, **named: (levels.append(given[1]), compiled(*given, **named))[1]
+    )
+    found = []
+    for _ in range(12):
+        found.append(simulate(assembly, t_end=0.01, outputs=3)["crank.angle"].tolist())
+        if len(found) == 4:
+            few = levels.count(1)
+    assert levels.count(1) == few + 1
+    assert all(one == found[0] for one in found)
 
 
 def test_scenes_with_constraints_left_have_no_explicit_problem() -> None:

@@ -444,8 +444,8 @@ class CompiledRates:
         The address of ``int (double t, double *y, void *data)``, which takes values onto the constraints and returns
         0, or another number where it cannot, and its last argument; 0 where there are no constraints.
     faster
-        Told for how long, in seconds, steps have been taken, it returns what is faster and gives the same bits with
-        the same data, as soon as that pays; None before. It is None where there is nothing faster.
+        Told for how long, in seconds, steps have been taken, or 0 at a start, it returns what is faster and gives the
+        same bits with the same data, as soon as that pays; None before. It is None where there is nothing faster.
     """
 
     function: int

@@ -21,6 +21,9 @@ from atwood.expr.core.program import Program
 from atwood.integrators.protocol import MET, STEPS, CompiledRates
 from atwood.lazy_dataclasses import dataclass
 
+_STARTS = 10
+"""What was started so often will be started again."""
+
 
 def rates_source(coordinates: int, speeds: int, given: bool, projects: bool = False) -> RoutineSource:
     """Return what writes ``rates``, and ``project`` where there are constraints."""
@@ -104,7 +107,7 @@ class CompiledAccelerations:
         exports = ["rates", "project"] if projects else ["rates"]
         tiers = build_tiers(parts, is_brief, exports, routines)
         self._built, self._better, self._cost = tiers.quick, tiers.better, tiers.cost
-        self._lock = threading.Lock()
+        self._left, self._lock = self._cost, threading.Lock()
         self._prologues = [
             ctypes.CFUNCTYPE(None, *[c_void_p] * 3)(self._built.code.addresses[f"{name}_prologue"])
             for name in self._programs
@@ -156,9 +159,9 @@ class CompiledAccelerations:
         )
 
     def _spend(self, seconds: float) -> None:
-        """Take note that it has run; compile what is faster once it has run for as long as that takes."""
-        self._cost -= seconds
-        if self._cost <= 0.0:
+        """Take note of steps or a start; compile what is faster once it has run for as long as that takes, or often."""
+        self._left -= seconds or self._cost / _STARTS
+        if self._left <= 0.0:
             with suppress(TimeIsUp):
                 self.at_its_best()
 

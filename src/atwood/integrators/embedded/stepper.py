@@ -149,16 +149,20 @@ class CompiledStepper(NativeStepper):
         self._functions = self._routines.functions
 
     def _go_on(self, last: int, function: str, *arguments: int) -> int | None:
-        """Take steps; where these have taken long, the next ones are taken by faster code with the same bits."""
+        """Take steps, and see whether the next ones are to be taken by faster code."""
         if self._rates.faster is None:
             return super()._go_on(last, function, *arguments)
         began = time.perf_counter()
         code = super()._go_on(last, function, *arguments)
-        better = self._rates.faster(time.perf_counter() - began)
+        self._change_over(time.perf_counter() - began)
+        return code
+
+    def _change_over(self, seconds: float) -> None:
+        """Go on with faster code, which has the same bits, where that pays after steps that took so long."""
+        better = None if self._rates.faster is None else self._rates.faster(seconds)
         if better is not None:
             self._rates, self._keep = better, (self._keep, better.keep)
             self._set(function=better.function, project=better.project)
-        return code
 
     def batch_places(self) -> BatchPlaces:
         """Return the addresses with which many runs can be made in one call."""
@@ -253,6 +257,7 @@ class CompiledStepper(NativeStepper):
 
     def start(self, t: float, y: FloatArray) -> bool:
         """Start anew from a state; return whether it has finite rates."""
+        self._change_over(0.0)
         if self._restart is not None:
             self._restart(t)
         return super().start(t, y)
