@@ -112,7 +112,7 @@ class CompiledProgram:
         if self._is_compiled("_prologue"):
             return list(self._prologue(parameters)[0])
         values = {one.index: value for one, value in zip(program.parameters, parameters, strict=True)}
-        walk(live(program.prologue), values, _OPERATIONS["vectorized" if self.vectorized else "careful"])
+        walk(self._before, values, _OPERATIONS["vectorized" if self.vectorized else "careful"])
         return [values[one.index] for one in program.prologue]
 
     def _is_compiled(self, name: str) -> bool:
@@ -126,6 +126,11 @@ class CompiledProgram:
     @cached_property
     def _has_externals(self) -> bool:
         return any(node.operation == "external" for node in self.program.nodes)
+
+    @cached_property
+    def _before(self) -> list[Expression]:
+        """What is computed once a run, arguments before users."""
+        return live(self.program.prologue)
 
     @cached_property
     def _between(self) -> list[Expression]:
@@ -150,9 +155,7 @@ class CompiledProgram:
     def _prologue(self) -> Callable[..., tuple[list[Any], ...]]:
         flavour: Flavour = "vectorized" if self.vectorized else "careful"
         program = self.program
-        source, externals = write_function(
-            "prologue", flavour, [program.parameters], live(program.prologue), [program.prologue]
-        )
+        source, externals = write_function("prologue", flavour, [program.parameters], self._before, [program.prologue])
         return _execute("prologue", source, externals, flavour, program.name)
 
 
