@@ -136,7 +136,7 @@ class Adjoint(Passage):
         none = np.zeros((len(self.columns), len(leg.assembly.discrete_states)))
         seeds = self._seeds(leg, none)
         pulled = Pulled(Augmented(leg.plan, leg.begin[0], begin, seeds))
-        if not number:
+        if not number and leg.plan.assembly.own_equations.contacts:  # where they touch, small changes may let go
             self._tangent(leg, pulled.augmented, begin, self.moved, self._seeds(leg, self.held))
         times = segment.time
         last = np.arange(len(times)) == len(times) - 1
