@@ -39,8 +39,8 @@ FIELDS: dict[str, Kind] = {
 """The memory of sets. `finite` is 0 where limits are of impulses, which finite forces do not have; `blur` and `pace`
 are multiples of what is small and slow; `inside` is how deep a gap may be, in multiples of what is small; `ahead` is
 how long impacts may still go on that are summed, and then how long they do, `rough` how long where rounding tells the
-length of their intervals; `shared` is 1 where forces of a set that
-was found are not determined, as rows repeat each other, and `repeats` where those solved for last are not."""
+length of their intervals; `shared` is 1 where forces of a set that was found are not determined, as rows repeat each
+other, or where another share might let rest what begins to slip, and `repeats` where those solved for last are not."""
 
 UNITS = {
     name: k
@@ -834,6 +834,12 @@ def _settle() -> Routine:
     _going(r, m, some)
     with r.when(some.now), r.when(r.call("find_states", r.arguments[0]) != 0):
         r.give(NO_SET)
+    rests = r.variable(True, BOOLEAN)  # it starts, or has just come to touch: what can rest does, with some share
+    with r.count(m.count) as k:
+        trigger = m.unit("trigger")[k]
+        rests.now = rests.now & ((trigger == 0.0) | (trigger == float(CLOSES)))
+    with _each(r, m, "chosen") as (k, _, _), r.when(rests.now & (state[k] == float(GOES_ON))):
+        m.shared = r.choose(m.unit("given")[k] == 0.0, 1, m.shared, INTEGER)
     with r.count(m.count) as k:
         off = (chosen[k] == 0.0) | (state[k] == float(OPEN))
         state[k] = r.choose(off, float(OPEN), state[k])

@@ -18,12 +18,14 @@ from atwood_library import (
     Force,
     Ground,
     Inertia,
+    Link,
     PointContact,
     PointMass,
     RotationalFriction,
     RotationalSource,
     RotationalStop,
     SurfaceContact,
+    VertexContact,
 )
 from atwood_library.scenes import SCENES
 
@@ -193,3 +195,19 @@ def test_events_that_are_made_when_asked_for_are_those_of_their_run(make: Callab
     before = [event for event in alone.events if event.time <= 0.7 * end]
     assert [event.kind for event in again.events] == [event.kind for event in before]
     assert [event.time for event in again.events] == pytest.approx([event.time for event in before], abs=1e-11)
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+def test_where_a_second_end_comes_to_touch_both_rest(form: str) -> None:
+    """Forces along the rod are shared in many ways, by some of which neither end slips: one did, at no speed."""
+    scene, c, s = Scene(), math.cos(0.1), math.sin(0.1)
+    ground, rod = scene.add("ground", Ground()), scene.add("rod", Link(length=0.5, mass=1.0))
+    for end, frame in (("a", rod.a), ("b", rod.b)):
+        contact = scene.add(f"on_{end}", VertexContact(normal=(-s, 0.0, c), friction=0.3))
+        scene.connect(ground.frame, contact.plane)
+        scene.connect(frame, contact.body)
+    places = {"rod.position.x": 0.0, "rod.position.z": 0.37, "rod.angle": 0.01}
+    scene.start.update(places | {"rod.velocity.x": -0.5, "rod.velocity.z": 0.0, "rod.angular_velocity": -0.28})
+    result = simulate(scene, form=form, t_end=0.6, rtol=1e-9)
+    assert [(one.part, one.kind) for one in result.events][-2:] == [("on_a", "sticks"), ("on_b", "sticks")]
+    assert [result[f"on_{end}.slip_state"][-1] for end in "ab"] == [2.0, 2.0]
