@@ -21,7 +21,7 @@ from atwood.lazy_dataclasses import replace
 from atwood.model.compose.composite import Model
 from atwood.model.declare.component import Component
 from atwood.model.declare.connectors import Frame, Shaft
-from atwood.model.declare.laws import Kind
+from atwood.model.declare.laws import Kind, numbers_in
 from atwood.model.local.flatten import Part
 from atwood.model.values.outline import Outline
 from atwood.model.values.space import Space, make_space
@@ -272,7 +272,7 @@ def _wrong(trial: Trial, name: str, count: int) -> str:
         given = getattr(in_motion(trial), name)()
     except Exception as error:  # whatever a law of somebody's own can raise
         return f"it raises {type(error).__name__}: {error}"
-    values = list(_flat(given))
+    values = list(numbers_in(given))
     if len(values) != count:
         return f"it returns {len(values)} values where it sets {count}"
     for value in values:
@@ -283,12 +283,3 @@ def _wrong(trial: Trial, name: str, count: int) -> str:
             return f"it returns {value!r} where a number is wanted"
         return f"it returns {float(value)!r}, which no state can be"
     return ""
-
-
-def _flat(given: Any) -> Iterator[Any]:
-    """Yield the values in what an update returned."""
-    if isinstance(given, Iterable) and not isinstance(given, str):
-        for one in given:
-            yield from _flat(one)
-    else:
-        yield given

@@ -301,11 +301,7 @@ class Formula:
 
     def _rebuilt(self, graph: Graph, values: Sequence[Scalar]) -> Expression:
         made = {symbol: graph.convert(value) for symbol, value in zip(self._symbols, values, strict=True)}
-        for node in self._nodes:
-            if node.is_constant:
-                made[node] = graph.constant(node.value)
-            elif node not in made:
-                made[node] = algebra.build(graph, node.operation, [made[a] for a in node.arguments], node.payload)
+        algebra.rebuild(graph, self._nodes, made)
         return made[self._value]
 
 

@@ -14,6 +14,8 @@ coordinates, in terms of which everything is written.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import reduce
+from operator import add
 from typing import TYPE_CHECKING, Literal, cast
 
 from atwood.errors import AtwoodError
@@ -413,7 +415,4 @@ def _relative(equations: Equations, node: int, parent: int) -> list[Expression]:
 
 
 def _dot(a: Sequence[Expression], b: Sequence[Expression]) -> Expression:
-    total = a[0] * b[0]
-    for p, q in zip(a[1:], b[1:], strict=True):
-        total = total + p * q
-    return total
+    return reduce(add, [p * q for p, q in zip(a, b, strict=True)])

@@ -54,8 +54,8 @@ def _open(
     return routine, Search(routine.arguments[0], FIELDS), routine.arguments[1:]
 
 
-def _do(r: Routine, name: str, *arguments: Operand) -> None:
-    """Call a routine of the search, and return with its code where that is not zero."""
+def do_or_return(r: Routine, name: str, *arguments: Operand) -> None:
+    """Call a routine with the first argument and others, and return with its code where that is not zero."""
     code = r.call(name, r.arguments[0], *arguments)
     with r.when(code != 0):
         r.give(code)
@@ -118,7 +118,7 @@ def _noise() -> Routine:
 def _point() -> Routine:
     """Write time, values and slopes, the latter over a small part of a width that begins there."""
     r, m, (time, width, p) = _open("point", {"time": NUMBER, "width": NUMBER, "target": ADDRESS})
-    _do(r, "read", time)
+    do_or_return(r, "read", time)
     known, others, y, yp, shifted, count = m.row("known"), m.row("others"), m.y, m.yp, m.shifted, m.count
     past = width * SECANT
     with r.count(m.size) as i:
@@ -175,8 +175,8 @@ def _dip() -> Routine:
     a, last, stride, whole = m.point(FIRST), m.point(LAST), m.stride, end - begin
     r.copy(a, last, stride)
     with r.when(last[0] != begin):
-        _do(r, "point", begin, whole, a)
-    _do(r, "point", end, begin - end, last)
+        do_or_return(r, "point", begin, whole, a)
+    do_or_return(r, "point", end, begin - end, last)
     r.copy(m.point(STACK), last, stride)
     depth, count, share = r.variable(0, INTEGER), r.variable(0, INTEGER), r.variable(FULL)
     with r.forever() as loop:
@@ -191,7 +191,7 @@ def _dip() -> Routine:
             depth.now = deep - 1
             r.repeat(loop)
         p = m.point(deep + (STACK + 1))
-        _do(r, "point", a[0] + low * width, 0.0 - width, p)
+        do_or_return(r, "point", a[0] + low * width, 0.0 - width, p)
         with r.count(m.count) as i, r.when((dipping[i] != 0.0) & (dipping[i] * p[i + 1] <= 0.0)):
             m.dip = p[0]
             r.give(0)
@@ -217,7 +217,7 @@ def _settle() -> Routine:
     """Read the signs of what is or has just been zero where they are larger than rounding."""
     r, m, (begin,) = _open("settle", {"begin": NUMBER})
     unsure, blind, noise, known, origin, sign = map(m.row, ("unsure", "blind", "noise", "known", "origin", "sign"))
-    _do(r, "read", begin)
+    do_or_return(r, "read", begin)
     r.call("noise", r.arguments[0], m.end - begin)
     left, past = r.variable(False, BOOLEAN), r.variable(m.moment)
     with r.count(m.count) as i:
@@ -227,7 +227,7 @@ def _settle() -> Routine:
         with r.when(~(left.now & (begin < m.end))):
             r.leave(loop)
         time = r.least(begin + past.now, m.end)
-        _do(r, "read", time)
+        do_or_return(r, "read", time)
         left.now = False
         with r.count(m.count) as i:
             value, least = known[i], noise[i]
@@ -251,7 +251,7 @@ def _narrow() -> Routine:
     r, m, (begin, end, tolerance) = _open("narrow", dict.fromkeys(("begin", "end", "tolerance"), NUMBER))
     known, lower, upper, crossed, count = *map(m.row, ("known", "lower", "upper", "crossed")), m.count
     r.copy(upper, known, count)  # the end was read last
-    _do(r, "read", begin)
+    do_or_return(r, "read", begin)
     r.copy(lower, known, count)
     b, e, width, guesses = r.variable(begin), r.variable(end), r.variable(end - begin), r.variable(0, INTEGER)
     bisects = r.variable(False, BOOLEAN)
@@ -270,7 +270,7 @@ def _narrow() -> Routine:
         with r.when(~((first < middle) & (middle < last))):
             r.leave(loop)
         guesses.now = guesses.now + 1
-        _do(r, "read", middle)
+        do_or_return(r, "read", middle)
         is_past = r.call("crossings", r.arguments[0], middle, known, crossed) != 0
         with r.when(is_past):
             e.now = middle
@@ -306,14 +306,14 @@ def _happening() -> Routine:
     names = ("known", "crossed", "later", "old", "sign", "unsure", "origin", "carried", "fired", "found")
     known, crossed, later, old, sign, unsure, origin, carried, fired, found = map(m.row, names)
     for moment_read, target in ((time, crossed), (after, later)):
-        _do(r, "read", moment_read)
+        do_or_return(r, "read", moment_read)
         r.call("crossings", r.arguments[0], moment_read, known, target)
     with r.count(m.count) as i:
         before, one = sign[i], (crossed[i] != 0.0) | (later[i] != 0.0)
         old[i], crossed[i] = before, _flag(r, one)
         with r.when(one):
             sign[i], unsure[i], origin[i] = 0.0 - before, 1.0, 0.0
-    _do(r, "settle", time)
+    do_or_return(r, "settle", time)
     is_start, some = time - m.start <= moment, r.variable(False, BOOLEAN)
     with r.count(m.count) as i:
         passed = (crossed[i] != 0.0) & (sign[i] != old[i]) & ((carried[i] != 0.0) | ~is_start)
@@ -324,7 +324,7 @@ def _happening() -> Routine:
     m.fired_at = time
     with r.count(m.count) as i:
         fired[i], found[i] = later[i], (0.0 - old[i]) * later[i]
-    _do(r, "read", time)
+    do_or_return(r, "read", time)
     r.give(FOUND)
     return r
 
@@ -337,14 +337,14 @@ def _first_root() -> Routine:
 
     def divide(until: Operand) -> None:
         """Look on both sides of a dip, if there is one."""
-        _do(r, "find_dip", from_.now, until)
+        do_or_return(r, "find_dip", from_.now, until)
         dip = m.dip
         with r.when(dip < inf):
-            _do(r, "first_root", from_.now, dip)
+            do_or_return(r, "first_root", from_.now, dip)
             r.give(r.call("first_root", place, dip, end))
 
     divide(end)
-    _do(r, "read", end)
+    do_or_return(r, "read", end)
     changed = r.variable(False, BOOLEAN)
     with r.count(m.count) as i:
         changed.now = changed.now | ~(known[i] * sign[i] > 0.0)
@@ -353,7 +353,7 @@ def _first_root() -> Routine:
     tolerance = (r.size(end) + (end - begin)) * (4 * ROUNDING)
     moment = r.most(tolerance * 25.0, m.moment)
     with r.forever():
-        _do(r, "read", end)
+        do_or_return(r, "read", end)
         with r.when(r.call("crossings", place, end, known, crossed) == 0):
             _learn(r, m, end)  # a zero that is not an event keeps the sign it came with
             r.give(0)
@@ -364,11 +364,11 @@ def _first_root() -> Routine:
         with r.when(~exact.now):
             _learn(r, m, end)
             r.give(FOUND)
-        _do(r, "narrow", from_.now, end, tolerance)
+        do_or_return(r, "narrow", from_.now, end, tolerance)
         time = m.after
         divide(m.before)
         after = r.least(time + moment, end)  # what follows within rounding belongs to the same moment
-        _do(r, "happening", time, after, moment)
+        do_or_return(r, "happening", time, after, moment)
         with r.when(after >= end):
             r.give(0)
         from_.now = after
@@ -383,13 +383,13 @@ def _search() -> Routine:
     some, clear = r.variable(False, BOOLEAN), r.variable(-inf)
     _any(r, m, unsure, some)
     with r.when(some.now):
-        _do(r, "settle", begin)
+        do_or_return(r, "settle", begin)
     with r.count(m.count) as i:
         clear.now = r.most(clear.now, blind[i])
     until = r.least(clear.now, end)
     with r.when((begin < until) & (until < end)):
-        _do(r, "first_root", begin, until)
-        _do(r, "first_root", until, end)
+        do_or_return(r, "first_root", begin, until)
+        do_or_return(r, "first_root", until, end)
         r.give(0)
     r.give(r.call("first_root", r.arguments[0], begin, end))
     return r
@@ -404,7 +404,7 @@ def _restart() -> Routine:
     """Take the signs from a new start of the solution."""
     r, m, (t,) = _open("restart", {"t": NUMBER}, exported=True)
     m.here = nan
-    _do(r, "read", t)
+    do_or_return(r, "read", t)
     r.call("noise", r.arguments[0], 0.0)
     names = ("known", "noise", "given", "carried", "unsure", "origin", "sign", "blind")
     known, noise, given, carried, unsure, origin, sign, blind = map(m.row, names)

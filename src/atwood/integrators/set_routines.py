@@ -26,6 +26,7 @@ from atwood.codegen.routines import (
     call_kernel,
     place_of,
 )
+from atwood.integrators.event_routines import do_or_return
 from atwood.numerics.contact_sets import CLEAR, GOES_ON, OPEN, SLACK, STICKS, STILL, TURNS
 
 FIELDS: dict[str, Kind] = {
@@ -159,13 +160,6 @@ def _open(
 ) -> tuple[Routine, Sets, list[Value]]:
     routine = Routine(name, {"place": ADDRESS, **(more or {})}, result, exported)
     return routine, Sets(routine.arguments[0], FIELDS), routine.arguments[1:]
-
-
-def _do(r: Routine, name: str, *arguments: Operand) -> None:
-    """Call a routine, and return with its code where that is not zero."""
-    code = r.call(name, r.arguments[0], *arguments)
-    with r.when(code != 0):
-        r.give(code)
 
 
 def _sum(r: Routine, count: Operand, a: Value, b: Value) -> Value:
@@ -627,7 +621,7 @@ def _strike() -> Routine:
     r.clear(again, again.at(size))
     with _each(r, m, "chosen") as (k, row, _), r.when((gap[k] == 0.0) & (poisson[k] == 0.0)):
         free[row] = free[row] - share[row] * r.most(0.0 - rates[row], 0.0)
-    _do(r, "find_impulses")
+    do_or_return(r, "find_impulses")
     more = r.variable(False, BOOLEAN)
     with _each(r, m, "chosen") as (k, row, _), r.when((gap[k] == 0.0) & (poisson[k] != 0.0)):
         again[row] = share[row] * impulses[row]
@@ -637,8 +631,8 @@ def _strike() -> Routine:
             impulses[i] = impulses[i] + again[i]
         with r.count(size) as i:
             free[i] = free[i] + _sum(r, size, response.at(i * size), impulses)
-        _do(r, "find_impulses")
-    _do(r, "account")
+        do_or_return(r, "find_impulses")
+    do_or_return(r, "account")
     r.call("push", place, impulses)
     r.give(0)
     return r
@@ -692,7 +686,7 @@ def _collide() -> Routine:
         with r.count(m.count) as k, r.when(m.unit("speed")[k] != 0.0):
             chosen[k] = 1.0
         _choose_slips(r, m)
-        _do(r, "strike")
+        do_or_return(r, "strike")
     r.give(ENDLESS)
     return r
 
@@ -829,7 +823,7 @@ def _settle() -> Routine:
         with r.when(passes | (m.unit("trigger")[k] == float(OPENS))):
             chosen[k] = 0.0
     _choose_slips(r, m)
-    _do(r, "read_contacts", t)
+    do_or_return(r, "read_contacts", t)
     r.copy(m.row("wanted"), m.result("free"), m.size)
     _going(r, m, some)
     with r.when(some.now), r.when(r.call("find_states", r.arguments[0]) != 0):
@@ -968,19 +962,19 @@ def _resolve() -> Routine:
     """Find what becomes of gaps and slips at a moment: the speeds change, and the states after it are written."""
     r, m, (t, checks, sums) = _open("resolve", {"t": NUMBER, "checks": INTEGER, "sums": INTEGER}, exported=True)
     m.finite, m.blur, m.pace, m.logged, m.stops, m.shared = 1.0, 1.0, 1.0, 0, 0, 0
-    _do(r, "read_contacts", t)
+    do_or_return(r, "read_contacts", t)
     with r.when(sums != 0):
         r.call("series", r.arguments[0], t, result=None)
     with r.when(checks != 0):
-        _do(r, "check_inside")
+        do_or_return(r, "check_inside")
     r.call("touching", r.arguments[0], result=INTEGER)
     r.copy(m.unit("closed"), m.unit("chosen"), m.count)
     with r.when(m.stops != 0):
         r.call("stop", r.arguments[0])
         r.copy(m.unit("closed"), m.unit("stopped"), m.count)  # others may pass near by
     with r.otherwise():
-        _do(r, "collide")
-    _do(r, "settle_contacts", t)
+        do_or_return(r, "collide")
+    do_or_return(r, "settle_contacts", t)
     r.give(0)
     return r
 

@@ -8,7 +8,7 @@ change a value by rounding at most.  A product with the constant 0 is the consta
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from atwood.errors import AtwoodError
@@ -293,3 +293,12 @@ def build(graph: Graph, operation: str, arguments: Sequence[Expression], payload
     if operation == "external":
         return external(payload, arguments)
     return graph.node(operation, tuple(arguments), payload)
+
+
+def rebuild(graph: Graph, nodes: Iterable[Expression], made: dict[Expression, Expression]) -> None:
+    """Make nodes, in an order in which arguments come first, anew in a graph, where they are not known yet."""
+    for node in nodes:
+        if node.is_constant:
+            made[node] = graph.constant(node.value)
+        elif node not in made:
+            made[node] = build(graph, node.operation, [made[a] for a in node.arguments], node.payload)

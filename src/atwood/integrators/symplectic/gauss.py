@@ -18,8 +18,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from decimal import Decimal, localcontext
-from functools import cache
+from functools import cache, reduce
 from math import inf
+from operator import add
 from typing import NamedTuple
 
 from atwood.codegen.llvm.build import RoutineSource
@@ -66,10 +67,7 @@ def write_routines(layout: Layout, order: int) -> list[Routine]:
 
 
 def _weighted(weights: Sequence[float], values: Sequence[Value]) -> Value:
-    total = weights[0] * values[0]
-    for weight, value in zip(weights[1:], values[1:], strict=True):
-        total = total + weight * value
-    return total
+    return reduce(add, [weight * value for weight, value in zip(weights, values, strict=True)])
 
 
 def _evaluate(layout: Layout) -> Routine:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, reduce
+from operator import add
 
 import numpy as np
 
@@ -185,7 +186,7 @@ def _merge(shares: Sequence[RigidMass]) -> RigidMass:
     if len(shares) == 1:
         return shares[0]
     parts = tuple(path for one in shares for path in one.parts)
-    mass = _total([one.mass for one in shares])
+    mass = reduce(add, [one.mass for one in shares])
     if all(_same(one.center, shares[0].center) for one in shares):
         return RigidMass(mass, shares[0].center, _total_moment([one.moment for one in shares]), parts)
     massive = [one for one in shares if not is_zero(one.mass)]
@@ -216,24 +217,9 @@ def shifted_tensor(moment: Axes, mass: Scalar, r: Vector) -> Axes:
 
 def _total_moment(moments: Sequence[Scalar | Axes]) -> Scalar | Axes:
     if not isinstance(moments[0], tuple):
-        return _total(moments)
-    x, y, z = (sum_vectors([one[i] for one in moments if isinstance(one, tuple)]) for i in range(3))
+        return reduce(add, moments)
+    x, y, z = (reduce(add, [one[i] for one in moments if isinstance(one, tuple)]) for i in range(3))
     return x, y, z
-
-
-def sum_vectors(vectors: Sequence[Vector]) -> Vector:
-    """Return the sum of some vectors."""
-    total = vectors[0]
-    for vector in vectors[1:]:
-        total = total + vector
-    return total
-
-
-def _total(values: Sequence[Scalar]) -> Scalar:
-    total = values[0]
-    for value in values[1:]:
-        total = total + value
-    return total
 
 
 def _same(a: Vector, b: Vector) -> bool:
@@ -319,7 +305,7 @@ class CarriedInertia:
             turned = turned_tensor(own, one.axes)
             alone = len(self._shares) == 1
             tensors.append(turned if alone else shifted_tensor(turned, one.mass, one.center - self._center))
-        x, y, z = (sum_vectors([one[i] for one in tensors]) for i in range(3))
+        x, y, z = (reduce(add, [one[i] for one in tensors]) for i in range(3))
         return turned_tensor((x, y, z), transposed(_axes(self._layout[1][self._node])))
 
     @cached_property
@@ -331,7 +317,7 @@ class CarriedInertia:
         massive = [one for one in self._shares if not is_zero(one.mass)]
         if len(massive) < 2:
             return massive[0].center if massive else self._layout[0][self._node]
-        center: Vector = sum_vectors([one.center * one.mass for one in massive]) / self.mass
+        center: Vector = reduce(add, [one.center * one.mass for one in massive]) / self.mass
         return center
 
     @cached_property

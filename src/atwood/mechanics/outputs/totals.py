@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import reduce
+from operator import add
 
 from atwood.expr import Expression, Scalar, jvp, substitute, vjp
 from atwood.lazy_dataclasses import dataclass
@@ -190,7 +192,4 @@ def energies(mechanism: Mechanism, equations: Equations) -> tuple[Expression, Ex
 
 def add_up(values: Sequence[Expression]) -> Expression:
     """Return a sum."""
-    total = values[0]
-    for value in values[1:]:
-        total = total + value
-    return total
+    return reduce(add, values)

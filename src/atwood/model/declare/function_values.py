@@ -127,11 +127,7 @@ class Function:
     def _rebuilt(self, graph: Graph, values: Sequence[Scalar]) -> Sequence[Expression]:
         given = zip(self._names, values, strict=True)
         made = {self._symbol(name): graph.convert(value) for name, value in given}
-        for node in self._nodes:
-            if node.is_constant:
-                made[node] = graph.constant(node.value)
-            elif node not in made:
-                made[node] = algebra.build(graph, node.operation, [made[a] for a in node.arguments], node.payload)
+        algebra.rebuild(graph, self._nodes, made)
         return [made[one] for one in self._results]
 
     def _stored(self, where: str) -> list[StoredFunction]:

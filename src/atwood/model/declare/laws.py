@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import keyword
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Generic, Literal, Self, TypeVar, overload
 
 from atwood.arguments import (
@@ -29,6 +29,7 @@ from atwood.arguments import (
     whole,
 )
 from atwood.errors import DeclarationError
+from atwood.expr import Expression
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.connectors import Quantity, Reading
 from atwood.model.values.letters import OWN_LETTERS
@@ -542,3 +543,14 @@ class ObservableLaw(Generic[Reading]):
             return self._read.__get__(instance, owner)
         options = self._atwood_law.options
         return Quantity(instance, self._atwood_law.name, options.unit, options.doc)
+
+
+def numbers_in(given: Any) -> Iterator[Any]:
+    """Yield the numbers, or expressions, in what an update returned, however it is nested."""
+    if hasattr(given, "tolist"):  # an array of numpy
+        given = given.tolist()
+    if isinstance(given, Iterable) and not isinstance(given, (str, Expression)):
+        for one in given:
+            yield from numbers_in(one)
+    else:
+        yield given

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 
 from atwood.errors import AtwoodError, ParameterError
-from atwood.expr import Expression, OutputGroup, Program
+from atwood.expr import OutputGroup, Program
 from atwood.forms.program import state_groups
 from atwood.model.declare.component import Binding, bind
+from atwood.model.declare.laws import numbers_in
 from atwood.plotting.live.mode import ModeText, NotLiveError
 from atwood.simulation.events.sampling import Update, evaluated, find_sampler, in_order, update_inputs_of
 
@@ -90,21 +90,10 @@ def _traced(mode: ModeText, one: Update) -> Program:
     space = assembly.mechanism.space
     bound = bind(part.component, Binding(values=known, time=equations.time, space=space.name, line=space.line))
     try:
-        found = tuple(graph.convert(value) for value in _flat(getattr(bound, one.law.name)()))
+        found = tuple(graph.convert(value) for value in numbers_in(getattr(bound, one.law.name)()))
     except (AtwoodError, TypeError, ValueError) as error:
         raise NotLiveError(f"{label} is an update that cannot be written as a formula: {error}") from error
     if len(found) != len(one.sets):
         raise NotLiveError(f"{label} is an update that returns {len(found)} numbers for {len(one.sets)}")
     outputs = (OutputGroup("sets", found),)
     return Program(f"{mode.flat.name} ({label})", state_groups(equations), assembly.parameters, outputs)
-
-
-def _flat(value: Any) -> Iterator[Expression | float]:
-    """Yield the numbers in what an update returned."""
-    if isinstance(value, np.ndarray):
-        yield from value.ravel().tolist()
-    elif isinstance(value, Iterable) and not isinstance(value, (str, Expression)):
-        for one in value:
-            yield from _flat(one)
-    else:
-        yield value

@@ -22,7 +22,7 @@ from atwood.forms.program import state_groups
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.model.declare.component import Binding, Component, bind
-from atwood.model.declare.laws import Law
+from atwood.model.declare.laws import Law, numbers_in
 
 _SAMPLER: Key[Sampler] = Key("sample times")
 
@@ -191,7 +191,7 @@ def evaluated(
         known[name] = numbers[0] if spec.count is None else tuple(numbers)
     bound = bind(part.component, Binding(values=known, time=t, space=space.name, line=space.line))
     try:
-        given = _flat(getattr(bound, one.law.name)())
+        given = [float(value) for value in numbers_in(getattr(bound, one.law.name)())]
     except AtwoodError:
         raise
     except Exception as error:  # whatever somebody's own Python can raise
@@ -206,15 +206,6 @@ def evaluated(
             where=one.label,
         )
     return given
-
-
-def _flat(value: Any) -> list[float]:
-    """Return the numbers in what an update returned."""
-    if isinstance(value, np.ndarray):
-        return [float(number) for number in value.ravel()]
-    if isinstance(value, Iterable) and not isinstance(value, str):
-        return [number for one in value for number in _flat(one)]
-    return [float(value)]
 
 
 def remembering(assembly: Assembly) -> list[str]:

@@ -7,7 +7,7 @@ functions that are not Atwood's, is not traced, and stays Python.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from atwood.expr import Expression, Graph, InputGroup, OutputGroup, Program
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.model.declare.component import Binding, bind
+from atwood.model.declare.laws import numbers_in
 from atwood.simulation.events.sampling import Sampler, Update, UpdateInputs, in_order, update_inputs_of
 
 _CODE: Key[UpdateCode | None] = Key("machine code of updates")
@@ -126,7 +127,7 @@ class _Law:
             numbers = [held[reading.held[x]] if x in reading.held else q[reading.states[x]] for x in paths]
             known[name] = numbers[0] if spec.count is None else tuple(numbers)
         bound = bind(part.component, Binding(values=known, time=t, space=space.name, line=space.line))
-        found = [_operand(graph, value) for value in _flat(getattr(bound, one.law.name)())]
+        found = [_operand(graph, value) for value in numbers_in(getattr(bound, one.law.name)())]
         if len(found) != len(one.sets):
             raise TypeError("an update returns another number of values than it sets")
         plain = Graph()  # whose nodes can be compared
@@ -141,16 +142,6 @@ class _Law:
         """Return the values of its parameters."""
         known = assembly.flat.parts[self.update.path].values
         return [x for name in self._names for x in numbers_of(self._symbolic.get(name), known[name])]
-
-
-def _flat(value: Any) -> Iterator[Any]:
-    if isinstance(value, np.ndarray):
-        yield from value.ravel().tolist()
-    elif isinstance(value, Iterable) and not isinstance(value, (str, Expression)):
-        for one in value:
-            yield from _flat(one)
-    else:
-        yield value
 
 
 class UpdateCode:
