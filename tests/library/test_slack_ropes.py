@@ -181,6 +181,32 @@ def test_one_on_what_has_no_mass_keeps_its_modes(form: str) -> None:
     assert [one.time for one in result.events[:2]] == pytest.approx([slack, slack + flies], abs=1e-8)
 
 
+def test_gaps_and_modes_go_together() -> None:
+    """Of two ropes in a row one is on a knot without mass and the other is let go: and no jerk is there."""
+    ends = []
+    for form in FORMS:
+        scene = Scene(space="line", line_axis=(0.0, 0.0, 1.0), t_end=2.0)
+        ground, spring = scene.add("ground", Ground()), scene.add("spring", Spring(stiffness=100.0, natural_length=0.5))
+        knot, rope = scene.add("knot", Pulley()), scene.add("rope", Rope(when_slack="slack"))
+        under = scene.add("under", Rope(length=0.8, when_slack="slack", starts="slack", release="1.5 - t"))
+        one, two = scene.add("one", PointMass()), scene.add("two", PointMass())
+        scene.connect(ground.frame, spring.a)
+        scene.connect(spring.b, knot.center)
+        scene.connect(knot.center, rope.a)
+        scene.connect(rope.b, one.point)
+        scene.connect(one.point, under.a)
+        scene.connect(under.b, two.point)
+        scene.start.update(
+            {"one.position.z": -1.7, "one.velocity.z": 0.0, "two.position.z": -1.8, "two.velocity.z": 0.0}
+        )
+        scene.guess["knot.position.z"] = -0.7
+        result = simulate(scene, form=form, rtol=1e-10)
+        assert ("under", "released", pytest.approx(1.5)) in [(e.part, e.target, e.time) for e in result.events]
+        assert result.energy.max_drift < 1e-7
+        ends.append(result["two.position.z"][-1])
+    assert ends[0] == pytest.approx(ends[1], abs=1e-8)
+
+
 def test_what_is_said_of_it() -> None:
     scene = swung()
     assert assemble(scene).modes == {"rope": "taut"}

@@ -618,7 +618,7 @@ function struck(mode, t, q, u) {
   const bottom = slopes.map((row, k) => [...row.map(x => x / units[k]), ...units.map(() => 0)]);
   const right = masses.map(row => row.reduce((sum, x, j) => sum + x * before[j], 0) / unit);
   const found = leastNorm([...top, ...bottom], [...right, ...units.map((one, k) => -still[k] / one)]);
-  const impulses = found.slice(m), most = largest(impulses);
+  const impulses = found.slice(m), most = Math.max(largest(impulses), largest(right)); // beside what moves
   for (const [i, ways] of refused.entries()) {
     const way = Math.abs(impulses[i]) > 1e-9 * most && ways.find(([sign]) => sign === Math.sign(impulses[i]));
     if (way) return {failed: `an impact, in which ${labels[i]} would have to act against its one side`, by: way[1]};

@@ -103,7 +103,8 @@ def plastic_impact(
     t, q, u = state
     now = balance.at(t, q, u)
     velocities, impulses = _solve_impact(now, u, sizes, balance.row_scales(now, t, q, sizes))
-    size = float(np.max(np.abs(impulses), initial=0.0))
+    # Beside what moves: where nothing with mass is struck, impulses are rounding alone, of either sign.
+    size = float(np.max(np.abs([*impulses, *(sizes * (now.mass @ u))]), initial=0.0))
     for one, impulse in zip(after.maximal.constraints, impulses, strict=True):
         refused_by = refusing(after, one, state, one.sign * impulse) if abs(impulse) > 1e-9 * size else None
         if refused_by is not None:
