@@ -903,13 +903,22 @@ def _series() -> Routine:
         count.now, last.now = count.now + 1, time
     with r.when((count.now < SPANS[0]) | ~(spans[0] > 0.0)):
         r.give()
-    # Impacts that only happen to be near each other are no series: each interval shrinks about as the one before.
+    _end_series(r, m, spans, count.now)
+    r.give()
+    return r
+
+
+def _end_series(r: Routine, m: Sets, spans: Value, number: Value) -> None:
+    """Stop what has a series of intervals, the last first, that ends soon.
+
+    Impacts that only happen to be near each other are no series: each interval shrinks about as the one before.
+    """
     cube, typical = spans[0] / spans[SPANS[0] - 1], r.variable(0.5)
     with r.count(60):  # the cube root: the mean factor of three intervals
         typical.now = typical.now - (typical.now - cube / (typical.now * typical.now)) * (1.0 / 3.0)
     even, steady = r.variable(1, INTEGER), r.variable(True, BOOLEAN)
     long = r.variable(1, INTEGER)
-    with r.count(count.now, 1) as k:
+    with r.count(number, 1) as k:
         factor = spans[k - 1] / spans[k] / typical.now
         is_even, is_steady = ((factor <= by) & (factor * by >= 1.0) for by in (EVEN, STEADY))
         is_near = (even.now == k) & (k < SPANS[1])
@@ -933,8 +942,6 @@ def _series() -> Routine:
         sum_ = _sum_of_series(r, spans, long.now)
         with r.when(r.size(sum_ - left) <= left):
             m.ahead = sum_
-    r.give()
-    return r
 
 
 def _sum_of_series(r: Routine, spans: Value, count: Value) -> Value:
