@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from atwood.clock import check_time
 from atwood.codegen.python.source import Flavour, write_function
-from atwood.codegen.python.walk import WALKS, operations_of, walk
+from atwood.codegen.python.walk import LONG, LONG_WALKS, WALKS, operations_of, walk
 from atwood.errors import KernelEvaluationError
 from atwood.expr.core import elementary
 from atwood.expr.core.analysis import evaluate, live
@@ -121,7 +121,8 @@ class CompiledProgram:
 
     @cached_property
     def _walks(self) -> dict[str, Iterator[int]]:
-        return {"main": iter(range(WALKS)), "_prologue": iter(range(WALKS))}
+        count = WALKS if self.program.size < LONG else LONG_WALKS
+        return {"main": iter(range(count)), "_prologue": iter(range(count))}
 
     @cached_property
     def _has_externals(self) -> bool:

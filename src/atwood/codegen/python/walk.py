@@ -19,6 +19,9 @@ from atwood.expr.core.operations import BINARY, UNARY
 WALKS = 4
 """So often a program is walked through before it is compiled."""
 
+LONG, LONG_WALKS = 5000, 12
+"""Programs of so many nodes are walked through more often: to compile them takes long, and a second run need not."""
+
 _INFIX: Mapping[str, Callable[..., Any]] = {
     "add": operator.add,
     "sub": operator.sub,
