@@ -192,7 +192,9 @@ def _read_by_start(assembly: Assembly) -> frozenset[str]:
     equations, flat = assembly.reduced, assembly.flat
     said = {path.rpartition(".")[0] for path in (*flat.start, *flat.guess)} & set(flat.parts)
     restates = any(type(flat.parts[one].component).restate_start is not Component.restate_start for one in said)
-    if restates or starting(assembly) is not assembly or assembly.mechanism.table.origin:
+    # What touches at the start is held there, too.
+    is_held = bool(equations.contacts or assembly.own_equations.contacts)
+    if is_held or restates or starting(assembly) is not assembly or assembly.mechanism.table.origin:
         return frozenset(one.name for one in assembly.parameters)
     values = [
         one.observable.value for some in sort_targets(assembly, equations) for one in (*some.fixed, *some.guessed)

@@ -47,13 +47,10 @@ def exact_changes(
     levels = sort_targets(assembly, equations)
     fixed = [one for level in levels for one in level.fixed]
     is_known = starting(assembly) is assembly and not (assembly.mechanism.constants or assembly.mechanism.table.origin)
-    turns = equations.orientation_coordinates or own.orientation_coordinates
-    if (
-        not is_known
-        or turns
-        or any(one.given for one in fixed)
-        or (assembly.form == "reduced" and own is not equations)
-    ):
+    # Gaps that are closed at the start are conditions, too, and quaternions are not determined by any.
+    more = equations.orientation_coordinates or own.orientation_coordinates or equations.contacts or own.contacts
+    is_other = assembly.form == "reduced" and own is not equations
+    if not is_known or more or is_other or any(one.given for one in fixed):
         return [None] * len(columns)
     conditions = [one.value for one in equations.constraints if one.value is not None]
     conditions += [*(one.rate for one in equations.constraints), *(one.observable.value for one in fixed)]
