@@ -362,6 +362,7 @@ class Walk:
             return plan
         from atwood.simulation.contacts.compiled import kept_whole
 
+        self._kept.is_undisturbed = False
         whole = kept_whole(plan, self.t, self.q, self.u, self._kept.changes > MANY_CHANGES)
         if whole is plan or not self._kept.jumps(whole.assembly):
             return plan

@@ -302,8 +302,8 @@ class KeptSession:
 
     def jumps(self, assembly: Assembly) -> bool:
         """Whether steps are to make impacts, or changes of a set of contacts, by themselves."""
-        if self.impacts is None or not assembly.own_equations.contacts:
-            return False
+        if self.impacts is None or self.is_undisturbed or not assembly.own_equations.contacts:
+            return False  # what is tried as without contacts ends at the first event, and is made anew
         from atwood.simulation.contacts.compiled import FEW_ROWS  # few scenes have any
 
         many = len(self.impacts) >= _MANY_IMPACTS or self.changes >= MANY_CHANGES
