@@ -316,7 +316,9 @@ class Walk:
         """Take up where the run is that went through moments."""
         assert self.plan is not None
         self._piece_start, self.held = passed.begun, passed.held
-        self.assembly = self._in_piece(self.assembly.with_held(self.held) if self.held else self.assembly)
+        if self.held:  # before the piece, which has the discrete states of the scene as it is
+            self.assembly = self.assembly.with_held(self.held)
+        self.assembly = self._in_piece(self.assembly)
         self.plan, self.probe, self._plans = self.plan.in_piece(self.assembly), None, {}
         self.passes_moments = self.passes_moments and not passed.is_refused
 
