@@ -208,19 +208,16 @@ def solve_at(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> Solv
     if not can_be_solved(plan):
         return None
     about = t, q.tobytes(), u.tobytes(), plan.finding.kept, plan.scales.length
-    known = plan.assembly.kept.get(_SOLVED, dict)
-    if about not in known:
-        found = _solve_at(plan, t, q, u)
-        if len(known) >= _MOST_SOLVED:
-            known.clear()
-        known[about] = found
-    return known[about]
+    found = plan.assembly.kept.get(_SOLVED, lambda: _Found(_solve_at(plan, t, q, u)), *about)
+    return found.solved
 
 
-_SOLVED: Key[dict[tuple[object, ...], Solved | None]] = Key("solved loops")
+@dataclass(frozen=True, eq=False)
+class _Found:
+    solved: Solved | None
 
-_MOST_SOLVED = 16
-"""At so many places loops are remembered: where a run begins, and where another choice takes over."""
+
+_SOLVED: Key[_Found] = Key("solved loops")
 
 
 def _solve_at(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> Solved | None:
