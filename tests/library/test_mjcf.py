@@ -181,7 +181,7 @@ BAD = {
     "impossible inertia": (
         '<body name="b"><inertial pos="0 0 0" mass="1" diaginertia="1 1 5"/></body>',
         "",
-        r"model\.xml:4: body 'b'.*moments are 1, 1, 5",
+        r"model\.xml:4: body 'b'.*moments 1, 1, 5",
     ),
     "no joint": ("", '<equality><joint joint1="a" joint2="b"/></equality>', r"model\.xml:2.*'a' is no joint"),
     "no body": ("", '<equality><weld body1="a"/></equality>', r"model\.xml:2.*no body 'a'"),
