@@ -9,6 +9,8 @@ from xml.parsers import expat
 
 from atwood.errors import UsageError
 
+__all__ = ["XMLElement", "read_xml"]
+
 
 class XMLElement(ElementTree.Element):
     """An element of an XML file, with what is in it.

@@ -168,7 +168,7 @@ def test_what_derives_is_in_the_sources_that_the_key_covers(name, monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["double-pendulum", "double-pendulum-3d", "rolling-ball"])
-def test_other_processes_find_the_same_entries(name):
+def test_other_processes_find_the_same_entries(name, tmp_path):
     code = (
         "from atwood.forms import caches; from atwood import assemble, simulate;"
         "from atwood_library.scenes import SCENES; make = caches.derivation_key;"
@@ -177,7 +177,8 @@ def test_other_processes_find_the_same_entries(name):
     )
     outputs = set()
     for seed in ("1", "2"):
-        environment = {**os.environ, "PYTHONHASHSEED": seed}
+        # Of a derivation within another nothing is asked where that is kept already.
+        environment = {**os.environ, "PYTHONHASHSEED": seed, "ATWOOD_CACHE_DIR": str(tmp_path / seed)}
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
         outputs.add(done.stdout)
     assert len(outputs) == 1

@@ -91,8 +91,7 @@ def run_batches(
     """Make the runs that can be made many at a time."""
     equations = request.assembly.reduced
     count, shown = request.cases.count, len(request.times) * (len(equations.coordinates) + len(equations.speeds))
-    share = -(-count // (4 * threads if threads > 1 else 1))  # several for each, so that all end at about one time
-    length = max(1, min(_PIECE, share, _NUMBERS // max(1, shown)))
+    length = max(1, min(_PIECE, -(-count // (4 * threads)), _NUMBERS // max(1, shown)))
     pieces = [np.arange(first, min(first + length, count)) for first in range(0, count, length)]
     if find_event_functions(request.assembly):
         shared_work(Waves(request, records).work, pieces, threads, watch)
