@@ -273,9 +273,10 @@ _CHUNK = 128
 def columns_of(kernel: BoundKernel, size: int, *groups: Any) -> FloatArray:
     """Return the matrix of which a program gives the product with a direction, its last input."""
     state = [np.asarray(group, dtype=float)[:, None] for group in groups]
-    unit = np.eye(size)
-    parts = [kernel(*state, unit[:, i : i + _CHUNK])[0] for i in range(0, size, _CHUNK)]
-    return np.concatenate(parts, axis=1)
+    found = np.empty((size, size))
+    for i in range(0, size, _CHUNK):
+        found[:, i : i + _CHUNK] = kernel(*state, np.eye(size, min(_CHUNK, size - i), -i))[0]
+    return found
 
 
 def mass_at(assembly: Assembly, form: FormName, t: float, q: FloatArray, u: FloatArray) -> FloatArray:

@@ -216,8 +216,10 @@ def check_massless_directions(
 
 def _is_clearly_positive(weighed: FloatArray) -> bool:
     """Return whether there is inertia in every direction, free or not: then what is free need not be found."""
+    raised = weighed.copy()  # in its place: of ten thousand bodies each copy is large
+    raised[np.diag_indices_from(raised)] -= 1e-12 * np.trace(weighed)
     try:
-        np.linalg.cholesky(weighed - 1e-12 * np.trace(weighed) * np.eye(len(weighed)))
+        np.linalg.cholesky(raised)
     except np.linalg.LinAlgError:
         return False
     return True
