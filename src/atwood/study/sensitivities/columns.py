@@ -25,7 +25,7 @@ from atwood.forms.quantities import observer
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.component import Component
 from atwood.simulation.dynamics.scales import scene_length
-from atwood.simulation.initialization.start import Start, find_start, own_state, with_closed
+from atwood.simulation.initialization.start import Start, find_start, own_state
 from atwood.simulation.initialization.system import sort_targets
 
 SHARES: tuple[float, ...] = (2.0**-7, 2.0**-8, 2.0**-9)
@@ -189,7 +189,7 @@ def _handed_on(assembly: Assembly, near: Assembly, value: float, moved: float) -
 
 def _read_by_start(assembly: Assembly) -> frozenset[str]:
     """Return the names of the parameters of the equations on which the start may depend."""
-    equations, flat, held = assembly.reduced, assembly.flat, with_closed(assembly).constraints
+    equations, flat = assembly.reduced, assembly.flat
     said = {path.rpartition(".")[0] for path in (*flat.start, *flat.guess)} & set(flat.parts)
     restates = any(type(flat.parts[one].component).restate_start is not Component.restate_start for one in said)
     # What touches at the start is held there, too.
@@ -199,11 +199,11 @@ def _read_by_start(assembly: Assembly) -> frozenset[str]:
     values = [
         one.observable.value for some in sort_targets(assembly, equations) for one in (*some.fixed, *some.guessed)
     ]
-    if equations.constraints or held or equations.solved_speeds or equations.eliminated or assembly.form == "dae":
+    if equations.constraints or equations.solved_speeds or equations.eliminated or assembly.form == "dae":
         moved = equations.kinematics
         places = (*moved.placements.positions.values(), *moved.velocities.values(), *moved.angular_velocities.values())
         values += [component for one in places for component in one]
-    for one in (*equations.constraints, *held):
+    for one in equations.constraints:
         values += [one.rate, *(() if one.value is None else (one.value,))]
     return frozenset(one.name for one in read_by(values, assembly.parameters))
 

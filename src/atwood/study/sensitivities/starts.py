@@ -19,7 +19,7 @@ from atwood.forms.quantities import to_maximal
 from atwood.numerics.matrices import least_norm, or_one
 from atwood.numerics.rank import rank
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales
-from atwood.simulation.initialization.start import Start, with_closed
+from atwood.simulation.initialization.start import Start
 from atwood.simulation.initialization.system import sort_targets
 from atwood.study.sensitivities.columns import SHARES, Column
 
@@ -52,9 +52,8 @@ def exact_changes(
     is_other = assembly.form == "reduced" and own is not equations
     if not is_known or more or is_other or any(one.given for one in fixed):
         return [None] * len(columns)
-    held = with_closed(assembly).constraints
-    conditions = [one.value for one in held if one.value is not None]
-    conditions += [*(one.rate for one in held), *(one.observable.value for one in fixed)]
+    conditions = [one.value for one in equations.constraints if one.value is not None]
+    conditions += [*(one.rate for one in equations.constraints), *(one.observable.value for one in fixed)]
     slopes, direct = _slopes(assembly, tuple(conditions), start)
     sizes = np.concatenate([one(equations, start.length) for one in (coordinate_scales, motion_scales)])
     scaled = slopes * sizes
