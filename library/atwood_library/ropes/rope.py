@@ -123,13 +123,13 @@ class Rope(Component):
 
     @event(modes=("taut",), direction=-1, unit="N", target="when_slack", message="the rope has gone slack")
     def goes_slack(self) -> Scalar:
-        """Return the tension; that of a gap is watched by itself."""
-        return 1.0 if self.is_gap() else self.reaction("tension")
+        """Return the tension; nothing where it is a gap, which is watched by itself."""
+        return 0.0 if self.is_gap() else self.reaction("tension")
 
     @event(modes=("slack",), direction=-1, unit="m", target="taut", message="the rope has come taut", impact=True)
     def comes_taut(self) -> Scalar:
-        """Return how much rope is to spare."""
-        return 1.0 if self.is_gap() else self.whole_length() - self.reach()
+        """Return how much rope is to spare; nothing where it is a gap."""
+        return 0.0 if self.is_gap() else self.whole_length() - self.reach()
 
     @event(modes=("taut", "slack"), direction=-1, target="released", message="the rope has been let go")
     def lets_go(self) -> Scalar:
