@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from atwood import Scene, assemble, export_c, export_fmu, floor, sign, simulate
+from atwood import Component, Scene, assemble, export_c, export_fmu, floor, sign, simulate
 from atwood.cli import main
 from atwood.errors import ParameterError, UnsupportedError, UsageError
 from atwood.exchange.c.tables import quoted
@@ -18,6 +18,8 @@ from atwood_library import Drive, Ground, Link, PointMass, RigidBody, Rod, Rope
 from atwood_library.scenes import SCENES
 
 from ..exported_scenes import FLAGS, apart, built, compiler, happened, printed
+from ..helpers.tethers import Caught, Loose, Tether
+from ..library.test_slack_ropes import swung, thrown_up
 from ..library.test_tables import hoisted
 from ..simulation.contacts.test_drive_trains import lossy_train
 from ..simulation.test_sides import band, moving
@@ -41,10 +43,10 @@ def test_motions_are_those_of_simulate(name: str, form: str, tmp_path: Path) -> 
         assert states[0] == states[2] != "0", equal
 
 
-def body_on_a_string() -> Scene:
+def body_on_a_string(part: Component) -> Scene:
     """Return a body in space whose string goes slack and comes taut again."""
     scene = Scene(space="space", t_end=1.5)
-    ground, rope = scene.add("ground", Ground()), scene.add("rope", Rope(length=1.0, when_slack="slack"))
+    ground, rope = scene.add("ground", Ground()), scene.add("rope", part)
     arm, body = scene.add("arm", Link(length=0.3)), scene.add("body", RigidBody(mass=1.0, moments=(0.1, 0.2, 0.25)))
     for a, b in ((ground.frame, rope.a), (rope.b, arm.a), (arm.b, body.frame)):
         scene.connect(a, b)
@@ -57,8 +59,12 @@ def body_on_a_string() -> Scene:
 HAPPENING: dict[str, tuple[Callable[[], Scene], str, int]] = {
     "contacts": (SCENES["clutches"], "reduced", 8),
     "updates": (SCENES["cart-pole"], "reduced", 0),
-    "modes of a body that turns": (body_on_a_string, "reduced", 2),
-    "an update that strikes, and a mode": (lambda: hoisted("plane"), "reduced", 2),
+    "modes of a body that turns": (lambda: body_on_a_string(Tether()), "reduced", 2),
+    "a gap of a body that turns": (lambda: body_on_a_string(Rope(when_slack="slack")), "reduced", 2),
+    "an update that strikes, and a mode": (lambda: hoisted("plane", part=Tether(length=2.0)), "reduced", 2),
+    "an update that strikes, and a gap": (lambda: hoisted("plane"), "reduced", 2),
+    "a gap that is told of where it opens": (lambda: swung(Loose()), "reduced", 3),
+    "a gap that is told of where it closes": (lambda: swung(Caught()), "dae", 2),
     "a side": (lambda: moving(band(1e-3)), "reduced", 0),
     "floors": (lambda: moving(lambda x, v: 0.1 * floor(3.0 * x)), "dae", 0),
 }
@@ -79,6 +85,19 @@ def test_what_happens_in_c_is_what_happens_in_runs(name: str, tmp_path: Path) ->
     assert [one[:2] for one in found] == [one[:2] for one in known]
     assert [one[2] for one in found] == pytest.approx([one[2] for one in known], abs=1e-12)
     assert len(found) == count
+
+
+@needs_a_compiler
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+def test_a_rope_that_may_not_be_slack_again_stops_the_motion(form: str, tmp_path: Path) -> None:
+    scene = thrown_up()
+    known = simulate(scene, form=form, rtol=1e-11, solver="explicit")
+    done = subprocess.run(
+        [built(scene, tmp_path, form, QUICK), "2", "1e-11", "3", "--events"], capture_output=True, text=True
+    )
+    assert done.returncode == 1
+    assert done.stderr == f"at t = {known.time[-1]:.9g} s rope: the rope has gone slack\n"
+    assert known.status == "stopped"
 
 
 @needs_a_compiler

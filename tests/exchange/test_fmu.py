@@ -4,6 +4,7 @@ import ctypes
 import json
 import re
 import zipfile
+from collections.abc import Callable
 from ctypes import byref, c_bool, c_char_p, c_double, c_size_t, c_uint, c_void_p
 from pathlib import Path
 from xml.etree import ElementTree
@@ -11,12 +12,14 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from atwood import export_fmu, simulate
+from atwood import Component, export_fmu, simulate
 from atwood.cli import main
 from atwood.errors import UsageError
 from atwood.exchange.fmi import build
+from atwood_library import Rope
 from atwood_library.scenes import SCENES
 
+from ..helpers.tethers import Tether
 from ..plotting.test_live import slack_string
 
 needs_a_compiler = pytest.mark.skipif(build.find_compiler() is None, reason="there is no C compiler")
@@ -209,9 +212,19 @@ def test_what_cannot_be_is_refused(tmp_path: Path) -> None:
 
 
 @needs_a_compiler
-def test_a_scene_with_modes_is_for_co_simulation_and_its_states_are_kept(tmp_path: Path) -> None:
-    made = export_fmu(slack_string(), tmp_path / "a.fmu", output=["bob.position.x", "rope.tension"])
-    assert (made.kinds, made.reason) == (("co-simulation",), "each of its modes has states of its own")
+@pytest.mark.parametrize(
+    ("part", "reason"),
+    [
+        (Tether, "each of its modes has states of its own"),
+        (lambda: Rope(when_slack="slack"), "its states depend on each other, which steps keep so"),
+    ],
+    ids=["modes", "gap"],
+)
+def test_a_scene_with_modes_is_for_co_simulation_and_its_states_are_kept(
+    part: Callable[[], Component], reason: str, tmp_path: Path
+) -> None:
+    made = export_fmu(slack_string(part()), tmp_path / "a.fmu", output=["bob.position.x", "rope.tension"])
+    assert (made.kinds, made.reason) == (("co-simulation",), reason)
     unit = Unit(made.file, "CoSimulation")
     unit.step(0.0, 0.7)
     kept = c_void_p()
@@ -222,7 +235,7 @@ def test_a_scene_with_modes_is_for_co_simulation_and_its_states_are_kept(tmp_pat
     unit.call("FreeFMUState", byref(kept))
     unit.step(0.7, 0.9)
     assert unit.get("bob.position.x", "rope.tension") == there
-    known = simulate(slack_string(), rtol=1e-12, t_end=1.6, outputs=[0.0, 1.6], solver="explicit")
+    known = simulate(slack_string(part()), rtol=1e-12, t_end=1.6, outputs=[0.0, 1.6], solver="explicit")
     assert len(known.events) == 2
     assert there == [pytest.approx(known[one][-1], abs=1e-6) for one in ("bob.position.x", "rope.tension")]
 

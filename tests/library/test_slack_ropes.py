@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from atwood import Point, Result, Scene, StartError, UsageError, assemble, linearize, sensitivities, simulate
+from atwood import Component, Point, Result, Scene, StartError, UsageError, assemble, linearize, sensitivities, simulate
 from atwood_library import Ground, PointMass, Pulley, Rope, Spring
 from atwood_library.scenes import DoubleAtwood
 
 from ..helpers.runs import FORMS
-from ..helpers.tethers import Tether
+from ..helpers.tethers import Caught, Loose, Tether
 
 G = 9.81
 
 
 def swung(
-    part: Rope | Tether | None = None, size: float = 1.0, angle: float = 0.0, place: float = 0.0, **start: float
+    part: Component | None = None, size: float = 1.0, angle: float = 0.0, place: float = 0.0, **start: float
 ) -> Scene:
     """Return a bob that is swung from the bottom of a rope, faster than it swings and slower than it goes round."""
     down, along = (math.sin(angle), 0.0, -math.cos(angle)), (math.cos(angle), 0.0, math.sin(angle))
@@ -109,14 +109,33 @@ def test_a_mass_that_is_thrown_is_caught(space: str, form: str) -> None:
     assert result["rope.tension"][-1] == pytest.approx(3.0 * left**2, abs=1e-8)
 
 
-@pytest.mark.parametrize("form", FORMS)
-def test_one_that_may_not_be_slack_again_stops_the_run(form: str) -> None:
-    """Thrown straight up it comes taut, and falls at once."""
+def thrown_up() -> Scene:
+    """Return a mass whose rope, which may not be slack again, comes taut as it rises; it falls at once."""
     scene = thrown("line", when_slack="stop")
     scene.gravity, scene.line_axis = G, (0.0, 0.0, 1.0)
     scene.start.clear()
     scene.start.update({"mass.position.z": 0.0, "mass.velocity.z": 6.0})
-    result = simulate(scene, form=form, rtol=1e-10)
+    return scene
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(
+    ("part", "told"),
+    [
+        (Loose, [("goes_slack", "opens"), ("spare", "impact"), ("spare", "closes")]),
+        (Caught, [("spare", "opens"), ("comes_taut", "impact")]),
+    ],
+)
+def test_what_a_gap_has_no_word_for_is_told_of_as_of_any(part: Any, told: list[tuple[str, str]], form: str) -> None:
+    scene = swung(part())
+    result = simulate(scene, form=form, rtol=1e-9, t_end=1.6)
+    assert [(one.law, one.kind) for one in result.events] == told
+    assert len(result.impacts) == 1
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_one_that_may_not_be_slack_again_stops_the_run(form: str) -> None:
+    result = simulate(thrown_up(), form=form, rtol=1e-10)
     arrives = (6.0 - math.sqrt(36.0 - 2.0 * G)) / G
     assert [(one.law, one.target) for one in result.events] == [("comes_taut", "taut"), ("goes_slack", "stop")]
     assert [one.time for one in result.events] == pytest.approx([arrives, arrives], abs=1e-9)

@@ -161,10 +161,10 @@ def test_only_what_may_remember_is_not_solved_twice() -> None:
 # -- ropes -----------------------------------------------------------------------------------------------------------
 
 
-def hoisted(space: str, rows: Any = STOPS, when_slack: str = "slack") -> Scene:
-    """A mass of 2 kg on a rope of 2 m that a table lets out."""
+def hoisted(space: str, rows: Any = STOPS, when_slack: str = "slack", part: Component | None = None) -> Scene:
+    """A mass of 2 kg on a rope of 2 m, or another such part, that a table lets out."""
     scene = Scene(space=space, gravity=G, **({"line_axis": (0.0, 0.0, 1.0)} if space == "line" else {}))
-    ground, rope = scene.add("ground", Ground()), scene.add("rope", Rope(length=2.0, when_slack=when_slack))
+    ground, rope = scene.add("ground", Ground()), scene.add("rope", part or Rope(length=2.0, when_slack=when_slack))
     mass, winch = scene.add("mass", PointMass(mass=2.0)), scene.add("winch", Table(table=rows, at_end="hold"))
     scene.connect(ground.frame, rope.a)
     scene.connect(rope.b, mass.point)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from atwood import Scene, assemble, floor, sign, simulate
+from atwood import Component, Scene, assemble, floor, sign, simulate
 from atwood.errors import ParameterError
 from atwood.integrators.methods import METHODS
 from atwood.plotting.live import LiveProgram, engine_script, live_program
@@ -19,6 +19,8 @@ from atwood_library import BallContact, Ground, PointMass, Rope, Sphere, Spring
 from atwood_library.scenes import SCENES
 
 from ..helpers.node import run_node
+from ..helpers.tethers import Caught, Loose, Tether
+from ..library.test_slack_ropes import thrown_up
 from ..library.test_tables import hoisted
 from ..machines.bits import task_of
 from ..simulation.contacts.test_drive_trains import lossy_train
@@ -137,10 +139,10 @@ def test_changed_values_are_those_of_simulate() -> None:
         np.testing.assert_allclose(state, expected, rtol=0.0, atol=1e-8, err_msg=key)
 
 
-def slack_string() -> Scene:
+def slack_string(part: Component | None = None) -> Scene:
     """Return a bob on a string that goes slack and comes taut again."""
     scene = Scene(t_end=1.6)
-    ground, rope = scene.add("ground", Ground()), scene.add("rope", Rope(length=1.0, when_slack="slack"))
+    ground, rope = scene.add("ground", Ground()), scene.add("rope", part or Rope(length=1.0, when_slack="slack"))
     bob = scene.add("bob", PointMass(mass=1.0))
     scene.connect(ground.frame, rope.a)
     scene.connect(rope.b, bob.point)
@@ -153,19 +155,31 @@ def slack_string() -> Scene:
 def test_modes_are_entered_at_their_times(form: str) -> None:
     scenes = {"string": (slack_string, 2), "trebuchet": (SCENES["trebuchet"], 1), "wire": (SCENES["bead-on-wire"], 0)}
     scenes |= {"cart": (SCENES["cart-pole"], 0), "winch": (lambda: hoisted("plane"), 2)}
+    scenes |= {"tether": (lambda: slack_string(Tether()), 2), "loose": (lambda: slack_string(Loose()), 3)}
+    scenes["caught"] = lambda: slack_string(Caught()), 2
     made = {name: live_program(scene(), form) for name, (scene, _) in scenes.items()}
     script = """
     print(Object.keys(models).map(name => {
       const engine = start(name, {rtol: 1e-11}), said = engine.advance(1.6);
-      return [said.code, engine.events.map(one => one.time), Array.from(engine.state), engine.mode];
+      const told = engine.events.map(one => [one.law, one.target]);
+      return [said.code, engine.events.map(one => one.time), told, Array.from(engine.state), engine.mode];
     }));
     """
-    for (scene, count), (code, times, state, modes) in zip(scenes.values(), played(made, script), strict=True):
+    for (scene, count), (code, times, told, state, modes) in zip(scenes.values(), played(made, script), strict=True):
         run = simulate(scene(), form=form, t_end=1.6, rtol=1e-12, outputs=[0.0, 1.6]).run
         assert (code, len(times), modes) == ("reached", count, dict(run.segments[-1].assembly.modes))
         assert times == pytest.approx([one.time for one in run.events], abs=1e-9)
+        assert told == [[one.law, one.target] for one in run.events]
         last = run.segments[-1]
         np.testing.assert_allclose(state, [*last.coordinates[:, -1], *last.speeds[:, -1]], rtol=0.0, atol=2e-8)
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+def test_a_rope_that_may_not_be_slack_again_stops_the_motion(form: str) -> None:
+    script = 'const engine = start("up"), said = engine.advance(1.6); print([said, engine.events.map(one => one.law)]);'
+    (said, laws) = played({"up": live_program(thrown_up(), form)}, script)
+    assert (said["code"], said["text"]) == ("stopped", "at t = 0.199060013 s rope: the rope has gone slack")
+    assert laws == ["comes_taut", "goes_slack"]
 
 
 def test_what_is_wrong_is_said() -> None:

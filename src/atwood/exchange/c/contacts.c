@@ -33,6 +33,26 @@ static void remember_impact(scene *s, double t, double part)
     s->sets[SET_known].i++;
 }
 
+/* Say what has become of a gap that has names of its own for it, with the speed of an impact if there was one; these
+ * take the place of what is told of any gap.  Returns whether the motion ends there. */
+static int tell_named(scene *s, double t, int k, int was, int is, const double *speed, int is_start)
+{
+    const int source = EVENTS + k, closes = contact_names[2 * k], opens = contact_names[2 * k + 1];
+    const int leaves = !is && (was || speed != NULL);
+    if (speed != NULL) log_event(s, t, was || closes < 0 ? source : closes, scene_IMPACT, *speed);
+    if (!was && is && !is_start && (closes < 0 || speed == NULL)) {
+        log_event(s, t, closes < 0 ? source : closes, scene_CLOSES, 0.0);
+    }
+    if (leaves && opens >= 0) log_event(s, t, opens, scene_OPENS, 0.0);
+    if (was && !is && opens < 0 && !is_start) log_event(s, t, source, scene_OPENS, 0.0);
+    return leaves && contact_ends[k][0] != 0;
+}
+
+static int is_named(int k)
+{
+    return contact_names[2 * k] >= 0 || contact_names[2 * k + 1] >= 0;
+}
+
 /* Say what has become of a gap or a slip. */
 static void tell_change(scene *s, double t, int k, const double *was, const double *is)
 {
@@ -50,9 +70,10 @@ static void tell_change(scene *s, double t, int k, const double *was, const doub
 static int resolve_contacts(scene *s, double t, int is_start)
 {
     const double near = 10.0 * (s->rtol > 1e-13 ? s->rtol : 1e-13), ahead = 10.0 * sqrt(s->rtol) * time_scale;
-    double before[3 * CONTACTS], after[3 * CONTACTS], closed[3 * CONTACTS], speeds[SPEEDS];
+    double before[3 * CONTACTS], after[3 * CONTACTS], closed[3 * CONTACTS], speeds[SPEEDS], approach[CONTACTS];
+    const double *struck[CONTACTS];
     int32_t code;
-    int i, k, meets = 0;
+    int i, k, meets = 0, ends = -1;
     for (i = 0; i < UNITS * CONTACTS; i++) s->units[i].f = contact_units[i];
     for (i = 0; i < 3 * CONTACTS; i++) before[i] = contact_places[i] >= 0 ? s->values[contact_places[i]].f : 0.0;
     for (k = 0; k < CONTACTS; k++) {
@@ -72,13 +93,19 @@ static int resolve_contacts(scene *s, double t, int is_start)
     if (code != 0) return say(s, FAILED, refused[code]);
     for (k = 0; k < CONTACTS && s->sets[SET_stops].i != 0 && !is_start; k++) {
         if (unit(s, UNIT_stopped)[k].f == 0.0) continue;
-        log_event(s, t + s->sets[SET_ahead].f, EVENTS + k, scene_RESTS, 0.0);
+        if (contact_names[2 * k] < 0) log_event(s, t + s->sets[SET_ahead].f, EVENTS + k, scene_RESTS, 0.0);
         break;
     }
+    for (k = 0; k < CONTACTS; k++) struck[k] = NULL;
     for (i = 0; i < s->sets[SET_logged].i; i++) {
         const word *const entry = s->log_of_sets + i * (CONTACT_ROWS + ENTRY);
         k = (int)entry[0].f;
-        log_event(s, t, EVENTS + k, scene_IMPACT, -entry[1].f);
+        if (!is_named(k)) {
+            log_event(s, t, EVENTS + k, scene_IMPACT, -entry[1].f);
+        } else if (struck[k] == NULL) {
+            approach[k] = -entry[1].f;
+            struck[k] = approach + k;
+        }
         remember_impact(s, t, contact_units[UNIT_part * CONTACTS + k]);
     }
     for (k = 0; k < CONTACTS; k++) {
@@ -98,8 +125,15 @@ static int resolve_contacts(scene *s, double t, int is_start)
         for (i = 0; i < SPEEDS; i++) s->y[COORDINATES + i].f = speeds[i];
     }
     take_states(s, after);
-    for (k = 0; k < CONTACTS && !is_start; k++) tell_change(s, t, k, before + 3 * k, after + 3 * k);
-    return READY;
+    for (k = 0; k < CONTACTS; k++) {
+        const int was = before[3 * k] != 0.0 || (is_start && contact_starts_closed[k]);
+        if (is_named(k)) {
+            if (tell_named(s, t, k, was, after[3 * k] != 0.0, struck[k], is_start) && ends < 0) ends = k;
+        } else if (!is_start) {
+            tell_change(s, t, k, before + 3 * k, after + 3 * k);
+        }
+    }
+    return ends < 0 ? READY : say(s, STOPPED, contact_ends[ends]);
 }
 
 /* The values of events a moment later. */

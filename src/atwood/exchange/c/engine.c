@@ -609,7 +609,11 @@ static int begin_at(scene *s, double t, const double *state, int is_start)
 #endif
         for (i = 0; i < SIZE; i++) s->y[i].f = s->state[i];
 #if CONTACTS
-        if (resolve_contacts(s, t, is_start) != READY) return FAILED;
+        {
+            const int status = resolve_contacts(s, t, is_start);
+            if (status == STOPPED) take(s, t, s->y);
+            if (status != READY) return status;
+        }
 #endif
 #if SIDES
         for (i = 0; i < SIZE; i++) s->state[i] = s->y[i].f;

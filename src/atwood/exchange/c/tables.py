@@ -61,7 +61,7 @@ def tables_of(mode: ModeText, parameters: Sequence[dict[str, Any]], sizes: dict[
     if sizes["EVENTS"]:
         lines += _events(data, sizes)
     if sizes["CONTACTS"]:
-        lines += _contacts(data["contacts"])
+        lines += _contacts(data["contacts"], len(sources(mode)))
     if sizes["UPDATES"]:
         lines += _updates(data)
         lines += _lists("event_updates", [one["updates"] for one in data["events"]], "update_firsts")
@@ -103,11 +103,21 @@ def exported_tables(modes: Sequence[ModeText], parameters: Sequence[dict[str, An
 
 
 def sources(mode: ModeText) -> list[str]:
-    """Return the paths of what events come from: of events, of gaps and slips, and of constraints that may jump."""
+    """Return the paths of what events come from.
+
+    They are of events, of gaps and slips, of constraints that may jump, and of what gaps have names of their own for.
+    """
     data = mode.data
     laws = [f"{one['part']}.{one['law']}" for one in data["events"]]
     laws += [".".join(one) for one in data.get("contacts", {}).get("keys", ())]
-    return laws + list(dict.fromkeys(".".join(one) for one in data.get("passage", {}).get("laws", ())))
+    laws += dict.fromkeys(".".join(one) for one in data.get("passage", {}).get("laws", ()))
+    return laws + _named(data.get("contacts", {}))
+
+
+def _named(contacts: dict[str, Any]) -> list[str]:
+    """Return the paths of events that gaps have names of their own for."""
+    every = zip(contacts.get("keys", ()), contacts.get("words", ()), strict=True)
+    return [f"{part}.{said['law']}" for (part, _), words in every for said in words if said]
 
 
 def _places(names: Sequence[str], found: Sequence[Sequence[int]]) -> list[str]:
@@ -158,13 +168,23 @@ def _lists(name: str, lists: Sequence[Sequence[int]], starts: str) -> list[str]:
     return [array(name, [k for one in lists for k in one], "int"), array(starts, ends, "int")]
 
 
-def _contacts(contacts: dict[str, Any]) -> list[str]:
+def _contacts(contacts: dict[str, Any], count: int) -> list[str]:
+    """Return the tables of gaps and slips, of a scene with a number of sources."""
+    numbers = iter(range(count - len(_named(contacts)), count))  # the last sources
+    names = [next(numbers) if said else -1 for words in contacts["words"] for said in words]
+    ends = [
+        f"{part}: {opens['message']}" if opens and opens["target"] == "stop" else ""
+        for (part, _), (_, opens) in zip(contacts["keys"], contacts["words"], strict=True)
+    ]
     places = [place for some in contacts["places"] for place in [*some, -1, -1][:3]]
     refused = ["", *(sets.REFUSED[code] for code in sorted(sets.REFUSED))]
     return [
         array("contact_units", [x for row in contacts["units"] for x in row]),
         array("contact_places", places, "int"),
         array("contact_pattern", contacts["pattern"]),
+        array("contact_names", names, "int"),
+        array("contact_starts_closed", contacts["closed"], "int"),
+        _texts("static const char *const contact_ends", ends),
         _texts("static const char *const refused", refused),
     ]
 

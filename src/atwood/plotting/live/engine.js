@@ -303,7 +303,8 @@ function openMode(mode, options) {
       const [part, law] = keys[k], isOwn = one => one.part === part && one.law === law, [was] = before[k], [is] = after[k];
       const at = told.findIndex(isOwn), struck = told.find(one => isOwn(one) && one.kind === "impact"), found = struck && was ? [struck] : [];
       [!was && (is || struck), !is && (was || struck)].forEach((has, i) => {
-        if (has && said[i]) found.push({...(i === 0 && struck ? struck : {time: t, part, kind: ["closes", "opens"][i]}), ...said[i]});
+        if (has && !said[i]) found.push(...told.filter(one => isOwn(one) && (one.kind === "opens") === (i === 1)));
+        else if (has) found.push({...(i === 0 && struck ? struck : {time: t, part, kind: ["closes", "opens"][i]}), ...said[i]});
       });
       told = [...told.slice(0, at < 0 ? told.length : at), ...found, ...told.slice(at < 0 ? told.length : at).filter(one => !isOwn(one))];
     });

@@ -25,6 +25,7 @@ from atwood.expr import (
 from atwood.forms.accelerations import accelerations_of
 from atwood.forms.assembly import Assembly
 from atwood.forms.event_program import solved_reactions
+from atwood.forms.loose import kept_touching
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import find_observables
 from atwood.forms.sides import in_pieces
@@ -40,11 +41,9 @@ from atwood.mechanics.outputs.observables import Observable
 from atwood.mechanics.outputs.totals import energies
 from atwood.model.values.space import planar_axes
 from atwood.model.values.units import ALONG
-from atwood.numerics.contact_sets import STICKS
 from atwood.plotting.live.parameters import find_parameters
 from atwood.plotting.live.pulls import PULL, pulls_of
-from atwood.simulation.contacts.compiled import set_data, why_in_python
-from atwood.simulation.contacts.values import layout_of
+from atwood.simulation.contacts.compiled import in_no_contact, set_data, why_in_python
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.reactions import ReactionSolver
 from atwood.simulation.events.modes import MARGIN, EventProbe
@@ -329,13 +328,9 @@ class ModeText:
 
 def _touching(plan: SceneProblem) -> SceneProblem:
     """Return a plan with the programs for all states of gaps and slips, if there are any."""
-    layout = layout_of(plan.assembly) if plan.assembly.own_equations.contacts else None
-    if layout is None:
+    if not plan.assembly.own_equations.contacts:
         return plan
-    held = list(plan.assembly.held_now)
-    for places, is_slip in zip(layout.places, layout.is_slip, strict=True):
-        held[places[0]] = float(STICKS) if is_slip else 1.0
-    return plan.in_piece(plan.assembly.with_held(held))
+    return plan.in_piece(kept_touching(in_no_contact(plan.assembly)))
 
 
 def nodes_of(mode: ModeText) -> list[int]:

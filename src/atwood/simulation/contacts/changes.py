@@ -628,7 +628,9 @@ def in_own_words(
         told = [] if struck is None or before == OPEN else [struck]
         happened = (before == OPEN and (after != OPEN or struck), after == OPEN and (before != OPEN or struck))
         for has, said, kind in zip(happened, words, ("closes", "opens"), strict=True):
-            if has and said is not None:
+            if has and said is None:
+                told += [each for each in own if (each.kind == "opens") == (kind == "opens")]
+            elif has:
                 known = struck if kind == "closes" and struck else EventRecord(t, *key, "", "", False, kind)
                 told.append(replace(known, **said._asdict()))
         place = found.index(own[0]) if own else len(found)
@@ -769,7 +771,7 @@ def resolve(
     if is_start:
         closed = [one.is_closed_at_start(assembly.flat.parts) for one in moment.first]
         was = [(STICKS, one[1]) if is_closed else one for one, is_closed in zip(was, closed, strict=True)]
-    events = in_own_words(assembly, moment.layout, t, moment.events, (was, now))
+    events = in_own_words(assembly, moment.layout, moment.t, moment.events, (was, now))
     if np.array_equal(moment.u, before):
         speeds = u
     elif assembly.form == "dae":
