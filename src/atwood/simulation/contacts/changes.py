@@ -628,11 +628,13 @@ def in_own_words(
         told = [] if struck is None or before == OPEN else [struck]
         happened = (before == OPEN and (after != OPEN or struck), after == OPEN and (before != OPEN or struck))
         for has, said, kind in zip(happened, words, ("closes", "opens"), strict=True):
-            if has and said is None:
+            if not has:
+                continue
+            if said is None:
                 told += [each for each in own if (each.kind == "opens") == (kind == "opens")]
-            elif has:
-                known = struck if kind == "closes" and struck else EventRecord(t, *key, "", "", False, kind)
-                told.append(replace(known, **said._asdict()))
+                continue
+            known = struck if kind == "closes" and struck else EventRecord(t, *key, "", "", False, kind)
+            told.append(replace(known, **said._asdict()))
         place = found.index(own[0]) if own else len(found)
         found[place:] = [*told, *(each for each in found[place:] if (each.part, each.law) != key)]
     return found
