@@ -148,6 +148,8 @@ class Piece:
         Whether it began with an impact.
     is_switched
         Whether it began at a time event.
+    is_rest
+        Whether it began where impacts had accumulated.
     """
 
     time: FloatArray
@@ -160,19 +162,21 @@ class Piece:
     lost: FloatArray | None
     is_impact: bool
     is_switched: bool
+    is_rest: bool
 
     def gained_since(self, before: Piece) -> float:
         """Return the work that is done between the end of another piece and the start of this one, J.
 
-        An impact takes kinetic energy away. At a time event, all that jumps is work: of an input that a potential
-        reads, or of drives whose speed jumps. Other jumps of energy are none of work.
+        An impact takes kinetic energy away. Where impacts have accumulated, what still rises gives back the friction
+        of a flight that is left out. At a time event, all that jumps is work: of an input that a potential reads, or of
+        drives whose speed jumps. Other jumps of energy are none of work.
         """
         kinetic = float(self.kinetic[0] - before.kinetic[-1])
         if self.is_switched:
             return kinetic + float(self.potential[0] - before.potential[-1])
         after, earlier = self.switched, before.switched
         gained = (0.0 if after is None else float(after[0])) - (0.0 if earlier is None else float(earlier[-1]))
-        return gained + (min(0.0, kinetic) if self.is_impact else 0.0)
+        return gained + (kinetic if self.is_rest else min(0.0, kinetic) if self.is_impact else 0.0)
 
 
 def exchange(pieces: Sequence[Piece], work: FloatArray) -> float:
@@ -285,6 +289,7 @@ def account(reading: SegmentQuantities) -> Piece:
         lost=segment.lost,
         is_impact=segment.impact,
         is_switched=segment.after_time_event,
+        is_rest=segment.rests,
     )
 
 

@@ -95,7 +95,7 @@ class ImpulsiveProblem:
 class Change(NamedTuple):
     """A moment at which contacts change: time, states before and after, those of contacts, and what is told.
 
-    `strikes` says whether velocities may jump.
+    `strikes` says whether velocities may jump, `rests` whether impacts have accumulated.
     """
 
     time: float
@@ -103,6 +103,7 @@ class Change(NamedTuple):
     held: tuple[float, ...] | None
     told: list[Any]
     strikes: bool = True
+    rests: bool = False
 
 
 class TimeSteppingSession(SteppingSession):

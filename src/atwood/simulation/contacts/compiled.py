@@ -262,7 +262,8 @@ def told_sets(log: SetLog, assembly: Assembly) -> list[Change]:
             told += [] if change is None else [change]
         held = held_after(one, assembly)
         told = in_own_words(assembly, layout, one.time, told, (before, states_of(layout, held)))
-        found.append(Change(one.time, one.states, held, told, any(each.impact for each in told)))
+        strikes = any(each.impact for each in told)
+        found.append(Change(one.time, one.states, held, told, strikes, one.stopped >= 0))
     return found
 
 

@@ -36,6 +36,7 @@ from atwood.simulation.dynamics.orientation_coordinates import (
     switch_functions,
 )
 from atwood.simulation.dynamics.reactions import ReactionSolver
+from atwood.simulation.dynamics.scales import coordinate_scales
 from atwood.simulation.events.sides import SIDE, side_functions
 from atwood.simulation.problem.conditions import Condition, condition_functions
 from atwood.simulation.problem.problem import SceneProblem
@@ -189,6 +190,9 @@ MARGIN = 10.0
 _RUNS = 1000.0
 """Times what is small: slips in two directions that are faster than this may come to rest again."""
 
+_BLUR = 8.0
+"""Times rounding: a gap that opens at zero has closed again when it has passed zero by so much."""
+
 _MOMENT = 1e-12
 """In units of the scene's time: so much later it is seen whether something slows down."""
 
@@ -266,7 +270,9 @@ class EventProbe:
         # What has just passed zero, or will soon, is off by rounding.
         self.shift = np.where(sided & (values <= 0.0), 2.0 * np.abs(values) + TINY, self.shift)
         opening = self._opening(t, q, u, small) & (np.abs(values) <= small)
-        self.shift = np.where(opening, np.where(values > 0.0, 0.0, 2.0 * np.abs(values) + TINY), self.shift)
+        if opening.any():
+            blur = _BLUR * self._rounding(q)
+            self.shift = np.where(opening, np.where(values > blur, 0.0, 2.0 * np.abs(values) + blur), self.shift)
         happened &= ~opening
         self._arm(values, small, happened, (t, q, u))
         self.broken = next((one for one, has in zip(self.event_functions, happened, strict=True) if has), None)
@@ -293,6 +299,12 @@ class EventProbe:
         rates = kinematic_map_of(self.assembly, self.assembly.form).rates(t, q, u)
         accelerations, _ = self.plan.balance.accelerate(t, q, u, self.plan.kept)
         return self.values(t + moment, q + moment * rates, u + moment * accelerations) - self.shift
+
+    def _rounding(self, q: FloatArray) -> FloatArray:
+        """Return by how much rounding of the coordinates, and of what is formed from them, moves each event."""
+        scales = self.plan.scales
+        far = np.max(np.abs(q) / coordinate_scales(self.assembly.own_equations, scales.length), initial=1.0)
+        return np.array([ROUNDING * float(far) * scales.of(one.unit) for one in self.event_functions])
 
     def _opening(self, t: float, q: FloatArray, u: FloatArray, small: FloatArray) -> BoolArray:
         """Return which gaps are at zero and open with a speed: they need no margin."""

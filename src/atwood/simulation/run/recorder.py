@@ -59,6 +59,8 @@ class SegmentRecord:
         Whether it began at a time event, at which energy that comes or goes is work of inputs and drives.
     lost
         Energy that contacts of a group have taken since its start, J, shape (samples,); None where there is none.
+    rests
+        Whether it began where impacts had accumulated.
     """
 
     plan: SceneProblem
@@ -71,6 +73,7 @@ class SegmentRecord:
     singular_crossings: tuple[SingularCrossing, ...] = ()
     after_time_event: bool = False
     lost: FloatArray | None = None
+    rests: bool = False
 
     def __getstate__(self) -> dict[str, Any]:
         return {**vars(self), "misses": partial(np.asarray, self.held)}
@@ -92,7 +95,7 @@ class Stretch:
 
     Attributes
     ----------
-    plan, impact, after_time_event
+    plan, impact, after_time_event, rests
         As of the first record.
     time, coordinates, speeds, shown, misses, singular_crossings, lost
         As of `SegmentRecord`, for all records.
@@ -116,6 +119,7 @@ class Stretch:
     starts: NDArray[np.int_]
     changes: Sequence[Callable[[], Sequence[Change]]]
     lost: FloatArray | None
+    rests: bool
     plan_at: Callable[[int], SceneProblem] | None = None
 
     def records(self) -> Iterable[SegmentRecord]:
@@ -139,6 +143,7 @@ class Stretch:
                 singular_crossings=self.singular_crossings,
                 lost=None if self.lost is None else self.lost[each],
                 after_time_event=self.after_time_event if first == 0 else is_moment,
+                rests=self.rests if first == 0 else change is not None and change.rests,
             )
 
     def _plan_of(self, change: Change | None, known: dict[tuple[float, ...], SceneProblem]) -> SceneProblem:
@@ -342,7 +347,7 @@ class Recorder:
         """Whether nothing has been recorded, and nothing waits."""
         return not any(self._samples)
 
-    def stretch(self, impact: bool, after_time_event: bool = False) -> Stretch:
+    def stretch(self, impact: bool, after_time_event: bool = False, rests: bool = False) -> Stretch:
         """Return what was recorded."""
         self.settle()
         blocks = self._samples[0]
@@ -356,7 +361,7 @@ class Recorder:
             starts = np.append(starts, np.searchsorted(time, np.concatenate(self._jumps)) + 1)
             starts = starts[starts < len(time)]
         lost = None if self.loss_until is None else self.loss_until(time)
-        rest = crossings, starts, tuple(self._changes), lost, self._plan_at
+        rest = crossings, starts, tuple(self._changes), lost, rests, self._plan_at
         return Stretch(self.plan, impact, after_time_event, time, q, u, shown, misses, *rest)
 
     def _finish(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_], waiting: Sequence[_States] = ()) -> None:

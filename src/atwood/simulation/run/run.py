@@ -165,7 +165,7 @@ class Walk:
         self._sampled, self.log, self._known = -np.inf, log, known
         self.assembly = self.first = self._in_piece(self.assembly)
         self.coordinate_switches: list[CoordinateSwitch] = []
-        self.impact, self.show = False, bool(samples.shown[0])
+        self.impact, self.rests, self.show = False, False, bool(samples.shown[0])
         self._handed: tuple[int, ...] = ()
         self.plan: SceneProblem | None = None
         self.ended: EventRecord | None = None
@@ -209,7 +209,7 @@ class Walk:
             if outcome.event is None:
                 if outcome.status == "finished" and (outcome.t < self.options.t_end or self._due()):
                     _, self.q, self.u, _ = recorder.last()
-                    self.impact, chatter = False, 0
+                    self.impact, self.rests, chatter = False, False, 0
                     continue
                 return self._finished_run(outcome.status, outcome.message, outcome)
             target = outcome.event.target
@@ -278,7 +278,7 @@ class Walk:
             raise outcome.error
         if recorder.is_empty:  # nor was there time to
             return recorder, outcome
-        record = recorder.stretch(self.impact, after_time_event)
+        record = recorder.stretch(self.impact, after_time_event, self.rests)
         self.segments.append(self._sides.recorded(record, self.plan, self.assembly, bool(outcome.sides)))
         self._follow(outcome)
         return recorder, outcome
@@ -407,6 +407,7 @@ class Walk:
         told = [one for one in events if one is not self.ended]
         self.events += told if not is_start else [one for one in told if one.impact or one.kind == "opens"]
         self.impact |= any(one.impact for one in events)
+        self.rests |= any(one.kind == "rests" for one in events)
         self.u, self.held = changed.speeds, changed.held
         if changed.touching and not is_start:  # what is found to be closed is so to rounding
             met = self._sides.like(self.assembly.with_held(changed.touching), plan)
@@ -514,7 +515,7 @@ class Walk:
         """Go on in other coordinates of an orientation."""
         _, q, self.u, _ = recorder.last()
         self.assembly, self.q = switch_coordinates(self.assembly, to_regular(self.assembly, q), self._reassemble)
-        self.plan, self.impact, self.show, self._unsettled = None, False, False, ()
+        self.plan, self.impact, self.rests, self.show, self._unsettled = None, False, False, False, ()
         self.coordinate_switches.append(CoordinateSwitch(self.t, event.part))
 
     def _enter(self, outcome: Outcome, recorder: Recorder) -> None:
@@ -522,7 +523,7 @@ class Walk:
         _, q, u, _ = recorder.last()
         event = outcome.event
         assert event is not None
-        self.impact, self.show = event.impact, event.target != SIDE
+        self.impact, self.rests, self.show = event.impact, False, event.target != SIDE
         self._unsettled = ()
         if event.target in CONTACT:
             self.q, self.u, self.probe = q, u, None
