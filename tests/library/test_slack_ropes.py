@@ -163,9 +163,17 @@ def test_two_in_a_row_open_and_close_each_other_in_any_order() -> None:
     runs = [
         simulate(row(order), form=form, rtol=1e-10, t_end=5.0) for order, form in (((0, 1), "reduced"), ((1, 0), "dae"))
     ]
-    assert len(runs[0].events) > 4
-    assert [(one.part, one.law) for one in runs[0].events] == [(one.part, one.law) for one in runs[1].events]
-    assert [one.time for one in runs[0].events] == pytest.approx([one.time for one in runs[1].events], abs=1e-7)
+    # The jerks come ever faster, and the last ones are too near to each other for their number to be known.
+    told = [
+        [(one.part, one.law) for one in result.events if one.time < result.events[-1].time - 1e-6] for result in runs
+    ]
+    assert len(told[0]) > 8
+    assert told[0] == told[1]
+    times = [[one.time for one in result.events] for result in runs]
+    assert times[0][: len(told[0])] == pytest.approx(times[1][: len(told[0])], abs=1e-7)
+    assert times[0][-1] == pytest.approx(times[1][-1], abs=1e-6)
+    for path in ("mass0.position.x", "mass1.position.x", "mass1.velocity.z"):
+        assert runs[0][path][-1] == pytest.approx(runs[1][path][-1], abs=1e-8)
     for result in runs:
         assert result.energy.max_drift < 1e-6
         for k, (a, b) in enumerate((("mass0", None), ("mass1", "mass0"))):
