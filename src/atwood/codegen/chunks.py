@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 
-from atwood.codegen.llvm.layout import Body, Layout, MatrixKey, Unit, lay_out, matrix_key
+from atwood.codegen.llvm.layout import Body, Layout, MatrixKey, Unit, lay_out, matrix_key, places_of, targets_of
 from atwood.codegen.llvm.text import OWN_FUNCTIONS
 from atwood.codegen.routines import own_name
 from atwood.errors import UnsupportedError
@@ -54,7 +54,7 @@ class Places:
     pointers: list[str]
 
 
-def places_of(body: Body, at: Callable[[str, int], str]) -> Places:
+def write_places(body: Body, at: Callable[[str, int], str]) -> Places:
     """Return where everything is of a body; ``at`` writes an element of an array."""
     layout = lay_out(body, _LONGEST)
     systems = {matrix_key(unit[0]) for chunk in layout.chunks for unit in chunk if unit[0].operation == "solve"}
@@ -62,12 +62,10 @@ def places_of(body: Body, at: Callable[[str, int], str]) -> Places:
     for key in sorted(systems - set(regions)):
         size = round(len(key) ** 0.5)
         regions[key], used = used, used + size * (size + 2)
-    known = {node.index: at(pointer, k) for pointer, nodes in body.given for k, node in enumerate(nodes)}
+    known = {index: at(*place) for index, place in places_of(body).items()}
     known |= {index: at("scratch", slot) for index, slot in layout.slots.items()}
-    targets: dict[int, list[str]] = {}
+    targets = {index: [at(*place) for place in places] for index, places in targets_of(body).items()}
     results = {node.index: node for node, _, _ in body.results}
-    for node, pointer, position in body.results:
-        targets.setdefault(node.index, []).append(at(pointer, position))
     computed = {node.index for chunk in layout.chunks for unit in chunk for node in unit}
     passed = [node for index, node in results.items() if index not in computed]
     given = {pointer for pointer, _ in body.given if pointer != "derived"}

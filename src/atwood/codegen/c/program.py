@@ -14,9 +14,9 @@ from atwood.codegen.chunks import (
     CHOICES,
     FUNCTIONS,
     ChunkWriter,
-    places_of,
     print_bodies,
     write_chunks,
+    write_places,
 )
 from atwood.codegen.llvm.layout import Body, main_body, prologue_body
 from atwood.codegen.llvm.text import OWN_FUNCTIONS
@@ -56,7 +56,7 @@ outputs[0].p = derived;
 
 
 def _print(name: str, body: Body) -> tuple[str, int]:
-    places = places_of(body, lambda pointer, k: f"{pointer}[{k}].f")
+    places = write_places(body, lambda pointer, k: f"{pointer}[{k}].f")
     written = write_chunks(places, partial(_Writer, places))
     parts = ["\n".join([*one.lines, f"return {' + '.join(one.sums) or '0.0'};"]) for one in written]
     return _joined(name, parts, places.pointers), places.scratch

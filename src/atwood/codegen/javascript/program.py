@@ -15,9 +15,9 @@ from atwood.codegen.chunks import (
     FUNCTIONS,
     ChunkWriter,
     Places,
-    places_of,
     print_bodies,
     write_chunks,
+    write_places,
 )
 from atwood.codegen.functions import write_routines
 from atwood.codegen.javascript.printer import literal, print_routines
@@ -69,7 +69,7 @@ M[0] = top;
 
 
 def _print(name: str, body: Body) -> tuple[str, int]:
-    places = places_of(body, lambda pointer, k: f"M[{pointer} + {k}]")
+    places = write_places(body, lambda pointer, k: f"M[{pointer} + {k}]")
     written = write_chunks(places, partial(_Writer, places))
     alone, checks = len(written) == 1, not name.endswith("_values")
     arguments = ", ".join(["derived", "scratch", *places.pointers])
