@@ -33,14 +33,12 @@ class Loop:
     ----------
     stretches
         The operations of each.
+    read
+        What each reads of the outside: one value for each, stretch by stretch.
     """
 
     stretches: tuple[tuple[Unit, ...], ...]
-
-    @property
-    def read(self) -> list[tuple[Expression, ...]]:
-        """What stretches read of the outside: one value for each, stretch by stretch."""
-        return list(zip(*(_outside(one) for one in self.stretches), strict=True))
+    read: tuple[tuple[Expression, ...], ...]
 
 
 Chunk = tuple[Unit, ...] | Loop
@@ -80,14 +78,16 @@ def find_loops(
         straight += units[taken:start]
         stretches = [tuple(units[at : at + period]) for at in range(start, start + length - period + 1, period)]
         taken = start + len(stretches) * period
-        shapes = [_shape(one, known, targets) for one in stretches]
+        read = [_outside(one) for one in stretches]
+        shapes = [_shape(one, outside, known, targets) for one, outside in zip(stretches, read, strict=True)]
         first = 0
         while first < len(stretches):
             end = first + 1
             while end < len(stretches) and shapes[end] == shapes[first]:
                 end += 1
             if end - first >= _FEWEST and (end - first) * period >= _LEAST:
-                found += [tuple(straight)] * bool(straight) + [Loop(tuple(stretches[first:end]))]
+                loop = Loop(tuple(stretches[first:end]), tuple(zip(*read[first:end], strict=True)))
+                found += [tuple(straight)] * bool(straight) + [loop]
                 straight = []
             else:
                 straight += [unit for one in stretches[first:end] for unit in one]
@@ -153,10 +153,12 @@ def _outside(stretch: Sequence[Unit]) -> list[Expression]:
 
 
 def _shape(
-    stretch: Sequence[Unit], known: Mapping[int, tuple[str, int]], targets: Mapping[int, Sequence[tuple[str, int]]]
+    stretch: Sequence[Unit],
+    read: Sequence[Expression],
+    known: Mapping[int, tuple[str, int]],
+    targets: Mapping[int, Sequence[tuple[str, int]]],
 ) -> tuple[object, ...]:
-    """Return all of a stretch but where its values lie."""
-    read = _outside(stretch)
+    """Return all of a stretch, and of what it reads of the outside, but where values lie."""
     names: dict[int, object] = {
         one.index: (k, known[one.index][0] if one.index in known else "") for k, one in enumerate(read)
     }

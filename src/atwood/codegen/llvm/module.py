@@ -221,8 +221,9 @@ def _write_loop(
             carried.append((name_of_it, writer.load(*places[first.index]), made_before))
             writer.values[first.index] = name_of_it
     start, writer.lines, writer.places = writer.lines, [], read
+    solver = Solver({})
     for unit in loop.stretches[0]:
-        _write_unit(writer, Solver({}), unit)
+        _write_unit(writer, solver, unit)
         for node in unit:
             row = made[node.index]
             if node.index in places:
