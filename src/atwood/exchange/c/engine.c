@@ -36,15 +36,7 @@ static int32_t events_at(double t, word *y, word *yp, word *target, word *data)
 #endif
 
 #if EVENTS || CONTACTS || SWITCHES
-static void log_event(scene *s, double time, int source, int kind, double speed)
-{
-    scene_happening *const one = s->log + s->happened % scene_LOGGED;
-    one->time = time;
-    one->speed = speed;
-    one->source = source;
-    one->kind = kind;
-    s->happened++;
-}
+/* log */
 #endif
 
 /* Where everything lies; after an instance was copied, too. */

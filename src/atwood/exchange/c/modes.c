@@ -19,15 +19,7 @@ static int say(scene *s, int status, const char *text)
     return status;
 }
 
-static void log_event(scene *s, double time, int source, int kind, double speed)
-{
-    scene_happening *const one = s->log + s->happened % scene_LOGGED;
-    one->time = time;
-    one->speed = speed;
-    one->source = source;
-    one->kind = kind;
-    s->happened++;
-}
+/* log */
 
 /* modes */
 static int ask(scene *s, int request, double t, double *values)

@@ -127,7 +127,7 @@ def scene_text(
             of_modes[f"{own}.h"] = with_name(with_declarations(own_header), own)
             of_modes[f"{own}.c"] = with_name(own_source, own)
         header = header_of_modes(_template("scene.h"), modes, _counts(modes, parameters))
-        source = source_of_modes([*map(_template, ("modes.c", "ask.c", "change.c"))], modes, parameters)
+        source = source_of_modes([_with_log("modes.c"), _template("ask.c"), _template("change.c")], modes, parameters)
     return SceneText(
         name,
         with_name(header, name),
@@ -440,9 +440,14 @@ def _updating(programs: dict[str, Program]) -> str:
 """
 
 
+def _with_log(name: str) -> str:
+    """Return a template with what tells of events."""
+    return _template(name).replace("/* log */\n", _template("log.c"))
+
+
 def _engine(sizes: dict[str, int]) -> str:
     """Return the engine, with what passes through all bodies and what meets contacts where there are any."""
-    text = _template("engine.c")
+    text = _with_log("engine.c")
     for name, size in {"contacts": "", "sides": "", "leastnorm": "", "passage": "", "start": "STARTS"}.items():
         text = text.replace(f"/* {name} */\n", _template(f"{name}.c") if sizes[size or name.upper()] else "")
     return text
