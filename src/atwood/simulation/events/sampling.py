@@ -7,7 +7,7 @@ any Python; what they read is one program.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,12 +23,9 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.model.declare.component import Binding, Component, bind
 from atwood.model.declare.laws import Law, numbers_in
+from atwood.simulation.events.time_events import MOMENT
 
 _SAMPLER: Key[Sampler] = Key("sample times")
-
-_ROUNDING = 16.0
-"""Times that are so many units of rounding apart are one moment."""
-
 
 _MOST = 10_000_000
 """More sample times than these are no run."""
@@ -184,12 +181,8 @@ def evaluated(
     one: Update, assembly: Assembly, t: float, values: Mapping[str, Mapping[str, Any]], reading: UpdateInputs
 ) -> list[float]:
     """Return the numbers that one update returns."""
-    part, space = assembly.flat.parts[one.path], assembly.mechanism.space
-    known: dict[str, Any] = {**part.values, **values.get(one.path, {})}
-    for name, spec in part.component.state_specs().items():
-        numbers = [values[""].get(f"{one.path}.{own}", 0.0) for own in spec.names(part.values)]
-        known[name] = numbers[0] if spec.count is None else tuple(numbers)
-    bound = bind(part.component, Binding(values=known, time=t, space=space.name, line=space.line))
+    known = {**assembly.flat.parts[one.path].values, **values.get(one.path, {})}
+    bound = with_states(assembly, one.path, t, known, lambda state: values[""].get(state, 0.0))
     try:
         given = [float(value) for value in numbers_in(getattr(bound, one.law.name)())]
     except AtwoodError:
@@ -206,6 +199,16 @@ def evaluated(
             where=one.label,
         )
     return given
+
+
+def with_states(assembly: Assembly, path: str, t: Any, known: Mapping[str, Any], state: Callable[[str], Any]) -> Any:
+    """Return a component with its parameters and inputs as they are known, and its states by their paths."""
+    part, space = assembly.flat.parts[path], assembly.mechanism.space
+    found = dict(known)
+    for name, spec in part.component.state_specs().items():
+        numbers = [state(f"{path}.{own}") for own in spec.names(part.values)]
+        found[name] = numbers[0] if spec.count is None else tuple(numbers)
+    return bind(part.component, Binding(values=found, time=t, space=space.name, line=space.line))
 
 
 def remembering(assembly: Assembly) -> list[str]:
@@ -244,7 +247,7 @@ def _find_sampler(assembly: Assembly, start: float, end: float, moments: FloatAr
     merged: list[float] = []
     due: list[tuple[int, ...]] = []
     for t in order:
-        if merged and t - merged[-1] <= _ROUNDING * np.spacing(abs(t)):
+        if merged and t - merged[-1] <= MOMENT * np.spacing(abs(t)):
             due[-1] = tuple(sorted({*due[-1], *times[t]}))
         else:
             merged.append(t)
@@ -288,7 +291,7 @@ def _times(one: Update, assembly: Assembly, start: float, end: float) -> list[fl
     """Return when an update is due; pieces of functions of time do not begin at the very end of a run."""
     if one.law.options.when:
         given = np.array([start, *getattr(_bound(assembly, one.path, start), one.law.options.when)()], dtype=float)
-        return [float(t) for t in np.unique(given) if start <= t < end - _ROUNDING * np.spacing(abs(end))]
+        return [float(t) for t in np.unique(given) if start <= t < end - MOMENT * np.spacing(abs(end))]
     if one.every is None:
         return []
     span = end - start - one.offset
@@ -298,7 +301,7 @@ def _times(one: Update, assembly: Assembly, start: float, end: float) -> list[fl
         )
     count = max(0, int(np.ceil(span / one.every)) + 1)
     times = start + (one.offset + one.every * np.arange(count))
-    return [min(float(t), end) for t in times if t <= end + _ROUNDING * np.spacing(abs(end))]
+    return [min(float(t), end) for t in times if t <= end + MOMENT * np.spacing(abs(end))]
 
 
 def _snapped(times: FloatArray, moments: FloatArray) -> FloatArray:
@@ -308,7 +311,7 @@ def _snapped(times: FloatArray, moments: FloatArray) -> FloatArray:
     after = np.clip(np.searchsorted(moments, times), 1, max(1, len(moments) - 1))
     low, high = moments[after - 1], moments[np.minimum(after, len(moments) - 1)]
     nearest = np.where(times - low < high - times, low, high)
-    return np.where(np.abs(nearest - times) <= _ROUNDING * np.spacing(np.abs(times)), nearest, times)
+    return np.where(np.abs(nearest - times) <= MOMENT * np.spacing(np.abs(times)), nearest, times)
 
 
 _BOUND_KERNELS: Key[dict[bytes, BoundKernel]] = Key("what updates read, with parameters")

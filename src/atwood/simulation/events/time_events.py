@@ -27,7 +27,7 @@ _SCHEDULE: Key[Schedule] = Key("schedule")
 _RATE_OF_RELATION: Key[list[Expression]] = Key("its derivative")
 
 
-_ROUNDING = 16.0
+MOMENT = 16.0
 """Times that are so many units of rounding apart are one moment."""
 
 _MOST = 100_000
@@ -73,7 +73,7 @@ class Schedule:
     def reached(self, t: float) -> float:
         """Return a time, or the time of change that comes so soon that it is the same moment."""
         coming = self.next(t, np.inf)
-        return coming if coming - t <= _ROUNDING * np.spacing(abs(coming)) else t
+        return coming if coming - t <= MOMENT * np.spacing(abs(coming)) else t
 
     def at_samples(self, samples: FloatArray) -> Schedule:
         """Return the same with times that are those of samples but for rounding put there.
@@ -85,7 +85,7 @@ class Schedule:
         after = np.clip(np.searchsorted(samples, self.times), 1, max(1, len(samples) - 1))
         low, high = samples[after - 1], samples[np.minimum(after, len(samples) - 1)]
         nearest = np.where(self.times - low < high - self.times, low, high)
-        is_same = np.abs(nearest - self.times) <= 0.5 * _ROUNDING * np.spacing(np.abs(self.times))
+        is_same = np.abs(nearest - self.times) <= 0.5 * MOMENT * np.spacing(np.abs(self.times))
         return Schedule(np.where(is_same, nearest, self.times), self.values)
 
     def applied(self, assembly: Assembly, piece: int) -> Assembly:
@@ -136,7 +136,7 @@ class _Pieces:
         search = _Search(assembly, number, self)
         roots = search.roots()
         after = np.clip(np.searchsorted(self.edges, roots), 1, len(self.edges) - 1)
-        near = _ROUNDING * np.spacing(np.abs(roots))
+        near = MOMENT * np.spacing(np.abs(roots))
         inside = (roots > self.edges[after - 1] + near) & (roots < self.edges[after] - near)
         edges = np.unique(np.concatenate([self.edges, roots[inside]]))
         owner = np.searchsorted(self.edges, edges[:-1], side="right") - 1
@@ -156,7 +156,7 @@ class _Pieces:
     def schedule(self) -> Schedule:
         """Return times and values, without pieces that last no longer than rounding."""
         sizes = np.maximum(np.abs(self.edges[:-1]), np.abs(self.edges[1:]))
-        lasting = np.diff(self.edges) > _ROUNDING * np.spacing(sizes)
+        lasting = np.diff(self.edges) > MOMENT * np.spacing(sizes)
         left = _Pieces(np.append(self.edges[:-1][lasting], self.edges[-1]), self.values[:, lasting]).joined()
         return Schedule(left.edges[1:-1], left.values)
 

@@ -18,9 +18,8 @@ from atwood.errors import AtwoodError
 from atwood.expr import Expression, Graph, InputGroup, OutputGroup, Program
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
-from atwood.model.declare.component import Binding, bind
 from atwood.model.declare.laws import numbers_in
-from atwood.simulation.events.sampling import Sampler, Update, UpdateInputs, in_order, update_inputs_of
+from atwood.simulation.events.sampling import Sampler, Update, UpdateInputs, in_order, update_inputs_of, with_states
 
 _CODE: Key[UpdateCode | None] = Key("machine code of updates")
 
@@ -102,7 +101,7 @@ class _Law:
 
     def __init__(self, one: Update, assembly: Assembly, reading: UpdateInputs) -> None:
         self.update, self._symbolic = one, assembly.mechanism.locals_[one.path].binding.values
-        part, graph, space = assembly.flat.parts[one.path], _Notes(), assembly.mechanism.space
+        part, graph = assembly.flat.parts[one.path], _Notes()
         self._names = [name for name in part.values if name not in part.signals]
         parameters: list[Expression] = []
 
@@ -115,18 +114,18 @@ class _Law:
             return known
 
         known = {name: symbols(self._symbolic.get(name), part.values[name]) for name in self._names}
-        t, held, q, inputs = graph.symbol("t"), dict[int, Expression](), dict[int, Expression](), []
+        t, inputs = graph.symbol("t"), []
         for number, (path, name) in enumerate(reading.inputs):
             inputs.append(graph.symbol(f"input {number}"))
             if path == one.path:
                 known[name] = inputs[-1]
         held = {i: graph.symbol(f"held {i}") for i in range(len(assembly.discrete_states))}
         q = {i: graph.symbol(f"q {i}") for i in range(len(assembly.own_equations.coordinates))}
-        for name, spec in part.component.state_specs().items():
-            paths = [f"{one.path}.{own}" for own in spec.names(part.values)]
-            numbers = [held[reading.held[x]] if x in reading.held else q[reading.states[x]] for x in paths]
-            known[name] = numbers[0] if spec.count is None else tuple(numbers)
-        bound = bind(part.component, Binding(values=known, time=t, space=space.name, line=space.line))
+
+        def state(path: str) -> Expression:
+            return held[reading.held[path]] if path in reading.held else q[reading.states[path]]
+
+        bound = with_states(assembly, one.path, t, known, state)
         found = [_operand(graph, value) for value in numbers_in(getattr(bound, one.law.name)())]
         if len(found) != len(one.sets):
             raise TypeError("an update returns another number of values than it sets")

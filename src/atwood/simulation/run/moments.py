@@ -19,14 +19,11 @@ from atwood.integrators.moments import DONE, PAUSES, USED_UP, Changes
 from atwood.lazy_dataclasses import dataclass
 from atwood.simulation.events.impacts_in_time import motion_switches
 from atwood.simulation.events.sampling import Sampler, Updated
-from atwood.simulation.events.time_events import Schedule
+from atwood.simulation.events.time_events import MOMENT, Schedule
 from atwood.simulation.problem.options import RunOptions, Samples
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.run.recorder import Recorder
 from atwood.simulation.run.session import Filling
-
-_ROUNDING = 16.0
-"""Times that are so many units of rounding apart are one moment."""
 
 _BLOCKS = 50
 """Progress is told about so many times."""
@@ -105,7 +102,7 @@ def times_ahead(plan: SceneProblem, schedule: Schedule, sampler: Sampler, t: flo
         or any(one.law.options.at for one in sampler.updates)
     )
     gaps = np.diff(np.append(times, end))
-    return times if is_plain and np.all(gaps > _ROUNDING * np.spacing(np.abs(times) + end)) else np.array([t])
+    return times if is_plain and np.all(gaps > MOMENT * np.spacing(np.abs(times) + end)) else np.array([t])
 
 
 def pass_moments(

@@ -32,6 +32,7 @@ from atwood.simulation.dynamics.orientation_coordinates import (
 from atwood.simulation.dynamics.redundancy import RankFinding
 from atwood.simulation.events.modes import EventProbe, EventRecord, ToldLater, seen_late, without_margin
 from atwood.simulation.events.sides import SIDE
+from atwood.simulation.events.time_events import MOMENT
 from atwood.simulation.problem.preparation import pack_state
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.projection import project_safely
@@ -49,9 +50,6 @@ if TYPE_CHECKING:
 
 _BLOCKS = 50
 """Progress is told about so many times."""
-
-_MOMENT = 16.0
-"""Times that are so many units of rounding apart are one."""
 
 _PARTS = 5
 """So often it is seen to that coordinates of orientations keep their size."""
@@ -237,7 +235,7 @@ class _Runner:
             self.recorder.rewind(step_result.t)
             event, *together = self.segment.probe.changing(step_result)
             end = self.segment.end
-            if end - step_result.t <= _MOMENT * np.spacing(abs(end)):  # no step is left
+            if end - step_result.t <= MOMENT * np.spacing(abs(end)):  # no step is left
                 step_result = replace(step_result, t=end)
             if event.target not in (COORDINATE_SWITCH, SIDE):
                 self.recorder.take(step_result.t, step_result.y, True)
