@@ -19,7 +19,6 @@ from atwood_library import (
     OneWayClutch,
     RotationalFriction,
     RotationalSource,
-    RotationalSpringDamper,
     RotationalStop,
 )
 
@@ -48,23 +47,6 @@ def train(speeds: dict[str, float], moments: dict[str, float]) -> Scene:
 def push(scene: Scene, name: str, rotor: str, torque: object) -> None:
     source = scene.add(name, RotationalSource(value=torque, against="ground"))
     scene.connect(getattr(scene, rotor).flange, source.b)
-
-
-@FORMS
-def test_modelica_s_friction(form: str) -> None:
-    """Modelica.Mechanics.Rotational.Examples.Friction: a clutch sticks and slips, a brake stops, both stick."""
-    scene = train({"J1": 90.0, "J2": 90.0, "J3": 100.0}, {"J1": 1.0, "J2": 0.05, "J3": 1.0})
-    push(scene, "motor", "J3", lambda t: aw.select(t < 0.5, 200.0 * aw.sin(100.0 * t), 0.0))
-    clutch = scene.add("clutch", RotationalFriction(sliding="80"))
-    spring = scene.add("spring", RotationalSpringDamper(stiffness=160.0, damping=1.0))
-    level = lambda t: aw.select(t < 0.5, 0.0, 1.0)  # noqa: E731
-    brake = scene.add("brake", RotationalFriction(sliding="800", against="ground", level=level))
-    for one, other in ((scene.J3, clutch.a), (scene.J2, clutch.b), (scene.J2, spring.a), (scene.J1, spring.b)):
-        scene.connect(one.flange, other)
-    scene.connect(scene.J1.flange, brake.b)
-    known = [0.0067797089, 0.0593392840, 0.1092898268, 0.5342483385, 0.6406139408, 1.6636414428]
-    found = [one.time for one in run(scene, form, 2.0).events if one.time != 0.5]
-    assert found == pytest.approx(known, abs=1e-10)
 
 
 def lossy_train(bearing: bool) -> Scene:

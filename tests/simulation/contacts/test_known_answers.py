@@ -7,34 +7,24 @@ import math
 import numpy as np
 import pytest
 import scipy.special
-from tests.helpers.contact_scenes import box_of_walls, rough_pendulum
 
 import atwood as aw
 from atwood import Scene, simulate
 from atwood.simulation.events.modes import find_event_functions
 from atwood_library import (
-    BallContact,
     Box,
     BoxContact,
-    DistanceContact,
     Ground,
-    Inertia,
     Link,
-    Mass1D,
     Pivot,
     PointContact,
     PointMass,
     PointOnPlane,
-    RotationalFriction,
-    RotationalSource,
-    RotationalStop,
     Slider,
     Sphere,
     Spherical,
     Spring,
-    SurfaceContact,
     Universal,
-    VertexContact,
 )
 
 G = 9.81
@@ -92,16 +82,6 @@ def test_what_bounces_and_slides_is_rubbed_until_its_impacts_have_accumulated(fo
 
 @pytest.mark.sample(1)
 @FORMS
-def test_a_ball_in_a_box_is_reflected_as_light_is(form: str) -> None:
-    """Unfolded, its way is straight: after 4,321 s the place is that of a triangle wave of each coordinate."""
-    result = run(box_of_walls(), form, 4321.0)
-    assert len(times(result, "impact")) == 10_322
-    assert result["m.position.x"][-1] == pytest.approx(0.5, abs=2e-10)
-    assert result["m.position.z"][-1] == pytest.approx(0.4, abs=2e-10)
-
-
-@pytest.mark.sample(1)
-@FORMS
 @pytest.mark.parametrize("friction", [0.0, 1e-12])
 def test_an_elastic_ball_keeps_its_energy(form: str, friction: float) -> None:
     """Times of impacts are rounded, all the same way: what a ball falls in the rest of an ulp adds up."""
@@ -139,211 +119,6 @@ def test_a_block_slides_up_a_slope_and_stays(form: str) -> None:
     assert times(result, "sticks") == [pytest.approx(1.0 / slowing, abs=1e-10)]
     assert result["c.friction_force"][-1] == pytest.approx(2.0 * G * math.sin(0.3))
     assert result["c.slip_state"][-1] == 2.0
-
-
-@FORMS
-def test_a_block_slides_up_a_slope_and_back(form: str) -> None:
-    result = run(on_slope(0.6, 1.0), form, 0.3364573836)
-    assert along(result, 0.6, "position") == pytest.approx(0.0, abs=1e-9)
-    assert along(result, 0.6, "velocity") == pytest.approx(-0.5119431119, abs=1e-9)
-    assert len(times(result, "reverses")) == 1
-
-
-@FORMS
-def test_a_block_that_slides_across_a_slope_is_turned_down(form: str) -> None:
-    """With tan(angle) as friction, speed and its part downwards always add up to the same (a puck on a slope)."""
-    result = run(on_slope(0.3, 0.0, 2.0, math.tan(0.3)), form, 1.0)
-    assert math.hypot(along(result, 0.3, "velocity"), result["m.velocity.y"][-1]) == pytest.approx(
-        1.0081781882, abs=1e-9
-    )
-
-
-@FORMS
-def test_a_mass_on_a_spring_stops_where_friction_holds_it(form: str) -> None:
-    scene = on_plane(PointMass(mass=2.0), PointContact(friction=0.3))
-    spring = scene.add("spring", Spring(stiffness=50.0))
-    scene.connect(scene.ground.frame, spring.a)
-    scene.connect(scene.m.point, spring.b)
-    start_at(scene, 1.0, 0.0, 0.0, 0.0)
-    result = run(scene, form, 5.0)
-    assert times(result, "sticks")[-1] == pytest.approx(2.5132741229, abs=1e-9)
-    assert result["m.position.x"][-1] == pytest.approx(0.05824, abs=1e-9)
-
-
-@FORMS
-def test_a_mass_on_a_belt_sticks_and_slips(form: str) -> None:
-    contact = PointContact(friction=0.4, static_friction=0.6, surface_velocity=0.2)
-    scene = on_plane(PointMass(mass=1.0), contact)
-    wall, spring = (
-        scene.add("wall", Ground(position=(-5.0, 0.0, 0.0))),
-        scene.add("spring", Spring(stiffness=100.0, natural_length=5.0)),
-    )
-    scene.connect(wall.frame, spring.a)
-    scene.connect(scene.m.point, spring.b)
-    start_at(scene, 0.0, 0.0, 0.2, 0.0)
-    periods = np.diff(times(run(scene, form, 3.0), "slips"))
-    assert periods == pytest.approx(np.full(len(periods), 0.6693570623), abs=1e-9)
-
-
-@FORMS
-def test_a_sliding_ball_comes_to_roll(form: str) -> None:
-    scene = on_plane(Sphere(mass=1.0, radius=0.1), BallContact(friction=0.2, radius=0.1))
-    start_at(scene, 0.0, 0.1, 8.0, 0.0)
-    scene.start["m.angular_velocity.y"] = 0.0
-    result = run(scene, form, 2.0)
-    assert times(result, "sticks") == [pytest.approx(1.1649919907, abs=1e-9)]
-    assert result["m.velocity.x"][-1] == pytest.approx(5.0 / 7.0 * 8.0, abs=1e-9)
-
-
-@FORMS
-def test_a_cue_ball_with_spin_comes_to_roll(form: str) -> None:
-    """Friction keeps its direction while it slips: it rolls after 2 u/(7 mu g), u the slip at first."""
-    scene = on_plane(Sphere(mass=1.0, radius=0.0286), BallContact(friction=0.25, radius=0.0286), space="space")
-    start_at(scene, 0.0, 0.0286, 2.0, 0.0)
-    scene.start.update({"m.position.y": 0.0, "m.velocity.y": 0.0})
-    scene.start.update({f"m.angular_velocity.{axis}": value for axis, value in zip("xyz", (30, 40, 10), strict=True)})
-    result = run(scene, form, 0.5)
-    assert times(result, "sticks") == [pytest.approx(0.1411949146, abs=1e-9)]
-    assert result["m.velocity.x"][-1] == pytest.approx(1.7554285714, abs=1e-9)
-    assert result["m.velocity.y"][-1] == pytest.approx(-0.2451428571, abs=1e-9)
-
-
-@FORMS
-def test_a_ladder_leaves_the_wall(form: str) -> None:
-    scene = Scene()
-    ground, m = scene.add("ground", Ground()), scene.add("m", Link(length=2.0, mass=1.0))
-    for name, normal, end in (("floor", (0, 0, 1), m.a), ("wall", (1, 0, 0), m.b)):
-        contact = scene.add(name, VertexContact(normal=normal))
-        scene.connect(ground.frame, contact.plane)
-        scene.connect(end, contact.body)
-    scene.start.update({"m.angle": 0.5 * math.pi + 0.3, "m.angular_velocity": 0.0, "floor.gap": 0.0, "wall.gap": 0.0})
-    result = run(scene, form, 0.7)
-    assert [(one.part, one.kind) for one in result.events] == [("wall", "opens")]
-    assert result.events[0].time == pytest.approx(0.6505624421, abs=1e-9)
-
-
-@FORMS
-def test_a_bead_leaves_a_sphere(form: str) -> None:
-    scene = Scene()
-    ground, m = scene.add("ground", Ground()), scene.add("m", PointMass(mass=1.0))
-    contact = scene.add("c", SurfaceContact(function="x**2 + z**2 - 1"))
-    scene.connect(ground.frame, contact.a)
-    scene.connect(m.point, contact.b)
-    start_at(scene, 0.0, 1.0, 0.5, 0.0)
-    assert times(run(scene, form, 1.0), "opens") == [pytest.approx(0.7542388380, abs=1e-9)]
-
-
-@FORMS
-def test_a_stick_that_falls_slips(form: str) -> None:
-    scene = on_plane(Link(length=1.0, mass=1.0), VertexContact(friction=0.25))
-    scene.start.update({"m.angle": 0.5 * math.pi + 0.1, "m.angular_velocity": 0.0, "c.gap": 0.0, "c.slip": 0.0})
-    assert times(run(scene, form, 0.6), "slips") == [pytest.approx(0.4962296185, abs=1e-9)]
-
-
-@pytest.mark.sample(1)
-@FORMS
-def test_a_block_rocks(form: str) -> None:
-    """G. Housner's block (Bull. Seism. Soc. Am. 53, 1963): each impact leaves 1 - 3/2 sin^2(alpha) of the rate."""
-    box = BoxContact(length=0.5, height=2.0, friction=10.0)
-    scene = on_plane(Box(mass=1.0, length_x=0.5, length_z=2.0), box)
-    scene.start.update({"m.angle": 0.15, "m.angular_velocity.y": 0.0, "c.corner[0].gap": 0.0, "c.corner[0].slip": 0.0})
-    result = run(scene, form, 9.0)
-    found = times(result, "impact")
-    assert found[0] == pytest.approx(0.5999358452, abs=1e-9)
-    assert found[3] == pytest.approx(2.9278155896, abs=1e-9)
-    assert times(result, "rests") == [pytest.approx(8.6907773166, abs=1e-8)]
-    assert result["m.angle"][-1] == pytest.approx(0.0, abs=1e-9)
-
-
-@FORMS
-@pytest.mark.parametrize(
-    ("impacts", "speeds"), [("together", [-0.6, 0.4, 0.4, 0.4, 0.4]), ("one_by_one", [0, 0, 0, 0, 1])]
-)
-def test_newton_s_cradle(form: str, impacts: str, speeds: list[float]) -> None:
-    scene = Scene(space="line")
-    balls = [scene.add(f"m{i}", Mass1D(mass=1.0)) for i in range(5)]
-    for i in range(4):
-        contact = scene.add(f"c{i}", DistanceContact(lower=0.1, restitution=1.0))
-        scene.connect(balls[i].flange, contact.a)
-        scene.connect(balls[i + 1].flange, contact.b)
-    for i in range(5):
-        scene.start.update({f"m{i}.displacement": 0.1 * i - 0.5 * (i == 0), f"m{i}.speed": float(i == 0)})
-    result = run(scene, form, 1.0, impacts=impacts)
-    assert [float(result[f"m{i}.speed"][-1]) for i in range(5)] == pytest.approx(speeds, abs=1e-12)
-
-
-@FORMS
-def test_an_engine_runs_into_ten_wagons(form: str) -> None:
-    scene = Scene(space="line")
-    wagons = [scene.add(f"m{i}", Mass1D(mass=1.0)) for i in range(11)]
-    for i in range(10):
-        contact = scene.add(f"c{i}", DistanceContact(lower=1.0))
-        scene.connect(wagons[i].flange, contact.a)
-        scene.connect(wagons[i + 1].flange, contact.b)
-    for i in range(11):
-        scene.start.update({f"m{i}.displacement": 1.1 * i, f"m{i}.speed": 3.0 * (i == 0)})
-    result = run(scene, form, 2.0)
-    assert times(result, "impact")[-1] == pytest.approx(sum(0.1 * k / 3.0 for k in range(1, 11)), abs=1e-9)
-    assert result["m10.speed"][-1] == pytest.approx(3.0 / 11.0)
-
-
-@FORMS
-def test_two_rotors_with_play(form: str) -> None:
-    scene = Scene()
-    a, b = scene.add("a", Inertia(moment=1.0)), scene.add("b", Inertia(moment=2.0))
-    play = scene.add("play", RotationalStop(lower=-0.1, upper=0.1, restitution=0.6))
-    scene.connect(a.flange, play.a)
-    scene.connect(b.flange, play.b)
-    scene.start.update({"a.angle": 0.0, "b.angle": 0.0, "a.angular_velocity": 5.0, "b.angular_velocity": 0.0})
-    assert times(run(scene, form, 1.3), "impact")[5] == pytest.approx(1.2060082305, abs=1e-9)
-
-
-@FORMS
-def test_a_pendulum_with_friction_in_its_hinge_stays(form: str) -> None:
-    result = run(rough_pendulum(1.5), form, 15.0)
-    assert (result.events[-1].kind, result.events[-1].time) == ("sticks", pytest.approx(13.6445534015, abs=1e-9))
-
-
-@FORMS
-def test_modelica_s_coupled_clutches(form: str) -> None:
-    """Modelica.Mechanics.Rotational.Examples.CoupledClutches: times at which its clutches stick and slip."""
-    scene, turn = Scene(), 2.0 * math.pi
-    rotors = [scene.add(f"J{i}", Inertia(moment=1.0)) for i in range(4)]
-    motor = scene.add("motor", RotationalSource(value=lambda t: 10.0 * aw.sin(turn * 5.0 * t), against="ground"))
-    scene.connect(rotors[0].flange, motor.b)
-    levels = [
-        lambda t: aw.sin(turn * 0.2 * t + 0.5 * math.pi),
-        lambda t: aw.select(t < 0.4, 0.0, 1.0),
-        lambda t: aw.select(t < 0.9, 0.0, 1.0),
-    ]
-    for i, level in enumerate(levels):
-        clutch = scene.add(f"clutch{i}", RotationalFriction(sliding="10", peak=1.1, level=level))
-        scene.connect(rotors[i].flange, clutch.a)
-        scene.connect(rotors[i + 1].flange, clutch.b)
-    for i in range(4):
-        scene.start.update({f"J{i}.angle": 0.0, f"J{i}.angular_velocity": 10.0 * (i == 0)})
-    known = [0.7096214747, 0.7916623592, 0.8311085061, 0.9068501928, 1.0002958599, 1.1439674925]
-    found = [one.time for one in run(scene, form, 1.2).events if one.time > 0.5 and one.time != 0.9]
-    assert found == pytest.approx(known, abs=1e-9)
-
-
-@FORMS
-def test_a_ball_bounces_in_a_circle(form: str) -> None:
-    scene = Scene()
-    ground, m = scene.add("ground", Ground()), scene.add("m", PointMass(mass=1.0))
-    contact = scene.add("c", SurfaceContact(function="0.25 - x**2 - z**2", restitution=0.9))
-    scene.connect(ground.frame, contact.a)
-    scene.connect(m.point, contact.b)
-    start_at(scene, 0.1, 0.0, 0.3, 0.0)
-    assert times(run(scene, form, 2.2), "impact")[5] == pytest.approx(2.1345199766, abs=1e-9)
-
-
-@FORMS
-def test_painleve_s_rod_jams(form: str) -> None:
-    scene = on_plane(Link(length=2.0, mass=1.0), VertexContact(friction=1.6))
-    scene.start.update({"m.angle": 1.0, "m.angular_velocity": 0.0, "c.gap": 0.0, "c.slip": -1.0})
-    result = run(scene, form, 0.01)
-    assert times(result, "jams") == [0.0]
 
 
 def test_a_start_inside_is_refused_with_the_part_and_the_depth() -> None:

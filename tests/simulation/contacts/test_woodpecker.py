@@ -6,7 +6,19 @@ from itertools import pairwise
 
 import pytest
 
-from atwood import Component, Scalar, Scene, Shaft, Slide, connector, dry_friction, lagrangian, simulate, unilateral
+from atwood import (
+    Component,
+    Scalar,
+    Scene,
+    Shaft,
+    Slide,
+    connector,
+    dry_friction,
+    lagrangian,
+    parameter,
+    simulate,
+    unilateral,
+)
 from atwood_library import Inertia, Mass1D
 
 G = 9.81
@@ -18,17 +30,23 @@ TILT = (HOLE - POLE) / HALF_HEIGHT
 class Woodpecker(Component):
     """What acts between a sleeve on a pole, its tilt and a bird on a spring, with angles taken as small."""
 
+    size: float = parameter(1.0, unit="m", above=0.0, doc="Longer than Glocker's by so much; masses stay.")
     y: Slide = connector(Slide, "The height of the sleeve.")
     sleeve: Shaft = connector(Shaft, "The tilt of the sleeve.")
     bird: Shaft = connector(Shaft, "The tilt of the bird.")
 
+    def along(self, sleeve: float, bird: float = 0.0) -> Scalar:
+        """Return the speed of a place at some arms from the sleeve and from the bird."""
+        return self.y.rate + self.size * (sleeve * self.sleeve.rate + bird * self.bird.rate)
+
     @lagrangian
     def of_bird(self) -> Scalar:
         """Energy of the bird's mass and of the spring, and weights."""
-        rate = self.y.rate + SLEEVE_ARM * self.sleeve.rate + BIRD_ARM * self.bird.rate
-        height = self.y.value + SLEEVE_ARM * self.sleeve.value + BIRD_ARM * self.bird.value
+        rate = self.along(SLEEVE_ARM, BIRD_ARM)
+        height = self.y.value + self.size * (SLEEVE_ARM * self.sleeve.value + BIRD_ARM * self.bird.value)
         twist = self.sleeve.value - self.bird.value
-        return 0.5 * BIRD * (rate * rate - 2.0 * G * height) - 0.5 * STIFFNESS * twist * twist - 3e-4 * G * self.y.value
+        spring = 0.5 * STIFFNESS * self.size * twist * twist
+        return 0.5 * BIRD * (rate * rate - 2.0 * G * height) - spring - 3e-4 * G * self.y.value
 
     @unilateral(reaction="of_beak", unit="N*m", restitution=0.5, doc="Torque of the pole on the bird.")
     def beak(self) -> Scalar:
@@ -48,29 +66,29 @@ class Woodpecker(Component):
     @dry_friction(at="beak", reaction="rub_beak", limit="most_beak", doc="Friction of the beak.")
     def slip_beak(self) -> Scalar:
         """Speed of the beak along the pole."""
-        return self.y.rate + SLEEVE_ARM * self.sleeve.rate + (BIRD_ARM - BEAK_ARM) * self.bird.rate
+        return self.along(SLEEVE_ARM, BIRD_ARM - BEAK_ARM)
 
     @dry_friction(at="lower", reaction="rub_lower", limit="most_lower", doc="Friction of the sleeve.")
     def slip_lower(self) -> Scalar:
         """Speed of the sleeve along the pole."""
-        return self.y.rate + HOLE * self.sleeve.rate
+        return self.along(HOLE)
 
     @dry_friction(at="upper", reaction="rub_upper", limit="most_upper", doc="Friction of the sleeve.")
     def slip_upper(self) -> Scalar:
         """Speed of the sleeve along the pole."""
-        return self.y.rate + HOLE * self.sleeve.rate
+        return self.along(HOLE)
 
     def most_beak(self) -> Scalar:
         """Return the largest friction."""
-        return 0.3 / BEAK * self.reaction("of_beak")
+        return 0.3 / (BEAK * self.size) * self.reaction("of_beak")
 
     def most_lower(self) -> Scalar:
         """Return the largest friction."""
-        return 0.3 / HALF_HEIGHT * self.reaction("of_lower")
+        return 0.3 / (HALF_HEIGHT * self.size) * self.reaction("of_lower")
 
     def most_upper(self) -> Scalar:
         """Return the largest friction."""
-        return 0.3 / HALF_HEIGHT * self.reaction("of_upper")
+        return 0.3 / (HALF_HEIGHT * self.size) * self.reaction("of_upper")
 
 
 def woodpecker(start: dict[str, float]) -> Scene:
