@@ -1,10 +1,14 @@
 """What a chain costs grows linearly with its length."""
 
 import itertools
+from typing import Any
 
 import pytest
 from tests.calls import calls
 
+from atwood.expr.simplify import alike
+from atwood.expr.simplify.collect import collect
+from atwood.forms.accelerations import acceleration_program
 from atwood.pipeline import assemble
 from atwood_library.scenes import Chain
 
@@ -33,6 +37,33 @@ def test_a_hundred_links_are_derived_at_once(form: str) -> None:
         needed.append(made.count)
     assert sum(operations.values()) < 5000
     assert needed[1] < 2.2 * needed[0]
+
+
+def nodes_of_accelerations(links: int) -> list[tuple[object, ...]]:
+    nodes = acceleration_program(assemble(Chain(links=links))).program.nodes
+    place = {node: i for i, node in enumerate(nodes)}
+    return [(one.operation, one.payload, *(place[argument] for argument in one.arguments)) for one in nodes]
+
+
+def test_equal_links_are_rewritten_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    rewritten = [0]
+
+    def counted(*given: Any, **named: Any) -> Any:
+        rewritten[0] += 1
+        return collect(*given, **named)
+
+    monkeypatch.setenv("ATWOOD_CACHE", "0")
+    monkeypatch.setattr(alike, "collect", counted)
+    found, counts = {}, {}
+    for links in (20, 40):
+        rewritten[0] = 0
+        found[links] = nodes_of_accelerations(links)
+        counts[links] = rewritten[0]
+    assert counts[20] == counts[40]
+    monkeypatch.setattr(alike, "_shape", lambda *_: object())  # as if each were of a shape of its own
+    rewritten[0] = 0
+    assert nodes_of_accelerations(40) == found[40]
+    assert rewritten[0] > 4 * counts[40]
 
 
 def test_no_sympy_on_the_way() -> None:

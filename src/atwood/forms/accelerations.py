@@ -23,12 +23,12 @@ from atwood.expr import (
     Expression,
     OutputGroup,
     Program,
-    collect,
     jacobian,
     live,
     solve,
     substitute,
 )
+from atwood.expr.simplify.alike import Alike
 from atwood.expr.simplify.collect import cost
 from atwood.expr.simplify.polynomial import Effort
 from atwood.forms.caches import Key, derive_once
@@ -240,7 +240,7 @@ class _Tree:
         self.parameters = assembly.parameters
         self.u = self.reduced.speeds
         self.differences = True
-        self.effort = Effort(_EFFORT * (len(self.maximal.speeds) + len(self.maximal.constraints)))
+        self.alike = Alike(Effort(_EFFORT * (len(self.maximal.speeds) + len(self.maximal.constraints))))
         self.rewrites = not self.maximal.orientation_coordinates
         self.angles = [q for q, c in zip(self.reduced.coordinates, self.reduced.names, strict=True) if c.unit == "rad"]
         outputs = to_maximal(assembly).outputs
@@ -268,8 +268,7 @@ class _Tree:
             return values
         used = {node.index for node in nodes}
         angles = [a for a in self.angles if a.index in used] if self.differences else []
-        parameters = [node for node in nodes if node.is_symbol and node.is_parametric]
-        return collect(values, angles, parameters, effort=self.effort)
+        return self.alike.collect(values, nodes, angles)
 
     def _bodies_of_speeds(self) -> list[int]:
         forest = self.maximal.forest
