@@ -1,8 +1,10 @@
 """The explicit method of order 8(5,3): its coefficients, its orders, its steps, and the session around it."""
 
+import gc
 import math
 import signal
 import sys
+import weakref
 from collections.abc import Callable
 from typing import Any, Literal
 
@@ -523,6 +525,37 @@ def test_what_starts_often_gets_the_code_that_runs_faster(monkeypatch: pytest.Mo
             few = levels.count(1)
     assert levels.count(1) == few + 1
     assert all(one == found[0] for one in found)
+
+
+def test_code_that_is_replaced_is_called_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sessions that were opened before go on with the functions that were theirs, new ones with those there are."""
+    monkeypatch.setenv("ATWOOD_CACHE", "0")
+    assembly = assemble(SCENES["four-bar"](), form="dae")
+    start = find_start(assembly)
+    assembly, q, u = settle(assembly, start, assembly.other_mode)
+    plan = make_problem(assembly, 0.0, q, u, start.length, 1.0)
+    made = own_rates_on_constraints(plan, 0.0, np.concatenate([q, u]))
+    assert made is not None
+    code, before = made[0], made[0].open()
+    code.fill(before, values_on_constraints(plan))
+    quick = weakref.ref(code._built.code)
+    code.at_its_best()
+    del made
+    gc.collect()
+    assert quick() is not None  # its prologues are still called
+    code.fill(before, values_on_constraints(plan))
+    better, still = before.rates.faster(0.0), quick()
+    assert better is not None
+    assert better.function != before.rates.function
+    del before, still
+    gc.collect()
+    assert quick() is not None  # the arrays that it filled are still read
+    del better
+    gc.collect()
+    assert quick() is None
+    after = code.open()
+    assert set(after.prologues) <= set(code._built.code.addresses.values())
+    code.fill(after, values_on_constraints(plan))
 
 
 def test_scenes_with_constraints_left_have_no_explicit_problem() -> None:

@@ -13,13 +13,15 @@ from numpy.typing import ArrayLike
 
 from atwood.arrays import FloatArray
 from atwood.clock import TimeIsUp
-from atwood.codegen.llvm.build import RoutineSource, build_tiers
+from atwood.codegen.llvm.build import Built, RoutineSource, build_tiers
 from atwood.codegen.llvm.module import Part
 from atwood.codegen.routines import ADDRESS, CODE, NUMBER, Routine, call_kernel, place_of
 from atwood.errors import UnsupportedError
 from atwood.expr.core.program import Program
 from atwood.integrators.protocol import MET, STEPS, CompiledRates
 from atwood.lazy_dataclasses import dataclass
+
+_PROLOGUE = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)
 
 _STARTS = 10
 """What was started so often will be started again."""
@@ -108,10 +110,6 @@ class CompiledAccelerations:
         tiers = build_tiers(parts, is_brief, exports, routines)
         self._built, self._better, self._cost = tiers.quick, tiers.better, tiers.cost
         self._left, self._lock = self._cost, threading.Lock()
-        self._prologues = [
-            ctypes.CFUNCTYPE(None, *[c_void_p] * 3)(self._built.code.addresses[f"{name}_prologue"])
-            for name in self._programs
-        ]
 
     def bind(self, parameter_values: ArrayLike, projects: bool = True) -> Callable[[], CompiledRates]:
         """Return what gives each session functions of its own, with these parameters."""
@@ -136,23 +134,24 @@ class CompiledAccelerations:
         scratch = data + 8 * head
         pointers = [place for one in places for place in (one, scratch)]
         own[:head].view(np.uint64)[:] = [*pointers, data + 8 * room][:head]
-        rates = self._at(data, own, projects)
-        prologues = tuple(self._built.code.addresses[f"{name}_prologue"] for name in self._programs)
+        built = self._built
+        rates = self._at(data, (built, own), projects)
+        prologues = tuple(built.code.addresses[f"{name}_prologue"] for name in self._programs)
         return OwnRates(rates, prologues, places[0], scratch, tuple(places))
 
-    def _at(self, data: int, own: FloatArray, projects: bool) -> CompiledRates:
-        """Return the present code with the data of a session."""
+    def _at(self, data: int, kept: tuple[Built, FloatArray], projects: bool) -> CompiledRates:
+        """Return the present code with the data of a session; it keeps the code whose prologues fill that."""
         built, quick = self._built, self._better is not None
         project = built.code.addresses["project"] if projects and self._room else 0
 
         def faster(seconds: float) -> CompiledRates | None:
             self._spend(seconds)
-            return None if self._built is built else self._at(data, own, projects)
+            return None if self._built is built else self._at(data, kept, projects)
 
         return CompiledRates(
             built.code.addresses["rates"],
             data,
-            (built, own),
+            (built, *kept),
             project,
             data + 16 if project else 0,
             faster if quick else None,
@@ -174,10 +173,10 @@ class CompiledAccelerations:
         return self
 
     def fill(self, own: OwnRates, parameter_values: ArrayLike) -> None:
-        """Give rates of a session their parameters."""
+        """Give rates of a session their parameters, by the code that they were opened with."""
         values = np.array(parameter_values, dtype=np.float64)
-        for prologue, place in zip(self._prologues, own.places, strict=True):
-            prologue(values.ctypes.data, place, own.scratch)
+        for prologue, place in zip(own.prologues, own.places, strict=True):
+            _PROLOGUE(prologue)(values.ctypes.data, place, own.scratch)
 
 
 @dataclass(frozen=True)
