@@ -216,7 +216,7 @@ class Assembly:
         """The states of its parts that change at moments only, whose values are among the parameters."""
         return self.shared.get(_DISCRETE_STATES, lambda: discrete_states_of(self.mechanism))
 
-    @property
+    @cached_property
     def held_at_start(self) -> tuple[float, ...]:
         """Values of the discrete states before their first update."""
         if not self.discrete_states:

@@ -6,6 +6,7 @@ shorter.
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Mapping, Sequence
 from copy import copy
 from math import inf
@@ -105,7 +106,10 @@ _FILES = (*(f"integrators/{name}.py" for name in _OWN), "numerics/contact_sets.p
 @once
 def _routines() -> Built:
     source = RoutineSource("integrators.set_jump_routines", _FILES)
-    return build_code([], CodeOptions(level=2), exports=("jump",), routines=source)
+    return build_code([], CodeOptions(level=2), exports=("jump", "resolve"), routines=source)
+
+
+_RESOLVE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, ctypes.c_int64, ctypes.c_int64)
 
 
 class SetCode:
@@ -200,6 +204,7 @@ class SetJumps(Jumps):
         )
         self._place(events, rates, given)
         self._rates = RATES(rates.function), rates.data
+        self._resolve = _RESOLVE(code.routines.code.addresses["resolve"])
         self.function, self.data = code.routines.code.addresses["jump"], self._pieces["own"].ctypes.data
 
     def _place(
@@ -230,32 +235,58 @@ class SetJumps(Jumps):
     def _got(self, name: str) -> int:
         return int(self._pieces["own"].view(np.int64)[list(JUMP).index(name)])
 
-    def give(
-        self,
-        parameter_values: FloatArray,
-        states: FloatArray,
-        table: FloatArray,
-        scales: tuple[float, float, float, float, float],
-        past: Sequence[tuple[float, float]],
-    ) -> None:
-        """Begin again with other parameters, states of gaps and slips, and impacts that have been.
+    @property
+    def _own_units(self) -> FloatArray:
+        """What is known of each gap and slip, by the rows of `UNITS`."""
+        found: FloatArray = self._pieces["units"].reshape(self._units.shape)
+        return found
 
-        Scales are what is small, how long a set lasts at least, how long impacts may go on that are summed, as a rule
-        and where rounding tells in them, and the time of the scene.
-        """
-        near, shortest, ahead, rough, time = scales
+    def give(
+        self, parameter_values: FloatArray, states: FloatArray, near: float, past: Sequence[tuple[float, float]]
+    ) -> None:
+        """Take other parameters, states of gaps and slips, what is small, and impacts that have been."""
         self._pieces["values"][:] = parameter_values
         self._pieces["derived"][:] = self.set_code.built.derive("contacts", self.set_code.program, parameter_values)[0]
-        units = self._pieces["units"].reshape(self._units.shape)
+        units = self._own_units
         for name in ("small", "slow"):
             units[UNITS[name]] = near * self._units[UNITS[name]]
         units[UNITS["state"] : UNITS["state"] + 3] = states
-        self._pieces["table"][:] = table.ravel()
         known = list(past)[-PAST:]
         self._pieces["past"][: 2 * len(known)] = np.ravel(known)
         self._put("sets", {"known": len(known)})
-        self._put("own", {"logged": 0, "shortest": shortest, "ahead": ahead, "rough": rough, "time": time})
+
+    def begin_again(self, table: FloatArray, scales: tuple[float, float, float, float]) -> None:
+        """Take the events of another run, from what was given on.
+
+        Scales are how long a set lasts at least, how long impacts may go on that are summed, as a rule and where
+        rounding tells in them, and the time of the scene.
+        """
+        self._pieces["table"][:] = table.ravel()
+        self._put("own", {"logged": 0, **dict(zip(("shortest", "ahead", "rough", "time"), scales, strict=True))})
         self._told = 0
+
+    def resolve(
+        self, t: float, y: FloatArray, triggers: FloatArray, longest: tuple[float, float], is_start: bool
+    ) -> tuple[SetJump, FloatArray] | None:
+        """Return what becomes of gaps and slips at a moment, and which gaps were closed; None where it is not clear.
+
+        `triggers` says of each what has happened, and `longest` how long impacts may go on that are summed.
+        """
+        units, pieces = self._own_units, self._pieces
+        units[UNITS["trigger"]], pieces["y"][:] = triggers, y
+        self._put("sets", dict(zip(("ahead", "rough"), longest, strict=True)))
+        if self._resolve(pieces["sets"].ctypes.data, t, is_start, 1) or self._said("shared"):
+            return None
+        struck = pieces["struck"][: self._said("logged") * self._each].reshape(-1, self._each).copy()
+        gaps = np.flatnonzero((units[UNITS["stopped"]] != 0.0) & (units[UNITS["slip"]] == 0.0))
+        stopped = int(gaps[0]) if self._said("stops") and len(gaps) else -1
+        left = float(pieces["sets"][list(FIELDS).index("ahead")])
+        states = units[UNITS["next"] : UNITS["next"] + 3].copy()
+        made = SetJump(t, np.array([y, pieces["y"]]), states, stopped, left, struck)
+        return made, units[UNITS["closed"]] != 0.0
+
+    def _said(self, name: str) -> int:
+        return int(self._pieces["sets"].view(np.int64)[list(FIELDS).index(name)])
 
     def begin(self, t: float) -> None:
         """Learn when the present set begins."""

@@ -26,6 +26,7 @@ from atwood.numerics.contact_sets import STICKS, State
 from atwood.simulation.contacts.bounces import has_plain_impacts
 from atwood.simulation.contacts.changes import (
     NEAR,
+    Changed,
     in_own_words,
     longest_left,
     states_of,
@@ -220,13 +221,53 @@ def fill_sets(
             MARGIN * relative * scales.of(one.unit),
             not layout.first[k].is_speed,
         )
+    _give(jumps, plan, relative, impacts)
+    jumps.begin_again(table, (shortest, *longest_left(relative, scales), scales.time))
+
+
+def _give(jumps: SetJumps, plan: SceneProblem, relative: float, impacts: Sequence[tuple[float, str]]) -> None:
+    """Give them parameters and states, and times and parts of the impacts before."""
+    layout = layout_of(plan.assembly)
     states = np.array(
         [[state, *way, *[0.0] * (2 - len(way))] for state, way in states_of(layout, plan.assembly.held_now)]
     ).T
     parts = _parts(layout)
     past = [(time, parts[part]) for time, part in impacts if part in parts]
-    near, left = NEAR * max(relative, 1e-13), longest_left(relative, scales)
-    jumps.give(values_on_constraints(plan), states, table, (near, shortest, *left, scales.time), past)
+    jumps.give(values_on_constraints(plan), states, NEAR * max(relative, 1e-13), past)
+
+
+def resolved(
+    jumps: SetJumps,
+    plan: SceneProblem,
+    state: tuple[float, FloatArray, FloatArray],
+    relative: float,
+    triggers: Sequence[EventRecord],
+    impacts: Sequence[tuple[float, str]],
+    is_start: bool,
+    told: float,
+) -> Changed | None:
+    """Return what `resolve` in `changes` does, by the routine of a session; None where that leaves it to Python."""
+    assembly, layout, (t, q, u) = plan.assembly, layout_of(plan.assembly), state
+    _give(jumps, plan, relative, impacts)
+    happened = {(one.part, one.law): float(HAPPENED.get(one.target, 0)) for one in triggers}
+    codes = np.array([happened.get(one.row.key[:2], 0.0) for one in layout.first])
+    found = jumps.resolve(t, np.concatenate([q, u]), codes, longest_left(relative, plan.scales), is_start)
+    if found is None:
+        return None
+    one, closed = found[0]._replace(time=told), found[1]
+    was = states_of(layout, assembly.held_now)
+    if is_start:
+        closes = [first.is_closed_at_start(assembly.flat.parts) for first in layout.first]
+        before = [(STICKS, one[1]) if is_closed else one for one, is_closed in zip(was, closes, strict=True)]
+    held = held_after(one, assembly)
+    events = in_own_words(
+        assembly, layout, told, _told(layout, one, was), (before if is_start else was, states_of(layout, held))
+    )
+    touching = list(assembly.held_now)
+    for is_closed, places in zip(closed.tolist(), layout.places, strict=True):
+        for place in places:
+            touching[place] = float(is_closed)
+    return Changed(one.states[1][len(q) :], held, tuple(events), tuple(touching) if closed.any() else ())
 
 
 def noted_sets(log: SetLog, assembly: Assembly, changes: Callable[[], Sequence[Change]]) -> ToldLater:
@@ -252,19 +293,22 @@ def told_sets(log: SetLog, assembly: Assembly) -> list[Change]:
     """Return changes with the discrete states after each, and what is told of it."""
     layout, held, found = layout_of(assembly), assembly.held_now, list[Change]()
     for one in log.changes():
-        before, told = states_of(layout, held), list[EventRecord]()
-        if one.stopped >= 0:
-            told.append(told_rest(one.time, layout.first[one.stopped].row.key[:2], one.left))
-        told += [_struck(layout, one.time, row) for row in one.struck.tolist()]
-        for k, (state, *ways) in enumerate(one.set.T.tolist()):
-            after: State = (int(state), tuple(ways[: len(layout.units[k])]))
-            change = told_change(one.time, layout.first[k], before[k], after)
-            told += [] if change is None else [change]
-        held = held_after(one, assembly)
-        told = in_own_words(assembly, layout, one.time, told, (before, states_of(layout, held)))
+        before, held = states_of(layout, held), held_after(one, assembly)
+        told = in_own_words(assembly, layout, one.time, _told(layout, one, before), (before, states_of(layout, held)))
         strikes = any(each.impact for each in told)
         found.append(Change(one.time, one.states, held, told, strikes, one.stopped >= 0))
     return found
+
+
+def _told(layout: Layout, one: SetJump, before: Sequence[State]) -> list[EventRecord]:
+    """Return what is told of a change: of impacts, and of each gap and slip that has another state."""
+    told = [] if one.stopped < 0 else [told_rest(one.time, layout.first[one.stopped].row.key[:2], one.left)]
+    told += [_struck(layout, one.time, row) for row in one.struck.tolist()]
+    for k, (state, *ways) in enumerate(one.set.T.tolist()):
+        after: State = (int(state), tuple(ways[: len(layout.units[k])]))
+        change = told_change(one.time, layout.first[k], before[k], after)
+        told += [] if change is None else [change]
+    return told
 
 
 def _struck(layout: Layout, t: float, entry: Sequence[float]) -> EventRecord:

@@ -388,18 +388,15 @@ class Walk:
         if late is not None:  # what happens does so at the zero of the event, and goes on from there
             rest, (q, u) = late[0], split(late[1])
             t, self.q, self.u = t - rest, self.q - rest * q, self.u - rest * u
-        changed = resolve(
-            self.assembly,
-            (t, self.q, self.u),
-            self.start.length,
-            plan.scales,
-            options.relative_tolerance,
-            triggers,
-            options.impacts == "one_by_one",
-            self._impacts,
-            is_start,
-            self.t,
-        )
+        state, relative, one_by_one = (t, self.q, self.u), options.relative_tolerance, options.impacts == "one_by_one"
+        jumps, changed = None if one_by_one else self._kept.sets(plan), None
+        if jumps is not None:
+            from atwood.simulation.contacts.compiled import resolved
+
+            changed = resolved(jumps, plan, state, relative, triggers, self._impacts, is_start, self.t)
+        if changed is None:
+            about = self.start.length, plan.scales, relative
+            changed = resolve(self.assembly, state, *about, triggers, one_by_one, self._impacts, is_start, self.t)
         events = list(changed.events)
         self._kept.changes += 1
         self._remember(events)

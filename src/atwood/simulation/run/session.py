@@ -46,6 +46,7 @@ from atwood.simulation.run.choice import solved_loops
 if TYPE_CHECKING:
     from atwood.forms.loops.closed_form import ClosedForm
     from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
+    from atwood.integrators.set_jumps import SetJumps
     from atwood.integrators.symplectic.stepper import Hamiltonian
     from atwood.integrators.taylor.stepper import TaylorProblem
     from atwood.simulation.problem.closed_loops import Solved
@@ -312,6 +313,18 @@ class KeptSession:
     def filling_of(self, session: Session | None) -> Filling | None:
         """Return what gives a session its parameters; None where it is not kept."""
         return next((one.fill for one in self.kept if one.session is session), None)
+
+    def sets(self, plan: SceneProblem) -> SetJumps | None:
+        """Return the changes of sets of a session that is kept for a plan; None where there are none."""
+        own = plan.program, plan.scales, plan.sizes, plan.finding
+        for one in self.kept:
+            jumps, (_, shared, _, *objects) = one.fill.problem.jumps, one.objects
+            if jumps is not None and shared is plan.assembly.shared and all(map(is_, objects, own)):
+                from atwood.integrators.set_jumps import SetJumps
+
+                if isinstance(jumps, SetJumps):
+                    return jumps
+        return None
 
     def begin_again(
         self, request: SolverRequest, method: Method, t: float, y: FloatArray, on_stiff: OnStiff | None
