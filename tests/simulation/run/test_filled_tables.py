@@ -17,7 +17,7 @@ from atwood.integrators.ida import library as sundials_library, memory, native
 from atwood.integrators.ida.memory import IdaMemory
 from atwood.integrators.ida.native import NativeSession
 from atwood.integrators.protocol import StepResult
-from atwood_library.scenes import Bricard, FourBar, SliderCrank
+from atwood_library.scenes import Bricard, DoublePendulum, FlyballGovernor, FourBar, SliderCrank
 
 pytestmark = pytest.mark.skipif(not sundials_library.available(), reason=sundials_library.why_not() or "available")
 
@@ -47,6 +47,8 @@ SCENES: dict[str, tuple[Callable[[], Model], dict[str, Any]]] = {
     "slider-crank": (SliderCrank, {"t_end": 2.0, "rtol": 1e-5, "solver": "ida"}),
     "singular positions": (singular, {"t_end": 2.0, "form": "dae", "solver": "ida"}),
     "in space": (Bricard, {"t_end": 1.0, "solver": "ida"}),
+    "a tree": (DoublePendulum, {"solver": "ida"}),
+    "orientations": (FlyballGovernor, {"form": "dae"}),
     "with a limit": (FourBar, {"max_step": 1e-3, "form": "dae", "solver": "ida"}),
 }
 

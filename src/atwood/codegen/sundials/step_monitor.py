@@ -16,14 +16,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from atwood.codegen.llvm.build import Built, RoutineSource, build_code, default_options
-from atwood.codegen.llvm.module import Part
+from atwood.codegen.llvm.build import Built, RoutineSource, build_code, default_options, once
+from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.codegen.routines import (
     ADDRESS,
     BOOLEAN,
     CODE,
     INTEGER,
     NUMBER,
+    Operand,
     Record,
     Routine,
     Value,
@@ -33,6 +34,8 @@ from atwood.codegen.routines import (
 from atwood.errors import UsageError
 from atwood.expr.core.program import Program
 from atwood.lazy_dataclasses import dataclass
+
+_MODULE = "codegen.sundials.step_monitor"
 
 _LOOK = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, *[ctypes.c_void_p] * 3)
 
@@ -212,7 +215,7 @@ def compile_monitor(program: Program, speeds: int, size: int, places: tuple[Arra
     lists = slope_lists(outputs[0], list(zip(rows, columns, strict=True)))
     shape = Shape(inputs[1], speeds, size, outputs[0], len(rows), len(lists["product"]))
     part = Part("held", program)
-    routines = RoutineSource("codegen.sundials.step_monitor", (), (shape,))
+    routines = RoutineSource(_MODULE, (), (shape,))
     built = build_code(
         [part], default_options([part], is_brief=True), exports=["look", "drive", "fill"], routines=routines
     )
@@ -281,9 +284,18 @@ class Shape:
         return 1 + 2 * self.size
 
 
-def write_routines(shape: Shape) -> list[Routine]:
-    """Write what looks at a state, what sends IDA from look to look, and what fills a table on the way."""
-    return [_look(shape), _drive(), _fill(shape)]
+def write_routines(shape: Shape | None) -> list[Routine]:
+    """Write what looks at a state, what sends IDA from look to look, and what fills a table on the way.
+
+    The last alone where nobody looks; its data are then the length of y.
+    """
+    return [_fill(None)] if shape is None else [_look(shape), _drive(), _fill(shape)]
+
+
+@once
+def table_filler() -> Built:
+    """Return the code that fills a table without looking at the motion."""
+    return build_code([], CodeOptions(level=2), exports=["fill"], routines=RoutineSource(_MODULE, (), (None,)))
 
 
 def _look(shape: Shape) -> Routine:
@@ -439,12 +451,12 @@ def _drive() -> Routine:
     return r
 
 
-def _fill(shape: Shape) -> Routine:
+def _fill(shape: Shape | None) -> Routine:
     """Write the function that sends IDA on through times and fills a row of a table at each.
 
     A row is read from the last step that IDA has taken, once no look is due before its time.
     """
-    r = Routine("fill", _FILL, exported=True)
+    r = Routine("fill", _FILL if shape is not None else _FILL | {"data": INTEGER}, exported=True)
     (
         solve,
         steps,
@@ -464,7 +476,11 @@ def _fill(shape: Shape) -> Routine:
         filled,
         end,
     ) = r.arguments
-    state = Record(data.read(FIELDS.index("state"), ADDRESS), dict.fromkeys(STATE, NUMBER))
+    size: Operand = data
+    state = None
+    if shape is not None:
+        size = shape.size
+        state = Record(data.read(FIELDS.index("state"), ADDRESS), dict.fromkeys(STATE, NUMBER))
     taken = _count_steps(r, steps, memory)
     r.call(current, memory, end)
     with r.forever():
@@ -472,15 +488,19 @@ def _fill(shape: Shape) -> Routine:
         with r.when(i >= wanted):
             r.give(0)
         t = times[i]
-        with r.when((t <= end[0]) & (t < state.next)):
+        is_read = t <= end[0]
+        with r.when(is_read if state is None else is_read & (t < state.next)):
             with r.when(r.call(dky, memory, t, r.value(0, CODE), y) != 0):
                 r.give(UNREADABLE)
-            r.copy(table.at(i * shape.size), y_at, shape.size)
+            r.copy(table.at(i * size), y_at, size)
             filled.write(0, i + 1)
             with r.when(taken() >= allowed):
                 r.give(PAUSED)
         with r.otherwise():
-            flag = r.call("drive", solve, steps, memory, t, reached, y, yp, y_at, yp_at, allowed, data)
+            if state is None:
+                flag = r.call(solve, memory, t, reached, y, yp, r.value(1, CODE))
+            else:
+                flag = r.call("drive", solve, steps, memory, t, reached, y, yp, y_at, yp_at, allowed, data)
             r.call(current, memory, end)
             with r.when(flag != 0):
                 r.give(flag)

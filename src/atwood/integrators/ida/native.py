@@ -255,6 +255,8 @@ class NativeSession(SteppingSession):
         self._check_open()
         if past <= first or self._stale or self._pending is not None:
             return np.empty((0, self._size))
+        if self._fill is None and self._locator is None and not (self._by_steps or self._record.calls_python):
+            self._fill_alone()
         if self._goes_on and not self._is_first and self.budget.is_unlimited:
             return self._filled(np.array(times[first:past], dtype=float))
         known = self._reached if self._locator is None else min(self._searched, self._reached)
@@ -268,6 +270,14 @@ class NativeSession(SteppingSession):
             return self._table(times[first:past])
         finally:
             self._seconds += time.perf_counter() - began
+
+    def _fill_alone(self) -> None:
+        """Let tables be filled where nobody looks at the motion."""
+        from atwood.codegen.sundials.step_monitor import NOTICED, PAUSED, table_filler
+
+        code = table_filler().code.addresses["fill"]
+        self._fill = self._memory.fill(StepMonitor(0, code, NOTICED, PAUSED, self._size, self._due))
+        self._goes_on, self._paused_flag = True, PAUSED
 
     def _table(self, times: Sequence[float]) -> FloatArray:
         """Return the solution at times within the last step; none if it is not finite, which an advance says."""

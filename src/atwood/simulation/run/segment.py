@@ -478,7 +478,7 @@ class _Runner:
         samples = segment.samples
         times, shown, extra = (x.tolist() for x in (samples.times, samples.shown, samples.between))
         plan, told = segment.plan, -np.inf
-        repairs = self._repairs
+        repairs, ends = self._repairs, samples.ends_of_blocks(_PARTS)
         while done < len(times):
             moment, monitor = times[done], self.monitor
             look = np.inf if monitor is None else monitor.next
@@ -519,7 +519,8 @@ class _Runner:
                 if repairs:
                     self._repair(session, step_result)
             if self._reads_on():  # up to the last, at which a monitor looks
-                rows = session.read_on(times, done, len(times) - 1)
+                last = ends[ends.searchsorted(done, side="right")] if repairs and done < len(times) else len(times)
+                rows = session.read_on(times, done, int(last) - 1)
                 recorder.take_all(times[done : done + len(rows)], rows, shown[done : done + len(rows)])
                 done += len(rows)
             if progress is not None:
@@ -533,7 +534,7 @@ class _Runner:
         """Return whether nothing is looked at, or put right, from one output to the next within a step."""
         plan, monitor = self.segment.plan, self.monitor
         looks = plan.finding.redundant if monitor is None else monitor.next < np.inf
-        return not (looks or plan.reviews_outputs or self._repairs)
+        return not (looks or plan.reviews_outputs or plan.program.level == "index1-projected")
 
     @property
     def _repairs(self) -> bool:
