@@ -19,6 +19,7 @@ class Cornered(Model):
     restitution: Number = parameter(0.0, minimum=0.0, maximum=1.0, doc="Of each corner; see VertexContact.")
     friction: Number = parameter(0.0, minimum=0.0, doc="Coefficient of friction while a corner slips.")
     static_friction: Number = parameter(None, minimum=0.0, doc="The same while it sticks.")
+    stiffness: Number = parameter(None, unit="N/m", above=0.0, doc="How corners share a load; see VertexContact.")
     surface_velocity: Number = parameter(0.0, unit="m/s", doc="Velocity of the surface over the plane.")
     plane: Frame = connector(Frame, "The frame that carries the plane; its origin is in it.")
 
@@ -32,7 +33,7 @@ class Cornered(Model):
         places
             Where its corners are, in the axes of that frame, m.
         """
-        names = "normal", "restitution", "friction", "static_friction", "surface_velocity"
+        names = "normal", "restitution", "friction", "static_friction", "stiffness", "surface_velocity"
         common = {name: getattr(self, name) for name in names}
         for one in self.add("corner", [VertexContact(place=place, **common) for place in places]):
             self.connect(self.plane, one.plane)

@@ -52,6 +52,12 @@ class Touching(Component):
     static_friction: Number = parameter(
         None, minimum=0.0, doc="Coefficient of friction while it sticks; that of slipping if not given."
     )
+    stiffness: Number = parameter(
+        None,
+        unit="N/m",
+        above=0.0,
+        doc="How more places than are needed share a load: as springs of such stiffnesses. Nothing gives way.",
+    )
 
     def normal_in_world(self) -> Vector:
         """Return the unit normal, towards what the force acts on, in world axes."""
@@ -70,7 +76,11 @@ class Touching(Component):
         raise NotImplementedError
 
     @unilateral(
-        reaction="normal_force", unit="N", restitution="restitution", doc="Force along the normal; it only pushes."
+        reaction="normal_force",
+        unit="N",
+        restitution="restitution",
+        stiffness="stiffness",
+        doc="Force along the normal; it only pushes.",
     )
     def gap(self) -> Scalar:
         """Distance of the two bodies."""

@@ -12,7 +12,8 @@ sets of few rows are looked through.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
+from functools import partial
 from itertools import compress, product
 
 import numpy as np
@@ -36,6 +37,9 @@ CLEAR = 1e-8
 
 NOTHING = 1e-14
 """What moves by so small a share of what others do is held by joints but for rounding."""
+
+_GIVES = 0.03
+"""Of what rows move by their own forces: what gives way does so by as much while forces are projected one by one."""
 
 _SWEEPS = 5000
 """So often all forces are projected; each time takes some ten microseconds for each."""
@@ -97,7 +101,8 @@ class Limits:
 class Contacts:
     """What is asked of some gaps and slips: A, b, the units and their limits, also those of what goes backwards.
 
-    The static limit of a gap is what it bears that is pulled open.
+    The static limit of a gap is what it bears that is pulled open. Rows that give way, as springs do that are ever so
+    stiff, share a load by that where nothing else determines it; the others have zeros there.
     """
 
     response: FloatArray
@@ -105,6 +110,7 @@ class Contacts:
     units: tuple[Unit, ...]
     limits: Limits
     backwards: Limits | None = None
+    compliance: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +142,7 @@ class _Listed:
     free: list[float]
     units: tuple[Unit, ...]
     sides: tuple[_Side, _Side]
+    compliance: FloatArray | None
 
 
 _Side = tuple[list[float], list[list[float]], list[float], list[list[float]]]
@@ -145,7 +152,8 @@ _Side = tuple[list[float], list[list[float]], list[float], list[list[float]]]
 def _listed(contacts: Contacts) -> _Listed:
     ahead, back = _side(contacts.limits), contacts.backwards
     sides = ahead, ahead if back is None else _side(back)
-    return _Listed(contacts.response.tolist(), contacts.free.tolist(), contacts.units, sides)
+    gives = None if contacts.compliance is None or not contacts.compliance.any() else contacts.compliance
+    return _Listed(contacts.response.tolist(), contacts.free.tolist(), contacts.units, sides, gives)
 
 
 def _side(one: Limits) -> _Side:
@@ -177,7 +185,8 @@ def _at_rest(contacts: Contacts) -> Found | None:
     listed = _listed(contacts)
     rest = tuple(_allowed(unit, STICKS, (0.0,) * len(unit.rows)) for unit in contacts.units)
     acting, rows, right = _equations(listed, rest)
-    matrix, wanted = np.array(rows), np.array(right)
+    by_springs = _by_springs(listed, acting, {one.rows[0] for one in contacts.units if not one.is_slip})
+    matrix, wanted = np.vstack([np.array(rows), by_springs]), np.append(right, np.zeros(len(by_springs)))
     size = or_one(np.max(np.abs(matrix), axis=1, initial=0.0))
     matrix, wanted = matrix / size[:, None], wanted / size
     null, response = null_space(matrix, CLEAR), contacts.response[:, acting]
@@ -244,7 +253,8 @@ def _judged(contacts: Contacts, found: Found) -> Found:
     They are null vectors of the equations for forces, and what is pressed by no force can only be pressed more.
     What would slip nowhere sticks then: some share holds it.
     """
-    acting, rows, _ = _equations(_listed(contacts), found.states)
+    listed = _listed(contacts)
+    acting, rows, _ = _equations(listed, found.states)
     if not acting:
         return found
     # A motion of each row by the force that would make it alone: no unit has a say.
@@ -263,6 +273,15 @@ def _judged(contacts: Contacts, found: Found) -> Found:
         else state
         for unit, state in zip(contacts.units, found.states, strict=True)
     )
+    by_springs = _by_springs(listed, acting, _sticking(contacts.units, found.states)) / size
+    if len(by_springs):
+        null = null_space(np.vstack([matrix, by_springs / np.max(np.abs(by_springs), axis=1, keepdims=True)]), CLEAR)
+        if not null.size:
+            is_met = np.abs(by_springs @ (size * found.forces[acting])) <= SLACK * (
+                np.abs(by_springs) @ np.abs(size * found.forces[acting])
+            )
+            is_other = states != found.states or not np.all(is_met)
+            return Found(states, found.forces, found.motions, is_redundant=is_other)
     moved = contacts.response[:, acting] / size @ null / every[:, None]
     kinds = decompose(moved, math.sqrt(CLEAR))
     moving = null @ kinds.right[: kinds.rank].T
@@ -299,6 +318,10 @@ def _relaxed(contacts: Contacts) -> tuple[tuple[State, ...], FloatArray]:
     Where there are no such forces they grow without bound.
     """
     response, free = contacts.response, contacts.free
+    gives = contacts.compliance
+    if gives is not None and gives.any():  # far more than a little, so that it ends: states are looked for alone
+        own = np.diag(response)
+        response = response + np.diag(_GIVES * np.min(own[gives > 0.0] / gives[gives > 0.0]) * gives)
     forces = np.zeros(len(free))
     states: list[State] = []
     steps = [1.0 / (float(np.linalg.norm(response[np.ix_(one.rows, one.rows)], 2)) or 1.0) for one in contacts.units]
@@ -334,12 +357,46 @@ def _relaxed(contacts: Contacts) -> tuple[tuple[State, ...], FloatArray]:
 def _shared(contacts: _Listed, states: tuple[State, ...], forces: FloatArray) -> Found | None:
     """Return these states if forces near to those given contradict nothing, though the least ones may."""
     acting, rows, right = _equations(contacts, states)
+    if contacts.compliance is not None:  # which share is meant is known
+        return None
     given = forces[acting]
     more = _solved(rows, (np.array(right) - np.array(rows).reshape(len(rows), len(rows)) @ given).tolist())
     found, motions = _moved(contacts, acting, (given + np.array(more)).tolist())
     if _contradiction(contacts, states, found, motions)[0] >= 0:
         return None
     return Found(states, np.array(found), np.array(motions))
+
+
+def _sticking(units: Sequence[Unit], states: Sequence[State]) -> set[int]:
+    """Return the rows that hold."""
+    return {row for unit, (state, _) in zip(units, states, strict=True) if state == STICKS for row in unit.rows}
+
+
+def elastic(response: FloatArray, compliance: FloatArray) -> FloatArray:
+    """Return what more is asked of forces that hold some rows, as equations whose right-hand sides are zero.
+
+    With ``A + e C`` in the place of A, the limit for small e has ``C f`` square to all forces that balance each other,
+    of the rows that give way: the least elastic energy ``f C f/2``.
+    """
+    soft = np.flatnonzero(compliance > 0.0)
+    own = np.diag(response)
+    every = np.sqrt(np.where(own > NOTHING * np.max(own, initial=0.0), own, np.inf))
+    scaled = response[:, soft] / every[:, None] / every[soft]
+    balancing = null_space(scaled, CLEAR) / np.where(np.isfinite(every[soft]), every[soft], 1.0)[:, None]
+    found = np.zeros((balancing.shape[1], len(own)))
+    found[:, soft] = (compliance[soft, None] * balancing).T
+    return found
+
+
+def _by_springs(contacts: _Listed, acting: Sequence[int], holding: Collection[int]) -> FloatArray:
+    """Return the same for some of the rows that act, which hold, as equations for all that act."""
+    found, places = np.zeros((0, len(acting))), [i for i, row in enumerate(acting) if row in holding]
+    if contacts.compliance is not None and places:
+        rows = [acting[i] for i in places]
+        more = elastic(np.array(contacts.response)[np.ix_(rows, rows)], contacts.compliance[rows])
+        found = np.zeros((len(more), len(acting)))
+        found[:, places] = more
+    return found
 
 
 def all_states(contacts: Contacts) -> Iterator[Found]:
@@ -399,7 +456,8 @@ def _met(contacts: _Listed, states: tuple[State, ...]) -> tuple[tuple[State, ...
     method. Where the motion turns round there is no such direction, and it is left as it is.
     """
     acting, rows, right = _equations(contacts, states)
-    forces, motions = _moved(contacts, acting, _solved(rows, right))
+    springs = partial(_by_springs, contacts, acting, _sticking(contacts.units, states))
+    forces, motions = _moved(contacts, acting, _solved(rows, right, springs))
     slipping = zip(contacts.units, states, strict=True)
     cones = [k for k, (unit, state) in enumerate(slipping) if state[0] == GOES_ON and unit.is_free_cone]
     cones = [k for k in cones if not _is_loose(states, contacts.units[k])]
@@ -427,7 +485,7 @@ def _met(contacts: _Listed, states: tuple[State, ...]) -> tuple[tuple[State, ...
                 place = acting.index(row)
                 rows[place] = [x + share * part * across[i] for x, i in zip(rows[place], acting, strict=True)]
                 right[place] += share * part * before
-        forces, motions = _moved(contacts, acting, _solved(rows, right))
+        forces, motions = _moved(contacts, acting, _solved(rows, right, springs))
     return states, forces, motions
 
 
@@ -463,16 +521,21 @@ def _moved(contacts: _Listed, acting: list[int], given: list[float]) -> tuple[li
     return forces, motions
 
 
-def _solved(matrix: list[list[float]], right: list[float]) -> list[float]:
-    """Solve a small linear system; where rows depend on each other, by least norm."""
+def _solved(
+    matrix: list[list[float]], right: list[float], springs: Callable[[], FloatArray] | None = None
+) -> list[float]:
+    """Solve a small linear system; where rows depend on each other, by least norm, with what springs ask besides."""
     count = len(right)
     sizes = [max(map(abs, row)) or 1.0 for row in matrix]
     left = [[*(x / size for x in row), one / size] for row, one, size in zip(matrix, right, sizes, strict=True)]
     for i in range(count):
         best = max(range(i, count), key=lambda k: abs(left[k][i]))
         if not abs(left[best][i]) > CLEAR:
-            size = np.array(sizes)
-            found: list[float] = least_norm(np.array(matrix) / size[:, None], np.array(right) / size).tolist()
+            more = np.zeros((0, count)) if springs is None else springs()
+            every = np.vstack([np.array(matrix), more])
+            size = or_one(np.max(np.abs(every), axis=1))
+            wanted = np.append(right, np.zeros(len(more)))
+            found: list[float] = least_norm(every / size[:, None], wanted / size).tolist()
             return found
         left[i], left[best] = left[best], left[i]
         pivot = left[i]

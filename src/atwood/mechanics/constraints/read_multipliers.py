@@ -88,7 +88,9 @@ def known_multipliers(
     seconds = substitute([one.row.second for one in contacts], at_rest)
     right += [-(one.mask * second) for one, second in zip(contacts, seconds, strict=True)]
     system = _System(rows, speeds, accelerations, constraints, right, contacts)
-    can_repeat = _close_loops(mechanism, [*constraints, *(one.row for one in contacts)])
+    held = [*constraints, *(one.row for one in contacts)]
+    system.sharing = _sharing(mechanism, held, n) if system.stiffness else []
+    can_repeat = _close_loops(mechanism, held)
     can_repeat = can_repeat or (bool(contacts) and _are_crowded(system))
     if can_repeat:
         symbols = (*equations.coordinates, *speeds)
@@ -136,6 +138,10 @@ class _System:
         The diagonal of C; empty where it is zero. A row of a gap that is open says that its multiplier is zero.
     masses
         Number of accelerations.
+    stiffness, bare
+        Of rows that share loads as springs do, and their entries of G without masks.
+    sharing
+        Groups of rows among which forces that balance each other stay, as far as is known.
     of_contacts
         The rows of gaps and slips.
     is_regular
@@ -165,7 +171,13 @@ class _System:
         self.diagonal: list[Expression] = []
         if contacts:
             self.diagonal = [*([zero] * count), *(1.0 - one.mask for one in contacts)]
+        rows_held = [*constraints, *(one.row for one in contacts)]
+        self.stiffness = {
+            self.masses + i: one.stiffness for i, one in enumerate(rows_held) if one.stiffness is not None
+        }
+        self.bare = {(self.masses + r, c): e for r, c, e in held.triples if self.masses + r in self.stiffness}
         self.is_regular = self.has_inertia = False
+        self.sharing: list[list[int]] = []
         self.of_contacts = range(self.masses + count, len(self.right)) if contacts else range(0)
 
     def times(self, solved: Sequence[Expression], diagonal: Sequence[Expression]) -> list[Expression]:
@@ -206,14 +218,34 @@ def _close_loops(mechanism: Mechanism, constraints: Sequence[Constraint]) -> boo
             body = group[body]
         return body
 
-    body_of, node_of = mechanism.bodies.body_of, mechanism.graph.node_of
-    for path in dict.fromkeys(one.key[0] for one in constraints):
-        bodies = {body_of[node_of[path, name]] for name in mechanism.locals_[path].connectors}
+    for bodies in _bodies_of(mechanism, constraints).values():
         leaders = {leader(body) for body in bodies}
         if len(leaders) < len(bodies):
             return True
         group.update(dict.fromkeys(leaders, min(leaders)))
     return False
+
+
+def _bodies_of(mechanism: Mechanism, constraints: Sequence[Constraint]) -> dict[str, set[int]]:
+    """Return the bodies that each part with constraints joins."""
+    body_of, node_of, parts = mechanism.bodies.body_of, mechanism.graph.node_of, mechanism.locals_
+    paths = dict.fromkeys(one.key[0] for one in constraints)
+    return {path: {body_of[node_of[path, name]] for name in parts[path].connectors} for path in paths}
+
+
+def _sharing(mechanism: Mechanism, constraints: Sequence[Constraint], first: int) -> list[list[int]]:
+    """Return the rows, counted from the first, in groups: loads are shared among bodies that no single one parts."""
+    from networkx import Graph, biconnected_components
+
+    bodies, graph = _bodies_of(mechanism, constraints), Graph()
+    graph.add_edges_from((a, b) for own in bodies.values() for a in own for b in own if a < b)
+    places = list(biconnected_components(graph))
+    found: dict[tuple[int, ...], list[int]] = {}
+    for row, one in enumerate(constraints, first):
+        own = bodies[one.key[0]]
+        key = next((place for place in places if len(own) > 1 and own <= place), own)
+        found.setdefault(tuple(sorted(key)), []).append(row)
+    return list(found.values())
 
 
 def _are_crowded(system: _System) -> bool:
@@ -248,6 +280,8 @@ def _without_choice(system: _System, speeds: Sequence[Expression]) -> list[Expre
         if (c, c) not in system.mass and r in own:
             diagonal[r - n] = diagonal[r - n] + entry * entry * (sum(own[r], graph.zero) / float(len(own[r])))
     added = [_ADDED * one if not one.is_zero else graph.constant(_ADDED) for one in diagonal]
+    for row, one in _give_way(system).items():
+        added[row - n] = _ADDED * one
     masked = system.diagonal or [graph.zero] * len(added)
     system.is_regular = True
     system.diagonal = [more if one.is_zero else one + more for one, more in zip(masked, added, strict=True)]
@@ -256,6 +290,24 @@ def _without_choice(system: _System, speeds: Sequence[Expression]) -> list[Expre
         system.right = [side - one for side, one in zip(right, system.times(solved, masked), strict=True)]
         solved = [one + more for one, more in zip(solved, _solve_system(system), strict=True)]
     return solved
+
+
+def _give_way(system: _System) -> dict[int, Expression]:
+    """Return by how much rows give way to a unit of force, in a unit for each group in which forces can be shared.
+
+    With ``A + c C`` in the place of A, the limit for small c has ``C f`` square to all forces that balance each other:
+    the least elastic energy. The unit is such that no row gives way by more than its own entry of A.
+    """
+    found: dict[int, Expression] = {}
+    own = dict.fromkeys(system.stiffness, system.right[0].graph.zero)
+    for (row, column), entry in system.bare.items():
+        if (column, column) in system.mass:
+            own[row] = own[row] + entry * entry / system.mass[column, column]
+    for group in system.sharing:
+        some = [row for row in group if row in own and not own[row].is_zero]
+        unit = sum((1.0 / (own[row] * system.stiffness[row]) for row in some), system.right[0].graph.zero)
+        found |= {row: float(len(some)) / (unit * system.stiffness[row]) for row in some}
+    return found
 
 
 def _solve_system(system: _System) -> list[Expression]:

@@ -110,7 +110,7 @@ def levels(
         else:
             rate, second = rates[number], seconds[number]
         key = (path, one.law.name, one.index)
-        found.append(Constraint(key, one.reaction, one.sign, value, rate, second, multiplier))
+        found.append(Constraint(key, one.reaction, one.sign, value, rate, second, multiplier, stiffness=one.stiffness))
     return found
 
 
@@ -133,7 +133,8 @@ def velocity_levels(
         key = (path, one.law.name, one.index)
         integral = integrals.get(key)
         value = None if integral is None else integral.value
-        found.append(Constraint(key, one.reaction, one.sign, value, rate, second, multiplier, integral is not None))
+        known = key, one.reaction, one.sign, value, rate, second, multiplier
+        found.append(Constraint(*known, integral is not None, one.stiffness))
     return found
 
 

@@ -48,6 +48,8 @@ class Constraint:
         The symbol of the multiplier.
     holonomic
         Whether it holds positions, and not only velocities.
+    stiffness
+        Where it shares a load with others in a way that nothing else determines, as springs do; None if it is rigid.
     """
 
     key: tuple[str, str, int]
@@ -58,6 +60,7 @@ class Constraint:
     second: Expression
     multiplier: Expression
     holonomic: bool = True
+    stiffness: Expression | None = None
 
     @property
     def label(self) -> str:

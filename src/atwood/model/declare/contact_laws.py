@@ -44,6 +44,7 @@ class UnilateralOptions:
     impact_law: str
     level: str
     adhesion: str
+    stiffness: str
     given: tuple[str, ...]
     closes: Told | None
     opens: Told | None
@@ -169,6 +170,7 @@ _TOLD = each(TEXT, "a name, a target and a message", single=False)
     impact_law=one_of(("newton", "poisson")),
     level=one_of(("position", "velocity")),
     adhesion=TEXT,
+    stiffness=TEXT,
     given=NAMES,
     closes=_TOLD,
     opens=_TOLD,
@@ -185,6 +187,7 @@ def unilateral(
     impact_law: Literal["newton", "poisson"] = "newton",
     level: Literal["position", "velocity"] = "position",
     adhesion: str = "",
+    stiffness: str = "",
     given: Sequence[str] = (),
     closes: Sequence[str] = (),
     opens: Sequence[str] = (),
@@ -214,6 +217,9 @@ def unilateral(
         What the method reads: positions, angles and time, or also velocities, in which it is affine then.
     adhesion
         Name of a method, or a parameter, that gives how much a gap bears that is pulled open; it then lets go.
+    stiffness
+        Name of the parameter that says how gaps of which more are closed than are needed share a load: as springs of
+        these stiffnesses do, however stiff, which hold the slips at them, too. Nothing gives way. None is rigid.
     given
         Parameters without which there is no gap: it is not there where one of them is None. Methods that read
         parameters alone say by True or False whether it is there.
@@ -234,7 +240,7 @@ def unilateral(
         raise DeclarationError(
             "a gap that closes ends no run", advice="Ask for it with until=, or declare an @event of the gap."
         )
-    options = UnilateralOptions((reaction,), unit, share, impact_law, level, adhesion, *own, doc, *many)
+    options = UnilateralOptions((reaction,), unit, share, impact_law, level, adhesion, stiffness, *own, doc, *many)
     along = _along(unit, "/s" if level == "velocity" else "")
     return lambda function: ContactLaw(function, Law("unilateral", function.__name__, options), along)
 

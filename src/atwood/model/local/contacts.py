@@ -90,7 +90,9 @@ def local_contacts(
     never: dict[str, Scalar] = {one.row.reaction: 0.0 for one in found if one not in gaps}
     pressing = {one.row.reaction: one.read for one in gaps}  # zero where the gap is open
     bound = bind(part.component, replace(binding, reactions={**binding.reactions, **never, **pressing}))
-    slips = [one for law in laws if law.kind == "friction" for one in _slip(part, law, bound, graph)]
+    stiff = {one.law.name: one.row.stiffness for one in gaps}
+    friction = [law for law in laws if law.kind == "friction"]
+    slips = [one for law in friction for one in _slip(part, law, bound, graph, stiff.get(law.options.at))]
     never |= {one.row.reaction: 0.0 for one in slips if one.is_free}
     slips = [one for one in slips if not one.is_free]
     forces = {one.row.reaction: one.force for one in (*gaps, *slips)}
@@ -155,14 +157,26 @@ def _gap(
     multiplier, read, stand_in = _symbols(part, law, graph)
     along = {symbol: rate for one in connectors.values() for symbol, rate in one.rates.items()}
     rate = value if is_speed else jvp([value], {graph.convert(binding.time): 1.0, **along})[0]
-    row = LocalConstraint(law, 0, value, law.options.reactions[0], 1.0)
+    row = LocalConstraint(law, 0, value, law.options.reactions[0], 1.0, stiffness=_stiffness(part, law, bound, graph))
     pull = _named(part, law, bound, law.options.adhesion, graph) if law.options.adhesion else None
     force = mask * multiplier
     read = force if mask.is_constant else read
     return LocalContact(row, multiplier, read, mask, force, rate, stand_in, static_limit=pull, restitution=share)
 
 
-def _slip(part: Part, law: Law, bound: Any, graph: Graph) -> list[LocalContact]:
+def _stiffness(part: Part, law: Law, bound: Any, graph: Graph) -> Expression | None:
+    """Return how stiff a gap is that shares a load with others; None where it is rigid."""
+    name = law.options.stiffness
+    if name and name not in part.component.parameter_specs():
+        raise DeclarationError(
+            f"its stiffness {name!r} is no parameter of the component",
+            where=f"{part.path}.{law.name}",
+            advice=suggestion(name, list(part.component.parameter_specs())),
+        )
+    return graph.convert(getattr(bound, name)) if name and getattr(bound, name) is not None else None
+
+
+def _slip(part: Part, law: Law, bound: Any, graph: Graph, stiffness: Expression | None) -> list[LocalContact]:
     options: FrictionOptions = law.options
     names = options.reactions
     values = call_law(part.path, law, lambda: [one_scalar(graph, one) for one in scalars(getattr(bound, law.name)())])
@@ -186,7 +200,7 @@ def _slip(part: Part, law: Law, bound: Any, graph: Graph) -> list[LocalContact]:
         multiplier, read, stand_in = _symbols(part, law, graph, i)
         force = mask * multiplier - way * limit
         read = force if mask.is_constant else read
-        row = LocalConstraint(law, i, value, name, 1.0)
+        row = LocalConstraint(law, i, value, name, 1.0, stiffness=stiffness)
         found.append(LocalContact(row, multiplier, read, mask, force, value, stand_in, held[i], limit, static))
     return found
 

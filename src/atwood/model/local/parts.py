@@ -93,7 +93,8 @@ class LocalJoint:
 class LocalConstraint:
     """One scalar that must stay zero: its law, its number there, its reaction's name and sign.
 
-    One that `counts` gives a joint coordinate its value, turns counted, where nothing hangs on the joint.
+    One that `counts` gives a joint coordinate its value, turns counted, where nothing hangs on the joint. Of several
+    that hold the same, those with a `stiffness` share the load as springs do.
     """
 
     law: Law
@@ -102,6 +103,7 @@ class LocalConstraint:
     reaction: str
     sign: float
     counts: Expression | None = None
+    stiffness: Expression | None = None
 
 
 @dataclass(frozen=True)

@@ -170,6 +170,9 @@ def live_modes(
 def _refuse(assembly: Assembly) -> None:
     """Say what keeps a scene from being live."""
     refuse_groups(assembly)
+    stiff = next((one for one in assembly.own_equations.contacts if one.row.stiffness is not None), None)
+    if stiff is not None:
+        raise NotLiveError(f"{stiff.row.key[0]} shares loads by its stiffness, which is worked out in Python alone")
     if kinematic_map_of(assembly, assembly.form).has_singular_coordinates:
         raise NotLiveError("its orientations have three coordinates, which are switched; quaternions are live")
 

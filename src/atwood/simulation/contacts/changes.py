@@ -44,10 +44,11 @@ from atwood.numerics.contact_sets import (
     Limits,
     State,
     all_states,
+    elastic,
     find_states,
     is_back,
 )
-from atwood.numerics.matrices import least_norm
+from atwood.numerics.matrices import least_norm, or_one
 from atwood.numerics.rank import rank
 from atwood.simulation.contacts.values import ContactValues, Layout
 from atwood.simulation.dynamics.orientation_coordinates import to_regular
@@ -74,13 +75,16 @@ MOST_TURNS = 50
 CONTRADICT = "Contacts contradict each other here: look at what moves them, and at their friction."
 
 _UNDETERMINED = "friction depends on how forces are shared, which nothing determines"
-_SHARES = "Give one of them no friction, or put a spring where it is stiff."
+_SHARES = "Give each of them a stiffness, as a place that gives way a little has, or one of them no friction."
 
 _SHARED = 100.0
 """Times the slack of one inequality: shares that nothing determines come from other equations."""
 
 _MOST_SHARES = 500
 """So many shares of forces that nothing determines are tried."""
+
+_ALONG = 1e-3
+"""Of what is slow: by so much goes what is moved along."""
 
 _MOST_IMPACTS = 1000
 """So many impacts one after the other happen at one moment at most."""
@@ -341,8 +345,9 @@ class _Moment:
         slips = self.slips_at(gaps)
         if not gaps and not slips:
             return self._take([], Found((), np.zeros(0), np.zeros(0)))
+        self._rest(gaps, slips)
         self.values = self.values.with_speeds(self.u)
-        given = self._going(slips, rates)
+        given = self._going(slips, self.rates())
         given |= {k: self._yielding(k) for k in slips if k not in given and self.trigger(k) == YIELDS}
         chosen = [*gaps, *slips]
         still = *gaps, *self._stopped(slips)
@@ -375,8 +380,11 @@ class _Moment:
         idle = [k for k, one in enumerate(states) if (one[0] == STICKS and fixed[k] if is_slip[k] else one[0] == OPEN)]
         states = self._without(states, idle)
         holding = [k for k, one in enumerate(states) if one[0] == STICKS]
-        holding.sort(key=lambda k: not is_slip[k])
-        some = (gone for count in range(len(holding) + 1) for gone in combinations(holding, count))
+        soft = self.values.compliance > 0.0  # gaps that give way go on to press
+        loosable = sorted(
+            (k for k in holding if is_slip[k] or not soft[self.units[k][0]]), key=lambda k: not is_slip[k]
+        )
+        some = (gone for count in range(len(loosable) + 1) for gone in combinations(loosable, count))
         least = self._rank(states)
         for gone in islice(some, _MOST_SHARES):
             tried = self._without(states, gone)
@@ -429,18 +437,33 @@ class _Moment:
             soon = [row for k in begins for row in self.units[k]]
             wanted[soon] = moment * falls[soon]
         if rows:
-            push, response = np.zeros(len(self.contacts)), self.values.response
-            push[rows] = least_norm(response[np.ix_(rows, rows)], (wanted - self.rates())[rows])
-            self.u = self.u + self.values.speeds_by(push)
+            self._take_away(rows, wanted)
 
     def _going(self, slips: list[int], rates: FloatArray) -> dict[int, tuple[float, ...]]:
-        """Return the directions of the slips that go on already; what has come to rest is as slow as its event sees."""
+        """Return the directions of the slips that go on already; what has come to rest is as slow as its event sees.
+
+        What has gone on so far does so along with what it is moved by.
+        """
         sizes, stops = {k: self.rate(k, rates) for k in slips}, self._stopped(slips)
-        return {
-            k: tuple(float(x) / size for x in rates[list(self.units[k])])
-            for k, size in sizes.items()
-            if size > (SEEN if k in stops else 1.0) * self.slow[k]
-        }
+        fast = {k for k, size in sizes.items() if size > (SEEN if k in stops else 1.0) * self.slow[k]}
+        first, response = [rows[0] for rows in self.units], self.values.response
+        slower = [k for k in slips if self.before[k][0] == GOES_ON and k not in stops and k not in fast]
+        along = [k for k in slower if sizes[k] > _ALONG * self.slow[k]]
+        fast |= {k for k in along if any(response[first[k], first[j]] for j in fast)}
+        return {k: tuple(float(x) / sizes[k] for x in rates[list(self.units[k])]) for k in slips if k in fast}
+
+    def _rest(self, gaps: list[int], slips: list[int]) -> None:
+        """Take away the rates of what comes to rest now: what can move only with it rests, too."""
+        stops = self._stopped(slips)
+        held = *gaps, *stops, *(k for k in slips if k not in stops and self.before[k][0] == STICKS)
+        if stops:
+            self._take_away([row for k in held for row in self.units[k]], np.zeros(len(self.contacts)))
+
+    def _take_away(self, rows: list[int], wanted: FloatArray) -> None:
+        """Give rows other rates."""
+        push, response = np.zeros(len(self.contacts)), self.values.response
+        push[rows] = least_norm(response[np.ix_(rows, rows)], (wanted - self.rates())[rows])
+        self.u = self.u + self.values.speeds_by(push)
 
     def _stopped(self, slips: list[int]) -> list[int]:
         return [k for k in slips if self.trigger(k) in (STOPS, RESTS)]
@@ -502,6 +525,11 @@ class _Moment:
 
     def _contradiction(self, what: str, chosen: list[int], advice: str = CONTRADICT) -> SolveError:
         names = ", ".join(dict.fromkeys(self.first[k].row.key[0] for k in chosen))
+        rigid = dict.fromkeys(self.first[k].row.key[0] for k in chosen if self.first[k].row.stiffness is None)
+        if advice == _SHARES and self.values.compliance.any() and rigid:
+            advice = f"Stiffness decides only where each of them has one: give one to {', '.join(rigid)}, too."
+        elif advice == _SHARES and not rigid:
+            advice = "At rest no share by their stiffness holds it, though another one might: load it from a motion."
         return SolveError(
             f"at t = {self.t:.9g} {what} ({names})",
             where=self.first[chosen[0]].row.key[0] if chosen else "",
@@ -709,7 +737,13 @@ def forces_in(values: ContactValues, states: Sequence[State], rates: FloatArray 
                     side = limits[is_back(way)]
                     matrix[row] = matrix[row] + part * side.shares[number]
                     right[row] = -part * side.free[number]
-        last, forces = forces, least_norm(matrix, right)
+        more = np.zeros((0, count))
+        if values.compliance.any():
+            holding = [row for rows, one in zip(values.units, states, strict=True) if one[0] == STICKS for row in rows]
+            by_springs = elastic(values.response[np.ix_(holding, holding)], values.compliance[holding])
+            more = np.zeros((len(by_springs), count))
+            more[:, holding] = by_springs / or_one(np.max(np.abs(by_springs), axis=1, initial=0.0))[:, None]
+        last, forces = forces, least_norm(np.vstack([matrix, more]), np.append(right, np.zeros(len(more))))
         if not values.layout.is_curved or is_same(last, forces):
             break
     return forces

@@ -102,6 +102,7 @@ def _layout(assembly: Assembly) -> Layout:
         *(OutputGroup(name, tuple(some)) for name, some in zip(_LIMITS, limits, strict=True)),
         *(OutputGroup(f"shares of {name}", tuple(one.entries)) for name, one in zip(_LIMITS, found, strict=True)),
         OutputGroup("restitution", tuple(none if one.restitution is None else one.restitution for one in contacts)),
+        OutputGroup("compliance", tuple(map(_compliance, contacts))),
     )
     groups = (*state_groups(equations), InputGroup("read", read))
     program = Program("gaps and slips", groups, assembly.parameters, outputs)
@@ -130,6 +131,12 @@ def _layout(assembly: Assembly) -> Layout:
         ),
         tuple(tuple(states[path] for path in state_paths(one)) for one in first),
     )
+
+
+def _compliance(one: ContactRow) -> Expression:
+    """Return by how much a row gives way to a unit of force, where it shares a load; zero where it is rigid."""
+    stiffness = one.row.stiffness
+    return one.row.multiplier.graph.zero if stiffness is None else 1.0 / stiffness
 
 
 def _forces(equations: Equations, parameters: tuple[Expression, ...]) -> Program:
@@ -197,7 +204,7 @@ class ContactValues:
     def _take(self, u: FloatArray) -> None:
         found = [np.array(x) for x in self._kernel([self.t], self.q, u, self.read)]
         self.values, self.rates, slopes, self.seconds, *limits = found
-        self._limits, self._shares, self.restitution = limits[:4], limits[4:8], limits[8]
+        self._limits, self._shares, (self.restitution, self.compliance) = limits[:4], limits[4:8], limits[8:]
         self.slopes = np.zeros((len(self.contacts), len(u)))
         self.slopes[self.layout.slopes] = slopes
 
@@ -315,4 +322,4 @@ class ContactValues:
             )
             for some in limits
         )
-        return Contacts(self.response[rows][:, rows], free[rows], units, ahead, back)
+        return Contacts(self.response[rows][:, rows], free[rows], units, ahead, back, self.compliance[rows])
