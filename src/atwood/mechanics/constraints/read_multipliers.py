@@ -237,9 +237,10 @@ def _sharing(mechanism: Mechanism, constraints: Sequence[Constraint], first: int
     """Return the rows, counted from the first, in groups: loads are shared among bodies that no single one parts."""
     from networkx import Graph, biconnected_components
 
-    bodies, graph = _bodies_of(mechanism, constraints), Graph()
+    bodies = _bodies_of(mechanism, constraints)
+    graph: Graph[int] = Graph()
     graph.add_edges_from((a, b) for own in bodies.values() for a in own for b in own if a < b)
-    places = list(biconnected_components(graph))
+    places: list[set[int]] = [set(one) for one in biconnected_components(graph)]
     found: dict[tuple[int, ...], list[int]] = {}
     for row, one in enumerate(constraints, first):
         own = bodies[one.key[0]]
