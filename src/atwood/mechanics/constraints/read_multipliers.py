@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -240,7 +241,8 @@ def _sharing(mechanism: Mechanism, constraints: Sequence[Constraint], first: int
     bodies = _bodies_of(mechanism, constraints)
     graph: Graph[int] = Graph()
     graph.add_edges_from((a, b) for own in bodies.values() for a in own for b in own if a < b)
-    places: list[set[int]] = [set(one) for one in biconnected_components(graph)]
+    every: Any = biconnected_components(graph)  # sets, which its types do not say
+    places: list[set[int]] = list(every)
     found: dict[tuple[int, ...], list[int]] = {}
     for row, one in enumerate(constraints, first):
         own = bodies[one.key[0]]
