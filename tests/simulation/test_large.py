@@ -14,6 +14,7 @@ from atwood.numerics.rank import independent_rows
 from atwood.numerics.sparse import csr_of, free_columns, smallest_direction, solve_bordered
 from atwood.numerics.sparse_batch import Borders, Elimination, Normal, Pattern
 from atwood.pipeline import assemble
+from atwood.simulation.dynamics import balance
 from atwood_library import Ground, PointMass, Rod
 from atwood_library.scenes.chain import Chain
 from atwood_library.scenes.four_bar import FourBar
@@ -79,6 +80,20 @@ def test_start_says_the_same(by_entries: None) -> None:
     start = find_start(assemble(scene))
     assert set(start.free_coordinates) == {f"rod[{i}].angle" for i in (0, 2, 3, 4)}
     assert set(start.free_speeds) == {f"rod[{i}].angle" for i in (1, 2, 3, 4)}
+
+
+def test_a_full_mass_matrix_of_many_bodies_is_never_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    how = {"t_end": 1e-3, "outputs": 2, "solver": "explicit"}
+    expected = simulate(Chain(links=100), **how).table()
+
+    def refused(*_: object) -> None:
+        raise AssertionError("a matrix of all bodies was made")
+
+    monkeypatch.setattr(balance, "LARGEST_FULL", 50)
+    monkeypatch.setattr(balance, "columns_of", refused)
+    monkeypatch.setenv("ATWOOD_CACHE", "0")
+    found = simulate(assemble(Chain(links=100)), **how).table()
+    np.testing.assert_allclose(found["bob[99].position.z"], expected["bob[99].position.z"], rtol=1e-7)
 
 
 def test_something_without_mass_is_named(by_entries: None) -> None:

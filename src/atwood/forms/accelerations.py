@@ -242,7 +242,8 @@ class _Tree:
         self.differences = True
         self.alike = Alike(Effort(_EFFORT * (len(self.maximal.speeds) + len(self.maximal.constraints))))
         self.rewrites = not self.maximal.orientation_coordinates
-        self.angles = [q for q, c in zip(self.reduced.coordinates, self.reduced.names, strict=True) if c.unit == "rad"]
+        named = zip(self.reduced.coordinates, self.reduced.names, strict=True)
+        self.angles = {q: i for i, (q, one) in enumerate(named) if one.unit == "rad"}
         outputs = to_maximal(assembly).outputs
         symbols = (*self.maximal.coordinates, *self.maximal.speeds)
         self.places = dict(zip(symbols, (*outputs[0].expressions, *outputs[1].expressions), strict=True))
@@ -266,8 +267,7 @@ class _Tree:
         nodes = live(values) if self.rewrites else []
         if not self.rewrites or len(nodes) > _SMALL:
             return values
-        used = {node.index for node in nodes}
-        angles = [a for a in self.angles if a.index in used] if self.differences else []
+        angles = sorted((a for a in nodes if a in self.angles), key=self.angles.__getitem__) if self.differences else []
         return self.alike.collect(values, nodes, angles)
 
     def _bodies_of_speeds(self) -> list[int]:

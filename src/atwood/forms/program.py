@@ -250,6 +250,9 @@ A chain of 80 links is about that long. There, on one core, the columns of 100 l
 which is little beside the 5 ms of a factorisation; to derive and compile them takes 0.1 s instead of 2 s.
 """
 
+_LOOKED = 64
+"""Of many more columns than these some are looked at, evenly spread: how full they are is seen in them."""
+
 _FULL = 0.05
 """A Jacobian is full if a column visits more than this share of the nodes; where it is not, a product wastes work."""
 
@@ -280,7 +283,8 @@ def is_too_long(
     """Return whether a Jacobian is better done by columns than entry by entry."""
     if len(wrt) < 50:
         return False
-    return sweeps_exceed(outputs, wrt, max(_LONGEST, int(_FULL * len(wrt) * len(live(outputs)))))
+    every = max(1, len(wrt) // _LOOKED)
+    return sweeps_exceed(outputs, wrt[::every], max(_LONGEST, int(_FULL * len(wrt) * len(live(outputs)))) // every)
 
 
 def directions(symbols: Sequence[Expression]) -> InputGroup:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from atwood import Scene, StartError, simulate
+from atwood.simulation.dynamics import balance
 from atwood_library import Ground, PointMass, Rod
 
 
@@ -26,6 +27,12 @@ def test_the_reason_is_rounding_and_no_lack_of_inertia() -> None:
         simulate(chain(1e-9, 1e9), t_end=0.1)
     assert "form='dae'" in str(caught.value)
     assert simulate(chain(1e-9, 1e9), form="dae", t_end=0.1).energy.max_drift < 1e-4
+
+
+def test_it_is_said_of_more_masses_than_a_matrix_is_made_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(balance, "LARGEST_FULL", 50)
+    with pytest.raises(StartError, match=r"lost to rounding.*bob0 has 1e-09 kg and bob89 has 1e\+09 kg"):
+        simulate(chain(1e-9, 1e9, 90), t_end=1e-3)
 
 
 def test_what_has_no_inertia_is_still_said_so() -> None:

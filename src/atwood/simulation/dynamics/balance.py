@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.codegen import BoundKernel
 from atwood.errors import SolveError
+from atwood.forms.accelerations import accelerations_of
 from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.balance_program import BalanceProgram
 from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.matrices import (
+    LARGEST_FULL,
     Matrix,
     from_entries,
     is_best_full,
@@ -40,8 +42,8 @@ class BalanceValues:
 
     Attributes
     ----------
-    mass
-        Mass matrix M, shape (speeds, speeds).
+    inertia
+        Mass matrix M, shape (speeds, speeds), or what gives it where it is large and full.
     bias
         Forces that do not depend on accelerations, with the sign of inertia, shape (speeds,).
     value
@@ -56,13 +58,18 @@ class BalanceValues:
         Explicit time part g_t of the velocity constraints, shape (constraints,).
     """
 
-    mass: Matrix
+    inertia: Matrix | Callable[[], Matrix]
     bias: FloatArray
     value: FloatArray
     rate: FloatArray
     gamma: FloatArray
     jacobian: Matrix
     explicit_rate: FloatArray
+
+    @cached_property
+    def mass(self) -> Matrix:
+        """The mass matrix."""
+        return self.inertia() if callable(self.inertia) else self.inertia
 
 
 @dataclass(frozen=True)
@@ -89,6 +96,8 @@ class Balance:
         How far rounding can take the constraint Jacobian.
     mass
         Gives the mass matrix where the program does not.
+    accelerations
+        Gives the accelerations without that matrix; None where nothing does.
     """
 
     def __init__(
@@ -99,9 +108,10 @@ class Balance:
         kinematic_map: KinematicMap,
         errors: RowErrors,
         mass: Callable[[float, FloatArray, FloatArray], FloatArray] | None = None,
+        accelerations: Callable[[], BoundKernel | None] = lambda: None,
     ) -> None:
         self.program, self._kernel, self.kinematic_map = program, kernel, kinematic_map
-        self.errors, self._mass = errors, mass
+        self.errors, self._mass, self._accelerations = errors, mass, accelerations
         self._all = len(program.holonomic) == program.constraints
         self._constraint_kernel = constraint_kernel
         self.holonomic = np.asarray(program.holonomic, dtype=np.intp)
@@ -116,8 +126,9 @@ class Balance:
         p = self.program
         mass, bias, value, rate, gamma, entries, explicit_rate = self._kernel()([t], q, u)
         full = self._mass is not None or is_best_full((p.speeds, p.speeds), len(mass))
+        matrix: Any
         if self._mass is not None:
-            matrix = self._mass(t, q, u)
+            matrix = partial(self._mass, t, q, u)
         else:
             matrix = from_entries(p.mass_rows, p.mass_columns, mass, (p.speeds, p.speeds), full)
         jacobian = from_entries(p.jacobian_rows, p.jacobian_columns, entries, (p.constraints, p.speeds), full)
@@ -134,10 +145,18 @@ class Balance:
         return ConstraintValues(np.asarray(value, dtype=float), matrix, np.asarray(explicit_rate, dtype=float))
 
     def accelerate(
-        self, t: float, q: FloatArray, u: FloatArray, kept: NDArray[np.intp] | None = None
+        self,
+        t: float,
+        q: FloatArray,
+        u: FloatArray,
+        kept: NDArray[np.intp] | None = None,
+        now: BalanceValues | None = None,
     ) -> tuple[FloatArray, FloatArray]:
-        """Return accelerations and multipliers."""
-        return solve_balance(self.at(t, q, u), kept, t)
+        """Return accelerations and multipliers; `now` is the balance there, if it is known."""
+        kernel = self._accelerations()
+        if kernel is not None:
+            return np.asarray(kernel([t], q, u)[-1], dtype=float), np.zeros(0)
+        return solve_balance(self.at(t, q, u) if now is None else now, kept, t)
 
     def project(
         self, t: float, q: FloatArray, u: FloatArray, scales: FloatArray, iterations: int = 12
@@ -205,7 +224,19 @@ def _balance_of(assembly: Assembly, form: FormName) -> Balance:
     laws = [one.key[:2] for one in assembly.in_coordinates(form).constraints]
     groups = ("value", "jacobian", "explicit_rate")
     errors = RowErrors(assembly, program.constraints_alone, groups, laws, places, kinematic_map)
-    return Balance(program, partial(assembly.kernel, program.program), held, kinematic_map, errors, mass)
+    solved = partial(_accelerations, assembly, program)
+    return Balance(program, partial(assembly.kernel, program.program), held, kinematic_map, errors, mass, solved)
+
+
+def is_wide(program: BalanceProgram) -> bool:
+    """Return whether a mass matrix is full and so large that it is better never made."""
+    return program.mass_product is not None and program.speeds > LARGEST_FULL
+
+
+def _accelerations(assembly: Assembly, program: BalanceProgram) -> BoundKernel | None:
+    """Return what gives accelerations where a mass matrix is better never made, and formulas give them."""
+    found = accelerations_of(assembly) if is_wide(program) else None
+    return None if found is None else assembly.kernel(found.program)
 
 
 def solve_balance(now: BalanceValues, kept: NDArray[np.intp] | None, t: float) -> tuple[FloatArray, FloatArray]:

@@ -9,6 +9,7 @@ from place to place, do not float.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -24,6 +25,7 @@ from atwood.mechanics.kinematics.mechanism import extent
 from atwood.mechanics.outputs.observables import Observable
 from atwood.model.values.units import parse_unit
 from atwood.numerics.matrices import or_one
+from atwood.topology.graph import connected_groups
 
 Sizes: TypeAlias = "FloatArray | float"
 """Of one scene, or of many."""
@@ -199,11 +201,12 @@ def _movable(assembly: Assembly, equations: Equations) -> list[tuple[int, ...]]:
 
     def find() -> list[tuple[int, ...]]:
         mechanism, forest = assembly.mechanism, equations.forest
-        group_of = list(range(len(mechanism.bodies.bodies)))
+        pairs: list[tuple[int, int]] = []
         for path, local in mechanism.locals_.items():
             bodies = (mechanism.bodies.body_of[mechanism.graph.node_of[path, one]] for one in local.connectors)
-            joined = {group_of[one] for one in bodies if one}
-            group_of = [min(joined) if one in joined else one for one in group_of]
+            pairs += pairwise(one for one in bodies if one)
+        groups = connected_groups(range(len(mechanism.bodies.bodies)), pairs)
+        group_of = {body: number for number, group in enumerate(groups) for body in group}
         number = {one.name.partition(" from ")[0]: i for i, one in enumerate(equations.names)}
         found: dict[tuple[int, int], list[int]] = {}
         for one in forest.attachments:

@@ -9,9 +9,10 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import StartError, TopologyError
-from atwood.expr import Expression, Program, depends_on, is_zero
+from atwood.expr import Expression, OutputGroup, Program, SparseMatrix, depends_on, is_zero, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
+from atwood.forms.program import state_groups
 from atwood.forms.quantities import known_program
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Constraint
@@ -19,8 +20,8 @@ from atwood.model.declare.component import Component
 from atwood.model.declare.laws import Kind
 from atwood.numerics.matrices import LARGEST_FULL, Matrix, is_full, scaled, to_array
 from atwood.numerics.rank import independent_rows, open_directions
-from atwood.numerics.sparse import massless_directions
-from atwood.simulation.dynamics.balance import balance_of
+from atwood.numerics.sparse import csr_of, massless_directions
+from atwood.simulation.dynamics.balance import BalanceValues, balance_of, is_wide
 from atwood.simulation.dynamics.reactions import maximal_state
 from atwood.simulation.dynamics.scales import is_length, motion_names, motion_scales, scene_length
 from atwood.simulation.initialization.start import Start, start_in_maximal
@@ -187,12 +188,13 @@ State = tuple[float, FloatArray, FloatArray]
 
 
 def check_massless_directions(
-    assembly: Assembly, mass: Matrix, jacobian: Matrix, sizes: FloatArray, state: State
+    assembly: Assembly, now: BalanceValues, jacobian: Matrix, sizes: FloatArray, state: State
 ) -> None:
     """Refuse a direction in which something can move without inertia."""
-    n = mass.shape[0]
-    if n == 0:
+    n = len(now.bias)
+    if n == 0 or (is_wide(assembly.balance(assembly.form)) and _bodies_have_inertia(assembly, *state)):
         return
+    mass = now.mass
     sizes = _sizes_of_inertia(mass, sizes)
     if not is_full(mass):
         moving = massless_directions(mass, jacobian, sizes)
@@ -212,6 +214,33 @@ def check_massless_directions(
     if values[0] > 1e-14 * max(values[-1], 1e-300):
         return
     raise _massless_directions(assembly, np.abs(vectors[:, 0] @ free), state)
+
+
+_INERTIA: Key[tuple[Program, SparseMatrix]] = Key("inertia of bodies")
+
+
+def _bodies_have_inertia(assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> bool:
+    """Return whether each body has inertia in all its directions, and none so much more that others' is rounding.
+
+    Then there is inertia along all generalized coordinates, and their mass matrix, which is full, need not be made.
+    """
+    maximal = assembly.maximal
+
+    def make() -> tuple[Program, SparseMatrix]:
+        found = jacobian(list(maximal.rows), list(maximal.accelerations))
+        outputs = (OutputGroup("inertia", tuple(found.entries)),)
+        return Program("inertia of bodies", state_groups(maximal), assembly.parameters, outputs), found
+
+    program, places = assembly.shared.get(_INERTIA, make)
+    big_q, big_u = (one[:, 0] for one in maximal_state(assembly, np.array([t]), q[:, None], u[:, None]))
+    n = len(maximal.speeds)
+    mass = csr_of(places.rows, places.columns, assembly.kernel(program)([t], big_q, big_u)[0], (n, n))
+    own = np.asarray(mass.diagonal(), dtype=float)
+    units = np.array([one.unit for one in maximal.speed_names])
+    alike = (own[units == unit] for unit in np.unique(units))
+    if not np.all(own > 0.0) or any(np.max(one) > _APART * np.min(one) for one in alike):
+        return False
+    return massless_directions(mass, np.zeros((0, n)), 1.0 / np.sqrt(own)) is None
 
 
 def _is_clearly_positive(weighed: FloatArray) -> bool:

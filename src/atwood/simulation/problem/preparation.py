@@ -25,7 +25,7 @@ from atwood.model.declare.component import bind
 from atwood.model.local.parts import LocalPart
 from atwood.model.values.space import Vector
 from atwood.numerics.matrices import to_array
-from atwood.simulation.dynamics.balance import balance_of, solve_balance
+from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.numerical_failure import ADVICE_AT_START, undefined_value_at
 from atwood.simulation.dynamics.reactions import check_read_reactions
 from atwood.simulation.dynamics.redundancy import RankFinding, find_rank
@@ -81,7 +81,7 @@ def _make_problem(
             advice=ADVICE_AT_START,
         ) from error
     constraint_jacobian = now.jacobian[list(finding.kept)] if finding.kept else now.jacobian[:0]
-    check_massless_directions(assembly, now.mass, constraint_jacobian, sizes, (t, q, u))
+    check_massless_directions(assembly, now, constraint_jacobian, sizes, (t, q, u))
     if finding.starts_singular:
         raise _singular_start(assembly, finding)
     dependent: tuple[tuple[int, ...], tuple[int, ...]] = (), ()
@@ -89,7 +89,7 @@ def _make_problem(
         dependent = dependent_speeds_of(balance, finding, to_array(now.jacobian), sizes)
     program = assembly.form_program(kept_rows(finding), *dependent)
     kept = np.asarray(finding.kept, dtype=np.intp) if finding.redundant else None
-    accelerations, _ = solve_balance(now, kept, t)
+    accelerations, _ = balance.accelerate(t, q, u, kept, now)
     share, moving = seen_from_afar(assembly, q, u, length, span)
     scales = find_scales(assembly, length, moving, accelerations, sizes, span)
     not_compilable = find_not_compilable(assembly)
@@ -111,8 +111,7 @@ def _singular_start(assembly: Assembly, finding: RankFinding) -> StartError:
 
 def pack_state(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return consistent y and y' from a state that fulfils the constraints."""
-    now = plan.balance.at(t, q, u)
-    accelerations, multipliers = solve_balance(now, plan.kept, t)
+    accelerations, multipliers = plan.balance.accelerate(t, q, u, plan.kept)
     if plan.assembly.form == "dae":
         tail = [multipliers, np.zeros(plan.program.extra)]
     else:
