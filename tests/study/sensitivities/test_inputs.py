@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from atwood import AtwoodError, Scene, sensitivities
+from atwood import AtwoodError, Component, Scene, UsageError, discrete_state, parameter, sensitivities, signal, update
+from atwood.study.sensitivities import changes, passage
 from atwood_library import Drive, Force, Ground, PointMass, PositionSensor, Rod, Rope, SampledFeedback, Slider
 
 NODES = [(0.0, 2.0), (0.3, -1.0), (0.7, 0.0), (1.5, 1.0)]
@@ -47,6 +48,47 @@ def sampled():
     return scene
 
 
+class Control(Component):
+    """Reads a measurement, and gives a command."""
+
+    u = signal(0.0, unit="any", doc="Measured.")
+    most = parameter(0.5, unit="N", doc="The force.")
+    y = discrete_state(0.0, unit="any", doc="Command.")
+
+
+class Damper(Control):
+    """Pushes back, by no more than a force."""
+
+    @update(every=0.1, sets="y", pure=True)
+    def saturated(self):
+        return -max(-self.most, min(self.most, 9.0 * self.u - 0.4 * self.y))
+
+
+class Smooth(Control):
+    """The same without a bound."""
+
+    @update(every=0.1, sets="y", pure=True)
+    def free(self):
+        return 0.4 * self.y * self.most - 9.0 * self.u * self.time
+
+
+class Remembering(Control):
+    """Says no more than that it may remember."""
+
+    @update(every=0.1, sets="y")
+    def remembered(self):
+        return -self.u
+
+
+def controlled(kind):
+    scene = pendulum()
+    seen, control = scene.add("seen", PositionSensor()), scene.add("control", kind())
+    scene.connect(scene["bob"].point, seen.point)
+    scene.connect(seen.output("position.x"), control.input("u"))
+    scene.connect(control.output("y"), scene["against"].input("value"))
+    return scene
+
+
 def driven():
     scene = Scene(t_end=1.0)
     ground, drive, bob = (
@@ -84,6 +126,29 @@ def test_meets_differences(kind, form, between):
         near = (4.0 * slopes[1] - slopes[0]) / 3.0
         assert found.derivatives[:, k] == pytest.approx(near, abs=1e-7)
         assert np.max(np.abs(near)) > 1e-3
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+@pytest.mark.parametrize("kind", [Smooth, Damper])
+def test_updates_that_are_arithmetic_are_derived_on_the_graph(kind, form, monkeypatch):
+    def run(**about):
+        about = {"outputs": [0.5, 1.2], "form": form, "rtol": 1e-12} | about
+        return sensitivities(controlled(kind), ["bob.position.x"], **about)
+
+    about = {"parameters": ["control.most", "rod.length"], "start": ["rod.angle"]}
+    calls, differences = [], passage.extrapolated
+    monkeypatch.setattr(passage, "extrapolated", lambda function: calls.append(1) or differences(function))
+    found, graph = run(**about), len(calls)
+    assert run(mode="adjoint", **about).derivatives == pytest.approx(found.derivatives, abs=1e-9)
+    calls.clear()
+    monkeypatch.setattr(changes, "updated", lambda *given: None)
+    assert found.derivatives == pytest.approx(run(**about).derivatives, abs=1e-9)
+    assert (len(calls) - graph >= 30) == (kind is Smooth)
+
+
+def test_updates_that_may_remember_are_refused():
+    with pytest.raises(UsageError, match=r"control.*may remember.*no derivatives"):
+        sensitivities(controlled(Remembering), parameters=["rod.length"])
 
 
 def test_of_a_block():

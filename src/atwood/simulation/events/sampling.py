@@ -217,14 +217,17 @@ def remembering(assembly: Assembly) -> list[str]:
     return [path for path, part in parts if any(not law.options.pure for law in part.component.laws("update"))]
 
 
-def refuse_updates(assembly: Assembly) -> None:
-    """Refuse to solve a scene twice whose parts call functions at sample times."""
+_AGAIN = "; or run it again with a smaller rtol"
+
+
+def refuse_updates(assembly: Assembly, lost: str = "estimated error", instead: str = _AGAIN) -> None:
+    """Refuse to solve a scene twice whose parts call functions at sample times; say what it has not, then."""
     for path in remembering(assembly):
         raise UsageError(
             "it calls functions at sample times, which may remember what they were called with: the scene is not "
-            "solved twice, and so has no estimated error",
+            f"solved twice, and so has no {lost}",
             where=path,
-            advice="Mark them with @update(..., pure=True) if they do not; or run it again with a smaller rtol.",
+            advice=f"Mark them with @update(..., pure=True) if they do not{instead}.",
         )
 
 

@@ -4,7 +4,8 @@ Let an event happen at ``t1`` where ``g(t, y, p) = 0``, and let it make ``y+ = h
 ``dt1/dp = -(g_y s + g_p) / (g_t + g_y f-)``, and behind it ``s+ = dh - f+ dt1/dp``, where dh is the change of h along
 ``(dt1/dp, s + f- dt1/dp, 1)`` (M. A. Aizerman, F. R. Gantmakher, Quart. J. Mech. Appl. Math. 11, 1958; R. I. Leine,
 H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, 2004, section 7.1). Times of events and the
-right-hand sides are derived on the graph; h, which impacts and updates work out in numbers, is by differences.
+right-hand sides are derived on the graph, and so are updates that are arithmetic; what impacts and other updates work
+out in numbers is by differences.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import UnsupportedError
+from atwood.expr import Expression
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.outputs.event_functions import CONTACT, UPDATE
@@ -31,6 +33,7 @@ from atwood.simulation.run.run import Walk
 from atwood.simulation.run.run_record import Outcome
 from atwood.simulation.run.session import KeptSession
 from atwood.study.sensitivities.inputs import is_nodes
+from atwood.study.sensitivities.updated import updated
 
 State = tuple[float, FloatArray, FloatArray]
 Beside = Callable[[Assembly], Assembly]
@@ -49,11 +52,14 @@ class Change:
         Gives coordinates, speeds and discrete states behind it, from those before it in a scene.
     enters
         The parts of inputs of which another piece begins, where that is all that happens.
+    updated
+        Discrete states and coordinates behind it, where these have formulas and speeds stay as they are.
     """
 
     assembly: Assembly
     apply: Callable[[Beside, State], tuple[FloatArray, FloatArray, tuple[float, ...]]]
     enters: tuple[str, ...] = ()
+    updated: tuple[Expression, ...] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +140,7 @@ class WatchedWalk(Walk):
 
         assembly = before
         if chosen:
-            self.changes.append(Change(assembly, apply))
+            self.changes.append(Change(assembly, apply, updated=updated(assembly, sampler, chosen)))
         super()._update(due)
 
     def _jump(self, before: Assembly, show_both: bool = False) -> None:

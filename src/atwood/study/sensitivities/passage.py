@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -63,6 +64,7 @@ class Passage:
     ) -> None:
         self.columns, self.paths, self.rtol = columns, paths, rtol
         self._changes: dict[tuple[int, str], tuple[FloatArray, object]] = {}
+        self._times: dict[tuple[int, str], tuple[FloatArray, FloatArray, object]] = {}
         self.max_steps: int | None = max_steps
         run = result.run
         self.steps: int = run.statistics.steps
@@ -193,7 +195,9 @@ class Passage:
 
     def _seeds(self, leg: Leg, held: FloatArray) -> FloatArray:
         """Return the change of each parameter in a stretch by each column."""
-        plain, symbols = leg.assembly, leg.plan.assembly.parameters
+        return self._seeds_in(leg.assembly, leg.plan.assembly.parameters, held)
+
+    def _seeds_in(self, plain: Assembly, symbols: Sequence[Expression], held: FloatArray) -> FloatArray:
         places = {symbol: k for k, symbol in enumerate(symbols)}
         own = [places[symbol] for symbol in plain.parameters if symbol in places]
         kept = [k for k, symbol in enumerate(plain.parameters) if symbol in places]
@@ -263,12 +267,13 @@ class Passage:
         """Return derivatives of the state and of discrete states behind what ends a stretch."""
         still = leg.end[0] <= leg.begin[0]
         moments = np.zeros(len(self.columns)) if still else self._moments(leg, columns, seeds)
-        before, behind = (_rates(one, state) for one, state in ((leg, leg.end), (after, after.begin)))
-        columns = columns + before * moments[:, None]
+        is_later = bool(np.any(moments))
+        if is_later:
+            columns = columns + _rates(leg, leg.end) * moments[:, None]
         state = np.concatenate(leg.end[1:])
         for change in after.changes:
             columns, held, state = self._changed(change, leg.end[0], state, columns, held, moments)
-        return columns - behind * moments[:, None], held
+        return (columns - _rates(after, after.begin) * moments[:, None] if is_later else columns), held
 
     def _changed(
         self,
@@ -283,6 +288,12 @@ class Passage:
         if change.enters:
             return columns, self._entered(change, t, held), state
         n = len(change.assembly.own_equations.coordinates)
+        if change.updated is not None:
+            seeds, count = self._seeds_in(change.assembly, change.assembly.parameters, held), held.shape[1]
+            about = np.array([t]), state[None, :], columns[None, :, :], seeds, moments
+            values, slopes = (one[..., 0] for one in derivatives(change.assembly, change.updated, *about))
+            behind = np.concatenate([slopes[count:].T, columns[:, n:]], axis=1)
+            return behind, slopes[:count].T, np.concatenate([values[count:], state[n:]])
         now, equations = np.array(change.assembly.held_now), change.assembly.own_equations
         sizes = np.concatenate([one(equations, self.start.length) for one in (coordinate_scales, motion_scales)])
 
@@ -374,23 +385,35 @@ class Passage:
         if column.is_start:
             return 0.0
 
-        def times(assembly: Assembly) -> FloatArray:
-            begin = self.start.time
+        here, slopes = self._times_by(leg.assembly, column)
+        return float(slopes[np.argmin(np.abs(here - t))])
+
+    def _times_by(self, now: Assembly, column: Column) -> tuple[FloatArray, FloatArray]:
+        """Return the time events and sample times of a mode, and by how much each changes with a column."""
+        about = id(now.shared), column.path
+        if about in self._times:
+            return self._times[about][:2]
+
+        def times(share: float) -> FloatArray:
+            assembly, begin = self._beside(now, column, share), self.start.time
             schedule = find_schedule(assembly, begin, self.end)
             return np.sort(np.concatenate([schedule.times, find_sampler(assembly, begin, self.end, np.zeros(0)).times]))
 
-        here = times(self._beside(leg.assembly, column, 0.0))
-        number = int(np.argmin(np.abs(here - t)))
+        here = times(0.0)
 
         def at(share: float) -> FloatArray:
-            found = times(self._beside(leg.assembly, column, share))
-            near = found[np.argmin(np.abs(found - here[number]))] if len(found) != len(here) else found[number]
-            return np.array([near])
+            found = times(share)
+            if len(found) == len(here):
+                return found
+            after = np.clip(np.searchsorted(found, here), 1, max(1, len(found) - 1))
+            low, high = found[after - 1], found[np.minimum(after, len(found) - 1)]
+            return np.where(here - low < high - here, low, high)
 
         try:
-            return float(extrapolated(at)[0])
+            self._times[about] = here, extrapolated(at), now.shared
         except AtwoodError as error:
             raise UnsupportedError(f"its times do not follow it: {error.message}", where=column.path) from error
+        return self._times[about][:2]
 
 
 def _only_leg(segment: SegmentRecord) -> Leg:

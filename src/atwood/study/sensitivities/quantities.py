@@ -104,12 +104,14 @@ def derivatives(
     """
     kernel = assembly.kernel(derived(assembly, tuple(expressions)), vectorized=True)
     n, count = len(assembly.own_equations.coordinates), columns.shape[1]
-    q, u = states[:, :n].T, states[:, n:].T
-    values = np.empty((len(expressions), len(times)))
-    found = np.empty((len(expressions), count, len(times)))
-    for j in range(count):
-        dt = np.full((1, len(times)), 0.0 if passing is None else passing[j])
-        dp = np.repeat(seeds[j][:, None], len(times), axis=1)
-        own = columns[:, j]
-        values[:], found[:, j] = kernel(times[None, :], q, u, dt, own[:, :n].T, own[:, n:].T, dp)
-    return values, found
+    steps, total = len(times), len(times) * count
+    if not total:
+        return np.empty((len(expressions), steps)), np.empty((len(expressions), 0, steps))
+    # One column after the other, each with all times.
+    q, u = np.tile(states[:, :n].T, count), np.tile(states[:, n:].T, count)
+    along = np.moveaxis(columns, 2, 0).transpose(0, 2, 1).reshape(-1, total)
+    dt = np.repeat(np.zeros(count) if passing is None else passing, steps)[None, :]
+    dp = np.repeat(seeds.T, steps, axis=1)
+    made = kernel(np.tile(times, count)[None, :], q, u, dt, along[:n], along[n:], dp)
+    values, found = (np.broadcast_to(one, (len(expressions), total)) for one in made)
+    return values[:, :steps], found.reshape(len(expressions), count, steps)

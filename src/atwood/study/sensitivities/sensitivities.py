@@ -19,6 +19,7 @@ from atwood.model.compose.composite import Model
 from atwood.model.values.units import parse_unit, unit_of
 from atwood.pipeline import SCENE, assembly_of, simulate
 from atwood.result.result import Result
+from atwood.simulation.events.sampling import refuse_updates
 from atwood.simulation.problem.arguments import FORM, OUTPUTS, RTOL, T_END
 from atwood.study.sensitivities.adjoint import Adjoint
 from atwood.study.sensitivities.columns import Column, find_columns
@@ -169,7 +170,8 @@ def sensitivities(
     Raises
     ------
     UsageError
-        If something has no derivative, by its path.
+        If something has no derivative, by its path; so have runs with updates that may remember what they were called
+        with.
     SolveError
         If the run does not get to its end, or has no derivative at an event, with time and part.
     """
@@ -195,6 +197,7 @@ def derivatives_of(
     """Return the derivatives along a run; see `sensitivities`."""
     from atwood.study.sweeps.runs import expand_paths
 
+    refuse_updates(assembly, "derivatives", "")
     result = simulate(assembly, t_end=t_end, outputs=outputs, rtol=rtol, max_steps=max_steps)
     run = result.run
     if result.status not in ("finished", "stopped"):
