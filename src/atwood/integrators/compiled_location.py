@@ -22,11 +22,14 @@ if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventData
 
 FIELDS: dict[str, Kind] = {
-    **dict.fromkeys(("interpolate", "session", "events", "data", "y", "yp", "shifted", "turns", "rows"), ADDRESS),
+    **dict.fromkeys(
+        ("interpolate", "session", "events", "data", "y", "yp", "shifted", "turns", "rows", "kept"), ADDRESS
+    ),
     **dict.fromkeys(("moment", "start", "end", "here", "fired_at", "root", "before", "after", "dip"), NUMBER),
     **dict.fromkeys(("size", "count", "settling", "evaluations", "is_first", "bad"), INTEGER),
 }
-"""The memory of a search. `here` is the time that was read, `root` the last that was tried, `bad` what has no value."""
+"""The memory of a search. `here` is the time that was read, `root` the last that was tried, `bad` what has no value,
+`kept` what the rows were before the last search."""
 
 ROWS = {
     name: k
@@ -89,17 +92,19 @@ class CompiledLocator(EventLocator):
         count, size = events.count, problem.size
         self._own = problem.event_signs
         turns, rows, points = len(FIELDS) + 3 * size, len(FIELDS) + 5 * size, (STACK + MOST + 2) * (1 + 2 * count)
-        self._numbers = memory = np.zeros(rows + len(ROWS) * count + points)
+        kept = rows + len(ROWS) * count + points
+        self._numbers = memory = np.zeros(kept + len(ROWS) * count)
         self._integers = memory.view(np.int64)
         self._state = memory[len(FIELDS) : turns - size].reshape(2, size)
         memory[turns:rows].reshape(2, size)[:] = [turn(1.0 + 2.4 * np.arange(size)) for turn in (np.cos, np.sin)]
         self._rows = memory[rows : rows + len(ROWS) * count].reshape(len(ROWS), count)
+        self._kept_rows = memory[kept:].reshape(len(ROWS), count)
         self._row("direction")[:] = problem.event_directions or 0.0
         self._row("rough")[list(problem.event_rough)] = 1.0
         self.place = begin = memory.ctypes.data
         arrays = {name: begin + 8 * (len(FIELDS) + k * size) for k, name in enumerate(("y", "yp", "shifted", "turns"))}
         self._set(interpolate=interpolation[0], session=interpolation[1], events=events.plain, data=events.address)
-        self._set(**arrays, rows=begin + 8 * rows, size=size, count=count)
+        self._set(**arrays, rows=begin + 8 * rows, kept=begin + 8 * kept, size=size, count=count)
         self._keep = events
         addresses = _routines().code.addresses
         self.functions = addresses["search"], addresses["restart"]
@@ -152,6 +157,10 @@ class CompiledLocator(EventLocator):
     def search(self, begin: float, end: float, at: Interpolant) -> Root | None:
         """Return the first root between two times of the last step, or `None`."""
         return self.found(self._search(self.place, begin, end))
+
+    def forget_search(self) -> None:
+        """Know what was known before the last search, as the step in which it searched is another one now."""
+        self._rows[:] = self._kept_rows
 
     @property
     def last(self) -> float:

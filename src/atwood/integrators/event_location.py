@@ -173,6 +173,7 @@ class EventLocator:
         self._last: Point | None = None
         self._known: dict[float, list[float]] = {}  # values at the times that were read
         self._evaluations = 0
+        self._kept: tuple[list[float], ...] = ()
 
     @property
     def evaluations(self) -> int:
@@ -216,6 +217,7 @@ class EventLocator:
 
         After a root the search can go on from the root's time.
         """
+        self._kept = tuple([*some] for some in (self._signs, self._unsure, self._origin, self._blind, self._fired))
         self._settling, self._end, self._known = False, end, {}
         at = cache(at)  # the ends of parts of a step are read more than once
         if any(self._unsure):
@@ -224,6 +226,12 @@ class EventLocator:
         if begin < clear < end:
             return self._first_root(begin, clear, at) or self._first_root(clear, end, at)
         return self._first_root(begin, end, at)
+
+    def forget_search(self) -> None:
+        """Know what was known before the last search, as the step in which it searched is another one now."""
+        signs, unsure, origin, blind, fired = self._kept
+        self._signs, self._origin, self._blind = [int(one) for one in signs], [*origin], [*blind]
+        self._unsure, self._fired, self._last = [bool(one) for one in unsure], [bool(one) for one in fired], None
 
     def _settle(self, begin: float, at: Interpolant) -> None:
         """Read the signs of what is or has just been zero where they are larger than rounding.

@@ -1,7 +1,7 @@
 """Runs with an explicit method: output times, events and limits around a stepper.
 
 Steps are chosen by their error alone.  What lies between two steps is read from the dense output, so that output
-times and events never change the solution.
+times and events never change the solution, but for events at which it starts anew.
 """
 
 from __future__ import annotations
@@ -134,7 +134,21 @@ class ExplicitSession(SteppingSession):
         if located is not None and code is not None:
             self._root = located.found(code)
             self._searched = self._reached if self._root is None else self._root.state[0]
-        return super()._find_root(t_out)
+        known, searched = self._root, self._searched
+        root = super()._find_root(t_out)
+        if known is None and root is not None and self._ends_at(root):
+            assert self._locator is not None
+            self._locator.forget_search()
+            self._root, self._searched = None, searched
+            self._newest = self._stepper.state()
+            self._reached = min(self._newest[0], self._end)
+            root = super()._find_root(t_out)
+        return root
+
+    def _ends_at(self, root: Root) -> bool:
+        """Take the last step anew to just behind a root at which all starts anew, where that finds it better."""
+        is_one = any(root.events[i] for i in self._problem.event_anew)
+        return is_one and self._stepper.shorten(root.state[0])
 
     def begin_again(
         self,

@@ -478,6 +478,8 @@ class ExplicitProblem:
         For each event +1 (rising values only), -1 (falling values only) or 0 (both).  Empty: all 0.
     event_rough
         Numbers of the events whose exact time does not matter: they happen at the end of a step.
+    event_anew
+        Numbers of the events at which the solution starts anew, so that the step before may end there.
     event_signs
         The sign that each event had before the start, 0 where it is not known, or
         `~atwood.integrators.protocol.JUST_HAPPENED`.  Empty: all 0.
@@ -500,6 +502,7 @@ class ExplicitProblem:
     event_count: int = 0
     event_directions: tuple[int, ...] = ()
     event_rough: tuple[int, ...] = ()
+    event_anew: tuple[int, ...] = ()
     event_signs: tuple[int, ...] = ()
     compiled: Callable[[], CompiledRates] | None = None
     compiled_events: EventData | None = None

@@ -126,6 +126,10 @@ class Stepper(ABC):
         """Return what came of the search for an event that is left to Python, once; None where there is none."""
         return None
 
+    def shorten(self, event: float) -> bool:
+        """Take the last step anew to just behind an event, where that finds it better; whether it was."""
+        return False
+
     def expect(self, signs: FloatArray) -> None:
         """Learn which sign each event has; where it is zero, every step is noticed."""
         return

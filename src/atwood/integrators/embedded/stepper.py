@@ -214,6 +214,10 @@ class CompiledStepper(NativeStepper):
         self._set(waits=0)
         return self._count("found")
 
+    def shorten(self, event: float) -> bool:
+        """Take the last step anew to just behind an event, where that finds it better; whether it was."""
+        return self._call("shorten", event) != 0
+
     def nearest(self, t: FloatArray, y: FloatArray) -> NDArray[np.bool_] | None:
         """Take states, one row each, onto the constraints as steps are; return which could be, None where none can."""
         if self._calls_python or not self._count("project"):
@@ -325,4 +329,4 @@ _FILES = (
 def _routines(pair: Tableau) -> Routines:
     """Return the routines of a pair."""
     source = RoutineSource("integrators.embedded.steps", _FILES, (pair,))
-    return routines_of(source, project_each=(c_void_p, c_void_p, c_void_p, c_int64))
+    return routines_of(source, project_each=(c_void_p, c_void_p, c_void_p, c_int64), shorten=(c_double,))

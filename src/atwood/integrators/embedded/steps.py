@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from math import inf, prod
 
 from atwood.codegen.routines import ADDRESS, BOOLEAN, INTEGER, NUMBER, Record, Routine, Value
-from atwood.integrators.compiled_location import FIELDS as LOCATOR, FOUND, NO_STATE
+from atwood.integrators.compiled_location import FIELDS as LOCATOR, FOUND, NO_STATE, ROWS
 from atwood.integrators.embedded.dense_output import slopes, weighted, write_dense_output, write_polynomial
 from atwood.integrators.embedded.stepper import open_routine
 from atwood.integrators.embedded.tableau import Tableau
@@ -33,6 +33,10 @@ the estimate is taken to be no smaller than the ratio in the step before makes i
 
 RETREAT = 0.25
 """The share of a step that is tried where a step had no finite value."""
+
+_BEHIND, _ROUGH = 1.001, 0.01
+"""A step is taken anew with so many times the length up to an event, where the last term of its dense output is there
+larger than this share of what is allowed."""
 
 _STRETCH = 1.5
 """The end of a step takes the place of a look that was wanted before, if that makes the way to it longer by no more."""
@@ -384,10 +388,53 @@ def _settles(pair: Tableau) -> Routine:
 def _seek(pair: Tableau) -> Routine:
     """Locate the first event in the last step; it then waits until the run comes there, or until Python asks."""
     r, m, () = open_routine(pair, "seek")
-    until = r.least(m.t, m.last)
+    until, own = r.least(m.t, m.last), Record(m.locator, LOCATOR)
     with r.when(m.t_old < until):
-        found = r.call(m.search, m.locator, m.t_old, until)
-        m.found, m.waits = found.integer(), r.choose(found == 0, 0, r.choose(found == FOUND, 1, 2, INTEGER), INTEGER)
+        found = r.variable(r.call(m.search, m.locator, m.t_old, until).integer(), INTEGER)
+        with r.when(found.now == FOUND), r.when(r.call("shorten", m.session, own.root) != 0):
+            r.copy(own.rows, own.kept, own.count * len(ROWS))
+            found.now = r.call(m.search, m.locator, m.t_old, r.least(m.t, m.last)).integer()
+        m.found = found.now
+        m.waits = r.choose(found.now == 0, 0, r.choose(found.now == FOUND, 1, 2, INTEGER), INTEGER)
+    r.give(0)
+    return r
+
+
+def _shorten(pair: Tableau) -> Routine:
+    """Take the last step anew to just behind an event, where its dense output is rough there; 1 where it was.
+
+    Dense output is of a lower order than the steps, and nothing bounds its error; near the end it is as good as a step.
+    """
+    r, m, (event,) = open_routine(pair, "shorten", {"event": NUMBER}, exported=True)
+    h, short = m.h, (event - m.t_old) * _BEHIND
+    with r.when(~((short < h) & (short > 0.0))):
+        r.give(0)
+    with r.when(r.call("densify", m.session) != 0):
+        r.give(0)
+    x, term = short / h, _size(r, m, m.row("dense").at(m.padded * (pair.terms - 1)))
+    for power in range(pair.terms):
+        term = term * (1.0 - x if power % 2 else x)
+    with r.when(~(term > _ROUGH)):
+        r.give(0)
+    with r.when(r.call("retake", m.session, short) != 0):
+        r.call("retake", m.session, h)
+    r.give(1)
+    return r
+
+
+def _retake(pair: Tableau) -> Routine:
+    """Take the last step anew with another length; 1 where there is no value."""
+    r, m, (h,) = open_routine(pair, "retake", {"h": NUMBER})
+    t = m.t_old + h
+    r.copy(m.row("y"), m.row("y_old"), m.padded)
+    slopes(pair, r, m, range(1, pair.end), m.t_old, h, lambda: r.give(1))
+    r.call(f"stage{pair.end}", m.session, h)
+    with r.when(r.call("held", m.session, t) != 0):
+        r.give(1)
+    with r.when(r.call("evaluate", m.session, t, m.row("trial"), m.row("end slope")) != 0):
+        r.give(1)
+    r.copy(m.row("y"), m.row("trial"), m.padded)
+    m.h, m.t, m.is_dense, m.steps = h, t, 0, m.steps + 1
     r.give(0)
     return r
 
@@ -438,8 +485,21 @@ def write_routines(pair: Tableau) -> list[Routine]:
 
     They take the address of a session; see `atwood.integrators.embedded.stepper`.
     """
-    ends = (_begin, _run, _sample, _project_each)
-    inner = (_evaluate, _attempt, _error, _stability, _project, _guarded, _look, _watched, _settles, _seek, _leap)
+    ends = (_begin, _run, _sample, _project_each, _shorten)
+    inner = (
+        _evaluate,
+        _attempt,
+        _error,
+        _stability,
+        _project,
+        _guarded,
+        _look,
+        _watched,
+        _settles,
+        _seek,
+        _retake,
+        _leap,
+    )
     written = [write(pair) for write in (*ends, *inner)]
     return [*written, *(_stage(pair, stage) for stage in range(1, len(pair.nodes))), *write_dense_output(pair)]
 

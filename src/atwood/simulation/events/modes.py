@@ -347,6 +347,11 @@ class EventProbe:
         """Numbers of the events whose exact time does not matter."""
         return tuple(i for i, one in enumerate(self.event_functions) if one.target == COORDINATE_SWITCH)
 
+    @property
+    def anew(self) -> tuple[int, ...]:
+        """Numbers of the events of gaps and slips, at which a run starts anew."""
+        return tuple(i for i, one in enumerate(self.event_functions) if one.target in CONTACT)
+
     def values(self, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
         """Return the value of each event at a state, shifted where it starts at zero."""
         assert self.kernel is not None
