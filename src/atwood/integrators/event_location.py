@@ -217,7 +217,7 @@ class EventLocator:
 
         After a root the search can go on from the root's time.
         """
-        self._kept = tuple([*some] for some in (self._signs, self._unsure, self._origin, self._blind, self._fired))
+        self._kept = tuple(map(list, (self._signs, self._unsure, self._origin, self._blind, self._fired)))
         self._settling, self._end, self._known = False, end, {}
         at = cache(at)  # the ends of parts of a step are read more than once
         if any(self._unsure):

@@ -513,7 +513,7 @@ def _explicit_problem(request: SolverRequest, method: Method) -> ExplicitProblem
 def _watched(request: SolverRequest, problem: ExplicitProblem, method: Method) -> ExplicitProblem:
     """Return a problem with what judges its steps, whose events are machine code too, if they can be."""
     probe = request.probe
-    about = {"event_rough": probe.rough, "event_anew": probe.anew, "event_signs": probe.handed}
-    problem = replace(problem, **about, guard=request.guard(method))
+    problem = replace(problem, event_rough=probe.rough, event_anew=probe.anew, event_signs=probe.handed)
+    problem = replace(problem, guard=request.guard(method))
     found = None if problem.events is None else probe.compiled(for_ida=False)
     return problem if found is None else replace(problem, events=found.function(), compiled_events=found)
