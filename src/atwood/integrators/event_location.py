@@ -27,6 +27,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import cache
 from math import inf, isnan, sqrt
+from typing import Any
 
 import numpy as np
 
@@ -173,7 +174,7 @@ class EventLocator:
         self._last: Point | None = None
         self._known: dict[float, list[float]] = {}  # values at the times that were read
         self._evaluations = 0
-        self._kept: tuple[list[float], ...] = ()
+        self._kept: tuple[list[Any], ...] = ()
 
     @property
     def evaluations(self) -> int:
@@ -217,7 +218,8 @@ class EventLocator:
 
         After a root the search can go on from the root's time.
         """
-        self._kept = tuple(map(list, (self._signs, self._unsure, self._origin, self._blind, self._fired)))
+        rows: tuple[list[Any], ...] = (self._signs, self._unsure, self._origin, self._blind, self._fired)
+        self._kept = tuple([*row] for row in rows)
         self._settling, self._end, self._known = False, end, {}
         at = cache(at)  # the ends of parts of a step are read more than once
         if any(self._unsure):
@@ -229,9 +231,8 @@ class EventLocator:
 
     def forget_search(self) -> None:
         """Know what was known before the last search, as the step in which it searched is another one now."""
-        signs, unsure, origin, blind, fired = self._kept
-        self._signs, self._origin, self._blind = [int(one) for one in signs], [*origin], [*blind]
-        self._unsure, self._fired, self._last = [bool(one) for one in unsure], [bool(one) for one in fired], None
+        self._signs, self._unsure, self._origin, self._blind, self._fired = self._kept
+        self._last = None
 
     def _settle(self, begin: float, at: Interpolant) -> None:
         """Read the signs of what is or has just been zero where they are larger than rounding.
