@@ -45,8 +45,15 @@ _NULL_SPACE: Key[NullSpaceProgram] = Key("program of the null space")
 _NULL_SPACE_CODE: Key[NullSpaceCallbacks] = Key("machine code of the null space")
 
 
+_USED: Key[list[int]] = Key("for how many states programs have been worked out")
+_REVIEWED: Key[RankFinding | None] = Key("better choice of constraints at the start")
+
+
 _LARGEST_COLUMNS = 20_000
 """Programs for many states that are larger are not compiled: that would take longer than it saves."""
+
+_MANY_STATES = 1000
+"""From so many states on, in runs of one structure, it pays to compile what is worked out for each."""
 
 
 @dataclass
@@ -132,9 +139,12 @@ class SceneProblem:
             self._kernels = (assembly.kernel(program.residual), assembly.kernel(program.jacobian, vectorized=many))
         return self._kernels
 
-    def columns(self, program: Program) -> Callable[..., tuple[FloatArray, ...]]:
-        """Return a program for many states: compiled where that was asked for and pays, else with NumPy."""
-        compiles = self.compiles_columns and not self.not_compilable and program.size <= _LARGEST_COLUMNS
+    def columns(self, program: Program, states: int = 0) -> Callable[..., tuple[FloatArray, ...]]:
+        """Return a program for many states: compiled where that was asked for or pays by now, else with NumPy."""
+        used = self.assembly.shared.get(_USED, lambda: [0], program)
+        used[0] += states
+        compiles = (self.compiles_columns or used[0] > _MANY_STATES) and not self.not_compilable
+        compiles = compiles and program.size <= _LARGEST_COLUMNS
         return self.assembly.columns(program) if compiles else self.assembly.kernel(program, vectorized=True)
 
     @property
@@ -169,7 +179,8 @@ class SceneProblem:
 
     def keep_better(self, t: float, q: FloatArray) -> None:
         """Keep the constraints that are better kept at a place, if those that are will not do."""
-        finding = self.better_kept(t, q)
+        about = t, q.tobytes(), self.sizes.tobytes(), self.finding.kept
+        finding = self.assembly.kept.get(_REVIEWED, lambda: self.better_kept(t, q), *about)
         if finding is not None:
             self.keep(finding, t, q)
 

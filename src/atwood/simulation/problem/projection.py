@@ -238,7 +238,7 @@ def constraints_at(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArr
         alone = plan.assembly.kernel(program)(t, q[:, 0], u[:, 0])
         value, entries, explicit_rate = (np.reshape(one, (-1, 1)) for one in alone)
     else:
-        value, entries, explicit_rate = plan.columns(program)(t[None, :], q, u)
+        value, entries, explicit_rate = plan.columns(program, count)(t[None, :], q, u)
     kept, pattern = list(plan.finding.kept), _pattern(plan)
     farthest = int(np.argmax(np.max(np.abs(q), axis=0, initial=0.0)))
     errors = plan.balance.errors.near(float(t[farthest]), q[:, farthest], plan.sizes)
@@ -254,23 +254,18 @@ def _project(
     sizes = plan.sizes[:, None]
     kinematic_map, holding = plan.balance.kinematic_map, plan.balance.holding(list(plan.finding.kept))
     q, speeds = kinematic_map.normalized(q.copy()), (u / sizes).T
-    met = None if nearest is None else _met_quickly(plan, t, q, u, nearest)
-    if met is not None:
-        return met
-    found = None if nearest is None else _taken(plan, t, q, u, nearest)
-    if found is None:
-        now = constraints_at(plan, t, q, u)
-        held = _largest(now, speeds)
-    else:
-        held, near, moving, done = found
-    if _are_exact(plan, held):
-        return Projected(q, u.copy(), lambda: held, np.zeros(len(t), dtype=bool))
-    if found is not None:
-        doubtful = np.zeros(len(t), dtype=bool)
+    taken = None if nearest is None else _taken(plan, t, q, u, nearest)
+    if taken is not None:
+        found, done = taken
         if not done.all():
             rest = _project(plan, t[~done], q[:, ~done], u[:, ~done])
-            near[:, ~done], moving[:, ~done], doubtful[~done] = rest.coordinates, rest.speeds, rest.doubtful
-        return Projected(near, moving, lambda: held, doubtful)
+            found.coordinates[:, ~done], found.speeds[:, ~done] = rest.coordinates, rest.speeds
+            found.doubtful[~done] = rest.doubtful
+        return found
+    now = constraints_at(plan, t, q, u)
+    held = _largest(now, speeds)
+    if _are_exact(plan, held):
+        return Projected(q, u.copy(), lambda: held, np.zeros(len(t), dtype=bool))
     last = np.full(len(t), np.inf)
     active = np.ones(len(t), dtype=bool)
     for _ in range(_STEPS):
@@ -295,50 +290,37 @@ def _are_exact(plan: SceneProblem, held: FloatArray) -> bool:
     return bool(np.all(held[0] <= _EXACT) and np.all(held[1] * plan.scales.time <= _EXACT))
 
 
-def _met_quickly(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray, nearest: Nearest) -> Projected | None:
-    """Return what machine code finds, if that moves by next to nothing where it is taken onto the constraints again.
-
-    A row in units of its largest entry misses no more than the sum of what its unknowns move by to meet it. None where
-    that does not tell.
-    """
-    if plan.finding.redundant or plan.assembly.own_equations.contacts:
-        return None
-    own = np.ascontiguousarray(np.concatenate([q, u]).T)
-    rows, free = own.copy(), np.zeros(len(t), dtype=bool)
-    met = nearest(t, rows)
-    if met is None or not met.all():
-        return None
-    sizes = np.concatenate([plan.coordinate_sizes, plan.sizes / plan.scales.time])
-    misses: Misses = cache(partial(misses_of, plan, t, q, u))
-    if np.max(np.abs(rows - own) / sizes) <= _FAR and _are_exact(plan, misses()):
-        return Projected(q, u.copy(), misses, free)
-    again = rows.copy()
-    met = nearest(t, again)
-    if met is None or not met.all() or not 2 * len(sizes) * np.max(np.abs(again - rows) / sizes) <= tolerances.MET:
-        return None
-    near, moving = (part.copy() for part in plan.program.split(rows.T))
-    near = plan.balance.kinematic_map.normalized(near)
-    return Projected(near, moving, misses, free)
-
-
 def _taken(
     plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray, nearest: Nearest
-) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]] | None:
-    """Return by how much states miss the constraints, where machine code takes them, and which then meet all.
-
-    All states are looked at in one call: most of its time does not depend on their number.
-    """
-    count, rows = len(t), np.ascontiguousarray(np.concatenate([q, u]).T)
+) -> tuple[Projected, NDArray[np.bool_]] | None:
+    """Return what machine code finds, and which of it meets all constraints; None where it finds nothing."""
+    own = np.ascontiguousarray(np.concatenate([q, u]).T)
+    rows = own.copy()
     met = nearest(t, rows)
     if met is None:
         return None
+    sizes = np.concatenate([plan.coordinate_sizes, plan.sizes / plan.scales.time])
+    misses: Misses = cache(partial(misses_of, plan, t, q, u))
+    free, contacts = np.zeros(len(t), dtype=bool), plan.assembly.own_equations.contacts
+    has_more, moved = bool(contacts or plan.finding.redundant), np.max(np.abs(rows - own) / sizes)
+    # A row in units of its largest entry misses no more than the sum of what its unknowns move by to meet it.
+    meets = not has_more and len(sizes) * moved <= _EXACT
+    if met.all() and (meets or ((contacts or moved <= _FAR) and _are_exact(plan, misses()))):
+        return Projected(q, u.copy(), misses, free), met
     near, moving = (part.copy() for part in plan.program.split(rows.T))
-    near = plan.balance.kinematic_map.normalized(near)
-    both = np.concatenate([u, moving], axis=1)
-    now = constraints_at(plan, np.concatenate([t, t]), np.concatenate([q, near], axis=1), both)
-    missed = _largest(now, (both / plan.sizes[:, None]).T)
-    left = missed[:, count:] * np.array([[1.0], [plan.scales.time]])
-    return missed[:, :count], near, moving, met & np.all(left <= tolerances.MET, axis=0)
+    found = Projected(plan.balance.kinematic_map.normalized(near), moving, misses, free)
+    if has_more or not _stays(plan, t, rows, sizes, nearest):
+        left = misses_of(plan, t, found.coordinates, moving) * np.array([[1.0], [plan.scales.time]])
+        met = met & np.all(left <= tolerances.MET, axis=0)
+    return found, met
+
+
+def _stays(plan: SceneProblem, t: FloatArray, rows: FloatArray, sizes: FloatArray, nearest: Nearest) -> bool:
+    """Return whether states move by next to nothing where they are taken onto the constraints again."""
+    again = rows.copy()
+    met = nearest(t, again)
+    most = 2 * len(sizes) * np.max(np.abs(again - rows) / sizes)
+    return met is not None and bool(met.all() and most <= tolerances.MET)
 
 
 def _least_norm(jacobian: FloatArray) -> Callable[[FloatArray], FloatArray]:

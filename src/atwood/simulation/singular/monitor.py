@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 _BEGUN: Key[MonitorData | None] = Key("first looks for singular positions")
 
+_LOOKED_AHEAD: Key[tuple[SingularCrossing | None, list[float]]] = Key("first look ahead")
+
 _REVIEW = 8
 """So many looks are judged together where they are not compiled."""
 
@@ -104,6 +106,7 @@ class SingularityMonitor(Branches):
         self._start, self._is_behind = step_result, False
         self._starts_low = False
         about = step_result.t, step_result.y.tobytes(), step_result.yp.tobytes(), self._whole, plan.finding.kept
+        self._about: tuple[object, ...] | None = about
         begun = plan.assembly.kept.get(_BEGUN, self._first_looks, *about)
         if begun is None:
             self._begin_looks()
@@ -138,7 +141,7 @@ class SingularityMonitor(Branches):
 
     def restart(self, step_result: StepResult, is_behind: bool = False) -> None:
         """Begin again from a state, perhaps behind a singular position."""
-        self._start, self._is_behind = step_result, is_behind
+        self._start, self._is_behind, self._about = step_result, is_behind, None
         self._begin_looks()
 
     def _start_anew(self) -> None:
@@ -223,10 +226,21 @@ class SingularityMonitor(Branches):
         if not self._starts_low:
             return None
         self._starts_low = False
-        self._samples = [Sample(self._start.t, self._start.y, self._start.yp)]
-        self._away = []
+        self._samples, self._away = [Sample(self._start.t, self._start.y, self._start.yp)], []
+        if self._about is None:
+            self._measure()
+            return self._coming(self._start.t)
+        kept = self.plan.assembly.kept
+        found, self._away = kept.get(_LOOKED_AHEAD, self._first_ahead, *self._about)
+        self._largest = max(self._largest, self._away[0]) if np.isfinite(self._away[0]) else self._largest
+        if found is not None:
+            kept.take(_LOOKED_AHEAD)
+        return found
+
+    def _first_ahead(self) -> tuple[SingularCrossing | None, list[float]]:
+        """Return what is just ahead of the start of a run, and the measure there."""
         self._measure()
-        return self._coming(self._start.t)
+        return self._coming(self._start.t), self._away[:]
 
     def _in_run(self, times: FloatArray) -> FloatArray:
         """Return times, none of them outside the run: what begins slowly has long strides, and drives other places."""
