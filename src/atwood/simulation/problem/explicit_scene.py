@@ -207,12 +207,13 @@ def impact_code(plan: SceneProblem, t: float, y: FloatArray, gaps: Sequence[Cont
     return assembly.shared.get(_IMPACTS, make, assembly.form, kept, light)
 
 
-def nearest_place(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
-    """Return the coordinates nearest to others at which the constraints, and the gaps that are closed, are met."""
+def nearest_state(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the coordinates and speeds nearest to others that meet the constraints, and gaps that are closed."""
     y = np.concatenate([q, u])
     values = values_on_constraints(plan)
     nearer = plan.assembly.compiled(program_on_constraints(plan, t, y).projection).bind(values)
-    return _projected(nearer, t, y, len(q))[: len(q)]
+    found = _projected(nearer, t, y, len(q))
+    return found[: len(q)], found[len(q) :]
 
 
 def rates_on_constraints(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> FloatArray:

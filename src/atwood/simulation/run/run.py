@@ -377,7 +377,7 @@ class Walk:
         if triggers is None or not plan.assembly.own_equations.contacts:
             return plan
         from atwood.simulation.contacts.changes import check_start, resolve
-        from atwood.simulation.problem.explicit_scene import nearest_place, rates_on_constraints
+        from atwood.simulation.problem.explicit_scene import nearest_state, rates_on_constraints
 
         options, is_start = self.options, not self.segments
         if not self.options.looks_for_events:
@@ -408,7 +408,7 @@ class Walk:
         self.u, self.held = changed.speeds, changed.held
         if changed.touching and not is_start:  # what is found to be closed is so to rounding
             met = self._sides.like(self.assembly.with_held(changed.touching), plan)
-            self.q = nearest_place(plan.in_piece(met), t, self.q, self.u)
+            self.q, _ = nearest_state(plan.in_piece(met), t, self.q, self.u)
         self.assembly = self.assembly.with_held(self.held)
         self.probe, self._plans, self._handed = None, {}, ()
         made = plan.in_piece(self._sides.like(self.assembly, plan))

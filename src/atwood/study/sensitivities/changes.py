@@ -26,7 +26,7 @@ from atwood.simulation.events.impacts_in_time import jumped
 from atwood.simulation.events.mode_change import enter_mode
 from atwood.simulation.events.modes import EventProbe, EventRecord
 from atwood.simulation.events.sides import SIDE
-from atwood.simulation.problem.explicit_scene import nearest_place
+from atwood.simulation.problem.explicit_scene import nearest_state
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.run.recorder import Recorder
 from atwood.simulation.run.run import Walk
@@ -178,10 +178,11 @@ class WatchedWalk(Walk):
             t, q, u = state
             there, looser = beside(assembly), 1e3 * options.relative_tolerance
             own = plan.in_piece(self._sides.like(there, plan))
+            q, u = nearest_state(own, t, q, u)  # what misses a gap that is closed would be an impact, or none
             touching = resolve(there, state, length, scales, looser, triggers, one_by_one, impacts).touching
             if touching:
                 met = self._sides.like(there.with_held(touching), plan)
-                q = nearest_place(own.in_piece(met), t, q, u)
+                q, _ = nearest_state(own.in_piece(met), t, q, u)
             found = resolve(there, (t, q, u), length, scales, looser, triggers, one_by_one, impacts)
             return q, found.speeds, found.held
 
