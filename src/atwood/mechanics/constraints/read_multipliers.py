@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from atwood.errors import AtwoodError, UnsupportedError
-from atwood.expr import Expression, absolute, depends_on, evaluate, jacobian, select, solve, sqrt, substitute
+from atwood.expr import Expression, absolute, depends_on, evaluate, jacobian, select, solve, sqrt, substitute, vjp
 from atwood.lazy_dataclasses import replace
 from atwood.mechanics.dynamics.augmented import SymmetricSystem, back_substitute, eliminate, fill_of, minimum_degree
 from atwood.mechanics.dynamics.equations import Constraint, ContactRow, Equations
@@ -112,8 +112,11 @@ def _forces_met(
     """Return the multipliers that forces read, from what they are in terms of the rows of these forces."""
     graph = bias[0].graph
     forces, values = list(stand_ins.values()), [bias[i] for i in stand_ins]
-    slopes = jacobian(found, forces)
-    shares = slopes.by_place
+    if len(found) < len(forces):
+        slopes = [vjp([one], [1.0], forces) for one in found]
+        shares = {(r, k): one for r, row in enumerate(slopes) for k, one in enumerate(row) if not one.is_zero}
+    else:
+        shares = jacobian(found, forces).by_place
     rest = substitute(found, dict.fromkeys(forces, graph.zero))
     try:
         found = _fixed_point(wanted, rest, shares, values)
