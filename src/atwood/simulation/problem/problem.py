@@ -141,11 +141,15 @@ class SceneProblem:
 
     def columns(self, program: Program, states: int = 0) -> Callable[..., tuple[FloatArray, ...]]:
         """Return a program for many states: compiled where that was asked for or pays by now, else with NumPy."""
+        compiles = self.pays(program, states)
+        return self.assembly.columns(program) if compiles else self.assembly.kernel(program, vectorized=True)
+
+    def pays(self, program: Program, states: int) -> bool:
+        """Return whether it pays to compile what is worked out for so many more states."""
         used = self.assembly.shared.get(_USED, lambda: [0], program)
         used[0] += states
-        compiles = (self.compiles_columns or used[0] > _MANY_STATES) and not self.not_compilable
-        compiles = compiles and program.size <= _LARGEST_COLUMNS
-        return self.assembly.columns(program) if compiles else self.assembly.kernel(program, vectorized=True)
+        is_often = self.compiles_columns or used[0] > _MANY_STATES
+        return is_often and not self.not_compilable and program.size <= _LARGEST_COLUMNS
 
     @property
     def _present(self) -> FormProgram:

@@ -23,10 +23,15 @@ from atwood.simulation.problem.problem import SceneProblem
 from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
+    from atwood.codegen.llvm.misses import MissProgram
     from atwood.numerics.sparse_batch import Normal, Pattern
 
 
 _NORMAL: Key[Normal] = Key("normal equations of the constraints")
+
+_MISSES: Key[MissProgram] = Key("machine code of what states miss constraints by")
+
+_MISSES_HERE: Key[Callable[..., FloatArray]] = Key("the same with parameters")
 
 _PATTERN: Key[Pattern] = Key("where the constraint Jacobian has entries")
 
@@ -178,6 +183,9 @@ def nearly_projected(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatA
 
 def misses_of(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatArray:
     """Return by how much states miss the constraints on position and velocity, shape (2, states)."""
+    held = plan.balance.program
+    if plan.pays(held.constraints_alone, len(t)):
+        return _misses(plan)(t, np.concatenate([q, u]).T, plan.sizes, tolerances.TRUSTED * _errors(plan, t, q))
     chunk = _chunk(plan)
     found = np.zeros((2, len(t)))
     for i in range(0, len(t), chunk):
@@ -185,6 +193,23 @@ def misses_of(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray) -
         now = constraints_at(plan, t[part], q[:, part], u[:, part])
         found[:, part] = _largest(now, (u[:, part] / plan.sizes[:, None]).T)
     return found
+
+
+def _misses(plan: SceneProblem) -> Callable[..., FloatArray]:
+    """Return the same as machine code."""
+    from atwood.codegen.llvm.misses import compile_misses
+
+    held, assembly = plan.balance.program, plan.assembly
+    places = tuple(zip(held.jacobian_rows.tolist(), held.jacobian_columns.tolist(), strict=True))
+    code = partial(compile_misses, held.constraints_alone, places)
+    made = assembly.shared.get(_MISSES, code, assembly.form)
+    return assembly.kept.get(_MISSES_HERE, lambda: made.bind(assembly.parameter_values), made)
+
+
+def _errors(plan: SceneProblem, t: FloatArray, q: FloatArray) -> FloatArray:
+    """Return how far rounding can take the constraints at states."""
+    farthest = int(np.argmax(np.max(np.abs(q), axis=0, initial=0.0)))
+    return plan.balance.errors.near(float(t[farthest]), q[:, farthest], plan.sizes)
 
 
 def _chunk(plan: SceneProblem) -> int:
@@ -240,8 +265,7 @@ def constraints_at(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArr
     else:
         value, entries, explicit_rate = plan.columns(program, count)(t[None, :], q, u)
     kept, pattern = list(plan.finding.kept), _pattern(plan)
-    farthest = int(np.argmax(np.max(np.abs(q), axis=0, initial=0.0)))
-    errors = plan.balance.errors.near(float(t[farthest]), q[:, farthest], plan.sizes)
+    errors = _errors(plan, t, q)
     entries = entries * plan.sizes[pattern.columns, None]
     rows = trusted_sizes(pattern.largest(entries).T, errors)
     entries /= rows.T[pattern.rows]
@@ -262,10 +286,10 @@ def _project(
             found.coordinates[:, ~done], found.speeds[:, ~done] = rest.coordinates, rest.speeds
             found.doubtful[~done] = rest.doubtful
         return found
-    now = constraints_at(plan, t, q, u)
-    held = _largest(now, speeds)
+    held = misses_of(plan, t, q, u)
     if _are_exact(plan, held):
         return Projected(q, u.copy(), lambda: held, np.zeros(len(t), dtype=bool))
+    now = constraints_at(plan, t, q, u)
     last = np.full(len(t), np.inf)
     active = np.ones(len(t), dtype=bool)
     for _ in range(_STEPS):
