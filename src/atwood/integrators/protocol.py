@@ -426,6 +426,9 @@ STEPS = 6
 RATES = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, *[ctypes.c_void_p] * 3)
 """The function of `CompiledRates`."""
 
+PROJECTION = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, *[ctypes.c_void_p] * 2)
+"""Its projection."""
+
 
 @dataclass(frozen=True, eq=False)
 class CompiledRates:

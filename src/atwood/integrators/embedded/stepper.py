@@ -25,6 +25,7 @@ from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Kind, Routin
 from atwood.errors import KernelEvaluationError
 from atwood.integrators.embedded.tableau import Tableau
 from atwood.integrators.protocol import (
+    PROJECTION,
     RATES,
     CompiledRates,
     ExplicitProblem,
@@ -96,7 +97,6 @@ def open_routine(
     return session_routine(partial(Memory, fields, pair.rows, runs=runs), name, given, own, exported)
 
 
-_PROJECTION = ctypes.CFUNCTYPE(c_int, c_double, c_void_p, c_void_p)
 _GUARDS = ctypes.CFUNCTYPE(c_int, *[c_double, c_void_p, c_void_p] * 2, c_void_p)
 
 
@@ -285,7 +285,7 @@ class CompiledStepper(NativeStepper):
     def _in_python(self, problem: ExplicitProblem) -> CompiledRates:
         """Return rates and projection that call Python."""
         rates = self._called(RATES, problem.rates, (1,), 2)
-        project = 0 if problem.project is None else self._called(_PROJECTION, problem.project, (1,), 1)
+        project = 0 if problem.project is None else self._called(PROJECTION, problem.project, (1,), 1)
         return CompiledRates(rates, project=project, keep=self._callbacks)
 
     def _called(

@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,11 @@ from atwood.lazy_dataclasses import dataclass, replace
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.projection import misses_of
+
+if TYPE_CHECKING:
+    from atwood.codegen.llvm.columns import ColumnKernel, ColumnProgram
+
+_COLUMNS: Key[ColumnProgram] = Key("machine code of all coordinates from independent ones")
 
 _NEAR = 0.1
 """Nearer to a dead centre of every choice, as the square of a sine, the constraints are kept from there on.
@@ -107,14 +113,22 @@ class Solved:
         free, moving, n = self.independent, self.form.loops.speeds, len(self.assembly.reduced.coordinates)
         return np.concatenate([y[free], y[[n + i for i in moving]]])
 
-    def states(self, t: FloatArray, y: FloatArray) -> FloatArray:
+    def states(self, t: FloatArray, y: FloatArray, is_compiled: bool = False) -> FloatArray:
         """Return all coordinates and speeds from the independent ones, shape (samples, unknowns)."""
         n = len(self.form.loops.independent)
         if not len(t):
             equations = self.assembly.reduced
             return np.zeros((0, len(equations.coordinates) + len(equations.speeds)))
-        q, u = self.kernel(self.form.states, vectorized=True)(t[None, :], y[:, :n].T, y[:, n:].T)
+        kernel = self._columns if is_compiled else self.kernel(self.form.states, vectorized=True)
+        q, u = kernel(t[None, :], y[:, :n].T, y[:, n:].T)
         return np.concatenate([q, u]).T
+
+    @cached_property
+    def _columns(self) -> ColumnKernel:
+        from atwood.codegen.llvm.columns import compile_columns
+
+        program = self.form.states
+        return self.assembly.shared.get(_COLUMNS, lambda: compile_columns(program), program).bind(self.values)
 
     def state(self, t: float, y: FloatArray) -> FloatArray:
         """Return the same of one state."""
@@ -207,17 +221,19 @@ def solve_at(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> Solv
     """Return the loops of a mechanism solved by formulas on the branch of a position, with the best choice there."""
     if not can_be_solved(plan):
         return None
+    known: dict[tuple[object, ...], Solved | None] = plan.assembly.kept.get(_SOLVED, dict)
     about = t, q.tobytes(), u.tobytes(), plan.finding.kept, plan.scales.length
-    found = plan.assembly.kept.get(_SOLVED, lambda: _Found(_solve_at(plan, t, q, u)), *about)
-    return found.solved
+    if about not in known:
+        known[about] = _solve_at(plan, t, q, u)
+        for oldest in [*known][:-_REMEMBERED]:
+            del known[oldest]
+    return known[about]
 
 
-@dataclass(frozen=True, eq=False)
-class _Found:
-    solved: Solved | None
+_SOLVED: Key[dict[tuple[object, ...], Solved | None]] = Key("solved loops")
 
-
-_SOLVED: Key[_Found] = Key("solved loops")
+_REMEMBERED = 8
+"""At so many places it is known how loops are solved: a run begins anew at its start, and where dead centres are."""
 
 
 def _solve_at(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> Solved | None:

@@ -219,14 +219,19 @@ def nearest_state(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) ->
 def rates_on_constraints(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
     """Return the rates of coordinates and speeds on the constraints."""
     y = np.concatenate([q, u])
-    program, values, found = program_on_constraints(plan, t, y), values_on_constraints(plan), np.empty_like(y)
-    compiled = _compiled_on_constraints(plan, program, values)
-    if compiled is None:
+    rates, found = compiled_on_constraints(plan, t, y), np.empty_like(y)
+    if rates is None:
+        program, values = program_on_constraints(plan, t, y), values_on_constraints(plan)
         found[:] = first_order(plan.assembly.compiled(program.accelerations).bind(values), len(q))(t, y)
     else:
-        rates = compiled()
         RATES(rates.function)(t, y.ctypes.data, found.ctypes.data, rates.data)
     return found
+
+
+def compiled_on_constraints(plan: SceneProblem, t: float, y: FloatArray) -> CompiledRates | None:
+    """Return rates and projections on the constraints as machine code; None where they cannot be."""
+    found = _compiled_on_constraints(plan, program_on_constraints(plan, t, y), values_on_constraints(plan))
+    return None if found is None else found()
 
 
 def program_on_constraints(plan: SceneProblem, t: float, y: FloatArray) -> ConstrainedProgram:

@@ -85,6 +85,8 @@ class SceneProblem:
         Where bodies float far away, tolerances relative to unknowns are this share of those relative to their sizes.
     compiles_columns
         Whether programs for many states are compiled; asked for once many evaluations of few states are needed.
+    has_rates
+        Whether rates and projections on the constraints are machine code already.
     """
 
     assembly: Assembly
@@ -100,6 +102,7 @@ class SceneProblem:
     not_compilable: str = ""
     relative_share: float = 1.0
     compiles_columns: bool = False
+    has_rates: bool = False
     _kernels: tuple[BoundKernel, BoundKernel] | None = field(default=None, repr=False)
     _seen: tuple[float, FloatArray] | None = field(default=None, repr=False)
     _null_space: CompiledNullSpace | None = field(default=None, repr=False)

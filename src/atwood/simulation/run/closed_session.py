@@ -124,7 +124,8 @@ class ClosedLoopSession(Session):
         done = 0
         while True:
             y, _, result = self._session.sample(times[done:])
-            parts.append(self._solved.states(times[done : done + len(y)], y))
+            is_often = self._request.plan.pays(self._solved.form.states, len(y))
+            parts.append(self._solved.states(times[done : done + len(y)], y, is_often))
             done += len(y)
             found = self._handed_out(result)
             if found is not None:

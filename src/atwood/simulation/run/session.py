@@ -467,6 +467,7 @@ def _open_on_constraints(
     plan, probe, kept = request.plan, request.probe, request.kept
     plan.keep_better(t, plan.program.split(y)[0])
     session = kept.begin_again(request, method, t, y, on_stiff)
+    plan.has_rates = not plan.not_compilable
     if session is not None:
         return session
     problem = constrained_problem(plan, t, y, probe.function(), probe.directions)

@@ -9,16 +9,18 @@ repeated integration, with each state projected onto the constraints before forc
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import TypeAlias
 
 import numpy as np
 from numpy.polynomial import legendre
 
 from atwood.arrays import FloatArray
-from atwood.errors import AtwoodError
+from atwood.errors import AtwoodError, KernelEvaluationError
+from atwood.integrators.protocol import PROJECTION, RATES, CompiledRates
 from atwood.lazy_dataclasses import dataclass
 from atwood.simulation.dynamics.reactions import accelerations_at
+from atwood.simulation.problem.explicit_scene import compiled_on_constraints
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.projection import ProjectedStates, nearly_projected, project_safely, project_states
 
@@ -157,10 +159,14 @@ def _settle(
     kept = np.asarray(plan.finding.kept, dtype=np.intp)
     last, sizes, balance = np.inf, [], plan.columns(plan.balance.program.program)
     places, speeds = guess
+    code = compiled_on_constraints(plan, t, np.concatenate([q, u])) if plan.has_rates else None
     for _ in range(_SWEEPS):
-        held = _projected(plan, times, places, speeds, is_far)
+        held = None if code is None else _held_by(code, times, places, speeds)
+        held = _projected(plan, times, places, speeds, is_far) if held is None else held
         state = times, held.coordinates, held.speeds
-        accelerations = accelerations_at(plan.assembly, plan.assembly.form, *state, kept, balance)
+        accelerations = None if code is None else _rates_by(code, *state)[len(q) :]
+        if accelerations is None:
+            accelerations = accelerations_at(plan.assembly, plan.assembly.form, *state, kept, balance)
         turned = half * (integral @ accelerations.T)
         turned[0] += u
         later = (_REACH @ turned).T  # known already, and twice as near as what the places would follow from
@@ -181,6 +187,35 @@ def _settle(
             return Arc(t, end, moved, turned, max(min(change, left), _size(plan, *rest)))
         last, is_far = change, change > _CLOSE
     return None
+
+
+def _held_by(code: CompiledRates, t: FloatArray, q: FloatArray, u: FloatArray) -> ProjectedStates | None:
+    """Return states that machine code takes onto the constraints; None where it cannot all."""
+    project, n = PROJECTION(code.project), len(q)
+
+    def taken(speeds: FloatArray, places: FloatArray) -> FloatArray | None:
+        y = np.ascontiguousarray(np.concatenate([places, speeds]).T)
+        first, width = y.ctypes.data, y.strides[0]
+        flags = [project(one, first + i * width, code.project_data) for i, one in enumerate(t.tolist())]
+        return None if any(flags) or not np.all(np.isfinite(y)) else y.T
+
+    def hold(places: FloatArray, speeds: FloatArray) -> FloatArray:
+        found = taken(speeds, places)
+        if found is None:
+            raise KernelEvaluationError("speeds cannot be taken onto the constraints")
+        return found[n:]
+
+    near = taken(u, q)
+    return None if near is None else ProjectedStates(near[:n], near[n:], partial(hold, near[:n]))
+
+
+def _rates_by(code: CompiledRates, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatArray:
+    """Return rates of coordinates and speeds by machine code, shape (number, states)."""
+    function, y = RATES(code.function), np.ascontiguousarray(np.concatenate([q, u]).T)
+    found, width = np.empty_like(y), y.strides[0]
+    for i, one in enumerate(t.tolist()):
+        function(one, y.ctypes.data + i * width, found.ctypes.data + i * width, code.data)
+    return found.T
 
 
 def _projected(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray, is_far: bool) -> ProjectedStates:
