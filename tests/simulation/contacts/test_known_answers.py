@@ -14,6 +14,7 @@ from atwood.simulation.events.modes import find_event_functions
 from atwood_library import (
     Box,
     BoxContact,
+    Force,
     Ground,
     Link,
     Pivot,
@@ -24,6 +25,7 @@ from atwood_library import (
     Sphere,
     Spherical,
     Spring,
+    SurfaceContact,
     Universal,
 )
 
@@ -119,6 +121,38 @@ def test_a_block_slides_up_a_slope_and_stays(form: str) -> None:
     assert times(result, "sticks") == [pytest.approx(1.0 / slowing, abs=1e-10)]
     assert result["c.friction_force"][-1] == pytest.approx(2.0 * G * math.sin(0.3))
     assert result["c.slip_state"][-1] == 2.0
+
+
+@FORMS
+@pytest.mark.parametrize("scene", ["bead", "block"])
+def test_what_is_light_has_forces_of_its_own_size(form: str, scene: str) -> None:
+    """A gram beside a thousand tons leaves a sphere, or slips, when it does so alone."""
+    made, bead = Scene(), scene == "bead"
+    ground, m, heavy = (
+        made.add("ground", Ground()),
+        made.add("m", PointMass(mass=1e-3)),
+        made.add("heavy", PointMass(mass=1e6)),
+    )
+    floor = made.add("floor", PointContact(friction=0.3))
+    made.connect(ground.frame, floor.plane)
+    made.connect(heavy.point, floor.point)
+    made.start.update({"heavy.position.x": 2.0, "heavy.position.z": 0.0})
+    made.start.update({"heavy.velocity.x": 0.0, "heavy.velocity.z": 0.0})
+    if bead:
+        contact = made.add("c", SurfaceContact(function="x**2 + z**2 - 1"))
+        made.connect(ground.frame, contact.a)
+        made.connect(m.point, contact.b)
+        start_at(made, 0.0, 1.0, 0.5, 0.0)
+    else:
+        contact, pull = made.add("c", PointContact(friction=0.5)), made.add("pull", Force(value=lambda t: 1e-3 * G * t))
+        for ends in ((ground.frame, contact.plane), (m.point, contact.point), (m.point, pull.point)):
+            made.connect(*ends)
+        start_at(made, 0.0, 0.0, 0.0, 0.0)
+    result = run(made, form, 1.0)
+    told = [(one.part, one.kind) for one in result.events]
+    assert told == [("c", "opens" if bead else "slips")]
+    assert result.events[0].time == pytest.approx(0.7542388380 if bead else 0.5, abs=1e-9)
+    assert bead or result["m.velocity.x"][-1] == pytest.approx(0.125 * G, abs=1e-9)
 
 
 def test_a_start_inside_is_refused_with_the_part_and_the_depth() -> None:

@@ -44,6 +44,7 @@ from atwood.model.values.units import ALONG
 from atwood.plotting.live.parameters import find_parameters
 from atwood.plotting.live.pulls import PULL, pulls_of
 from atwood.simulation.contacts.compiled import in_no_contact, set_data, why_in_python
+from atwood.simulation.contacts.values import with_own_sizes
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.reactions import ReactionSolver
 from atwood.simulation.events.modes import MARGIN, EventProbe
@@ -76,6 +77,7 @@ def plan_of(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length: 
     if sided.sides is not None:
         sided = replace(sided, side_values=plain_sides(sided, t, q, u))
     plan = problem_of_run(sided, t, q, u, length, assembly.flat.t_end - assembly.flat.t_start)
+    plan = with_own_sizes(plan, t, q, u)
     plan.keep_better(t, q)
     if plan.not_compilable:
         raise NotLiveError(f"{plan.not_compilable}, and a page has no Python")
@@ -304,7 +306,7 @@ class ModeText:
                 "direction": one.direction,
                 "impact": one.impact,
                 "noted": one.is_noted,
-                "small": MARGIN * self.plan.scales.of(one.unit),
+                "small": MARGIN * self.plan.scales.of_law(one.part, one.law, one.unit),
                 "updates": [],
             }
             for one in probe.event_functions

@@ -218,7 +218,7 @@ def fill_sets(
         table[:, i] = (
             k,
             HAPPENED.get(one.target, 0),
-            MARGIN * relative * scales.of(one.unit),
+            MARGIN * relative * scales.of_law(one.part, one.law, one.unit),
             not layout.first[k].is_speed,
         )
     _give(jumps, plan, relative, impacts)

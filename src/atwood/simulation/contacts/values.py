@@ -19,16 +19,19 @@ from atwood.forms.caches import Key
 from atwood.forms.loose import state_paths
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import to_maximal
-from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.dynamics.equations import ContactRow, Equations
-from atwood.numerics.contact_sets import GOES_ON, Contacts, Limits, State, Unit, is_back
+from atwood.model.values.units import ALONG
+from atwood.numerics.contact_sets import GOES_ON, NOTHING, Contacts, Limits, State, Unit, is_back
 from atwood.numerics.matrices import least_norm, or_one, to_array
 from atwood.simulation.dynamics.balance import LIGHT, BalanceValues, balance_of, even_balance
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
-from atwood.simulation.dynamics.scales import motion_scales
+from atwood.simulation.dynamics.scales import Scales, motion_scales
+from atwood.simulation.problem.problem import SceneProblem
 
 _LAYOUT: Key[Layout] = Key("gaps and slips")
 _FORCES: Key[Program] = Key("forces of gaps and slips")
+_OWN_SIZES: Key[Scales] = Key("sizes of forces of gaps and slips")
 
 _LIMITS = ("limits", "static limits", "limits backwards", "static limits backwards")
 
@@ -143,6 +146,34 @@ def _forces(equations: Equations, parameters: tuple[Expression, ...]) -> Program
     """Return the program of the multipliers of all rows."""
     found = substitute([one.row.multiplier for one in equations.contacts], dict(equations.read))
     return Program("forces of contacts", state_groups(equations), parameters, (OutputGroup("forces", tuple(found)),))
+
+
+def with_own_sizes(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> SceneProblem:
+    """Return a plan that knows sizes of the forces of its gaps and slips.
+
+    A part that is far lighter than the whole scene has smaller forces. Those of some rows are off by
+    ``|A^+| a`` where accelerations are off by a: what touches, in whatever set, is then off by no more.
+    """
+    assembly, scales = plan.assembly, plan.scales
+    layout = layout_of(assembly)
+    if not layout.contacts or layout.is_borne:  # limits that read forces of joints are off by these
+        return plan
+
+    def make() -> Scales:
+        values = ContactValues(assembly, t, q, u, scales.length)
+        own = np.diag(values.response)
+        size = np.sqrt(np.where(own > NOTHING * np.max(own), own, np.inf))
+        inverse = least_norm(values.response / size / size[:, None], np.eye(len(size)), errors=LIGHT)
+        falls = [scales.of(ALONG[one.law.options.unit]) / scales.time**2 for one in layout.contacts]
+        each = np.abs(inverse / size / size[:, None]) @ np.array(falls)
+        each = np.where(np.isfinite(size), each, np.inf)
+        found: dict[tuple[str, str], float] = {}
+        for one, rows, at in zip(layout.first, layout.units, layout.gap_of, strict=True):
+            asked = [*rows, *(layout.units[at] if at >= 0 else ())]
+            found[one.row.key[:2]] = float(np.max(each[asked]))
+        return replace(scales, contacts=found)
+
+    return replace(plan, scales=assembly.kept.get(_OWN_SIZES, make, t, q.tobytes(), u.tobytes(), scales.time))
 
 
 class ContactValues:

@@ -23,7 +23,7 @@ from atwood.mechanics.constraints.knots import BALANCES
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import extent
 from atwood.mechanics.outputs.observables import Observable
-from atwood.model.values.units import parse_unit
+from atwood.model.values.units import ALONG, parse_unit
 from atwood.numerics.matrices import or_one
 from atwood.topology.graph import connected_groups
 
@@ -43,11 +43,19 @@ class Scales:
         Time in which something happens, s.
     force
         Size of a force, N.
+    contacts
+        Sizes of forces of gaps and slips by part and law, where these are known by themselves.
     """
 
     length: float
     time: float
     force: float
+    contacts: Mapping[tuple[str, str], float] | None = None
+
+    def of_law(self, part: str, law: str, unit: str) -> float:
+        """Return the size of what a law of a part tells: of a gap or a slip, with a unit of forces, of its own."""
+        whole = self.of(unit)
+        return min(whole, (self.contacts or {}).get((part, law), whole)) if unit in ALONG else whole
 
     def of(self, unit: str) -> float:
         """Return the size of a quantity by the powers of mass, length and time in its SI unit; of an angle, one."""

@@ -260,7 +260,8 @@ class EventProbe:
         self.kernel = assembly.kernel(
             known_program(assembly, _EVENTS, lambda: [one.value for one in self.event_functions], self._about)
         )
-        small = np.array([MARGIN * tolerance * plan.scales.of(one.unit) for one in self.event_functions])
+        sizes = [plan.scales.of_law(one.part, one.law, one.unit) for one in self.event_functions]
+        small = MARGIN * tolerance * np.array(sizes)
         self.shift = np.zeros(len(small))
         about = *state, plan.finding.kept, self._about
         values = assembly.kept.get(_AT_START, lambda: self.values(t, q, u), *about)

@@ -429,7 +429,12 @@ class Walk:
     def _plan(self) -> SceneProblem:
         assembly = self._sides.in_pieces(self.assembly, self.t, self.q, self.u)
         span = self.options.t_end - self.start.time
-        return problem_of_run(assembly, self.t, self.q, self.u, self.start.length, span)
+        plan = problem_of_run(assembly, self.t, self.q, self.u, self.start.length, span)
+        if not assembly.own_equations.contacts:
+            return plan
+        from atwood.simulation.contacts.values import with_own_sizes
+
+        return with_own_sizes(plan, self.t, self.q, self.u)
 
     def _schedule(self, assembly: Assembly) -> Schedule:
         """Return the time events of a scene in one mode."""
