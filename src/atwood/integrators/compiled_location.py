@@ -156,6 +156,7 @@ class CompiledLocator(EventLocator):
 
     def search(self, begin: float, end: float, at: Interpolant) -> Root | None:
         """Return the first root between two times of the last step, or `None`."""
+        self._kept_rows[:] = self._rows
         return self.found(self._search(self.place, begin, end))
 
     def forget_search(self) -> None:

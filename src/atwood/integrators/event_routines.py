@@ -378,7 +378,6 @@ def _first_root() -> Routine:
 def _search() -> Routine:
     """Find the first event between two times of the last step; its state is what was read last."""
     r, m, (begin, end) = _open("search", {"begin": NUMBER, "end": NUMBER}, exported=True)
-    r.copy(m.kept, m.rows, m.count * len(ROWS))
     m.settling, m.end, m.here = 0, end, nan
     unsure, blind = m.row("unsure"), m.row("blind")
     some, clear = r.variable(False, BOOLEAN), r.variable(-inf)

@@ -390,6 +390,7 @@ def _seek(pair: Tableau) -> Routine:
     r, m, () = open_routine(pair, "seek")
     until, own = r.least(m.t, m.last), Record(m.locator, LOCATOR)
     with r.when(m.t_old < until):
+        r.copy(own.kept, own.rows, own.count * len(ROWS))
         found = r.variable(r.call(m.search, m.locator, m.t_old, until).integer(), INTEGER)
         with r.when(found.now == FOUND), r.when(r.call("shorten", m.session, own.root) != 0):
             r.copy(own.rows, own.kept, own.count * len(ROWS))
