@@ -223,7 +223,7 @@ def _without_rounding(
     rows = [one.row for one in equations.contacts]
     known = dict(zip(equations.accelerations, accelerations, strict=True))
     misses, masks = substitute([row.second for row in rows], known), [one.mask for one in equations.contacts]
-    changed = _nearest(_slopes(equations, rows), misses, sizes, masks)
+    changed = nearest(equations, rows, misses, sizes, masks)
     return [a - one * size for a, one, size in zip(accelerations, changed, sizes, strict=True)]
 
 
@@ -278,23 +278,24 @@ def _projection(equations: Equations, sizes: Sequence[Expression]) -> list[Expre
     rows = [*((held, one) for held in equations.constraints), *((held.row, held.mask) for held in equations.contacts)]
     holding = [(held, mask) for held, mask in rows if held.holonomic and held.value is not None]
     values = [held.value for held, _ in holding if held.value is not None]
-    moved = _nearest(_slopes(equations, [held for held, _ in holding]), values, sizes, [mask for _, mask in holding])
+    moved = nearest(equations, [held for held, _ in holding], values, sizes, [mask for _, mask in holding])
     coordinates = _moved(equations, [-one * size for one, size in zip(moved, sizes, strict=True)])
     there = dict(zip(equations.coordinates, coordinates, strict=True))
     misses = substitute([held.rate for held, _ in rows], there)
-    changed = _nearest(_slopes(equations, [held for held, _ in rows]), misses, sizes, [mask for _, mask in rows])
+    changed = nearest(equations, [held for held, _ in rows], misses, sizes, [mask for _, mask in rows])
     speeds = [u - one * size for u, one, size in zip(equations.speeds, changed, sizes, strict=True)]
     return [*coordinates, *speeds, *moved]
 
 
-def _nearest(
-    slopes: Sequence[Mapping[int, Expression]],
+def nearest(
+    equations: Equations,
+    rows: Sequence[Constraint],
     right: Sequence[Expression],
     sizes: Sequence[Expression],
     masks: Sequence[Expression],
 ) -> list[Expression]:
     """Return the shortest solution of ``G d = right``, in units of the sizes; of rows whose mask is one, not zero."""
-    zero = sizes[0].graph.zero
+    zero, slopes = equations.graph.zero, _slopes(equations, rows)
     scaled = [{c: mask * (e * sizes[c]) for c, e in row.items()} for row, mask in zip(slopes, masks, strict=True)]
     right = [mask * one for one, mask in zip(right, masks, strict=True)]
     by_column: dict[int, list[int]] = {}

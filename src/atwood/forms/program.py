@@ -7,8 +7,9 @@ column after the other.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import field
 from functools import cached_property, reduce
 from operator import add
 from typing import Any, Literal
@@ -200,6 +201,31 @@ def kinematic_rows(equations: Equations, shift: Sequence[Expression] | None = No
             less = {speed: speed - by for speed, by in zip(equations.speeds, shift, strict=True)}
             rows.append(symbol - substitute([rate], less)[0])
     return rows
+
+
+@dataclass(frozen=True, eq=False)
+class Pull:
+    """How a motion is pulled onto what it is to hold: nothing if there is none.
+
+    Attributes
+    ----------
+    speeds, accelerations
+        What takes the place of the speeds where they move coordinates, and of their derivatives.
+    """
+
+    speeds: Mapping[Expression, Expression] = field(default_factory=dict)
+    accelerations: Mapping[Expression, Expression] = field(default_factory=dict)
+
+    def of_rates(self, rows: Sequence[Expression]) -> list[Expression]:
+        """Return kinematic rows with it."""
+        return substitute(list(rows), self.speeds) if self.speeds else list(rows)
+
+    def of_motion(self, rows: Sequence[Expression]) -> list[Expression]:
+        """Return balances of forces with it."""
+        return substitute(list(rows), self.accelerations) if self.accelerations else list(rows)
+
+
+NO_PULL = Pull()
 
 
 def either_sign(row: Expression) -> Expression:

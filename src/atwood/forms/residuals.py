@@ -33,8 +33,10 @@ from atwood.expr import (
     substitute,
 )
 from atwood.forms.program import (
+    NO_PULL,
     FormProgram,
     Level,
+    Pull,
     either_sign,
     kinematic_rows,
     make_form_program,
@@ -53,6 +55,7 @@ def reduced_form(
     rows: Callable[[], Sequence[Expression]],
     dependent: Sequence[int] = (),
     dependent_speeds: Sequence[int] | None = None,
+    pull: Callable[[], Pull] = Pull,
 ) -> FormProgram:
     """Return the reduced form of a scene.
 
@@ -60,18 +63,22 @@ def reduced_form(
     them.
     """
     if not equations.constraints:
-        return make_form_program(
-            name, "reduced", "", equations, parameters, lambda: [*kinematic_rows(equations), *rows()]
-        )
+
+        def tree() -> list[Expression]:
+            held = pull()
+            return [*held.of_rates(kinematic_rows(equations)), *held.of_motion(rows())]
+
+        return make_form_program(name, "reduced", "", equations, parameters, tree)
     balances, kinematic = rows(), rows_along_speeds(equations)
     independent = _others(kinematic, dependent)
     given = sorted(dependent if dependent_speeds is None else dependent_speeds)
 
     def residual() -> list[Expression]:
+        held = pull()
         return [
-            *(kinematic[i] for i in independent),
+            *held.of_rates([kinematic[i] for i in independent]),
             *(either_sign(one.value) for one in equations.constraints if one.value is not None),
-            *_project(equations, balances, given, _others(equations.speeds, given)),
+            *held.of_motion(_project(equations, balances, given, _others(equations.speeds, given))),
             *(either_sign(one.rate) for one in equations.constraints),
         ]
 
@@ -142,11 +149,15 @@ class NullSpaceProgram:
 
 
 def null_space_program(
-    name: str, equations: Equations, parameters: Collection[Expression], rows: Sequence[Expression]
+    name: str,
+    equations: Equations,
+    parameters: Collection[Expression],
+    rows: Sequence[Expression],
+    pull: Pull = NO_PULL,
 ) -> NullSpaceProgram:
     """Return what the reduced form of a mechanism with loops is made of."""
-    rates = rate_symbols(equations)
-    kinematic = rows_along_speeds(equations)
+    rates, rows = rate_symbols(equations), pull.of_motion(rows)
+    kinematic = pull.of_rates(rows_along_speeds(equations))
     values = [either_sign(one.value) for one in equations.constraints if one.value is not None]
     speeds = [either_sign(one.rate) for one in equations.constraints]
     constraint_jacobian = jacobian([one.rate for one in equations.constraints], list(equations.speeds))
@@ -193,6 +204,7 @@ def dae_form(
     parameters: Collection[Expression],
     level: str,
     tidy: Callable[[Sequence[Expression]], list[Expression]] = list,
+    pull: Callable[[], Pull] = Pull,
 ) -> FormProgram:
     """Return the dae form of a scene at a level.
 
@@ -213,8 +225,8 @@ def dae_form(
     }
 
     def residual() -> list[Expression]:
-        rows = _smooth_at_zero(equations.rows_with_multipliers, multipliers) or equations.rows
-        dynamic = [r - f for r, f in zip(rows, equations.constraint_rows, strict=True)]
+        rows, pulled = _smooth_at_zero(equations.rows_with_multipliers, multipliers) or equations.rows, pull()
+        dynamic = pulled.of_motion([r - f for r, f in zip(rows, equations.constraint_rows, strict=True)])
         if chosen == "ggl":
             kinematic = _shifted(equations, extra) if multipliers else kinematic_rows(equations)
             values = [one.value for one in constraints if one.value is not None]
@@ -222,7 +234,7 @@ def dae_form(
         else:
             kinematic = kinematic_rows(equations)
             held = [one.second for one in constraints]
-        return tidy(kinematic + dynamic + [either_sign(one) for one in held])
+        return tidy(pulled.of_rates(kinematic) + dynamic + [either_sign(one) for one in held])
 
     return make_form_program(name, "dae", chosen, equations, parameters, residual, multipliers, tuple(extra.values()))
 

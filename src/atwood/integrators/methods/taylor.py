@@ -17,7 +17,9 @@ def _stepper(task: Task) -> CompiledStepper:
     from atwood.integrators.taylor.stepper import CompiledStepper
 
     assert task.series is not None
-    return CompiledStepper(task.series(), task.settings, guard=task.problem.guard)
+    problem = task.problem
+    onto = None if problem.project is None or problem.compiled is None else problem.compiled()
+    return CompiledStepper(task.series(), task.settings, guard=problem.guard, onto=onto)
 
 
 def _open(task: Task) -> ExplicitSession:
@@ -47,6 +49,7 @@ TAYLOR = Method(
     open=_open,
     batch=_batch,
     lanes=_lanes,
+    keeps_constraints=True,
     word="Taylor series",
     nodes_in_step=12,
     reach=2.0,

@@ -40,7 +40,7 @@ from atwood.codegen.routines import ADDRESS, CODE, Kind, Lanes, Routine, Value, 
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.program import OutputGroup, Program
 from atwood.expr.series.taylor import TaylorPrograms
-from atwood.integrators.protocol import SolverOptions, StepGuard, absolute_tolerances
+from atwood.integrators.protocol import CompiledRates, SolverOptions, StepGuard, absolute_tolerances
 from atwood.integrators.stepper import (
     LANE_FIELDS,
     WIDTH,
@@ -160,6 +160,7 @@ FIELDS = fields_of(
         *("start_derived", "derived", "scratch", "known"),
         *("new_in", "new_out", "trial_in", "trial_out", "order_in", "order_out"),  # tables of pointers
         *("arrays", "table", "pair_sums", "square_sums", "guard", "guard_data"),
+        *("project", "project_data"),
     ),
     (
         *("order_number", "order_inverse", "order_step", "order_tick"),  # what the program of an order is told
@@ -321,7 +322,9 @@ class _Layout:
         far |= {name: far["tables"] + 8 * at for name, at in zip(names, (0, 2, 4, 6, 8, 12), strict=True)}
         code = recurrences.addresses
         given = {"start": code["start"], "prologue": code["order_prologue"], "recurrence": code["order"]}
-        given |= dict.fromkeys(("start_derived", "guard", "guard_data"), 0)  # of each session
+        given |= dict.fromkeys(
+            ("start_derived", "guard", "guard_data", "project", "project_data"), 0
+        )  # of each session
         pointers = [name for name, kind in FIELDS.items() if kind is ADDRESS]
         self.pointers = np.array([{**far, **given}[name] for name in pointers], dtype=np.int64)
         self.is_own = np.array([name not in given for name in pointers], dtype=np.int64)
@@ -351,6 +354,8 @@ class CompiledStepper(NativeStepper):
         The order of the method; None takes the one that suits the tolerance.
     guard
         What judges steps besides their error.
+    onto
+        Takes states onto the constraints, with which steps end.
     """
 
     _fields = FIELDS
@@ -361,6 +366,7 @@ class CompiledStepper(NativeStepper):
         options: SolverOptions,
         order: int | None = None,
         guard: StepGuard | None = None,
+        onto: CompiledRates | None = None,
     ) -> None:
         recurrences, derived = problem.compiled()
         self._size, self._options = recurrences.size, options
@@ -374,6 +380,9 @@ class CompiledStepper(NativeStepper):
         self._set(size=n, padded=self._arrays.shape[1], order=chosen, pair_blocks=pairs, square_blocks=squares)
         self._set(first=options.first_step or 0.0, longest=options.max_step or inf, horizon=options.horizon)
         self._set(stop_time=problem.stop_time, reach=problem.reach)
+        if onto is not None:
+            self._keep = *self._keep, onto
+            self._set(project=onto.project, project_data=onto.project_data)
         self._set(share=log2(share_of_radius(chosen, options.relative_tolerance)))
         self._set(allowed=DEFECT * options.relative_tolerance + FLOOR)
         self._functions = _routines().functions

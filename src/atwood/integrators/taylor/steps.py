@@ -34,7 +34,7 @@ _REACHED, _USED_UP, _TOO_SMALL, _NO_VALUE, _NO_RATES = range(5)
 def write_routines() -> list[Routine]:
     """Write the routines; ``run``, ``interpolate``, ``sample`` and ``begin`` are called from outside."""
     ends = [_begin(), _run(), _interpolate(), _sample()]
-    return [*ends, _evaluate(), _expand(), _misses(), _guarded(), *write_inner(1)]
+    return [*ends, _evaluate(), _expand(), _misses(), _guarded(), _held(), *write_inner(1)]
 
 
 def write_inner(runs: int) -> list[Routine]:
@@ -270,6 +270,18 @@ def _guarded() -> Routine:
     return r
 
 
+def _held() -> Routine:
+    """Take the end of a step onto the constraints, if there are any, with the rates there; 0 where that can be done."""
+    r, m, (t,) = open_routine(1, "held", {"t": NUMBER})
+    project = m.project
+    with r.when(r.is_null(project)):
+        r.give(0)
+    with r.when(r.call(project, t, m.row("new"), m.project_data) != 0):
+        r.give(1)
+    r.give(r.call("evaluate", m.session, m.new_in, m.new_out))
+    return r
+
+
 def _run() -> Routine:
     """Take steps until one ends at or after the time to stop at."""
     r, m, _ = open_routine(1, "run", exported=True)
@@ -297,6 +309,8 @@ def _run() -> Routine:
                 fits.now = ~r.call("misses", m.session, step, result=BOOLEAN)
             with r.when(fits.now):
                 fits.now = r.call("guarded", m.session, t, step) == 0
+            with r.when(fits.now):
+                fits.now = r.call("held", m.session, t_new.now) == 0
             with r.when(fits.now):
                 r.leave(attempts)
             h.now = step * RETREAT

@@ -15,7 +15,9 @@ from atwood.errors import SolveError
 from atwood.expr import Program
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
+from atwood.forms.loose import has_touched
 from atwood.forms.program import FormProgram
+from atwood.forms.pulled import form_at_contacts, null_space_at_contacts
 from atwood.forms.residuals import NullSpaceProgram, keep_constraints, null_space_program
 from atwood.integrators.methods import Method
 from atwood.integrators.protocol import ImplicitProblem, LinearSolver, NativeCallbacks
@@ -48,6 +50,8 @@ _NULL_SPACE_CODE: Key[NullSpaceCallbacks] = Key("machine code of the null space"
 _USED: Key[list[int]] = Key("for how many states programs have been worked out")
 _REVIEWED: Key[RankFinding | None] = Key("better choice of constraints at the start")
 
+_PULL = 1e3
+"""In units of the scene's time, the rate at which implicit steps near gaps that are closed and what sticks."""
 
 _LARGEST_COLUMNS = 20_000
 """Programs for many states that are larger are not compiled: that would take longer than it saves."""
@@ -139,7 +143,8 @@ class SceneProblem:
         if self._kernels is None:
             assembly, program = self.assembly, self._present
             many = program.derivative.by_columns
-            self._kernels = (assembly.kernel(program.residual), assembly.kernel(program.jacobian, vectorized=many))
+            made = assembly.compiled(program.residual), assembly.compiled(program.jacobian, many)
+            self._kernels = made[0].bind(self._values), made[1].bind(self._values)
         return self._kernels
 
     def columns(self, program: Program, states: int = 0) -> Callable[..., tuple[FloatArray, ...]]:
@@ -156,10 +161,17 @@ class SceneProblem:
 
     @property
     def _present(self) -> FormProgram:
-        """The form's programs for the present dependent coordinates."""
-        if not self.dependent_speeds:
-            return self.program
-        return self.assembly.form_program(kept_rows(self.finding), self.dependent, self.dependent_speeds)
+        """The form's programs for the present dependent coordinates, and for what touches."""
+        chosen = kept_rows(self.finding), self.dependent, self.dependent_speeds
+        if self.assembly.own_equations.contacts:
+            return form_at_contacts(self.assembly, *chosen)
+        return self.assembly.form_program(*chosen) if self.dependent_speeds else self.program
+
+    @property
+    def _values(self) -> FloatArray:
+        """The parameters of these."""
+        own = self.assembly.parameter_values
+        return np.concatenate([own, [_PULL / self.scales.time], self.sizes]) if has_touched(self.assembly) else own
 
     def review_partitioning(self, t: float, q: FloatArray) -> bool:
         """Choose other dependent coordinates if the present ones have become a poor choice; return whether it did."""
@@ -247,7 +259,7 @@ class SceneProblem:
 
         def jacobian(t: float, y: FloatArray, yp: FloatArray, cj: float) -> Sequence[float] | FloatArray:
             kernel = self.kernels()[1]
-            if self.program.derivative.by_columns:
+            if self._present.derivative.by_columns:
                 return columns_of(kernel, size, [t], y, yp, [cj]).T.ravel()
             values: Sequence[float] = kernel([t], y, yp, [cj])[0]
             return values
@@ -259,7 +271,7 @@ class SceneProblem:
             full[present.columns * size + present.rows] = self.kernels()[1]([t], y, yp, [cj])[0]
             return full
 
-        pattern = (self.program.rows, self.program.columns)
+        pattern = (self._present.rows, self._present.columns)
         if self.dependent_speeds:
             pattern = (np.tile(np.arange(size), size), np.repeat(np.arange(size), size))
         return ImplicitProblem(
@@ -279,7 +291,7 @@ class SceneProblem:
         """Return how the Newton matrix of the dae form is eliminated."""
         from atwood.simulation.problem.implicit_scene import pivots_of
 
-        shared, program = self.assembly.shared, self.program
+        shared, program = self.assembly.shared, self._present
         about = program, *(one.tobytes() for one in samples)
         kept = self.assembly.kept if samples else shared
         return kept.get(_PIVOTS, lambda: pivots_of(self.assembly.own_equations, program, samples), *about)
@@ -295,11 +307,12 @@ class SceneProblem:
         from atwood.simulation.problem.implicit_scene import CompiledNullSpace, compile_null_space
 
         shared, kept = self.assembly.shared, self.finding.kept
+        about = kept, has_touched(self.assembly)
         if self._null_space is None:
-            program = shared.get(_NULL_SPACE, lambda: _null_space_program(self.assembly, kept), kept)
-            self._null_space = CompiledNullSpace(program, self.assembly.parameter_values, self.sizes)
+            program = shared.get(_NULL_SPACE, lambda: _null_space_program(self.assembly, kept), *about)
+            self._null_space = CompiledNullSpace(program, self._values, self.sizes)
         made = self._null_space.program
-        code = shared.get(_NULL_SPACE_CODE, lambda: compile_null_space(made, linear_solver), kept, linear_solver)
+        code = shared.get(_NULL_SPACE_CODE, lambda: compile_null_space(made, linear_solver), *about, linear_solver)
         coordinates = self.program.coordinates
 
         def review(t: float, y: FloatArray) -> bool:
@@ -309,7 +322,7 @@ class SceneProblem:
 
     def compiled(self, linear_solver: LinearSolver) -> NativeCallbacks:
         """Return residual and Jacobian as machine code, for one session."""
-        program = self.program
+        program = self._present
         code = self.assembly.shared.get(
             _IDA,
             lambda: compile_ida_callbacks(
@@ -325,7 +338,7 @@ class SceneProblem:
             program,
             linear_solver,
         )
-        data = code.bind(self.assembly.parameter_values)
+        data = code.bind(self._values)
         return NativeCallbacks(
             code.residual_address,
             code.jacobian_address,
@@ -374,6 +387,8 @@ def _restored(
 
 
 def _null_space_program(assembly: Assembly, kept: tuple[int, ...]) -> NullSpaceProgram:
+    if assembly.own_equations.contacts:
+        return null_space_at_contacts(assembly, kept)
     equations = keep_constraints(assembly.own_equations, kept)
     return null_space_program(f"{assembly.flat.name} (reduced)", equations, assembly.parameters, assembly.rows)
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import UnsupportedError, UsageError
-from atwood.expr import Expression, live, substitute
+from atwood.expr import Expression, Program, live, substitute
 from atwood.expr.series.taylor import TaylorPrograms, taylor_programs
-from atwood.forms.accelerations import AccelerationProgram, accelerations_of
+from atwood.forms.accelerations import accelerations_of
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.integrators.methods import EXPLICIT, IDA, advise
@@ -39,10 +39,10 @@ def recurrences(assembly: Assembly) -> TaylorPrograms:
             where=assembly.flat.name,
             advice=advise(IDA),
         )
-    return recurrences_of(assembly, found)
+    return recurrences_of(assembly, found.program)
 
 
-def recurrences_of(assembly: Assembly, found: AccelerationProgram) -> TaylorPrograms:
+def recurrences_of(assembly: Assembly, found: Program) -> TaylorPrograms:
     """Return the recurrences of accelerations of a scene; errors as for `recurrences`."""
     is_partial = assembly.shared.get(_BRANCHES, lambda: _has_partial_branch(assembly, found), found)
     chosen = assembly.known_relations if is_partial else {}
@@ -53,14 +53,14 @@ _PARTIAL = frozenset({"sqrt", "log", "pow", "asin", "acos", "tan", "atan2", "div
 """Operations that have no value, or no series, somewhere."""
 
 
-def _has_partial_branch(assembly: Assembly, found: AccelerationProgram) -> bool:
+def _has_partial_branch(assembly: Assembly, found: Program) -> bool:
     """Return whether a branch that a relation of functions of time leaves out could be without a value.
 
     A series is of all that there is, whatever is chosen of it. Then each piece has recurrences of its own, in which
     there is only what acts.
     """
     symbols = {one.symbol for one in assembly.relations}
-    nodes = found.program.nodes if symbols else ()
+    nodes = found.nodes if symbols else ()
     branches = [
         one
         for node in nodes
@@ -70,8 +70,7 @@ def _has_partial_branch(assembly: Assembly, found: AccelerationProgram) -> bool:
     return any(node.operation in _PARTIAL and not node.is_parametric for node in live(branches))
 
 
-def _make(found: AccelerationProgram, chosen: Mapping[Expression, float]) -> TaylorPrograms:
-    program = found.program
+def _make(program: Program, chosen: Mapping[Expression, float]) -> TaylorPrograms:
     (time,), q, u = (group.symbols for group in program.inputs)
     results = substitute(program.results, chosen)
     rates = u if len(program.outputs) == 1 else ()  # else the program gives them
@@ -86,7 +85,7 @@ def taylor_problem(
     assembly: Assembly,
     stop_time: float = inf,
     has_events: bool = False,
-    found: AccelerationProgram | None = None,
+    found: Program | None = None,
     values: FloatArray | None = None,
 ) -> TaylorProblem:
     """Return what the Taylor-series method is given of a scene; errors as for `recurrences`."""

@@ -230,7 +230,7 @@ def _can_be_recurrences(assembly: Assembly, solved: Solved | None) -> bool:
     from atwood.simulation.problem.taylor_scene import recurrences, recurrences_of  # many runs need no series
 
     try:
-        recurrences(assembly) if solved is None else recurrences_of(assembly, solved.form.accelerations)
+        recurrences(assembly) if solved is None else recurrences_of(assembly, solved.form.accelerations.program)
     except AtwoodError:
         return False
     return True

@@ -248,7 +248,7 @@ class _Runner:
                 )
             sides = self.segment.probe.changed_sides(step_result)
             late = None
-            if event.target in CONTACT and not self.method.is_implicit:
+            if event.target in CONTACT:
                 late = seen_late(*at_event, step_result, self.began), step_result.yp
             ended = self._ended(step_result.t, "event", "")
             return replace(ended, event=event, together=tuple(together), sides=sides, late=late)

@@ -36,6 +36,7 @@ from atwood.simulation.problem.explicit_scene import (
     explicit_problem,
     own_rates,
     own_rates_on_constraints,
+    program_on_constraints,
     values_on_constraints,
 )
 from atwood.simulation.problem.options import RunOptions
@@ -132,7 +133,7 @@ def open_session(
     if not method.looks_for_events:
         return _open_time_stepping(request, method, t, y)
     refuse_groups(plan.assembly)
-    if plan.assembly.own_equations.contacts and (method.is_implicit or not method.keeps_constraints):
+    if plan.assembly.own_equations.contacts and not method.keeps_constraints:
         raise UsageError(
             f"{method.title} does not end its steps on gaps that are closed and on what sticks",
             where=plan.assembly.own_equations.contacts[0].row.key[0],
@@ -443,7 +444,9 @@ def equations_of(
 ) -> tuple[Callable[[], TaylorProblem], Callable[[], Hamiltonian]]:
     """Return the equations of a task as series and as Hamilton's, made where a method asks for them."""
     assembly, options = request.plan.assembly, request.options
-    found = () if solved is None else (solved.form.accelerations, solved.values)
+    found = () if solved is None else (solved.form.accelerations.program, solved.values)
+    if problem.project is not None:
+        found = program_on_constraints(request.plan, *start).accelerations, values_on_constraints(request.plan)
 
     def series() -> TaylorProblem:
         from atwood.simulation.problem.taylor_scene import taylor_problem
@@ -490,7 +493,10 @@ def _open_on_constraints(
         fill(request)
         rates = own[1].rates
         explicit = replace(explicit, compiled=lambda: rates)
-    task = Task(settings, t, y, budget=request.budget, end=request.end, on_stiff=on_stiff, explicit=explicit)
+    series, _ = equations_of(request, explicit, (t, y))
+    task = Task(
+        settings, t, y, budget=request.budget, end=request.end, on_stiff=on_stiff, explicit=explicit, series=series
+    )
     opened = method.open(task)
     if fill is not None:
         kept.keep(request, method, on_stiff, opened, fill)

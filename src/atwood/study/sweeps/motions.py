@@ -247,7 +247,7 @@ def task_of(
     events = None if data is None else data.function()
     problem = explicit_problem_of(assembly, motion.program, values, events, directions)
     problem = replace(problem, compiled=lambda: own.rates, guard=guard, compiled_events=data)
-    series = partial(taylor_problem, assembly, options.t_end, False, motion.program, values)
+    series = partial(taylor_problem, assembly, options.t_end, False, motion.program.program, values)
     start = np.zeros(problem.size)
     return Task(
         settings,
