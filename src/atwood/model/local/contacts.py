@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from atwood.errors import DeclarationError, UnsupportedError, suggestion
-from atwood.expr import Expression, Graph, Scalar, depends_on, jvp, sqrt
+from atwood.expr import Expression, Graph, Scalar, depends_on, jvp, select, sqrt
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.declare.component import Binding, bind
 from atwood.model.declare.contact_laws import FrictionOptions, is_given, state_names, value_names
@@ -215,7 +215,9 @@ def _ways(values: Sequence[Expression], held: Sequence[Expression]) -> list[Expr
         return list(held)
     zero = values[0].graph.zero
     turned = [v + _TINY * e for v, e in zip(values, held, strict=True)]
-    share = sum((e * e for e in held), zero) / (sqrt(sum((one * one for one in turned), zero)) + _TINY * _TINY)
+    share = sum((e * e for e in held), zero)
+    square = select(share > 0.5, sum((one * one for one in turned), zero), 1.0)  # no root of what sticks
+    share = share / (sqrt(square) + _TINY * _TINY)
     return [share * one for one in turned]
 
 

@@ -135,7 +135,7 @@ def choose(plan: SceneProblem, options: RunOptions, t: float, q: FloatArray, u: 
     if not len(q):
         return Choice(t, implicit_solver(), "nothing is free to move")
     if assembly.own_equations.contacts:
-        return Choice(t, EXPLICIT.key, "gaps and slips hold and let go, on which its steps end", True)
+        return _choose_on_constraints(plan, options, t, q, u, "gaps and slips hold and let go")
     if assembly.form == "dae":
         return _choose_on_constraints(plan, options, t, q, u, "the dae form keeps constraints")
     if plan.balance.constraints:
@@ -185,7 +185,7 @@ def _choose_on_constraints(
     makes of it that is to be seen.
     """
     kinematic_map = plan.balance.kinematic_map
-    is_for_ida = (
+    is_for_ida = not plan.assembly.own_equations.contacts and (
         plan.program.level not in ("", "ggl")
         or bool(plan.not_compilable)
         or kinematic_map.has_singular_coordinates
@@ -259,7 +259,7 @@ def stiffness_of(
         if solved is not None:
             program, values = solved.form.accelerations.program, solved.values
             y, scale, count = solved.reduced(y), solved.reduced(scale), len(solved.independent)
-    if solved is None and (plan.balance.constraints or assembly.form == "dae"):
+    if solved is None and (plan.balance.constraints or assembly.form == "dae" or assembly.own_equations.contacts):
         program, values = program_on_constraints(plan, t, y).accelerations, values_on_constraints(plan)
     elif solved is None:
         found = accelerations_of(assembly)
@@ -328,16 +328,21 @@ _CAN_BE_STIFF: Key[bool] = Key("whether anything can be stiff")
 
 
 def can_be_stiff(assembly: Assembly) -> bool:
-    """Return whether anything can make motions die away: a Rayleigh function, or a load that reads velocities."""
+    """Return whether anything can make motions die away: a Rayleigh function, or a load that reads velocities.
+
+    Dry friction does so only where its limit reads velocities.
+    """
 
     def find() -> bool:
         for local in assembly.mechanism.locals_.values():
-            if local.dissipations:
+            if len(local.dissipations) > len(local.contacts):  # each gap and slip has one
                 return True
             speeds: list[Expression] = []
             for one in local.connectors.values():
                 speeds += [*one.velocity, *one.spin]
             speeds += local.signal_symbols.values()  # what it is linked to may be a velocity
+            if depends_on([one.limit for one in local.contacts if one.limit is not None], speeds):
+                return True
             speeds += local.reads  # a reaction depends on velocities
             for load in local.loads:
                 read = [*assembly.mechanism.space.components(load.force), *load.torque]

@@ -360,7 +360,8 @@ class Walk:
 
     def _whole(self, plan: SceneProblem) -> SceneProblem:
         """Return a plan with the programs for all states of gaps and slips, where steps then change these."""
-        if not is_loose(plan.assembly) or self.options.conditions or self.options.impacts == "one_by_one":
+        asked = self.options.conditions or self.options.impacts == "one_by_one"
+        if asked or not is_loose(plan.assembly) or self.choice.method.tableau is None:
             return plan
         from atwood.simulation.contacts.compiled import kept_whole
 

@@ -312,8 +312,7 @@ class _Runner:
         )
         if choice.method.is_implicit:
             self.request, self.opened = request, StepResult(t, y, yp, Status.REACHED)
-        has_contacts = bool(segment.plan.assembly.own_equations.contacts)
-        on_stiff = self._is_stiff if options.solver == AUTO and not has_contacts else None
+        on_stiff = self._is_stiff if options.solver == AUTO else None
         try:
             self.session = open_session(
                 request, choice.method, t, y, yp, on_stiff, self._on_dead_centre, choice.keeps_constraints

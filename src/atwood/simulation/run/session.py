@@ -16,7 +16,7 @@ from atwood.forms.caches import Key
 from atwood.forms.loose import is_loose
 from atwood.integrators.explicit_session import ExplicitSession, OnStiff
 from atwood.integrators.ida.guarded_residual import GuardedResidual
-from atwood.integrators.methods import EXPLICIT, IDA, LEAST, Method, Task, advise
+from atwood.integrators.methods import EXPLICIT, IDA, LEAST, TAYLOR, Method, Task, advise
 from atwood.integrators.protocol import (
     Budget,
     ExplicitProblem,
@@ -137,7 +137,7 @@ def open_session(
         raise UsageError(
             f"{method.title} does not end its steps on gaps that are closed and on what sticks",
             where=plan.assembly.own_equations.contacts[0].row.key[0],
-            advice=advise(EXPLICIT),
+            advice=advise(EXPLICIT, TAYLOR, IDA),
         )
     if method.is_implicit:
         return method.open(_implicit_task(request, method, t, y, yp))
