@@ -267,8 +267,7 @@ def simulate(
         ``"ida"``: SUNDIALS IDA with the equations as machine code. ``"ida-sundae"``: the same method through
         scikit-sundae with the equations as Python, the reference. ``"explicit"``: a Runge-Kutta method of order 8(5,3),
         on constraints too. ``"tsitouras"``: one of order 5(4), which takes fewer slopes where few digits are asked for.
-        ``"taylor"``: Taylor series, for the reduced form without closed loops, or with such as
-        formulas solve (four-bars, slider-cranks, groups of these, in any plane). ``"auto"``: IDA for what is
+        ``"taylor"``: Taylor series, on constraints too, where every law has them. ``"auto"``: IDA for what is
         stiff, or turns out so, and for index 1; else an explicit method. `Result.solver` says which, and why.
         ``"gauss"``: a symplectic method with equal steps, whose energy error does not grow, for scenes that have a
         Hamiltonian, closed loops that formulas solve included. ``"composition"``: the same where that is

@@ -35,6 +35,7 @@ from atwood.simulation.problem.arguments import check_span
 from atwood.simulation.problem.options import RunOptions, Samples, sample_times
 from atwood.simulation.problem.preparation import problem_of_run
 from atwood.simulation.problem.problem import SceneProblem
+from atwood.simulation.problem.projection import project_safely
 from atwood.simulation.run.choice import Choice, check_asked, check_solver, choose
 from atwood.simulation.run.recorder import Recorder, Stretch
 from atwood.simulation.run.run_record import (
@@ -339,6 +340,8 @@ class Walk:
             if not self.segments and not options.structure and not has_states:
                 refuse_immobile(self.assembly, len(plan.assembly.own_equations.speeds) - plan.finding.rank, self.start)
             self._plans, self.probe, self._handed = {}, None, ()
+        if is_new and self.segments and plan.is_projected:  # what has no mass has the speed that the new mode holds
+            self.q, self.u = project_safely(plan, self.t, self.q, self.u)
         plan = self._settled(plan)
         t, q, u = self.t, self.q, self.u
         if self.segments:
