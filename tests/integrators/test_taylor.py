@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.special import ellipj, ellipk
 
 from atwood import Component, Point, Scalar, Scene, connector, expr as ex, parameter, potential, simulate
-from atwood.errors import StartError, UnsupportedError, UsageError
+from atwood.errors import StartError, UnsupportedError
 from atwood.expr.series.taylor import taylor_programs
 from atwood.integrators.explicit_session import ExplicitSession
 from atwood.integrators.protocol import Budget, ExplicitProblem, SolverOptions, Status
@@ -390,12 +390,6 @@ def test_laws_that_switch_with_the_motion_are_refused_where_they_have_no_value_b
     with pytest.raises(UnsupportedError, match="switches with the motion") as refused:
         simulate(scene, solver="taylor")
     assert refused.value.where == "rail.displacement"
-
-
-@pytest.mark.parametrize(("name", "form"), [("bricard", "reduced"), ("double-pendulum", "dae")])
-def test_constraints_are_refused(name: str, form: Any) -> None:
-    with pytest.raises(UsageError, match="without closed loops"):
-        simulate(SCENES[name](), form=form, solver="taylor")
 
 
 def test_stiff_springs_are_slow_but_right() -> None:

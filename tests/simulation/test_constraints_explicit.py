@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from atwood import Scene, UsageError, assemble, simulate
+from atwood import Scene, assemble, simulate
 from atwood.arrays import FloatArray
 from atwood.integrators.embedded.stepper import CompiledStepper
 from atwood.integrators.explicit_session import ExplicitSession
