@@ -1,4 +1,4 @@
-"""Gaps and slips by IDA and by Taylor series: known answers, the same events as by the explicit method, and refusals."""
+"""Gaps and slips by IDA and by Taylor series: known answers, the events of the explicit method, and refusals."""
 
 from __future__ import annotations
 
