@@ -45,8 +45,6 @@ _IDA: Key[IdaCallbacks] = Key("machine code for IDA")
 _PIVOTS: Key[FixedPivots | None] = Key("elimination with fixed pivots")
 _NULL_SPACE: Key[NullSpaceProgram] = Key("program of the null space")
 _NULL_SPACE_CODE: Key[NullSpaceCallbacks] = Key("machine code of the null space")
-
-
 _USED: Key[list[int]] = Key("for how many states programs have been worked out")
 _REVIEWED: Key[RankFinding | None] = Key("better choice of constraints at the start")
 
