@@ -370,7 +370,7 @@ class CompiledStepper(NativeStepper):
     ) -> None:
         recurrences, derived = problem.compiled()
         self._size, self._options = recurrences.size, options
-        self._keep = recurrences, derived
+        self._keep: tuple[object, ...] = recurrences, derived
         chosen = choose_order(options) if order is None else order
         self._lay_out(recurrences, derived, guard)
         n = self._size
