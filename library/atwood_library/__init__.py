@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from atwood_library.contacts.ball_pair_contact import BallPairContact as BallPairContact
     from atwood_library.contacts.box_contact import BoxContact as BoxContact
     from atwood_library.contacts.compliant_contact import CompliantContact as CompliantContact
+    from atwood_library.contacts.convex_contacts import ConvexContacts as ConvexContacts
     from atwood_library.contacts.disc_contacts import DiscContacts as DiscContacts
     from atwood_library.contacts.distance_contact import DistanceContact as DistanceContact
     from atwood_library.contacts.ellipsoid_contact import EllipsoidContact as EllipsoidContact
@@ -169,6 +170,7 @@ _MODULES = {
     "Damper": "forces.damper",
     "DeadZone": "blocks.dead_zone",
     "Disc": "parts.disc",
+    "ConvexContacts": "contacts.convex_contacts",
     "DiscContacts": "contacts.disc_contacts",
     "DistanceContact": "contacts.distance_contact",
     "Drag": "forces.drag",

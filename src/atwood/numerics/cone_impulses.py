@@ -1,9 +1,11 @@
-"""Impulses of many contacts in a plane: a normal one that only pushes, and friction within Coulomb's cone.
+"""Impulses of many contacts: a normal one that only pushes, and friction within Coulomb's cone.
 
 Each contact has ``0 <= p_n``, ``w_n - b >= 0``, ``p_n (w_n - b) = 0`` and ``|p_t| <= mu p_n`` with p_t against w_t:
 they are zeros of ``p - P(p - (w - b)/D)`` with the projection P onto the cone and any D > 0 (P. Alart, A. Curnier,
 Computer Methods in Applied Mechanics and Engineering 92, 1991). They are solved one after the other, there and back:
-Gauss and Seidel's method, projected (M. Jean 1999; V. Acary, B. Brogliato 2008, section 13.7), as machine code.
+Gauss and Seidel's method, projected (M. Jean 1999; V. Acary, B. Brogliato 2008, section 13.7), as machine code. Of few
+contacts Newton's method then finds the zero, with slopes of P on either side of its edges, where it leads nearer. In a
+plane a body has three speeds and a contact one direction of slip, in space six and two.
 """
 
 from __future__ import annotations
@@ -17,7 +19,8 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.codegen.llvm.build import Built, RoutineSource, build_code, once
 from atwood.codegen.llvm.module import CodeOptions
-from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Routine
+from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Routine, Value
+from atwood.numerics.matrices import least_norm, or_one
 
 _SWEEPS, _EACH = 5, 2000
 """What is missing is looked at after so many sweeps, there and back, or so many contacts."""
@@ -27,62 +30,69 @@ _LEAST, _WORK, _TURNS = 200_000, 2_000_000, 50
 
 _SWEEP = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, ctypes.c_int64, ctypes.c_double, *[ctypes.c_void_p] * 4)
 
-_ENTRIES = 11
-"""Numbers of each contact: normal, arms, least rate, compliances, inverse masses and moments of inertia of both."""
+_FEW, _TRIES, _HALVED = 24, 20, 6
+"""Of so many contacts at most Newton's method is tried, with so many steps, each halved so often at most."""
+
+_SHAPES = ((2, 3), (3, 6))
+"""Rows of a contact and speeds of a body, in a plane and in space."""
 
 _ROUNDED = 1e-13
 """Of a speed: what is missed by less is rounding."""
 
 
 class Touches(NamedTuple):
-    """Contacts of discs with each other and with walls.
+    """Contacts of bodies with each other and with walls.
 
     Attributes
     ----------
     bodies
-        Of each contact the numbers of the disc and of what it touches, shape (2, contacts); the last is the world.
-    normal
-        From the first to the second, alike.
-    arms
-        Radii of both, shape (2, contacts); a wall has none.
+        Of each contact the numbers of the body and of what it touches, shape (2, contacts); the last is the world.
+    slopes
+        How the rates of each contact, that of opening first and then those of slip, follow from the speeds of both,
+        shape (2, contacts, rows, speeds of a body).
     inverse
-        Inverse masses along x and z, and moments of inertia, of each disc and of the world, shape (bodies + 1, 3).
+        Inverse mass matrices of each body and of the world, shape (bodies + 1, speeds, speeds).
     friction
         Coefficient of friction.
     """
 
     bodies: NDArray[np.intp]
-    normal: FloatArray
-    arms: FloatArray
+    slopes: FloatArray
     inverse: FloatArray
     friction: float
 
     def rates(self, v: FloatArray) -> FloatArray:
-        """Return how fast they open, and slip to the left of the normal, at speeds of all bodies."""
-        (a, b), (x, z), (r, s) = self.bodies, self.normal, self.arms
-        one, other = v[a], v[b]
-        dx, dz = (other - one)[:, :2].T
-        return np.array([x * dx + z * dz, x * dz - z * dx - (r * one[:, 2] + s * other[:, 2])])
+        """Return how fast contacts open, and slip, at speeds of all bodies, shape (rows, contacts)."""
+        found: FloatArray = np.einsum("scrk,sck->rc", self.slopes, v[self.bodies])
+        return found
 
     @property
-    def compliance(self) -> FloatArray:
-        """How the rates change by a unit of their own impulses, shape (2, contacts)."""
-        (a, b), (r, s) = self.bodies, self.arms
-        straight, turn = self.inverse[a, 0] + self.inverse[b, 0], self.inverse[:, 2]
-        return np.array([straight, straight + r * r * turn[a] + s * s * turn[b]])
+    def moves(self) -> FloatArray:
+        """The speeds of both bodies by a unit of each impulse, shaped as the slopes."""
+        found: FloatArray = self.slopes @ self.inverse[self.bodies]
+        return found
+
+    def compliance(self, moves: FloatArray) -> FloatArray:
+        """Return how the rates change by a unit of their own impulses, and slips at most, shape (2, contacts)."""
+        own = np.einsum("scrk,scqk->crq", self.slopes, moves)
+        slip = own[:, 1:, 1:]
+        largest = slip[:, 0, 0] if slip.shape[1] == 1 else np.linalg.eigvalsh(slip)[:, -1]
+        return or_one(np.array([own[:, 0, 0], largest]))
 
 
 def _projected(p: FloatArray, friction: float) -> FloatArray:
     normal = np.maximum(p[0], 0.0)
-    return np.array([normal, np.clip(p[1], -friction * normal, friction * normal)])
+    size, most = np.sqrt(np.sum(p[1:] ** 2, axis=0)), friction * normal
+    return np.concatenate([normal[None], p[1:] * np.where(size > most, most / or_one(size), 1.0)])
 
 
 def missing(touches: Touches, v: FloatArray, p: FloatArray, least: FloatArray, compliance: FloatArray) -> float:
     """Return by which speed the laws are missed, in quadratic mean over the contacts."""
     rates = touches.rates(v)
     rates[0] -= least
-    misses = (p - _projected(p - rates / compliance, touches.friction)) * compliance
-    return float(np.sqrt(np.mean(misses[0] ** 2 + misses[1] ** 2)))
+    each = compliance[[0] + [1] * (len(p) - 1)]
+    misses = (p - _projected(p - rates / each, touches.friction)) * each
+    return float(np.sqrt(np.mean(np.sum(misses**2, axis=0))))
 
 
 def impulses(
@@ -95,76 +105,146 @@ def impulses(
     touches
         The contacts.
     free
-        Speeds without impulses, shape (bodies + 1, 3).
+        Speeds without impulses, shape (bodies + 1, speeds).
     least
         With which speeds contacts open at least.
     guess
-        Impulses to begin with, shape (2, contacts).
+        Impulses to begin with, shape (rows, contacts).
     small, large
         A speed that is as good as none, and one for which ten times as much is done before it is left.
     """
-    compliance = touches.compliance
+    moves = touches.moves
+    compliance = touches.compliance(moves)
     p = _projected(guess, touches.friction)
-    v = _moved(touches, free, p)
+    v = _moved(touches, moves, free, p)
     missed = missing(touches, v, p, least, compliance)
     nothing = _ROUNDED * float(np.max(np.abs(free)))
-    (a, b), own = touches.bodies, np.ascontiguousarray(p.T)
-    masses = (touches.inverse[a, 0], touches.inverse[a, 2], touches.inverse[b, 0], touches.inverse[b, 2])
-    table = np.stack([*touches.normal, *touches.arms, least, *compliance, *masses], axis=1)
-    index = np.ascontiguousarray(3 * touches.bodies.T, dtype=np.int64)
-    sweep = _SWEEP(_code().code.addresses["sweeps"])
-    count, done = len(a), 0
-    sweeps = max(_SWEEPS, _EACH // count)
+    own, (_, count, rows, speeds) = np.ascontiguousarray(p.T), touches.slopes.shape
+    both = [np.moveaxis(one, 0, 1).reshape(count, -1) for one in (touches.slopes, moves)]
+    table = np.concatenate([np.stack([least, *compliance], axis=1), *both], axis=1)
+    index = np.ascontiguousarray(speeds * touches.bodies.T, dtype=np.int64)
+    sweep = _SWEEP(_code().code.addresses[f"sweeps_{rows}"])
+    done, look, sweeps = 0, 0, max(_SWEEPS, _EACH // count)
     most = max(_WORK, 2 * _TURNS * sweeps * count)
     while missed > nothing and not (missed <= small and done >= _LEAST):
         sweep(count, sweeps, touches.friction, *(one.ctypes.data for one in (index, table, v, own)))
+        v = _moved(touches, moves, free, own.T)
+        missed, done = missing(touches, v, own.T, least, compliance), done + 2 * sweeps * count
+        look += 1
+        if missed > nothing and count <= _FEW and look & (look - 1) == 0:  # ever more seldom
+            wanted = touches.rates(free)
+            wanted[0] -= least
+            nearer = _nearer(touches, moves, wanted, own.T, compliance)
+            there = _moved(touches, moves, free, nearer)
+            found = missing(touches, there, nearer, least, compliance)
+            if found < missed:
+                own[:], v, missed = nearer.T, there, found
         p = own.T
-        v = _moved(touches, free, p)
-        missed, done = missing(touches, v, p, least, compliance), done + 2 * sweeps * count
         if done >= most * (1 if missed <= large else 10):
             break
     return v, p, missed
 
 
-def _moved(touches: Touches, free: FloatArray, p: FloatArray) -> FloatArray:
+def _nearer(touches: Touches, moves: FloatArray, free: FloatArray, p: FloatArray, compliance: FloatArray) -> FloatArray:
+    """Return impulses by Newton's method, of least norm where contacts repeat each other."""
+    rows, count = p.shape
+    size, mu = rows * count, touches.friction
+    bodies, numbers = np.unique(touches.bodies, return_inverse=True)
+    speeds = moves.shape[3]
+    both = np.zeros((2, count, rows, len(bodies), speeds))
+    for k, (slope, move) in enumerate(zip(touches.slopes, moves, strict=True)):
+        place = numbers.reshape(2, count)[k]
+        both[0, np.arange(count), :, place] += slope
+        both[1, np.arange(count), :, place] += move
+    one, other = both.reshape(2, size, -1)
+    response, start = (one @ other.T).reshape(count, rows, size), free.T
+    each = compliance[[0] + [1] * (rows - 1)].T
+    unit = np.eye(size).reshape(count, rows, size)
+
+    def missed(given: FloatArray) -> tuple[FloatArray, FloatArray]:
+        ahead = given - (response @ given.ravel() + start) / each
+        return (given - _projected(ahead.T, mu).T) * each, ahead
+
+    now, (gap, ahead) = p.T.copy(), missed(p.T)
+    for _ in range(_TRIES):
+        slopes = unit - response / each[:, :, None]
+        normal, slip = ahead[:, 0], ahead[:, 1:]
+        length = np.sqrt(np.sum(slip**2, axis=1))
+        pressed, slides = normal > 0.0, length > mu * np.maximum(normal, 0.0)
+        way = slip / or_one(length)[:, None]
+        turned = slopes[:, 1:] - way[:, :, None] * np.einsum("cr,crs->cs", way, slopes[:, 1:])[:, None]
+        along = mu * (way[:, :, None] * slopes[:, :1] + (normal / or_one(length))[:, None, None] * turned)
+        taken = np.concatenate([slopes[:, :1], np.where(slides[:, None, None], along, slopes[:, 1:])], axis=1)
+        matrix = (unit - np.where(pressed[:, None, None], taken, 0.0)) * each[:, :, None]
+        step = least_norm(matrix.reshape(size, size), -gap.ravel(), errors=1e-12).reshape(count, rows)
+        found = next(
+            (
+                (now + share * step, there)
+                for share in 0.5 ** np.arange(_HALVED)
+                if np.linalg.norm((there := missed(now + share * step))[0]) < np.linalg.norm(gap)
+            ),
+            None,
+        )
+        if found is None:
+            break
+        now, (gap, ahead) = found
+    projected: FloatArray = _projected(now.T, mu)
+    return projected
+
+
+def _moved(touches: Touches, moves: FloatArray, free: FloatArray, p: FloatArray) -> FloatArray:
     """Return the speeds that impulses make of others."""
-    (a, b), (x, z), (r, s) = touches.bodies, touches.normal, touches.arms
-    force, count = np.array([x * p[0] - z * p[1], z * p[0] + x * p[1]]), len(free)
-    total = [np.bincount(b, one, count) - np.bincount(a, one, count) for one in force]
-    turned = -np.bincount(a, r * p[1], count) - np.bincount(b, s * p[1], count)
-    found: FloatArray = free + touches.inverse * np.array([*total, turned]).T
+    pushed, found = np.einsum("scrk,rc->sck", moves, p), np.array(free)
+    for bodies, by in zip(touches.bodies, pushed, strict=True):
+        for column, each in zip(found.T, by.T, strict=True):
+            column += np.bincount(bodies, each, len(free))
     return found
 
 
 @once
 def _code() -> Built:
     """Return the code of the sweeps."""
-    return build_code([], CodeOptions(level=2), exports=["sweeps"], routines=RoutineSource("numerics.cone_impulses"))
+    names = [f"sweeps_{rows}" for rows, _ in _SHAPES]
+    return build_code([], CodeOptions(level=2), exports=names, routines=RoutineSource("numerics.cone_impulses"))
 
 
 def write_routines() -> list[Routine]:
-    """Write the sweeps."""
+    """Write the sweeps, in a plane and in space."""
+    return [routine for shape in _SHAPES for routine in _sweeps(*shape)]
+
+
+def _sweeps(rows: int, speeds: int) -> list[Routine]:
     of_contact = {"i": INTEGER, "friction": NUMBER, "index": ADDRESS, "table": ADDRESS, "v": ADDRESS, "p": ADDRESS}
-    one = Routine("contact", of_contact)
+    one = Routine(f"contact_{rows}", of_contact)
     i, friction, index, table, v, p = one.arguments
-    a, b = (v.at(index.read(i * 2 + k, INTEGER)) for k in (0, 1))
-    x, z, r, s, least, gives, yields, m, j, n, k = (table[i * _ENTRIES + k] for k in range(_ENTRIES))
-    dx, dz, old, before = b[0] - a[0], b[1] - a[1], p[i * 2], p[i * 2 + 1]
-    normal = old - (x * dx + z * dz - least) / gives
+    row = table.at(i * (3 + 4 * rows * speeds))
+    least, gives, yields = (row[k] for k in range(3))
+    bodies, own = [v.at(index.read(i * 2 + k, INTEGER)) for k in (0, 1)], p.at(i * rows)
+    entries = [(bodies[s], s * rows * speeds, k) for s in (0, 1) for k in range(speeds)]
+
+    def rate(r: int) -> Value:
+        first, *rest = (row[3 + start + r * speeds + k] * body[k] for body, start, k in entries)
+        return sum(rest, first)
+
+    def push(r: int, by: Value) -> None:
+        for body, start, k in entries:
+            body[k] = body[k] + row[3 + 2 * rows * speeds + start + r * speeds + k] * by
+
+    old = own[0]
+    normal = old - (rate(0) - least) / gives
     normal = one.choose(normal > 0.0, normal, 0.0)
-    most = friction * normal
-    tangent = before - (x * dz - z * dx - (r * a[2] + s * b[2])) / yields
-    tangent = one.choose(tangent > most, most, one.choose(tangent < 0.0 - most, 0.0 - most, tangent))
-    pushed, rubbed = normal - old, tangent - before
-    along, up = x * pushed - z * rubbed, z * pushed + x * rubbed
-    for body, straight, turn, sign, arm in ((a, m, j, -1.0, r), (b, n, k, 1.0, s)):
-        body[0] = body[0] + straight * along * sign
-        body[1] = body[1] + straight * up * sign
-        body[2] = body[2] - turn * arm * rubbed
-    p[i * 2], p[i * 2 + 1] = normal, tangent
+    own[0] = normal
+    push(0, normal - old)
+    before = [own[r] for r in range(1, rows)]
+    slips = [one_before - rate(r) / yields for r, one_before in enumerate(before, 1)]
+    size = one.sqrt(sum((x * x for x in slips[1:]), slips[0] * slips[0]))
+    share = one.choose(size > friction * normal, friction * normal / one.choose(size > 0.0, size, 1.0), 1.0)
+    for r, (slip, was) in enumerate(zip(slips, before, strict=True), 1):
+        own[r] = slip * share
+        push(r, slip * share - was)
     one.give(0)
     every = Routine(
-        "sweeps",
+        f"sweeps_{rows}",
         {"count": INTEGER, "sweeps": INTEGER, **{key: of_contact[key] for key in [*of_contact][1:]}},
         exported=True,
     )

@@ -139,10 +139,11 @@ def test_pairs_near_by_are_all_found_once() -> None:
 def test_impulses_meet_the_laws() -> None:
     """Three discs in a row between two walls, pressed together: the forces go through."""
     bodies = np.array([[0, 0, 1, 2], [3, 1, 2, 3]])
-    normal = np.array([[-1.0, 1.0, 1.0, 1.0], [0.0, 0.0, 0.0, 0.0]])
-    arms = np.array([[0.1] * 4, [0.0, 0.1, 0.1, 0.0]])
-    inverse = np.array([[1.0, 1.0, 200.0]] * 3 + [[0.0] * 3])
-    touches = Touches(bodies, normal, arms, inverse, 0.5)
+    x, arm = np.array([-1.0, 1.0, 1.0, 1.0]), np.full(4, -0.1)
+    one = np.moveaxis(np.array([[-x, 0.0 * x, 0.0 * x], [0.0 * x, -x, arm]]), -1, 0)
+    other = np.moveaxis(np.array([[x, 0.0 * x, 0.0 * x], [0.0 * x, x, arm]]), -1, 0)
+    inverse = np.array([np.diag([1.0, 1.0, 200.0])] * 3 + [np.zeros((3, 3))])
+    touches = Touches(bodies, np.array([one, other]), inverse, 0.5)
     free = np.array([[2.0, 0.0, 0.0], [0.0, -0.5, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
     v, p, missed = impulses(touches, free, np.zeros(4), np.zeros((2, 4)), 1e-12, 1e-9)
     assert missed < 1e-12

@@ -50,6 +50,8 @@ class Pushed(NamedTuple):
         States of the contacts from now on, to be compared with those before; None where none are recorded.
     told
         What is told of it.
+    error
+        By how much of the largest speed impulses are off that have not been found to rounding.
     """
 
     change: FloatArray
@@ -57,6 +59,7 @@ class Pushed(NamedTuple):
     loss: float
     states: tuple[float, ...] | None
     told: Callable[[float], list[Any]]
+    error: float = 0.0
 
 
 class Touching(Protocol):
@@ -252,7 +255,7 @@ class TimeSteppingSession(SteppingSession):
             if pushed is not None:
                 moved = self._relative(free - known, free, n)
                 # Rounding in what follows from many rows is larger than that of one.
-                if moved <= _MET or (moved <= 1e3 * _MET and moved >= last):
+                if moved <= max(_MET, pushed.error) or (moved <= 1e3 * _MET and moved >= last):
                     self._last = None if pushed.is_impact else (h, pushed.change)
                     return middle, pushed
                 last = moved

@@ -1,4 +1,4 @@
-"""Groups of discs of which any two may touch: which scenes have one, and who refuses them."""
+"""Groups of bodies of which any two may touch: which scenes have one, and who refuses them."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from atwood.model.declare.contact_group import ContactGroup
 
 
 def groups_of(assembly: Assembly) -> list[str]:
-    """Return the paths of the groups of discs in a scene."""
+    """Return the paths of the groups of bodies in a scene."""
     return [path for path, part in assembly.flat.parts.items() if isinstance(part.component, ContactGroup)]
 
 
 def refuse_groups(assembly: Assembly) -> None:
-    """Refuse a scene with a group of discs where nothing is known of their contacts."""
+    """Refuse a scene with a group of bodies where nothing is known of their contacts."""
     paths = groups_of(assembly)
     if paths:
         raise UnsupportedError(
