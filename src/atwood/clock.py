@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from contextvars import ContextVar
 from math import inf
 from typing import Any, TypeVar
@@ -45,27 +44,29 @@ class Clock:
         """What is left, s; negative behind the limit, infinite without one."""
         return self._end - time.perf_counter()
 
-    @contextmanager
-    def kept(self, grace: float = 0.0) -> Iterator[None]:
+    def kept(self, grace: float = 0.0) -> _Ending:
         """Let everything in a ``with`` block keep the limit, or end so many seconds behind it."""
-        with _ending(self._end + grace):
-            yield
+        return _Ending(self._end + grace)
 
 
-@contextmanager
-def more_time() -> Iterator[None]:
+def more_time() -> _Ending:
     """Give what is in a ``with`` block at least a little time from now on, however little is left."""
-    with _ending(max(_deadline.get(), time.perf_counter() + GRACE)):
-        yield
+    return _Ending(max(_deadline.get(), time.perf_counter() + GRACE))
 
 
-@contextmanager
-def _ending(end: float) -> Iterator[None]:
-    token = _deadline.set(end)
-    try:
-        yield
-    finally:
-        _deadline.reset(token)
+class _Ending:
+    """Lets a ``with`` block end at a time."""
+
+    __slots__ = ("_end", "_token")
+
+    def __init__(self, end: float) -> None:
+        self._end = end
+
+    def __enter__(self) -> None:
+        self._token = _deadline.set(self._end)
+
+    def __exit__(self, *_: object) -> None:
+        _deadline.reset(self._token)
 
 
 def time_left() -> float:

@@ -32,10 +32,7 @@ else:
             return dataclasses.replace(one, **changes)
         if not completion.done:
             completion.complete()
-        for name in completion.given_names:
-            if name not in changes:
-                changes[name] = getattr(one, name)
-        return type(one)(**changes)
+        return type(one)(**dict(zip(completion.given_names, completion.taken(one), strict=True)) | changes)
 
     def dataclass(cls=None, /, *, frozen=False, eq=True):
         """Make a class a dataclass, as `dataclasses.dataclass` does with the same options."""
@@ -113,6 +110,7 @@ class _Completion:
             self.values = _reader([name for name, one in found.items() if one.compare])
             self.shown = [name for name, one in found.items() if one.repr]
             self.given_names = [name for name, one in found.items() if one.init]
+            self.taken = _reader(self.given_names)
             self.has_more = hasattr(self.cls, "__post_init__")
             self.done = True
 

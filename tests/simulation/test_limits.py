@@ -42,13 +42,14 @@ def looks(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 @pytest.mark.parametrize("form", FORMS)
 def test_a_limit_of_time_is_looked_at_all_along(form: str, looks: list[int]) -> None:
     scene = FourBarRow(windows=1)
-    simulate(scene, form=form, t_end=1.0)  # compiled code is in the cache from now on
+    for _ in range(6):  # what pays is compiled from then on
+        simulate(scene, form=form, t_end=1.0)
     before = looks[0]
     whole = simulate(scene, form=form, t_end=1.0, max_seconds=1e9)
     needed = looks[0] - before
     assert whole.status == "finished", whole.message
     assert len(whole.singular_crossings) == 1
-    for share in (1e-9, 0.1, 0.3, 0.6, 0.9):
+    for share in (1e-9, 0.1, 0.3, 0.6, 0.8):
         before = looks[0]
         found = simulate(scene, form=form, t_end=1.0, max_seconds=share * needed)
         assert found.status == "time_limit"
@@ -61,7 +62,7 @@ def test_a_limit_of_time_is_looked_at_all_along(form: str, looks: list[int]) -> 
 
 def test_a_crossing_is_left_when_the_time_is_used_up(looks: list[int]) -> None:
     assembly = assemble(FourBarRow(windows=10))
-    whole = simulate(assembly, t_end=2.0)  # compiled code is in the cache from now on
+    whole = [simulate(assembly, t_end=2.0) for _ in range(6)][-1]  # what pays is compiled from then on
     assert len(whole.singular_crossings) == 2
     before = looks[0]
     with calls() as made:

@@ -17,6 +17,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Sequence
 from enum import Enum
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
@@ -274,11 +275,12 @@ class Statistics:
     convergence_failures: int | None = None
 
     def __add__(self, other: Statistics) -> Statistics:
-        sums: dict[str, Any] = {}
-        for name in Statistics.__annotations__:
-            mine, theirs = getattr(self, name), getattr(other, name)
-            sums[name] = None if mine is None or theirs is None else mine + theirs
-        return Statistics(**sums)
+        both = zip(_COUNTED(self), _COUNTED(other), strict=True)
+        sums: list[Any] = [None if a is None or b is None else a + b for a, b in both]
+        return Statistics(*sums)
+
+
+_COUNTED = attrgetter(*Statistics.__annotations__)
 
 
 def choose_linear_solver(problem: ImplicitProblem, options: SolverOptions, has_fixed: bool = False) -> LinearSolver:

@@ -9,7 +9,6 @@ last good state and a little ahead of it, and the first that has no value is nam
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from math import isfinite
 
 import numpy as np
@@ -108,15 +107,18 @@ def _most_missed(
     return one.label, one.key[0], float(misses[worst])
 
 
-@contextmanager
-def named(assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> Iterator[None]:
-    """Turn the errors of libraries into those of a scene at a state; see `numerical_failure`."""
-    try:
-        yield
-    except (ValueError, ArithmeticError) as error:
-        if not is_numerical(error):
-            raise
-        raise numerical_failure(assembly, t, q, u, error) from error
+class named:
+    """Turns the errors of libraries in a ``with`` block into those of a scene at a state; see `numerical_failure`."""
+
+    def __init__(self, assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> None:
+        self._state = assembly, t, q, u
+
+    def __enter__(self) -> None:
+        return
+
+    def __exit__(self, _: object, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, (ValueError, ArithmeticError)) and is_numerical(error):
+            raise numerical_failure(*self._state, error) from error
 
 
 ADVICE_AT_START = (

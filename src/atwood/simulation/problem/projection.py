@@ -8,7 +8,7 @@ safe where constraints nearly depend on each other.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cache, cached_property, partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -212,6 +212,18 @@ def _errors(plan: SceneProblem, t: FloatArray, q: FloatArray) -> FloatArray:
     return plan.balance.errors.near(float(t[farthest]), q[:, farthest], plan.sizes)
 
 
+def once(make: Misses) -> Misses:
+    """Return the same, made at the first call; `functools.cache` takes longer than it saves a run."""
+    made: list[FloatArray] = []
+
+    def get() -> FloatArray:
+        if not made:
+            made.append(make())
+        return made[0]
+
+    return get
+
+
 def _chunk(plan: SceneProblem) -> int:
     """Return how many states to work on at once."""
     program = plan.balance.program
@@ -324,7 +336,7 @@ def _taken(
     if met is None:
         return None
     sizes = np.concatenate([plan.coordinate_sizes, plan.sizes / plan.scales.time])
-    misses: Misses = cache(partial(misses_of, plan, t, q, u))
+    misses = once(partial(misses_of, plan, t, q, u))
     free, contacts = np.zeros(len(t), dtype=bool), plan.assembly.own_equations.contacts
     has_more, moved = bool(contacts or plan.finding.redundant), np.max(np.abs(rows - own) / sizes)
     # A row in units of its largest entry misses no more than the sum of what its unknowns move by to meet it.

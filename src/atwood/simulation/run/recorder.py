@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import cache, partial
+from functools import partial
 from itertools import chain, pairwise
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -16,7 +16,7 @@ from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, made_of
 from atwood.simulation.problem.problem import SceneProblem
-from atwood.simulation.problem.projection import Misses, Nearest, misses_of, project_safely, project_states
+from atwood.simulation.problem.projection import Misses, Nearest, misses_of, once, project_safely, project_states
 
 if TYPE_CHECKING:
     from atwood.integrators.time_stepping.session import Change
@@ -352,7 +352,7 @@ class Recorder:
         self.settle()
         blocks = self._samples[0]
         q, u = (np.concatenate([getattr(one, name) for one in blocks], axis=1) for name in ("q", "u"))
-        misses = cache(lambda: np.concatenate([one.misses() for one in blocks], axis=1))
+        misses = once(lambda: np.concatenate([one.misses() for one in blocks], axis=1))
         time, shown = (np.concatenate([getattr(one, name) for one in blocks]) for name in ("time", "shown"))
         # A path may lead over a place behind the end, or behind an event.
         crossings = tuple(one for one in self.singular_crossings if one.path is None or one.time <= time[-1])

@@ -9,6 +9,7 @@ from functools import cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.clock import TimeIsUp, check_time, more_time, time_left
@@ -362,12 +363,17 @@ class _Runner:
         """Let an explicit method fill tables; return how many samples are done, and why it stopped early."""
         segment, progress = self.segment, self.segment.options.progress
         kinematic_map = segment.plan.balance.kinematic_map
-        parts = _BLOCKS if progress is not None else _PARTS if kinematic_map.has_homogeneous else 1
-        samples = segment.samples
-        ends = samples.ends_of_blocks(parts)
+        samples, turns = segment.samples, kinematic_map.has_homogeneous
+        ends = samples.ends_of_blocks(_BLOCKS if progress is not None else 1)
+        looks = samples.ends_of_blocks(_PARTS) if turns else ends
         while done < len(samples.times):
             times = samples.times[done : ends[np.searchsorted(ends, done, side="right")]]
+            if turns and segment.plan.assembly.own_equations.contacts:  # what jumps has happened
+                times = times[: looks[np.searchsorted(looks, done, side="right")] - done]
             y, _, step_result = session.sample(times)
+            strayed = self._strayed(y, looks[(looks > done) & (looks <= done + len(y))] - done) if turns else None
+            if strayed is not None:  # what comes behind is done again
+                y, step_result = y[: strayed + 1], session.here
             count = len(y)
             jumps = self._take_jumps(session)
             shows = isinstance(segment.options.outputs, (int, np.integer))  # or just the times that were asked for
@@ -375,12 +381,20 @@ class _Runner:
             done += count
             if step_result.status is not Status.REACHED:
                 return done, step_result
-            q, u = segment.plan.program.split(y[-1])
-            if kinematic_map.needs_normalization(q):
-                session.reinitialize(float(times[-1]), np.concatenate([kinematic_map.normalized(q), u]))
+            if strayed is not None:
+                q, u = segment.plan.program.split(y[-1])
+                session.reinitialize(float(times[strayed]), np.concatenate([kinematic_map.normalized(q), u]))
+                if self.monitor is not None:
+                    self.monitor.restart(session.here)
             if progress is not None:
                 progress(float(times[-1]))
         return done, None
+
+    def _strayed(self, y: FloatArray, ends: NDArray[np.intp]) -> int | None:
+        """Return the first of some rows in which coordinates of an orientation need another size; None if none does."""
+        plan = self.segment.plan
+        needs = plan.balance.kinematic_map.needs_normalization
+        return next((int(k) - 1 for k in ends if needs(plan.program.split(y[k - 1])[0])), None)
 
     def _take_jumps(self, session: Session) -> tuple[FloatArray, FloatArray] | None:
         """Return times and states of the jumps since this was last asked, and note what is told of them."""

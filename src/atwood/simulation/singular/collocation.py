@@ -16,6 +16,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from atwood.arrays import FloatArray
+from atwood.clock import check_time
 from atwood.errors import AtwoodError, KernelEvaluationError
 from atwood.integrators.protocol import PROJECTION, RATES, CompiledRates
 from atwood.lazy_dataclasses import dataclass
@@ -194,6 +195,7 @@ def _held_by(code: CompiledRates, t: FloatArray, q: FloatArray, u: FloatArray) -
     project, n = PROJECTION(code.project), len(q)
 
     def taken(speeds: FloatArray, places: FloatArray) -> FloatArray | None:
+        check_time()
         y = np.ascontiguousarray(np.concatenate([places, speeds]).T)
         first, width = y.ctypes.data, y.strides[0]
         flags = [project(one, first + i * width, code.project_data) for i, one in enumerate(t.tolist())]
@@ -211,6 +213,7 @@ def _held_by(code: CompiledRates, t: FloatArray, q: FloatArray, u: FloatArray) -
 
 def _rates_by(code: CompiledRates, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatArray:
     """Return rates of coordinates and speeds by machine code, shape (number, states)."""
+    check_time()
     function, y = RATES(code.function), np.ascontiguousarray(np.concatenate([q, u]).T)
     found, width = np.empty_like(y), y.strides[0]
     for i, one in enumerate(t.tolist()):
