@@ -33,15 +33,16 @@ FIELDS: dict[str, Kind] = {
     **dict.fromkeys(("program", "derived", "scratch", "y", "out", "units", "rows", "matrix", "left"), ADDRESS),
     **dict.fromkeys(("shares", "pattern", "past", "log"), ADDRESS),
     **dict.fromkeys(("finite", "blur", "pace", "tolerance", "inside", "ahead", "rough"), NUMBER),
-    **dict.fromkeys(("better_x", "better_y"), NUMBER),
+    **dict.fromkeys(("better_x", "better_y", "lasted"), NUMBER),
     **dict.fromkeys(("count", "size", "entries", "coordinates", "speeds", "number", "better"), INTEGER),
     **dict.fromkeys(("logged", "known", "stops", "repeats", "shared"), INTEGER),
 }
 """The memory of sets. `finite` is 0 where limits are of impulses, which finite forces do not have; `blur` and `pace`
 are multiples of what is small and slow; `inside` is how deep a gap may be, in multiples of what is small; `ahead` is
 how long impacts may still go on that are summed, and then how long they do, `rough` how long where rounding tells the
-length of their intervals; `shared` is 1 where forces of a set that was found are not determined, as rows repeat each
-other, or where another share might let rest what begins to slip, and `repeats` where those solved for last are not."""
+length of their intervals, `lasted` how long these have gone on; `shared` is 1 where forces of a set that was found are
+not determined, as rows repeat each other, or where another share might let rest what begins to slip, and `repeats`
+where those solved for last are not."""
 
 UNITS = {
     name: k
@@ -49,12 +50,13 @@ UNITS = {
         (
             *("first", "width", "slip", "at", "speed", "poisson", "part", "small", "slow"),
             *("trigger", "state", "state_x", "state_y", "next", "next_x", "next_y", "closed"),
-            *("chosen", "given", "given_x", "given_y", "turned_x", "turned_y", "struck", "stopped", "acts"),
+            *("chosen", "given", "given_x", "given_y", "turned_x", "turned_y", "struck", "stopped", "acts", "series"),
         )
     )
 }
 """Of each gap and slip: its first row and their number, its kind and gap, what is zero but for errors, what has
-happened, its state and direction before and after, and whether it was closed at that moment; the rest is work."""
+happened, its state and direction before and after, and whether it was closed at that moment; the rest is work. Of what
+has impacts that accumulate `series` is 1."""
 
 ROWS = {
     name: k
@@ -108,6 +110,9 @@ FLATTENS = 0.9
 
 ALIKE = 100.0
 """Gaps that come to rest together part at speeds that differ by no larger factor."""
+
+OFTEN = 2
+"""A gap with so many impacts in the intervals of a series is part of it; with fewer it only passes near by."""
 
 SEEN = 2.0
 """Times what is slow: what has come to rest may go by that still, or again, where its event is seen."""
@@ -604,8 +609,10 @@ def _touch() -> Routine:
     with r.count(m.count) as k:
         row = r.truncated(m.unit("first")[k])
         closed = state[k] == float(STICKS)
-        is_near = closed | (values[row] <= m.unit("small")[k] * m.blur)
-        is_slow = (m.unit("speed")[k] == 0.0) | closed | (rates[row] <= m.unit("slow")[k] * m.pace)
+        in_series = m.unit("series")[k] != 0.0
+        blur, pace = r.choose(in_series, m.blur, 1.0), r.choose(in_series, m.pace, 1.0)
+        is_near = closed | (values[row] <= m.unit("small")[k] * blur)
+        is_slow = (m.unit("speed")[k] == 0.0) | closed | (rates[row] <= m.unit("slow")[k] * pace)
         is_one = (m.unit("slip")[k] == 0.0) & is_near & is_slow
         chosen[k] = r.choose(is_one, 1.0, 0.0)
         some.now = some.now + is_one.integer()
@@ -769,10 +776,12 @@ def _is_still(r: Routine, m: Sets, k: Value, size: Value) -> Value:
 
 
 def _stop() -> Routine:
-    """Stop whatever touches: impacts have accumulated; what bounced rubs as much. What has stuck goes on to."""
+    """Stop what touches with impacts that have accumulated; what bounced rubs as much. What has stuck goes on to."""
     r, m, () = _open("stop")
     chosen, slow, rates, given = m.unit("chosen"), m.unit("slow"), m.row("rates"), m.unit("given")
     r.call("touching", r.arguments[0], result=INTEGER)
+    with _each(r, m, "chosen") as (k, _, _), r.when(m.unit("series")[k] == 0.0):
+        chosen[k] = 0.0  # it is near by, and has no such impacts
     coming, turned = r.variable(0.0), r.variable(False, BOOLEAN)
     with _each(r, m, "chosen") as (_, row, _):
         coming.now = r.most(0.0 - rates[row], coming.now)
@@ -932,8 +941,23 @@ def _series() -> Routine:
     with r.when((count.now < SPANS[0]) | ~(spans[0] > 0.0)):
         r.give()
     _end_series(r, m, spans, count.now)
+    with r.when(m.stops != 0):
+        _mark_series(r, m, t)
     r.give()
     return r
+
+
+def _mark_series(r: Routine, m: Sets, t: Value) -> None:
+    """Mark the gaps that rest where impacts accumulate: those that close, are closed, or have impacts of it."""
+    series, past, often = m.unit("series"), m.past, r.variable(0, INTEGER)
+    with r.count(m.count) as k:
+        often.now = 0
+        with r.count(m.known) as i:
+            is_one = (past[i * 2 + 1] == m.unit("part")[k]) & (past[i * 2] >= t - m.lasted)
+            often.now = often.now + is_one.integer()
+        closes = (m.unit("trigger")[k] == float(CLOSES)) & (m.unit("speed")[k] == 0.0)
+        is_in = closes | (m.unit("state")[k] == float(STICKS)) | (often.now >= OFTEN)
+        series[k] = r.choose((m.unit("slip")[k] == 0.0) & is_in, 1.0, 0.0)
 
 
 def _end_series(r: Routine, m: Sets, spans: Value, number: Value) -> None:
@@ -966,7 +990,9 @@ def _end_series(r: Routine, m: Sets, spans: Value, number: Value) -> None:
     flattens = 1.0 - spans[0] / spans[1] < FLATTENS * (1.0 - share.now)
     longest = r.choose(steady.now, r.choose(flattens, m.rough, m.ahead), LATER * m.ahead)
     with r.when(left < longest):
-        m.ahead, m.stops, m.blur, m.pace = left, 1, NEAR_REST, NEAR_REST
+        m.ahead, m.stops, m.blur, m.pace, m.lasted = left, 1, NEAR_REST, NEAR_REST, 0.0
+        with r.count(even.now) as k:
+            m.lasted = m.lasted + spans[k]
         sum_ = _sum_of_series(r, spans, long.now)
         with r.when(r.size(sum_ - left) <= left):
             m.ahead = sum_
@@ -998,6 +1024,8 @@ def _resolve() -> Routine:
     r, m, (t, checks, sums) = _open("resolve", {"t": NUMBER, "checks": INTEGER, "sums": INTEGER}, exported=True)
     m.finite, m.blur, m.pace, m.logged, m.stops, m.shared = 1.0, 1.0, 1.0, 0, 0, 0
     do_or_return(r, "read_contacts", t)
+    series = m.unit("series")
+    r.clear(series, series.at(m.count))
     with r.when(sums != 0):
         r.call("series", r.arguments[0], t, result=None)
     with r.when(checks != 0):
@@ -1007,8 +1035,7 @@ def _resolve() -> Routine:
     with r.when(m.stops != 0):
         r.call("stop", r.arguments[0])
         r.copy(m.unit("closed"), m.unit("stopped"), m.count)  # others may pass near by
-    with r.otherwise():
-        do_or_return(r, "collide")
+    do_or_return(r, "collide")
     do_or_return(r, "settle_contacts", t)
     r.give(0)
     return r

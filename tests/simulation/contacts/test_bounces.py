@@ -261,3 +261,27 @@ def test_rounding_closes_no_gap_that_opens() -> None:
         for _ in range(10):
             near = q * (1.0 + chance.choice([-2.0, 0.0, 2.0], len(q)) * np.finfo(float).eps)
             assert np.all(probe.values(0.0, near, u) > 0.0)
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+@pytest.mark.parametrize(("away", "speed"), [(1e-8, 1e-3), (-1e-7, 1e-3), (0.0, 1e-3), (1e-7, 0.5)])
+def test_what_only_passes_near_by_does_not_rest_where_impacts_accumulate(form: str, away: float, speed: float) -> None:
+    """A ball comes to rest on a floor with e 1/2. A wall that it meets a moment before or later throws it back."""
+    fall = math.sqrt(2.0 / 9.81)
+    rest = 3.0 * fall
+    scene = Scene()
+    ground, m, far = (
+        scene.add("ground", Ground()),
+        scene.add("m", PointMass(mass=1.0)),
+        scene.add("far", Ground(position=(speed * rest + away, 0.0, 0.0))),
+    )
+    floor = scene.add("floor", PointContact(restitution=0.5))
+    wall = scene.add("wall", PointContact(normal=(-1.0, 0.0, 0.0), restitution=0.5))
+    for ends in ((ground.frame, floor.plane), (m.point, floor.point), (far.frame, wall.plane), (m.point, wall.point)):
+        scene.connect(*ends)
+    scene.start.update({"m.position.x": 0.0, "m.position.z": 1.0, "m.velocity.x": speed, "m.velocity.z": 0.0})
+    result = simulate(scene, form=form, t_end=rest + 0.2, rtol=1e-10, outputs=[0.0, rest + 0.2])
+    told = {(one.part, one.kind): one.time for one in result.events if (one.part, one.kind) != ("floor", "impact")}
+    assert set(told) == {("floor", "rests"), ("floor", "closes"), ("wall", "impact")}
+    assert told["wall", "impact"] == pytest.approx(rest + away / speed, abs=1e-10)
+    assert result["m.velocity.x"][-1] == pytest.approx(-0.5 * speed, rel=1e-9)

@@ -25,6 +25,7 @@ from atwood.integrators.set_routines import (
     LATER,
     LONG,
     NEAR_REST,
+    OFTEN,
     SEEN,
     SPANS,
     STEADY,
@@ -128,6 +129,7 @@ class _Moment:
         self.triggers = {(one.part, one.law): one.target for one in triggers}
         self.events: list[EventRecord] = []
         self.resting: list[int] | None = None
+        self._series: list[int] = []
 
     def trigger(self, k: int) -> str:
         """Return the target of the event of a unit; empty where it has none now."""
@@ -233,19 +235,37 @@ class _Moment:
         flattens = 1.0 - ratios[0] < FLATTENS * (1.0 - share)
         if not left < (longest[1 if flattens else 0] if is_steady else LATER * longest[0]):
             return None
-        self.small, self.slow = NEAR_REST * self.small, NEAR_REST * self.slow
+        self._series = self._accumulating(closing, impacts, self.t - float(np.sum(spans[: count + 1])))
+        self.small, self.slow = (self._blurred(one, NEAR_REST) for one in (self.small, self.slow))
         found = sum_of_series(np.array(spans[: long + 1]))
         return found if abs(found - left) <= left else left
 
+    def _accumulating(self, closing: Collection[int], impacts: Sequence[tuple[float, str]], since: float) -> list[int]:
+        """Return the gaps that rest where impacts accumulate: those that close, are closed, or have impacts of it."""
+        parts = [part for time, part in impacts if time >= since]
+        return [
+            k
+            for k, one in enumerate(self.first)
+            if not one.is_slip
+            if k in closing or self.before[k][0] == STICKS or parts.count(one.row.key[0]) >= OFTEN
+        ]
+
+    def _blurred(self, sizes: FloatArray, times: float) -> FloatArray:
+        """Return what is small or slow, and so many times that of gaps whose impacts accumulate."""
+        found = sizes.copy()
+        found[self._series] *= times
+        return found
+
     def stop(self, left: float) -> None:
-        """Stop whatever touches: impacts have accumulated, and nothing opens any more; what has stuck goes on to."""
+        """Stop what has impacts that have accumulated: nothing of it opens any more, and what has stuck goes on to."""
         still = [k for k, one in enumerate(self.first) if one.is_slip and self.before[k][0] == STICKS]
         rates = self.rates()
-        speeds = {k: self.rate(k, rates) for k in self.touching}
+        speeds = {k: self.rate(k, rates) for k in self.touching if k in self._series}
         # What has just bounced much faster than the others only passes: its impacts have not come to an end.
         coming = max(0.0, *(-speed for speed in speeds.values()))
         resting = [k for k, speed in speeds.items() if speed <= max(ALIKE * coming, self.slow[k])]
-        self.resting, self.slow = resting, 1.0 / NEAR_REST * self.slow
+        self.resting = resting
+        self.slow = self._blurred(self.slow, 1.0 / NEAR_REST)
         self._end_impacts(resting, still)
         self.events += [told_rest(self.t, self.first[k].row.key[:2], left) for k in resting[:1]]
 
@@ -801,7 +821,7 @@ def resolve(
         touching = moment.all_closed()
     else:
         touching = moment.all_closed()
-        moment.collide(one_by_one)
+    moment.collide(one_by_one)
     moment.settle()
     was, now = list(moment.before), states_of(moment.layout, moment.held)
     if is_start:
