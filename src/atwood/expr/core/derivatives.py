@@ -223,9 +223,11 @@ def jvp(outputs: Sequence[Expression | float], tangents: Mapping[Expression, Exp
     list of Expression
         One derivative for each output; the constant 0 where the output does not move.
     """
-    graph = _graph_of(outputs, tangents)
+    graph, nodes = _graph_of(outputs, tangents), live(outputs)
+    if len(tangents) > len(nodes):  # one part of a large scene
+        tangents = {node: tangents[node] for node in nodes if node in tangents}
     seeds = {key.index: graph.convert(rate) for key, rate in tangents.items()}
-    moved = _sweep(live(outputs), seeds)
+    moved = _sweep(nodes, seeds)
     return [moved.get(output.index, graph.zero) if isinstance(output, Expression) else graph.zero for output in outputs]
 
 

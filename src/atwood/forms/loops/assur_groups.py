@@ -20,7 +20,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from atwood.errors import AtwoodError
-from atwood.expr import Expression, atan2, cos, depends_on, evaluate, hypot, jacobian, jvp, sin
+from atwood.expr import Expression, atan2, cos, evaluate, hypot, jacobian, jvp, live, sin
 from atwood.forms.loops.closed_form import ClosedLoops, Group, Heading, Place
 from atwood.forms.loops.joint_groups import three_unknowns, two_unknowns
 from atwood.forms.loops.roots import ConstraintShapes, Vector, Wave, one_unknown, sum_of_waves, waves_of
@@ -236,9 +236,9 @@ class Loops:
 
     def _angles_read(self, p: Expression, q: Expression) -> list[Expression] | None:
         """Return the angles that a direction depends on; None if it depends on anything else that moves."""
-        angles = []
+        angles, reached = [], set(live([p, q]))
         for one, is_angle in zip((*self.q, self.equations.time), (*self.is_angle, False), strict=True):
-            if (depends_on(p, [one]) or depends_on(q, [one])) and not self.vanish(jvp([p, q], {one: 1.0})):
+            if one in reached and not self.vanish(jvp([p, q], {one: 1.0})):
                 if not is_angle:
                     return None
                 angles.append(one)

@@ -8,6 +8,7 @@ differentiated in the body's own axes, where it is constant, and turned into the
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import TypeAlias
 
 from atwood.expr import Expression, Graph, Scalar, jvp, substitute
@@ -80,7 +81,12 @@ class Course:
         if not values:
             return [], []
         rates = jvp(list(values), self.first)
-        return rates, jvp(rates, {**self.first, **self.second})
+        return rates, jvp(rates, self.both)
+
+    @cached_property
+    def both(self) -> Mapping[Expression, Expression | float]:
+        """Directions of the second time derivative."""
+        return {**self.first, **self.second}
 
 
 @dataclass(frozen=True)

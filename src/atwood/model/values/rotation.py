@@ -141,17 +141,23 @@ def as_rotation(value: Scalar | Rotation | None) -> Rotation:
 
 def compose(outer: Axes, inner: Axes) -> Axes:
     """Return the axes of a frame from those of a frame between: the product of the two matrices."""
+    if outer is IDENTITY or inner is IDENTITY:
+        return inner if outer is IDENTITY else outer
     return from_axes(outer, inner[0]), from_axes(outer, inner[1]), from_axes(outer, inner[2])
 
 
 def transposed(axes: Axes) -> Axes:
     """Return the inverse of a rotation matrix."""
+    if axes is IDENTITY:
+        return axes
     x, y, z = axes
     return Vector(x.x, y.x, z.x), Vector(x.y, y.y, z.y), Vector(x.z, y.z, z.z)
 
 
 def from_axes(axes: Axes, vector: Vector) -> Vector:
     """Return a vector, given by its components along some axes, in the frame that these axes are given in."""
+    if axes is IDENTITY:
+        return vector
     components = []
     for i in range(3):
         terms = [_times(vector[j], axes[j][i]) for j in range(3)]
@@ -161,6 +167,8 @@ def from_axes(axes: Axes, vector: Vector) -> Vector:
 
 def to_axes(axes: Axes, vector: Vector) -> Vector:
     """Return the components of a vector along some axes."""
+    if axes is IDENTITY:
+        return vector
     return Vector(*(_sum(*(_times(axis[i], vector[i]) for i in range(3))) for axis in axes))
 
 

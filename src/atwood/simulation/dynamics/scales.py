@@ -15,7 +15,7 @@ from typing import TypeAlias
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, evaluate, jvp
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, evaluate, jacobian, jvp
 from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import dataclass
@@ -198,7 +198,7 @@ FAR = 10.0
 """A group that is farther away than so many of its extents is measured from a place that moves with it."""
 
 _GROUPS: Key[list[tuple[int, ...]]] = Key("groups of bodies that may float")
-_FLOATS: Key[bool] = Key("whether a group of bodies floats")
+_FLOATS: Key[frozenset[tuple[int, ...]]] = Key("groups of bodies that float")
 
 
 def _movable(assembly: Assembly, equations: Equations) -> list[tuple[int, ...]]:
@@ -231,11 +231,13 @@ def _movable(assembly: Assembly, equations: Equations) -> list[tuple[int, ...]]:
 def _floats(assembly: Assembly, equations: Equations, places: tuple[int, ...]) -> bool:
     """Return whether nothing changes where coordinates all grow alike, and others stay."""
 
-    def find() -> bool:
+    def find() -> frozenset[tuple[int, ...]]:
         laws = [*equations.rows, *(one.value for one in equations.constraints if one.value is not None)]
-        return all(one.is_zero for one in jvp(laws, _direction(equations, places)))
+        groups = _movable(assembly, equations)
+        bound = set(jacobian(laws, [_direction(equations, group) for group in groups]).columns)
+        return frozenset(group for number, group in enumerate(groups) if number not in bound)
 
-    return assembly.shared.get(_FLOATS, find, equations.forest.form, places)
+    return places in assembly.shared.get(_FLOATS, find, equations.forest.form)
 
 
 def _direction(equations: Equations, places: Sequence[int]) -> Mapping[Expression, Expression | float]:
