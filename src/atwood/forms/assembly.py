@@ -166,7 +166,8 @@ class Assembly:
         )
         with mechanism.relations.reading():
             made = build_equations(mechanism, forest)
-        return made if form == "dae" or not made.read else with_reactions(made, self.maximal)
+        is_left = any(symbol is value for symbol, value in made.read.items())
+        return with_reactions(made, self.maximal) if form == "reduced" and is_left else made
 
     @property
     def rows(self) -> tuple[Expression, ...]:

@@ -16,7 +16,7 @@ from atwood.mechanics.constraints.elimination import (
 )
 from atwood.mechanics.constraints.knots import balance_knots, linear_knots
 from atwood.mechanics.constraints.massless_spins import IDLE_SPIN
-from atwood.mechanics.constraints.read_multipliers import known_multipliers, with_known
+from atwood.mechanics.constraints.read_multipliers import are_own, known_multipliers, with_known
 from atwood.mechanics.constraints.rolling import Taken, integrated, take_up, without_idle_spins
 from atwood.mechanics.constraints.values import (
     Values,
@@ -100,7 +100,7 @@ def build_equations(mechanism: Mechanism, forest: SpanningForest) -> Equations:
         contacts=contact_rows(derivation, site, state, signals),
     )
     read = _read_multipliers(derivation, signals) if derivation.can_read_multipliers else []
-    if forest.form == "reduced":
+    if forest.form == "reduced" and not are_own(derivation, made, read):
         return replace(made, read=dict(zip(read, read, strict=True)), decisions=tuple(derivation.decided))
     with derivation.relations.reading(False):
         made = with_known(made, known_multipliers(derivation, made, read)) if read else made

@@ -63,6 +63,19 @@ def _check_reads(mechanism: Mechanism, read: Sequence[Expression], equations: Eq
             )
 
 
+def are_own(mechanism: Derivation, equations: Equations, read: Sequence[Expression]) -> bool:
+    """Return whether multipliers that forces read follow in generalized coordinates alone, without other joints'.
+
+    They are those of gaps and slips then, nothing else is held, and everything has inertia.
+    """
+    if equations.constraints or not {*read} <= {*equations.contact_multipliers}:
+        return False
+    mass = jacobian(list(equations.rows), list(equations.accelerations)).by_place
+    symbols = (*equations.coordinates, *equations.speeds)
+    is_whole = all((i, i) in mass for i in range(len(equations.speeds)))
+    return is_whole and bool(decide(mechanism, partial(_has_inertia, dict(mass), symbols)))
+
+
 def known_multipliers(
     mechanism: Derivation, equations: Equations, read: Sequence[Expression]
 ) -> dict[Expression, Expression]:
