@@ -12,7 +12,7 @@ from atwood.arrays import FloatArray
 from atwood.clock import GRACE, Clock, TimeIsUp
 from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
-from atwood.forms.caches import Shared
+from atwood.forms.caches import Key, Shared
 from atwood.forms.loose import has_touched, is_loose
 from atwood.integrators.protocol import Statistics
 from atwood.lazy_dataclasses import replace
@@ -55,9 +55,12 @@ from atwood.stages import stage
 from atwood.topology.orientation_coordinates import Orientation
 
 if TYPE_CHECKING:
+    from atwood.simulation.contacts.changes import Changed
     from atwood.simulation.run.moments import Ahead, Passed
 
 _Walk = TypeVar("_Walk", bound="Walk")
+
+_AT_START: Key[Changed] = Key("what becomes of gaps and slips at the start")
 
 _CHATTER, _MOST_CONTACTS = 50, 2000
 """So many changes of mode without time passing end a run, and so many of gaps and slips."""
@@ -380,10 +383,10 @@ class Walk:
         (triggers, late), self._unsettled, self._late = (self._unsettled, self._late), None, None
         if triggers is None or not plan.assembly.own_equations.contacts:
             return plan
-        from atwood.simulation.contacts.changes import check_start, resolve
+        from atwood.simulation.contacts.changes import check_start
         from atwood.simulation.problem.explicit_scene import nearest_state, rates_on_constraints
 
-        options, is_start = self.options, not self.segments
+        is_start = not self.segments
         if not self.options.looks_for_events:
             if is_start:
                 check_start(plan.assembly, (self.t, self.q, self.u), self.start.length, plan.scales)
@@ -392,15 +395,7 @@ class Walk:
         if late is not None:  # what happens does so at the zero of the event, and goes on from there
             rest, (q, u) = late[0], split(late[1])
             t, self.q, self.u = t - rest, self.q - rest * q, self.u - rest * u
-        state, relative, one_by_one = (t, self.q, self.u), options.relative_tolerance, options.impacts == "one_by_one"
-        jumps, changed = None if one_by_one else self._kept.sets(plan), None
-        if jumps is not None:
-            from atwood.simulation.contacts.compiled import resolved
-
-            changed = resolved(jumps, plan, state, relative, triggers, self._impacts, is_start, self.t)
-        if changed is None:
-            about = self.start.length, plan.scales, relative
-            changed = resolve(self.assembly, state, *about, triggers, one_by_one, self._impacts, is_start, self.t)
+        changed = self._becomes(plan, (t, self.q, self.u), triggers, is_start)
         events = list(changed.events)
         self._kept.changes += 1
         self._remember(events)
@@ -420,6 +415,30 @@ class Walk:
             q, u = split(rates_on_constraints(made, self.t, self.q, self.u))
             self.q, self.u = self.q + rest * q, self.u + rest * u
         return made
+
+    def _becomes(
+        self,
+        plan: SceneProblem,
+        state: tuple[float, FloatArray, FloatArray],
+        triggers: Sequence[EventRecord],
+        is_start: bool,
+    ) -> Changed:
+        """Return what becomes of gaps and slips now, by the routine of the steps if there is one; of a start it is kept."""
+        from atwood.simulation.contacts.changes import resolve
+
+        relative, one_by_one = self.options.relative_tolerance, self.options.impacts == "one_by_one"
+
+        def find() -> Changed:
+            jumps, found = None if one_by_one else self._kept.sets(plan), None
+            if jumps is not None:
+                from atwood.simulation.contacts.compiled import resolved
+
+                found = resolved(jumps, plan, state, relative, triggers, self._impacts, is_start, self.t)
+            given = self.start.length, plan.scales, relative, triggers, one_by_one, self._impacts, is_start, self.t
+            return found or resolve(self.assembly, state, *given)
+
+        about = state[0], *(one.tobytes() for one in state[1:]), plan.scales, relative, one_by_one
+        return self.assembly.kept.get(_AT_START, find, *about) if is_start else find()
 
     def _remember(self, events: Sequence[EventRecord | ToldLater]) -> None:
         """Remember the impacts among some events."""
