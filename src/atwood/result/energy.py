@@ -16,7 +16,7 @@ from atwood.expr import Program, depends_on, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.quantities import energy_program, known_program
-from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.dynamics.equations import Constraint, Equations
 from atwood.mechanics.outputs.part_power import MovingMass, applied_power, moving_masses, switched_energy
 from atwood.result.segment_quantities import SegmentQuantities
@@ -270,27 +270,53 @@ _DIGIT = 4.0 * np.finfo(float).eps
 """Of each number in a state, relative to itself or to its size in the scene."""
 
 
-def account(reading: SegmentQuantities) -> Piece:
-    """Return the samples that a ledger is made of."""
-    segment, assembly = reading.segment, reading.segment.assembly
-    state = segment.coordinates, segment.speeds
-    mechanism, equations = assembly.mechanism, assembly.own_equations
-    switching = known_program(assembly, _SWITCHED, lambda: [switched_energy(mechanism, equations)])
-    kinetic, potential = _values(assembly, energy_program(assembly), segment.time, *state)
-    is_fixed = switching.results[0].is_zero
-    return Piece(
-        time=segment.time,
-        kinetic=kinetic,
-        potential=potential,
-        motions=_motions(segment),
-        rounding=_rounding(segment),
-        power=power_into(reading),
-        switched=None if is_fixed else _values(assembly, switching, segment.time, *state)[0],
-        lost=segment.lost,
-        is_impact=segment.impact,
-        is_switched=segment.after_time_event,
-        is_rest=segment.rests,
-    )
+def accounts(readings: Sequence[SegmentQuantities]) -> list[Piece]:
+    """Return the samples of all segments that a ledger is made of."""
+    found: dict[int, Piece] = {}
+    powers = powers_into(readings)
+    for numbers, joined in _together(readings):
+        assembly, state = joined.assembly, (joined.time, joined.coordinates, joined.speeds)
+        mechanism, equations = assembly.mechanism, assembly.own_equations
+        switching = known_program(assembly, _SWITCHED, lambda: [switched_energy(mechanism, equations)])  # noqa: B023
+        energies = _values(assembly, energy_program(assembly), *state)
+        switched = None if switching.results[0].is_zero else _values(assembly, switching, *state)[0]
+        motions, rounding, end = _motions(joined), _rounding(joined), 0
+        for number in numbers:
+            segment = readings[number].segment
+            own = slice(end, end := end + len(segment.time))
+            found[number] = Piece(
+                time=segment.time,
+                kinetic=energies[0, own],
+                potential=energies[1, own],
+                motions=tuple(Motion(m.part, m.axis, m.velocities[:, own], m.masses[..., own]) for m in motions),
+                rounding=rounding,
+                power=powers[number],
+                switched=None if switched is None else switched[own],
+                lost=segment.lost,
+                is_impact=segment.impact,
+                is_switched=segment.after_time_event,
+                is_rest=segment.rests,
+            )
+    return [found[number] for number in range(len(readings))]
+
+
+def _together(readings: Sequence[SegmentQuantities]) -> Iterator[tuple[list[int], SegmentRecord]]:
+    """Give the numbers of segments with the same equations and parameters, and a record of all their samples.
+
+    Runs with contacts have thousands of short ones.
+    """
+    alike: dict[tuple[int, bytes, bytes, float], list[int]] = {}
+    for number, one in enumerate(readings):
+        plan = one.segment.plan
+        about = id(plan.assembly), plan.coordinate_sizes.tobytes(), plan.sizes.tobytes(), plan.scales.time
+        alike.setdefault(about, []).append(number)
+    for numbers in alike.values():
+        segments = [readings[number].segment for number in numbers]
+        joined = {
+            name: np.concatenate([getattr(one, name) for one in segments], axis=-1)
+            for name in ("time", "coordinates", "speeds")
+        }
+        yield numbers, replace(segments[0], **joined) if len(segments) > 1 else segments[0]
 
 
 def _motions(segment: SegmentRecord) -> tuple[Motion, ...]:
@@ -310,15 +336,21 @@ def _motions(segment: SegmentRecord) -> tuple[Motion, ...]:
     return tuple(found)
 
 
-def power_into(reading: SegmentQuantities) -> FloatArray | None:
-    """Return the power that is put into the scene at each sample, or None if nothing can."""
-    segment, assembly = reading.segment, reading.segment.assembly
-    program = known_program(assembly, POWER, lambda: [applied_power(assembly.mechanism, assembly.own_equations)])
-    moving = any(_moves_by_itself(assembly.maximal, one) for one in assembly.maximal.constraints)
-    if program.results[0].is_zero and not moving:
-        return None
-    total: FloatArray = _values(assembly, program, segment.time, segment.coordinates, segment.speeds)[0]
-    return total + reading.reactions[1] if moving else total
+def powers_into(readings: Sequence[SegmentQuantities]) -> list[FloatArray | None]:
+    """Return the power that is put into the scene at each sample of each segment; None where nothing can."""
+    found: list[FloatArray | None] = [None] * len(readings)
+    for numbers, joined in _together(readings):
+        assembly, end = joined.assembly, 0
+        mechanism, equations = assembly.mechanism, assembly.own_equations
+        program = known_program(assembly, POWER, lambda: [applied_power(mechanism, equations)])  # noqa: B023
+        moving = any(_moves_by_itself(assembly.maximal, one) for one in assembly.maximal.constraints)
+        if program.results[0].is_zero and not moving:
+            continue
+        total: FloatArray = _values(assembly, program, joined.time, joined.coordinates, joined.speeds)[0]
+        for number in numbers:
+            own = total[end : (end := end + len(readings[number].segment.time))]
+            found[number] = own + readings[number].reactions[1] if moving else own
+    return found
 
 
 def _moves_by_itself(equations: Equations, constraint: Constraint) -> bool:

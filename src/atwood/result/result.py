@@ -20,7 +20,7 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import find_observables
 from atwood.integrators.protocol import Statistics
 from atwood.model.declare.connectors import PATHS, Quantity
-from atwood.result.energy import ConservedLedger, EnergyLedger, account
+from atwood.result.energy import ConservedLedger, EnergyLedger, accounts
 from atwood.result.segment_quantities import SegmentQuantities
 from atwood.result.trajectories import Trajectories
 from atwood.result.turns import TurnCounter
@@ -313,7 +313,7 @@ class Result(Trajectories):
     @cached_property
     def energy(self) -> EnergyLedger:
         """Kinetic and potential energy, work, and how well they balance."""
-        pieces = [account(reading) for reading in self._readings]
+        pieces = accounts(self._readings)
         every = (x for one in pieces for x in (one.kinetic, one.potential, one.power) if x is not None)
         if not all(np.all(np.isfinite(x)) for x in every):
             raise ResultError(
