@@ -29,6 +29,9 @@ from atwood.mechanics.dynamics.equations import Constraint, ContactRow, Equation
 _LARGEST_FILL = 60_000
 """More products than these are left to a loop when the program runs."""
 
+_FILL_OF_CONTACTS = 500
+"""The same of gaps and slips, each of which may meet all others, so that products grow with the cube of their number."""
+
 _ADDED = 1e-9
 """Of the diagonal of gaps and slips, which may repeat each other: what they miss shrinks by that in a step."""
 
@@ -310,7 +313,8 @@ def nearest(
     for k, mask in enumerate(masks):
         if not (mask - 1.0).is_zero:
             entries[k, k] = (1.0 + _ADDED) * entries.get((k, k), zero) + (1.0 - mask)
-    found = _solved(SymmetricSystem(entries, right, [1] * len(right))) if right else []
+    most = _LARGEST_FILL if all(mask.is_constant for mask in masks) else _FILL_OF_CONTACTS
+    found = _solved(SymmetricSystem(entries, right, [1] * len(right)), most) if right else []
     moved = [zero] * len(sizes)
     for row, multiplier in zip(scaled, found, strict=True):
         for column, entry in row.items():
@@ -329,11 +333,11 @@ def _moved(equations: Equations, displacements: Sequence[Expression]) -> list[Ex
     return coordinates
 
 
-def _solved(system: SymmetricSystem) -> list[Expression]:
-    """Return the solution of a system of masses and constraints."""
+def _solved(system: SymmetricSystem, most: int = _LARGEST_FILL) -> list[Expression]:
+    """Return the solution of a system of masses and constraints, written out with so many products at most."""
     size, places = len(system.right), list(system.entries)
     order = _order(places, system.signs)
-    if fill_of(places, order) > _LARGEST_FILL:
+    if fill_of(places, order) > most:
         return _solved_by_loops(system)
     known: dict[int, Expression] = {}
     for step in reversed(eliminate(system, order)):

@@ -43,8 +43,8 @@ _TIMES = 4
 _LEAST_INERTIA = 1e-9
 """In units of the diagonal of the mass matrix: what has less in some direction has none there."""
 
-_LARGEST_FILL = 20_000
-"""Beyond so many products the system is solved in numbers."""
+_LARGEST_FILL, _MANY_CONTACTS, _FILL_OF_CONTACTS = 20_000, 8, 5
+"""Beyond so many products the system is solved in numbers; with more gaps and slips, beyond so many for each unknown."""
 
 
 def _check_reads(mechanism: Mechanism, read: Sequence[Expression], equations: Equations) -> None:
@@ -66,9 +66,11 @@ def _check_reads(mechanism: Mechanism, read: Sequence[Expression], equations: Eq
 def are_own(mechanism: Derivation, equations: Equations, read: Sequence[Expression]) -> bool:
     """Return whether multipliers that forces read follow in generalized coordinates alone, without other joints'.
 
-    They are those of gaps and slips then, nothing else is held, and everything has inertia.
+    They are those of gaps and slips then, nothing else is held, and everything has inertia. Where no body hangs on a
+    joint, maximal coordinates are these, too.
     """
-    if equations.constraints or not {*read} <= {*equations.contact_multipliers}:
+    hangs = any(one.joint is not None for one in equations.forest.attachments)
+    if not hangs or equations.constraints or not {*read} <= {*equations.contact_multipliers}:
         return False
     mass = jacobian(list(equations.rows), list(equations.accelerations)).by_place
     symbols = (*equations.coordinates, *equations.speeds)
@@ -343,7 +345,8 @@ def _solve_system(system: _System) -> list[Expression]:
         order = [*range(n), *(i for i in minimum_degree(_after(places, n, size), size) if i >= n)]
     if all((i, i) in upper for i in system.of_contacts) and system.is_regular:  # many at a body of few coordinates
         order = [*system.of_contacts, *(i for i in order if i not in system.of_contacts)]
-    if (any_order or not light) and fill_of(places, order) <= _LARGEST_FILL:
+    most = _FILL_OF_CONTACTS * size if len(system.of_contacts) > _MANY_CONTACTS else _LARGEST_FILL
+    if (any_order or not light) and fill_of(places, order) <= most:
         try:
             steps = eliminate(SymmetricSystem(upper, right, [1] * n + [-1] * (size - n)), order)
         except (AtwoodError, KeyError):  # a pivot that is always zero
@@ -387,6 +390,8 @@ def _fixed_point(
     slopes = jacobian(list(forces), list(unknowns))
     turns = slopes.by_place
     is_affine = not depends_on(turns.values(), list(unknowns))
+    if is_affine and len(forces) < count:
+        return _met_by_forces(rest, shares, turns, substitute(list(forces), dict(zip(unknowns, rest, strict=True))))
 
     def times(matrix: Mapping[tuple[int, int], Expression], vector: Sequence[Expression]) -> list[Expression]:
         total = [graph.zero] * count
@@ -429,6 +434,25 @@ def _fixed_point(
     # The square root of minus one where Newton's method has not converged: no value rather than a wrong one.
     valid = sqrt(select(miss <= _CONVERGED * size, graph.one, -graph.one))
     return [graph.convert(value * valid) for value in values]
+
+
+def _met_by_forces(
+    rest: Sequence[Expression],
+    shares: Mapping[tuple[int, int], Expression],
+    turns: Mapping[tuple[int, int], Expression],
+    forces: Sequence[Expression],
+) -> list[Expression]:
+    """Return z with ``z = rest + S w``, ``w = forces + T (z - rest)``, by ``(1 - T S) w = forces``: they are fewer."""
+    graph, count = rest[0].graph, len(forces)
+    matrix = [[graph.one if i == j else graph.zero for j in range(count)] for i in range(count)]
+    for (r, k), turn in turns.items():
+        for c in range(count):
+            if (k, c) in shares:
+                matrix[r][c] = matrix[r][c] - turn * shares[k, c]
+    met, found = solve(matrix, list(forces)), list(rest)
+    for (k, c), share in shares.items():
+        found[k] = found[k] + share * met[c]
+    return found
 
 
 def with_known(equations: Equations, read: Mapping[Expression, Expression]) -> Equations:
