@@ -1,6 +1,7 @@
 """Contact, impact and friction beside C by hand: order 8(5,3), dense output, events located on it, the same events.
 
 A ball in a box, a mass on a belt, coupled clutches, a block on a slope; an event also in steps of the double pendulum.
+Then ratios: contacts far away to none, the first run of eight floors to that of one, and energies for each impact.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from ctypes import c_double, c_int, c_long, c_void_p
+from functools import partial
 from pathlib import Path
 
 import by_hand
@@ -20,7 +22,7 @@ from timing import best_of, options, print_table, save
 
 from atwood import Model, Scene, assemble, simulate
 from atwood.integrators.methods.dormand_prince import TABLEAU
-from atwood_library import Ground, PointContact, PointMass
+from atwood_library import Ground, PointContact, PointMass, Spring
 from atwood_library.scenes import Clutches, DoublePendulum, StickSlip
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -40,6 +42,22 @@ def block() -> Scene:
     scene.connect(ground.frame, slope.plane)
     scene.connect(mass.point, slope.point)
     scene.start.update({"m.position.x": 0.0, "m.position.z": 0.0, "m.velocity.x": c, "m.velocity.z": s})
+    return scene
+
+
+def over_floors(count: int, height: float) -> Scene:
+    """Return a mass on a spring over so many floors, the highest of which is so far below."""
+    scene = Scene()
+    mass = scene.add("m", PointMass(mass=1.0))
+    anchor, spring = scene.add("anchor", Ground()), scene.add("spring", Spring(stiffness=20.0, natural_length=1.0))
+    scene.connect(anchor.frame, spring.a)
+    scene.connect(mass.point, spring.b)
+    for i in range(count):
+        ground = scene.add(f"ground{i}", Ground(position=(0.0, 0.0, -height - i)))
+        floor = scene.add(f"floor{i}", PointContact(normal=(0.1 * i, 0.0, 1.0), friction=0.3))
+        scene.connect(ground.frame, floor.plane)
+        scene.connect(mass.point, floor.point)
+    scene.start.update({"m.position.x": 0.3, "m.position.z": -1.2, "m.velocity.x": 0.0, "m.velocity.z": 0.0})
     return scene
 
 
@@ -103,12 +121,43 @@ def in_c(number: int, case: Case, flags: str, header: Path) -> Callable[[], tupl
 
     def run() -> tuple[float, int]:
         y[:] = start
-        began = time.perf_counter()
+        began = time.process_time()
         places = times.ctypes.data, y.ctypes.data, ctypes.addressof(at_start), ctypes.addressof(taken)
         found = code.integrate(end, OF_CONTACTS * RTOL, OF_CONTACTS * RTOL, *places)
-        return time.perf_counter() - began, int(found)
+        return time.process_time() - began, int(found)
 
     return run
+
+
+def seconds(function: Callable[[], object]) -> float:
+    """Return the processor time that a call takes."""
+    began = time.process_time()
+    function()
+    return time.process_time() - began
+
+
+def ratios(repeat: int) -> list[list[object]]:
+    """Return what contacts cost that do nothing, a first run with many, and energies."""
+    rows: list[list[object]] = []
+    told: dict[str, object] = {"rtol": RTOL, "t_end": 10.0, "outputs": [0.0, 10.0]}
+    for form in ("reduced", "dae"):
+        none, far = (assemble(over_floors(count, 100.0), form=form) for count in (0, 20))
+        spent = best_of(
+            {
+                key: lambda one=one: seconds(lambda: simulate(one, **told))
+                for key, one in (("none", none), ("far", far))
+            },
+            repeat,
+        )
+        rows.append([f"20 contacts far away to none ({form}; goal 1.5)", spent["far"] / spent["none"]])
+        simulate(over_floors(2, 1.5), form=form, t_end=2.0, rtol=RTOL)  # so that routines are there
+        first = partial(simulate, form=form, t_end=2.0, rtol=RTOL)
+        one, eight = (seconds(partial(first, over_floors(count, 1.3))) for count in (1, 8))
+        rows.append([f"first run of eight floors to one, routines there ({form}; goal 2)", eight / one])
+    result = simulate(box_of_walls(), t_end=100.0, rtol=RTOL)
+    energies = seconds(lambda: result.energy)
+    rows.append(["energies, ms an impact", 1e3 * energies / len(result.events)])
+    return rows
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -129,9 +178,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             events = [one for one in simulate(assembly, **told).events if one.kind != "event"]
 
             def ours(assembly: object = assembly, told: dict[str, object] = told) -> float:
-                began = time.perf_counter()
-                simulate(assembly, **told)
-                return time.perf_counter() - began
+                return seconds(partial(simulate, assembly, **told))
 
             measures = {"ours": ours} | ({"c": lambda run=written: run()[0]} if written is not None else {})
             spent = best_of(measures, 1 if given.quick else given.repeat)
@@ -146,7 +193,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             )
     head = ("scene", "events", "in C", "ms", "us an event", "C, us an event", "times C", "steps of a pendulum")
     print_table("Events beside C by hand (goals: 3 times C; a reflection 12 steps of the double pendulum)", head, rows)
-    save(given.json, {"events": [dict(zip(head, row, strict=True)) for row in rows]})
+    more = ratios(1 if given.quick else given.repeat)
+    print_table("Contacts that do nothing, first runs, energies", ("what", "ratio"), more)
+    save(given.json, {"events": [dict(zip(head, row, strict=True)) for row in rows], "ratios": dict(map(tuple, more))})
 
 
 if __name__ == "__main__":
