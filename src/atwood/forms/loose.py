@@ -17,6 +17,7 @@ from atwood.model.declare.contact_laws import state_names
 
 _STATES: Key[tuple[int, ...]] = Key("states of gaps and slips")
 _LOOSE: Key[bool] = Key("whether nothing touches")
+_WHOLE: Key[Assembly] = Key("the scene with the programs for all states")
 
 
 def state_paths(one: ContactRow) -> tuple[str, ...]:
@@ -46,9 +47,15 @@ def is_loose(assembly: Assembly) -> bool:
 
 def kept_touching(assembly: Assembly) -> Assembly:
     """Return a scene in which nothing touches, slips or sticks, with the programs for all states."""
-    made = replace(assembly)
-    made.kept.get(_LOOSE, lambda: False)
-    return made
+    if not is_loose(assembly):
+        return assembly
+
+    def make() -> Assembly:
+        made = replace(assembly)
+        made.kept.get(_LOOSE, lambda: False)
+        return made
+
+    return assembly.kept.get(_WHOLE, make)
 
 
 def has_touched(assembly: Assembly) -> bool:

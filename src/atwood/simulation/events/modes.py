@@ -207,6 +207,10 @@ def margins_at_start(
     return happened, np.where(counts & (np.abs(values) <= small), -directions * small, 0.0)
 
 
+_SEEN = frozenset(("shift", "_sides", "needs", "reactions", "kernel", "broken"))
+"""What an `EventProbe` knows when it has looked at the start of its mode."""
+
+
 class EventProbe:
     """The events of one mode as a function of the solver's state.
 
@@ -228,6 +232,13 @@ class EventProbe:
         What the session before, in the same mode, hands on; see `EventLocator.handed_on`.
     """
 
+    shift: FloatArray
+    needs: _Needs
+    reactions: ReactionSolver | None
+    kernel: BoundKernel | None
+    broken: EventFunction | None
+    _sides: FloatArray
+
     def __init__(
         self,
         plan: SceneProblem,
@@ -242,13 +253,18 @@ class EventProbe:
         self.assembly = assembly = plan.assembly
         self._about = conditions, is_loose(assembly)
         self.event_functions = (*condition_functions(assembly, conditions), *find_event_functions(assembly))
+        self._start = t, q.copy(), u.copy(), tolerance
+
+    def __getattr__(self, name: str) -> Any:
+        """Look at the start when somebody asks for what is seen there: most changes of a set are followed by others."""
+        if name not in _SEEN:
+            raise AttributeError(name)
         self.shift = self._sides = np.zeros(0)
         self.needs = _NOTHING
-        self.reactions: ReactionSolver | None = None
-        self.kernel: BoundKernel | None = None
-        self.broken: EventFunction | None = None
+        self.reactions = self.kernel = self.broken = None
         if self.event_functions:
-            self._look(t, q, u, tolerance)
+            self._look(*self._start)
+        return vars(self)[name]
 
     def _look(self, t: float, q: FloatArray, u: FloatArray, tolerance: float) -> None:
         """See where the events are at the start of the mode."""
