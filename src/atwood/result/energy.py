@@ -312,11 +312,10 @@ def _together(readings: Sequence[SegmentQuantities]) -> Iterator[tuple[list[int]
         alike.setdefault(about, []).append(number)
     for numbers in alike.values():
         segments = [readings[number].segment for number in numbers]
-        joined = {
-            name: np.concatenate([getattr(one, name) for one in segments], axis=-1)
-            for name in ("time", "coordinates", "speeds")
-        }
-        yield numbers, replace(segments[0], **joined) if len(segments) > 1 else segments[0]
+        times = np.concatenate([one.time for one in segments])
+        places = np.concatenate([one.coordinates for one in segments], axis=1)
+        speeds = np.concatenate([one.speeds for one in segments], axis=1)
+        yield numbers, replace(segments[0], time=times, coordinates=places, speeds=speeds)
 
 
 def _motions(segment: SegmentRecord) -> tuple[Motion, ...]:

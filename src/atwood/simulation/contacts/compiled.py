@@ -20,7 +20,7 @@ from atwood.integrators.set_routines import UNITS
 from atwood.integrators.time_stepping.session import Change
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import ContactRow
-from atwood.mechanics.outputs.event_functions import CLOSES, CONTACT, OPENS, RESTS, STOPS, YIELDS
+from atwood.mechanics.outputs.event_functions import CLOSES, CONTACT, OPENS, RESTS, STOPS, YIELDS, EventFunction
 from atwood.model.values.units import ALONG
 from atwood.numerics.contact_sets import STICKS, State
 from atwood.simulation.contacts.bounces import has_plain_impacts
@@ -52,6 +52,8 @@ _MOST_ROWS = 40
 """Of more rows the responses to each other, which grow with the square, take too long to write and to compile."""
 
 _CODE: Key[tuple[SetData, SetCode] | None] = Key("machine code of sets")
+_TABLE: Key[FloatArray] = Key("events of gaps and slips for routines")
+_STATES: Key[FloatArray] = Key("states of gaps and slips for routines")
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,28 +212,33 @@ def fill_sets(
     shortest: float,
 ) -> None:
     """Give the changes of a session other parameters and states, and times and parts of the impacts before."""
-    layout, scales = layout_of(plan.assembly), plan.scales
-    numbers = {one.row.key[:2]: k for k, one in enumerate(layout.first)}
-    table = np.zeros((len(EVENTS), len(probe.event_functions)))
-    for i, one in enumerate(probe.event_functions):
-        k = numbers[one.part, one.law]
-        table[:, i] = (
-            k,
-            HAPPENED.get(one.target, 0),
-            MARGIN * relative * scales.of_law(one.part, one.law, one.unit),
-            not layout.first[k].is_speed,
-        )
+    scales, functions = plan.scales, probe.event_functions
+    table = plan.assembly.kept.get(_TABLE, lambda: _table(plan, functions, relative), functions, scales, relative)
     _give(jumps, plan, relative, impacts)
     jumps.begin_again(table, (shortest, *longest_left(relative, scales), scales.time))
 
 
+def _table(plan: SceneProblem, functions: Sequence[EventFunction], relative: float) -> FloatArray:
+    """Return what is known of each event, by the rows of `EVENTS`."""
+    layout, table = layout_of(plan.assembly), np.zeros((len(EVENTS), len(functions)))
+    numbers = {one.row.key[:2]: k for k, one in enumerate(layout.first)}
+    for i, one in enumerate(functions):
+        k, size = numbers[one.part, one.law], plan.scales.of_law(one.part, one.law, one.unit)
+        placed = not layout.first[k].is_speed
+        table[:, i] = k, HAPPENED.get(one.target, 0), MARGIN * relative * size, placed
+    return table
+
+
+def _states(assembly: Assembly) -> FloatArray:
+    """Return the states of gaps and slips, and their directions."""
+    found = states_of(layout_of(assembly), assembly.held_now)
+    return np.array([[state, *way, *[0.0] * (2 - len(way))] for state, way in found]).T
+
+
 def _give(jumps: SetJumps, plan: SceneProblem, relative: float, impacts: Sequence[tuple[float, str]]) -> None:
     """Give them parameters and states, and times and parts of the impacts before."""
-    layout = layout_of(plan.assembly)
-    states = np.array(
-        [[state, *way, *[0.0] * (2 - len(way))] for state, way in states_of(layout, plan.assembly.held_now)]
-    ).T
-    parts = _parts(layout)
+    assembly = plan.assembly
+    states, parts = assembly.kept.get(_STATES, lambda: _states(assembly)), _parts(layout_of(assembly))
     past = [(time, parts[part]) for time, part in impacts if part in parts]
     jumps.give(values_on_constraints(plan), states, NEAR * max(relative, 1e-13), past)
 
