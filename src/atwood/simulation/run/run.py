@@ -423,7 +423,7 @@ class Walk:
         triggers: Sequence[EventRecord],
         is_start: bool,
     ) -> Changed:
-        """Return what becomes of gaps and slips now, by the routine of the steps if there is one; of a start it is kept."""
+        """Return what becomes of gaps and slips now, by the routine of the steps if there is one; kept at a start."""
         from atwood.simulation.contacts.changes import resolve
 
         relative, one_by_one = self.options.relative_tolerance, self.options.impacts == "one_by_one"
