@@ -30,7 +30,7 @@ _LARGEST_FILL = 60_000
 """More products than these are left to a loop when the program runs."""
 
 _FILL_OF_CONTACTS = 500
-"""The same of gaps and slips, each of which may meet all others, so that products grow with the cube of their number."""
+"""The same of gaps and slips: each may meet all others, so that products grow with the cube of their number."""
 
 _ADDED = 1e-9
 """Of the diagonal of gaps and slips, which may repeat each other: what they miss shrinks by that in a step."""

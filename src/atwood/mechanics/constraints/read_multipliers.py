@@ -44,7 +44,7 @@ _LEAST_INERTIA = 1e-9
 """In units of the diagonal of the mass matrix: what has less in some direction has none there."""
 
 _LARGEST_FILL, _MANY_CONTACTS, _FILL_OF_CONTACTS = 20_000, 8, 5
-"""Beyond so many products the system is solved in numbers; with more gaps and slips, beyond so many for each unknown."""
+"""Beyond so many products it is solved in numbers; with more gaps and slips than that beyond so many an unknown."""
 
 
 def _check_reads(mechanism: Mechanism, read: Sequence[Expression], equations: Equations) -> None:
