@@ -7,14 +7,16 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.files import check_directory, write_atomically
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes as Axes
+    from matplotlib.figure import Figure as Figure
     from matplotlib.text import Text
-
+else:  # matplotlib is imported where a picture is drawn; what a signature says needs none of it
+    Axes = Figure = Any
 
 COLOURS = ("#2a6fbb", "#d1495b", "#2e9e6b", "#c98a1b", "#7b5ea7", "#3aa6b9", "#8a6d5a", "#d46ba3")
 """Told apart by most readers, and in print."""
@@ -68,6 +70,22 @@ def polish(axes: Axes, x_label: str = "", y_label: str = "") -> None:
     axes.set_axisbelow(True)
     axes.set_xlabel(x_label, color=INK, fontsize=10)
     axes.set_ylabel(y_label, color=INK, fontsize=10)
+
+
+def bare(axes: Axes, lows: FloatArray, highs: FloatArray) -> None:
+    """Give axes the bounds of a picture, and nothing else."""
+    axes.set_xlim(float(lows[0]), float(highs[0]))
+    axes.set_ylim(float(lows[1]), float(highs[1]))
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+
+
+def panels_of(figure: Figure, rows: int, columns: int, count: int) -> list[Axes]:
+    """Return the first so many axes of a grid in a figure; the others are hidden."""
+    panels = list(figure.subplots(rows, columns, squeeze=False).flat)
+    for axes in panels[count:]:
+        axes.set_visible(False)
+    return panels[:count]
 
 
 def headed(axes: Axes, text: str) -> None:

@@ -14,20 +14,17 @@ from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.files import write_atomically
 from atwood.plotting.camera import View, as_camera, check_view
-from atwood.plotting.canvas import COLOURS, INK, finished, need_matplotlib, new_figure, titled
+from atwood.plotting.canvas import COLOURS, INK, Axes, Figure, bare, finished, need_matplotlib, new_figure, titled
 from atwood.plotting.moving import check_moving, film
 from atwood.plotting.planar.geometry import Picture, find_connectors, make_picture
 from atwood.plotting.planar.strokes import Pen, draw_trace
-from atwood.plotting.scene3d.drawing import draw_space, frame_space, space_panels
+from atwood.plotting.scene3d.drawing import draw_space, space_panels
 from atwood.plotting.scene3d.picture import SpacePicture, make_space_picture
 from atwood.plotting.sheet import Sheet
 from atwood.result.result import Result
 from atwood.theory.linear import NormalModes
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
     from atwood.plotting.figure import Animation
 
 
@@ -109,7 +106,7 @@ def _draw_space(result: Result, picture: SpacePicture, moments: Sequence[int]) -
     alone = len(moments) == 1
     figure, panels = space_panels(picture, [f"{name}, {titles[0]}"] if alone else titles, "" if alone else name)
     for axes, moment in zip(panels, moments, strict=True):
-        frame_space(axes, picture, moment)
+        bare(axes, *picture.bounds_at(moment))
         draw_space(Sheet(axes), picture, moment)
     return figure
 
@@ -158,7 +155,7 @@ def _draw_apart(result: Result, picture: Picture, moments: Sequence[int], traced
         panels = figure.subplots(count, 1, squeeze=False, sharex=True)[:, 0]
     pen = Pen(picture)
     for axes, moment in zip(panels, moments, strict=True):
-        _frame(axes, lows, highs)
+        bare(axes, lows, highs)
         pen.draw(Sheet(axes), moment, alpha=1.0, depth=3)
         axes.set_title(f"t = {result.time[moment]:.3g} s", fontsize=10, color=INK)
     titled(figure, _name(result))
@@ -242,7 +239,7 @@ def _stage(result: Result, view: View | None, traced: Mapping[str, int]) -> tupl
 
         def draw_seen(moment: int) -> None:
             sheet.again()
-            frame_space(axes, seen, moment)
+            bare(axes, *seen.bounds_at(moment))
             draw_space(sheet, seen, moment)
 
         return figure, draw_seen
@@ -270,7 +267,7 @@ def _page(picture: Picture, shown: slice | None) -> tuple[Figure, Axes, Pen]:
     scale = 7.0 / max(width, height)
     figure = new_figure(max(3.6, scale * width), max(2.4, scale * height + 0.4))
     axes = figure.subplots()
-    _frame(axes, lows, highs)
+    bare(axes, lows, highs)
     return figure, axes, Pen(picture)
 
 
@@ -283,13 +280,6 @@ def _bounds(picture: Picture, shown: slice | None = None) -> tuple[FloatArray, F
     lows[0], highs[0] = lows[0] - 0.3 * side, highs[0] + 0.3 * side
     highs[1] += side
     return lows, highs
-
-
-def _frame(axes: Axes, lows: FloatArray, highs: FloatArray) -> None:
-    axes.set_xlim(float(lows[0]), float(highs[0]))
-    axes.set_ylim(float(lows[1]), float(highs[1]))
-    axes.set_aspect("equal")
-    axes.set_axis_off()
 
 
 @takes(

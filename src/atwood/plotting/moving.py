@@ -8,16 +8,13 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from atwood.errors import UsageError
-from atwood.plotting.canvas import ANIMATED, check_picture, titled
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from atwood.plotting.canvas import ANIMATED, Figure, check_picture, titled
 
 Frame: TypeAlias = NDArray[np.uint32]
 """Pixels as they lie in memory: red, green, blue, and 255."""

@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from atwood.arguments import FILE, TEXT, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
-from atwood.plotting.canvas import COLOURS, GREY, INK, finished, headed, new_figure
+from atwood.plotting.canvas import COLOURS, GREY, INK, Axes, Figure, finished, headed, new_figure
 from atwood.plotting.sphere import SEEN, draw_on_sphere, draw_sphere
 from atwood.result.result import Result
 from atwood.theory.rigid import FreeRotation
 from atwood.theory.rigid.bodies import principal_body
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 _EQUAL = 1e-9
 """Moments that differ by less, relative to the largest, are equal."""

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.plotting.canvas import GREY
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from atwood.plotting.canvas import GREY, Axes
 
 
 def _view(azimuth: float, elevation: float) -> FloatArray:

@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.expr import Program, depends_on, substitute
-from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.quantities import energy_program, known_program
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.dynamics.equations import Constraint, Equations
 from atwood.mechanics.outputs.part_power import MovingMass, applied_power, moving_masses, switched_energy
-from atwood.result.segment_quantities import SegmentQuantities
+from atwood.result.segment_quantities import SegmentQuantities, state_values
 from atwood.simulation.run.recorder import SegmentRecord
 
 if TYPE_CHECKING:
@@ -278,8 +277,8 @@ def accounts(readings: Sequence[SegmentQuantities]) -> list[Piece]:
         assembly, state = joined.assembly, (joined.time, joined.coordinates, joined.speeds)
         mechanism, equations = assembly.mechanism, assembly.own_equations
         switching = known_program(assembly, _SWITCHED, lambda: [switched_energy(mechanism, equations)])  # noqa: B023
-        energies = _values(assembly, energy_program(assembly), *state)
-        switched = None if switching.results[0].is_zero else _values(assembly, switching, *state)[0]
+        energies = state_values(assembly, energy_program(assembly), *state)
+        switched = None if switching.results[0].is_zero else state_values(assembly, switching, *state)[0]
         motions, rounding, end = _motions(joined), _rounding(joined), 0
         for number in numbers:
             segment = readings[number].segment
@@ -325,7 +324,7 @@ def _motions(segment: SegmentRecord) -> tuple[Motion, ...]:
     program = known_program(
         assembly, _VELOCITIES, lambda: [x for one in masses for row in (one.velocities, *one.masses) for x in row]
     )
-    values = _values(assembly, program, segment.time, segment.coordinates, segment.speeds)
+    values = state_values(assembly, program, segment.time, segment.coordinates, segment.speeds)
     found, done = [], 0
     for one in masses:
         count = len(one.velocities)
@@ -345,7 +344,7 @@ def powers_into(readings: Sequence[SegmentQuantities]) -> list[FloatArray | None
         moving = any(_moves_by_itself(assembly.maximal, one) for one in assembly.maximal.constraints)
         if program.results[0].is_zero and not moving:
             continue
-        total: FloatArray = _values(assembly, program, joined.time, joined.coordinates, joined.speeds)[0]
+        total: FloatArray = state_values(assembly, program, joined.time, joined.coordinates, joined.speeds)[0]
         for number in numbers:
             own = total[end : (end := end + len(readings[number].segment.time))]
             found[number] = own + readings[number].reactions[1] if moving else own
@@ -358,13 +357,6 @@ def _moves_by_itself(equations: Equations, constraint: Constraint) -> bool:
         relations = equations.graph.relations
         return depends_on(constraint.value, [equations.time] if relations is None else relations.roots)
     return not substitute([constraint.rate], dict.fromkeys(equations.speeds, 0.0))[0].is_zero
-
-
-def _values(assembly: Assembly, program: Program, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatArray:
-    """Return what a program of the state gives, shape (values, samples)."""
-    idle = (np.zeros_like(u), np.zeros((len(assembly.reactions), len(t))))
-    found = assembly.kernel(program, vectorized=True)(t[None, :], q, u, *idle)[0]
-    return np.array([np.broadcast_to(row, t.shape) for row in found])
 
 
 def _rounding(segment: SegmentRecord) -> float:
@@ -400,13 +392,13 @@ def _changed(segment: SegmentRecord, sizes: Sequence[FloatArray], share: float, 
         return found
 
     here, program = (segment.coordinates, segment.speeds), energy_program(assembly)
-    energy = np.sum(_values(assembly, program, segment.time, *here), axis=0)
+    energy = np.sum(state_values(assembly, program, segment.time, *here), axis=0)
     rows, largest = np.repeat(assembly.parameter_values[:, None], len(segment.time), axis=1), 0.0
     for _ in range(_DRAWS):
         turned = assembly.with_rows(near(rows, digit * np.abs(rows)))
         states = [near(x, share * size) for x, size in zip(here, sizes, strict=True)]
         time = near(segment.time, digit * np.abs(segment.time))
-        apart = np.abs(np.sum(_values(turned, program, time, *states), axis=0) - energy)
+        apart = np.abs(np.sum(state_values(turned, program, time, *states), axis=0) - energy)
         largest = max(largest, float(np.max(apart, initial=0.0, where=np.isfinite(apart))))
     return largest
 

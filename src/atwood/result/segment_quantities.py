@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.expr import Expression, depends_on
+from atwood.expr import Expression, Program, Scalar, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
-from atwood.forms.quantities import find_observables, observer
+from atwood.forms.quantities import find_observables, observer, state_program
 from atwood.simulation.dynamics.reactions import ReactionSolver
 from atwood.simulation.run.recorder import SegmentRecord
 
@@ -45,6 +45,20 @@ def quantities_at(
     kernel = assembly.kernel(observer(assembly, paths), vectorized=True)
     found: FloatArray = kernel(t[None, :], q, u, a, forces)[0]
     return found
+
+
+def state_values(assembly: Assembly, program: Program, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatArray:
+    """Return what a program of the state gives that reads no accelerations and reactions, shape (values, samples)."""
+    idle = (np.zeros_like(u), np.zeros((len(assembly.reactions), len(t))))
+    found = assembly.kernel(program, vectorized=True)(t[None, :], q, u, *idle)[0]
+    return np.array([np.broadcast_to(row, t.shape) for row in found])
+
+
+def shown_values(segment: SegmentRecord, name: str, quantities: Iterable[Scalar]) -> FloatArray:
+    """Return quantities of the configuration at the output times of a segment, shape (quantities, times)."""
+    assembly, convert = segment.assembly, segment.assembly.mechanism.table.graph.convert
+    program = state_program(assembly, name, [convert(one) for one in quantities])
+    return state_values(assembly, program, segment.time, segment.coordinates, segment.speeds)[:, segment.shown]
 
 
 class SegmentQuantities:

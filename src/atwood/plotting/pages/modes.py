@@ -27,7 +27,7 @@ def mode_page(modes: NormalModes, mode: int, shown: Sequence[str] = ()) -> Page:
     swings = _swings(modes, mode)
     largest, shape = swings[-1], modes.shapes[mode]
     for path in shown:
-        known_path(path, list(largest.paths), "show")
+        known_path(path, list(largest.paths))
     most = max(shape, key=lambda path: abs(shape[path]))
     content = page_content({"mode": largest}, list(shown) or [path for path in [most] if path in largest], {}, "never")
     reason = f"mode {mode} is shown, one period again and again"

@@ -145,8 +145,8 @@ def page(
         if one.assembly.mechanism.space.name != next(iter(results.values())).assembly.mechanism.space.name:
             raise UsageError("results in a plane and in space have no common picture", advice="Make a page of each.")
     known = list(dict.fromkeys(path for one in results.values() for path in one.paths))
-    shown = [known_path(path, known, "show") for path in ([show] if isinstance(show, str) else show)]
-    bounds = dict(read_slider(text) for text in ([sliders] if isinstance(sliders, str) else sliders))
+    shown = [known_path(path, known) for path in show]
+    bounds = dict(map(read_slider, sliders))
     made = make_page(results, shown, bounds, live)
     if len(made.html) > _LARGEST:
         raise UsageError(
@@ -184,10 +184,10 @@ def _result(one: Model | Assembly | Result | SavedResult) -> Result:
     return simulate(one.scene(), **one.settings()) if isinstance(one, SavedResult) else simulate(one)
 
 
-def known_path(path: str, known: Sequence[str], where: str) -> str:
+def known_path(path: str, known: Sequence[str]) -> str:
     """Return a path, or refuse one that is no quantity."""
     if path not in known:
-        raise UsageError(f"there is no quantity {path!r}", where=where, advice=suggestion(path, known))
+        raise UsageError(f"there is no quantity {path!r}", where="show", advice=suggestion(path, known))
     return path
 
 

@@ -53,8 +53,8 @@ class Viewer:
             raise UsageError(
                 "a viewer needs anywidget, which is not installed", advice="pip install 'atwood[notebook]'"
             )
-        self._shown = [show] if isinstance(show, str) else list(show)
-        self._bounds = dict(read_slider(text) for text in ([sliders] if isinstance(sliders, str) else sliders))
+        self._shown = show
+        self._bounds = dict(map(read_slider, sliders))
         self._first: dict[str, dict[str, float]] = {}
         self._reason = ""
         self.widget = _make_widget(self._take(scene if isinstance(scene, Result) else simulate(scene)))
@@ -118,7 +118,7 @@ class Viewer:
     def _take(self, result: Result) -> dict[str, str]:
         """Take up a result, and return the packets that show it."""
         for path in self._shown:
-            known_path(path, list(result.paths), "show")
+            known_path(path, list(result.paths))
         content = page_content({result.method: result}, self._shown, self._bounds, "auto")
         self.result, self._reason = result, content.program.reason
         data = content.program.data if content.modules else {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from functools import cached_property
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,6 @@ from atwood.arrays import FloatArray
 from atwood.errors import UsageError, suggestion
 from atwood.expr import Expression, Scalar, depends_on, evaluate
 from atwood.forms.assembly import Assembly
-from atwood.forms.quantities import state_program
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.kinematics.mechanism import Mechanism, world_position
 from atwood.mechanics.kinematics.orientation import body_offsets, plain
@@ -24,23 +23,25 @@ from atwood.model.values.outline import Outline
 from atwood.plotting.planar.columns import spread_columns
 from atwood.plotting.shapes.meshes import Mesh, joint_curve, numbers, outline_mesh, outline_of
 from atwood.result.result import Result
+from atwood.result.segment_quantities import shown_values
 
 Kind = Literal[
     "ground",
-    "rod",
-    "link",
-    "spring",
-    "damper",
-    "rope",
-    "mass",
-    "pulley",
     "rail",
-    "pivot",
-    "solid",
     "curve",
     "path",
+    "rope",
+    "spring",
+    "damper",
+    "solid",
     "spiral",
+    "link",
+    "rod",
+    "pulley",
+    "pivot",
+    "mass",
 ]
+"""Those that are drawn first, and so behind the others, stand first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,15 +251,7 @@ def _node_angles(result: Result, nodes: Sequence[int]) -> dict[int, FloatArray]:
 
 def _along_run(result: Result, name: str, quantities: Callable[[Assembly], Iterable[Scalar]]) -> FloatArray:
     """Return quantities of the configuration at the output times, shape (quantities, times)."""
-    pieces = []
-    for segment in result.run.segments:
-        assembly = segment.assembly
-        graph = assembly.mechanism.table.graph
-        program = state_program(assembly, name, [graph.convert(one) for one in quantities(assembly)])
-        idle = (np.zeros_like(segment.speeds), np.zeros((len(assembly.reactions), len(segment.time))))
-        kernel = assembly.kernel(program, vectorized=True)
-        values = kernel(segment.time[None, :], segment.coordinates, segment.speeds, *idle)[0]
-        pieces.append(np.asarray(values)[:, segment.shown])
+    pieces = [shown_values(one, name, quantities(one.assembly)) for one in result.run.segments]
     return np.concatenate(pieces, axis=1)
 
 
@@ -267,22 +260,7 @@ def _shapes(mechanism: Mechanism) -> list[Shape]:
     found: list[Shape] = []
     for path, local in mechanism.locals_.items():
         found += _shapes_of(mechanism, path, local)
-    order: tuple[Kind, ...] = (
-        "ground",
-        "rail",
-        "curve",
-        "path",
-        "rope",
-        "spring",
-        "damper",
-        "solid",
-        "spiral",
-        "link",
-        "rod",
-        "pulley",
-        "pivot",
-        "mass",
-    )
+    order = get_args(Kind)
     return sorted(found, key=lambda shape: order.index(shape.kind))
 
 

@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from atwood.arguments import FILE, instance, optional, takes
 from atwood.arrays import FloatArray
-from atwood.plotting.canvas import COLOURS, GREY, INK, finished, headed, legend, new_figure, polish
+from atwood.plotting.canvas import COLOURS, GREY, INK, Axes, Figure, finished, headed, legend, new_figure, polish
 from atwood.result.part_energy import PartEnergies, PartEnergy
 from atwood.result.result import Result
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 _SHOWN = 7
 """So many components have a colour each; the rest share the last."""

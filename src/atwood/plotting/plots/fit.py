@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
 
 from atwood.arguments import FILE, instance, optional, takes
-from atwood.plotting.canvas import COLOURS, finished, headed, legend, new_figure, polish, with_unit
+from atwood.plotting.canvas import COLOURS, Figure, finished, headed, legend, new_figure, polish, with_unit
 from atwood.study.sensitivities.fit import Fit
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _PANELS = 6
 

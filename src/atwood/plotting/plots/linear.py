@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +11,8 @@ from numpy.typing import NDArray
 from atwood.arguments import FILE, TEXT, each as several, instance, number, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError, suggestion
-from atwood.plotting.canvas import COLOURS, GREY, INK, finished, headed, legend, new_figure, polish
+from atwood.plotting.canvas import COLOURS, GREY, INK, Figure, finished, headed, legend, new_figure, polish
 from atwood.theory.linear import EquilibriumBranches, LinearModel, RootLocus
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 _POINTS = 600
 

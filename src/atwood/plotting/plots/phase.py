@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from atwood.arguments import FILE, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
-from atwood.plotting.canvas import COLOURS, GREY, INK, finished, headed, new_figure, polish, with_unit
+from atwood.plotting.canvas import COLOURS, GREY, INK, Axes, Figure, finished, headed, new_figure, polish, with_unit
 from atwood.theory.flow import PhaseCloud, PhasePortrait, PoincareSection
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 _HALF_TURNS = {-4: "-2 pi", -3: "-3 pi/2", -2: "-pi", -1: "-pi/2", 0: "0", 1: "pi/2", 2: "pi", 3: "3 pi/2", 4: "2 pi"}
 

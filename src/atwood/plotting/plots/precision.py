@@ -4,16 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 from atwood.arguments import FILE, instance, optional, takes
-from atwood.plotting.canvas import COLOURS, GREY, INK, finished, headed, legend, new_figure, polish
+from atwood.plotting.canvas import COLOURS, GREY, INK, Axes, Figure, finished, headed, legend, new_figure, polish
 from atwood.study.comparison.found import Comparison, ComparisonRow
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 _STYLES = {
     "reduced, IDA": (COLOURS[0], "o"),

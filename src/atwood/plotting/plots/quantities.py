@@ -4,20 +4,26 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 from atwood.arguments import FILE, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import ResultError
 from atwood.model.declare.connectors import PATH, PATHS
-from atwood.plotting.canvas import COLOURS, GREY, INK, finished, headed, legend, new_figure, polish, with_unit
+from atwood.plotting.canvas import (
+    COLOURS,
+    GREY,
+    INK,
+    Axes,
+    Figure,
+    finished,
+    headed,
+    legend,
+    new_figure,
+    polish,
+    with_unit,
+)
 from atwood.result.files import SavedResult
 from atwood.result.result import Result
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 _PANELS = 4
 _CURVES = 8

@@ -4,22 +4,28 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from atwood.arguments import FILE, TEXT, each, either, instance, optional, takes, whole
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError, suggestion
-from atwood.plotting.canvas import COLOURS, GREY, INK, finished, headed, legend, new_figure, polish, with_unit
+from atwood.plotting.canvas import (
+    COLOURS,
+    GREY,
+    INK,
+    Axes,
+    Figure,
+    finished,
+    headed,
+    legend,
+    new_figure,
+    polish,
+    with_unit,
+)
 from atwood.plotting.sphere import draw_on_sphere, draw_sphere
 from atwood.theory.reduction import ReducedMotion
 from atwood.theory.rigid import SymmetricTop
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 _POINTS = 800
 
@@ -190,9 +196,7 @@ def _draw_f(axes: Axes, low: float, high: float, square: Callable[[FloatArray], 
     axes.axhline(0.0, color=GREY, linewidth=0.9)
     for root in (low, high):
         axes.plot(root, 0.0, marker="o", color=INK, markersize=6)
-        axes.annotate(
-            f"{root:.4g}", (root, 0.0), (0, 8), textcoords="offset points", ha="center", fontsize=9, color=INK
-        )
+        _label(axes, root, 0.0)
     inside = (u >= low) & (u <= high)
     largest = float(np.max(np.abs(f))) if is_steady else float(np.max(f[inside], initial=0.0))
     largest = largest or 1.0

@@ -4,20 +4,26 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from atwood.arguments import FILE, instance, optional, takes
 from atwood.errors import UsageError
 from atwood.model.declare.connectors import PATHS
-from atwood.plotting.canvas import COLOURS, INK, finished, headed, legend, new_figure, polish, with_unit
+from atwood.plotting.canvas import (
+    COLOURS,
+    INK,
+    Axes,
+    Figure,
+    finished,
+    headed,
+    legend,
+    new_figure,
+    panels_of,
+    polish,
+    with_unit,
+)
 from atwood.study.sweeps.result import Sweep
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 _PANELS = 6
 
@@ -58,16 +64,14 @@ def plot_sweep(sweep: Sweep, paths: Iterable[str] | None = None, file: str | os.
     columns = min(len(wanted), 2 if is_map else 1)
     rows = -(-len(wanted) // columns)
     figure = new_figure(5.2 * columns if is_map else 8.0, 0.8 + (3.8 if is_map else 2.6) * rows)
-    panels = figure.subplots(rows, columns, squeeze=False)
-    for axes in panels.flat[len(wanted) :]:
-        axes.set_visible(False)
-    for axes, path in zip(panels.flat, wanted, strict=False):
+    panels = panels_of(figure, rows, columns, len(wanted))
+    for axes, path in zip(panels, wanted, strict=True):
         if is_map:
             _draw_map(figure, axes, sweep, path)
         else:
             _draw_curves(axes, sweep, path, numbers[0])
     title = f"{sweep.scene}, {len(sweep)} runs at t = {sweep.time[-1]:g} s"
-    headed(panels[0, 0], title)
+    headed(panels[0], title)
     return finished(figure, file)
 
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.plotting.camera import Camera
-from atwood.plotting.canvas import GREY, INK, PALE, ROPE, new_figure, titled
+from atwood.plotting.canvas import GREY, INK, PALE, ROPE, Axes, Figure, bare, new_figure, panels_of, titled
 from atwood.plotting.scene3d.model import AXIS_COLOURS, SpaceModel
 from atwood.plotting.scene3d.painter import Stage, to_rgb
 from atwood.plotting.scene3d.picture import SpacePicture, Trail
@@ -17,11 +16,6 @@ from atwood.plotting.scene3d.pieces import Piece
 from atwood.plotting.scene3d.reading import Tie
 from atwood.plotting.shapes.meshes import Mesh, cylinder, frame_along
 from atwood.plotting.sheet import Sheet
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 _ROD = "#5d6b78"
 
@@ -127,15 +121,6 @@ _TIES: dict[str, Callable[[Stage, FloatArray, FloatArray], None]] = {
 # -- panels ---------------------------------------------------------------------------------------------------------
 
 
-def frame_space(axes: Axes, picture: SpacePicture, moment: int) -> None:
-    """Give axes the bounds of a picture, and nothing else."""
-    lows, highs = picture.bounds_at(moment)
-    axes.set_xlim(float(lows[0]), float(highs[0]))
-    axes.set_ylim(float(lows[1]), float(highs[1]))
-    axes.set_aspect("equal")
-    axes.set_axis_off()
-
-
 def space_panels(picture: SpacePicture, titles: Sequence[str], name: str = "") -> tuple[Figure, list[Axes]]:
     """Return a figure with panels of the shape of a picture."""
     lows, highs = picture.bounds_at(0)
@@ -145,15 +130,13 @@ def space_panels(picture: SpacePicture, titles: Sequence[str], name: str = "") -
     rows = -(-count // columns)
     scale = min(9.0 / (columns * width), 8.0 / (rows * height)) if count > 1 else min(7.0 / width, 7.0 / height)
     figure = new_figure(max(3.2, columns * scale * width), rows * (scale * height + 0.3) + (0.3 if name else 0.0))
-    panels = list(figure.subplots(rows, columns, squeeze=False).flat)
-    for axes in panels[count:]:
-        axes.set_visible(False)
-    for axes, title in zip(panels, titles, strict=False):
-        frame_space(axes, picture, 0)
+    panels = panels_of(figure, rows, columns, count)
+    for axes, title in zip(panels, titles, strict=True):
+        bare(axes, lows, highs)
         axes.set_title(title, fontsize=10, color=INK)
     if name:
         titled(figure, name)
-    return figure, panels[:count]
+    return figure, panels
 
 
 _SHADOW, _GRID, _AROUND = "#e7ebef", "#d9dfe5", 96

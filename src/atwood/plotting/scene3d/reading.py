@@ -10,8 +10,7 @@ from typing import Literal
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.expr import Expression, depends_on, is_zero
-from atwood.forms.quantities import state_program
+from atwood.expr import Expression, Scalar, depends_on, is_zero
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.kinematics.mechanism import Mechanism, world_position
 from atwood.mechanics.kinematics.orientation import body_offsets
@@ -31,6 +30,7 @@ from atwood.plotting.shapes.meshes import (
     outline_of,
 )
 from atwood.result.result import Result
+from atwood.result.segment_quantities import shown_values
 
 JoiningKind = Literal["hinge", "ball", "cross", "slide", "plane", "curve"]
 TieKind = Literal["rod", "rope", "spring", "damper"]
@@ -266,18 +266,11 @@ def _poses(result: Result) -> dict[int, Pose]:
     pieces: list[dict[int, FloatArray]] = []
     for segment in result.run.segments:
         assembly, mechanism = segment.assembly, segment.assembly.mechanism
-        placements, graph = assembly.own_equations.kinematics.placements, mechanism.table.graph
-        expressions = []
+        placements, quantities = assembly.own_equations.kinematics.placements, list[Scalar]()
         for body in mechanism.bodies.bodies:
-            expressions += [graph.convert(c) for c in world_position(mechanism, placements, body.root)]
-            axes = placements.axes.get(body.index)
-            unturned = [graph.constant(float(i == j)) for i in range(3) for j in range(3)]
-            expressions += unturned if axes is None else [graph.convert(c) for axis in axes for c in axis]
-        program = state_program(assembly, "poses", expressions)
-        idle = (np.zeros_like(segment.speeds), np.zeros((len(assembly.reactions), len(segment.time))))
-        kernel = assembly.kernel(program, vectorized=True)
-        values = np.asarray(kernel(segment.time[None, :], segment.coordinates, segment.speeds, *idle)[0])
-        shown = values[:, segment.shown].reshape(len(mechanism.bodies.bodies), 12, -1)
+            axes = placements.axes.get(body.index, np.eye(3).tolist())
+            quantities += [*world_position(mechanism, placements, body.root), *(c for axis in axes for c in axis)]
+        shown = shown_values(segment, "poses", quantities).reshape(len(mechanism.bodies.bodies), 12, -1)
         pieces.append({body.index: shown[i] for i, body in enumerate(mechanism.bodies.bodies)})
     poses = {}
     for index in pieces[0]:

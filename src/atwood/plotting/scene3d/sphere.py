@@ -4,23 +4,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from atwood.errors import UsageError
 from atwood.plotting.camera import Camera, View, as_camera
-from atwood.plotting.canvas import COLOURS, INK, finished, new_figure
+from atwood.plotting.canvas import COLOURS, INK, Axes, Figure, bare, finished, new_figure, panels_of
 from atwood.plotting.scene3d.drawing import draw_corner_axes, draw_sphere
 from atwood.plotting.scene3d.painter import lighter
 from atwood.plotting.scene3d.picture import Trail
 from atwood.plotting.sheet import Sheet
 from atwood.result.result import Result
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 _COLUMNS = 4
 _UNIT = 1e-6
@@ -75,10 +69,7 @@ def plot_on_sphere(
     for axes, name, trail in zip(panels, named, trails, strict=False):
         draw_sphere(Sheet(axes), camera, globe)
         _draw_path(axes, camera, trail)
-        axes.set_xlim(float(bounds[0][0]), float(bounds[1][0]))
-        axes.set_ylim(float(bounds[0][1]), float(bounds[1][1]))
-        axes.set_aspect("equal")
-        axes.set_axis_off()
+        bare(axes, *bounds)
         axes.set_title(name, fontsize=10, color=INK)
     draw_corner_axes(Sheet(panels[0]), camera, bounds)
     return finished(figure, file)
@@ -93,10 +84,7 @@ def _panels(count: int, wide: float, lines: int) -> tuple[Figure, list[Axes]]:
     figure.set_layout_engine(None)
     top = 1.0 - above / (rows * (high + above))
     figure.subplots_adjust(left=0.005, right=0.995, bottom=0.005, top=top, wspace=0.03, hspace=above / high)
-    panels = list(figure.subplots(rows, columns, squeeze=False).flat)
-    for axes in panels[count:]:
-        axes.set_visible(False)
-    return figure, panels[:count]
+    return figure, panels_of(figure, rows, columns, count)
 
 
 def _trail(result: Result, path: str, colour: str) -> Trail:
