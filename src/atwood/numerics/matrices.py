@@ -54,8 +54,7 @@ def from_entries(rows: Any, columns: Any, entries: Any, shape: tuple[int, int], 
 
 def to_array(matrix: Matrix) -> FloatArray:
     """Return a matrix as an array, whatever its size."""
-    found: FloatArray = matrix if is_full(matrix) else matrix.toarray()
-    return found
+    return np.asarray(matrix if is_full(matrix) else matrix.toarray())
 
 
 def or_one(sizes: FloatArray) -> FloatArray:
@@ -141,5 +140,4 @@ def least_size(jacobian: FloatArray, kept: NDArray[np.intp], multipliers: FloatA
     without_force = np.zeros((*found.shape, len(others)))
     without_force[:, kept], without_force[:, others] = -np.swapaxes(weights, 1, 2), np.eye(len(others))
     basis = np.linalg.qr(without_force)[0]
-    left: FloatArray = found - (basis @ (np.swapaxes(basis, 1, 2) @ found[:, :, None]))[:, :, 0]
-    return left
+    return np.asarray(found - (basis @ (np.swapaxes(basis, 1, 2) @ found[:, :, None]))[:, :, 0])

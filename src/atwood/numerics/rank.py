@@ -263,8 +263,7 @@ def review_rows(
 def _made_of(kept: Matrix, others: Matrix) -> FloatArray:
     """Return how often each kept row is in others, shape (others, kept)."""
     if is_full(kept):
-        found: FloatArray = least_squares(kept.T, others.T).T
-        return found
+        return np.asarray(least_squares(kept.T, others.T).T)
     return csr_made_of(kept, others)
 
 

@@ -41,8 +41,7 @@ def csr_scaled(matrix: Any, columns: FloatArray, rows: FloatArray | None) -> csr
 def csr_row_sizes(matrix: Any, scales: FloatArray) -> FloatArray:
     """Return the largest absolute value in each row after scaling its columns."""
     wide = abs(csr_scaled(matrix, scales, None))
-    found: FloatArray = wide.max(axis=1).toarray().ravel() if wide.nnz else np.zeros(wide.shape[0])
-    return found
+    return np.asarray(wide.max(axis=1).toarray().ravel() if wide.nnz else np.zeros(wide.shape[0]))
 
 
 def _factorised(square: Any, share: float) -> Any:
@@ -129,8 +128,7 @@ def massless_directions(mass: Any, jacobian: Any, sizes: FloatArray) -> FloatArr
 def csr_made_of(kept: Any, others: Any) -> FloatArray:
     """Return how often each of some independent rows is in others, shape (others, kept)."""
     solver = _factorised(scipy.sparse.csr_array(kept @ kept.T), 1e-15)
-    found: FloatArray = solver.solve((kept @ others.T).toarray()).T
-    return found
+    return np.asarray(solver.solve((kept @ others.T).toarray()).T)
 
 
 def free_columns(matrix: Any) -> NDArray[np.bool_]:

@@ -28,8 +28,7 @@ def _sums(values: FloatArray, starts: IndexArray, count: int) -> FloatArray:
     """Return the sums of consecutive rows; `starts` says where each of `count` groups begins, none is empty."""
     if not count:
         return np.zeros((0, values.shape[1]))
-    found: FloatArray = np.add.reduceat(values, starts, axis=0)
-    return found
+    return np.asarray(np.add.reduceat(values, starts, axis=0))
 
 
 class Pattern:
@@ -295,8 +294,7 @@ class Borders:
         n = self.jacobian.shape[1]
         a, multipliers = found[:n], found[n:]
         forces = self.jacobian.times_across(jacobian, multipliers) - self.mass.times(masses, a)
-        residual: FloatArray = right + np.concatenate([forces, self.jacobian.times(jacobian, a)])
-        return residual
+        return np.asarray(right + np.concatenate([forces, self.jacobian.times(jacobian, a)]))
 
 
 class Augmented:

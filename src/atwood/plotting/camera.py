@@ -52,18 +52,15 @@ class Camera:
     @property
     def towards(self) -> FloatArray:
         """Unit vector towards the eye, in world axes."""
-        toward: FloatArray = self.axes[2]
-        return toward
+        return np.asarray(self.axes[2])
 
     def project(self, points: ArrayLike) -> FloatArray:
         """Return where points are on the page."""
-        found: FloatArray = np.asarray(points, dtype=float) @ self.axes[:2].T
-        return found
+        return np.asarray(np.asarray(points, dtype=float) @ self.axes[:2].T)
 
     def depth(self, points: ArrayLike) -> FloatArray:
         """Return how near points are to the eye, m, shape (...): what is larger hides what is smaller."""
-        found: FloatArray = np.asarray(points, dtype=float) @ self.axes[2]
-        return found
+        return np.asarray(np.asarray(points, dtype=float) @ self.axes[2])
 
 
 def as_camera(view: View | None) -> Camera:

@@ -118,8 +118,7 @@ class Motion:
     def energy(self, mean: FloatArray | float = 0.0) -> FloatArray:
         """Return the kinetic energy of the deviations from mean velocities, at each sample."""
         w = self.velocities - np.reshape(mean, (-1, 1))
-        found: FloatArray = 0.5 * np.einsum("is,ijs,js->s", w, self.masses, w)
-        return found
+        return np.asarray(0.5 * np.einsum("is,ijs,js->s", w, self.masses, w))
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,8 +233,7 @@ def _typical(energy: FloatArray, shares: FloatArray, rounding: float) -> float:
 def _weights(t: FloatArray) -> FloatArray:
     """Return the time that each sample stands for."""
     gaps = np.diff(t)
-    shares: FloatArray = 0.5 * (np.append(gaps, 0.0) + np.append(0.0, gaps))
-    return shares
+    return np.asarray(0.5 * (np.append(gaps, 0.0) + np.append(0.0, gaps)))
 
 
 def make_ledger(
@@ -388,8 +386,7 @@ def _changed(segment: SegmentRecord, sizes: Sequence[FloatArray], share: float, 
     def near(numbers: FloatArray, by: FloatArray) -> FloatArray:
         # NumPy's generators take longer to load than all of this.
         bits = np.frombuffer(random.randbytes(numbers.size), dtype=np.uint8) & 1
-        found: FloatArray = numbers + (2.0 * bits - 1.0).reshape(numbers.shape) * by
-        return found
+        return np.asarray(numbers + (2.0 * bits - 1.0).reshape(numbers.shape) * by)
 
     here, program = (segment.coordinates, segment.speeds), energy_program(assembly)
     energy = np.sum(state_values(assembly, program, segment.time, *here), axis=0)

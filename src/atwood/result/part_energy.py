@@ -75,8 +75,7 @@ class PartEnergy:
     def error(self) -> FloatArray:
         """By how much it fails to balance: what it has gained less all that came in."""
         given = self.supplied - self.dissipated + self.constraints + self.impacts
-        error: FloatArray = self.gained - given - np.sum(list(self.work.values()), axis=0)
-        return error
+        return np.asarray(self.gained - given - np.sum(list(self.work.values()), axis=0))
 
     def table(self) -> dict[str, FloatArray]:
         """Return all of it by name: ``kinetic``, ``work.a`` and so on."""

@@ -227,7 +227,8 @@ class Result(Trajectories):
     @cached_property
     def time(self) -> FloatArray:
         """Output times, s."""
-        return self._all_time[self._shown]
+        times: FloatArray = self._all_time[self._shown]
+        return times
 
     @cached_property
     def _all_time(self) -> FloatArray:

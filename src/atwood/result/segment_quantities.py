@@ -43,8 +43,7 @@ def quantities_at(
     if u.size and reads(assembly, paths, assembly.own_equations.accelerations):
         a = accelerations()
     kernel = assembly.kernel(observer(assembly, paths), vectorized=True)
-    found: FloatArray = kernel(t[None, :], q, u, a, forces)[0]
-    return found
+    return np.asarray(kernel(t[None, :], q, u, a, forces)[0])
 
 
 def state_values(assembly: Assembly, program: Program, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatArray:

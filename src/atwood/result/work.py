@@ -65,8 +65,7 @@ def nodes_between(times: FloatArray, count: int) -> FloatArray:
     from numpy.polynomial import legendre
 
     middle, half = 0.5 * (times[1:] + times[:-1]), 0.5 * np.diff(times)
-    nodes: FloatArray = (middle[:, None] + half[:, None] * legendre.leggauss(count)[0]).ravel()
-    return nodes
+    return np.asarray((middle[:, None] + half[:, None] * legendre.leggauss(count)[0]).ravel())
 
 
 def integral_in_steps(times: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:

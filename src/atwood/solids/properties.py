@@ -283,8 +283,7 @@ def _cut_rounding(inertia: FloatArray, size: float) -> FloatArray:
 
 def _steiner(mass: float, offset: FloatArray) -> FloatArray:
     """Return the inertia of a point mass about a point that lies at minus the offset from it."""
-    tensor: FloatArray = mass * (np.dot(offset, offset) * np.eye(3) - np.outer(offset, offset))
-    return tensor
+    return np.asarray(mass * (np.dot(offset, offset) * np.eye(3) - np.outer(offset, offset)))
 
 
 def _along_frame(vectors: FloatArray) -> list[FloatArray]:

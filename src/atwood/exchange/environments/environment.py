@@ -262,8 +262,7 @@ def _actions(plant: Plant | WalkedPlant, given: Any, lanes: tuple[int]) -> Float
     if not np.all((found >= low - room) & (found <= high + room)):
         bounds = ", ".join(f"{path}: {a:g} to {b:g}" for path, a, b in zip(plant.actions, low, high, strict=True))
         raise UsageError(f"an action is beyond its bounds ({bounds})", where="Environment.step", advice="Clip it.")
-    clipped: FloatArray = np.clip(found, low, high)
-    return clipped
+    return np.asarray(np.clip(found, low, high))
 
 
 def _stepped(

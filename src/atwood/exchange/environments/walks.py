@@ -217,5 +217,4 @@ def _read(walk: Walk, paths: tuple[str, ...]) -> FloatArray:
     state = np.array([walk.t]), walk.q[:, None], walk.u[:, None]
     solver = partial(ReactionSolver, assembly, walk.t, walk.q, walk.u)
     accelerations = lambda: solver().own_accelerations(*state, finding)  # noqa: E731
-    found: FloatArray = quantities_at(assembly, paths, state, accelerations, lambda: solver().at(*state)[0])[:, 0]
-    return found
+    return np.asarray(quantities_at(assembly, paths, state, accelerations, lambda: solver().at(*state)[0])[:, 0])

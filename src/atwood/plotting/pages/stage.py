@@ -209,8 +209,7 @@ def _turned(mechanism: Mechanism, keys: Sequence[int]) -> tuple[tuple[int, ...],
 
 def _flat(points: FloatArray) -> FloatArray:
     """Return places on the page as places in space."""
-    found: FloatArray = np.column_stack([points[:, 0], np.zeros(len(points)), points[:, 1]])
-    return found
+    return np.asarray(np.column_stack([points[:, 0], np.zeros(len(points)), points[:, 1]]))
 
 
 def _flat_items(picture: Picture, pen: Pen, shape: Shape, number: Mapping[int, int]) -> Iterable[Item]:

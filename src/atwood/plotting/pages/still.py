@@ -40,8 +40,7 @@ def still_picture(stage: Stage, name: str) -> str:
 
     def seen(points: FloatArray) -> FloatArray:
         flat = camera.project(points)
-        found: FloatArray = np.column_stack([(flat[:, 0] - low[0]) * scale, (high[1] - flat[:, 1]) * scale])
-        return found
+        return np.asarray(np.column_stack([(flat[:, 0] - low[0]) * scale, (high[1] - flat[:, 1]) * scale]))
 
     marks = [mark for item in stage.items for mark in _marks(stage, item, camera, seen, scale)]
     if stage.stride != FLAT:
@@ -62,8 +61,7 @@ def _placed(stage: Stage, frame: int, points: FloatArray) -> FloatArray:
         turn, origin = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]), np.array([pose[0], 0.0, pose[1]])
     else:
         turn, origin = pose[3:].reshape(3, 3), pose[:3]
-    found: FloatArray = origin + points @ turn.T
-    return found
+    return np.asarray(origin + points @ turn.T)
 
 
 def _marks(stage: Stage, item: Item, camera: Camera, seen: object, scale: float) -> Iterator[_Mark]:

@@ -77,8 +77,7 @@ class Shape:
         assert self.surface is not None
         page = self.surface.vertices[:, [0, 2]]
         turn = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
-        found: FloatArray = page[np.unique(np.argmax(page @ np.array([np.cos(turn), np.sin(turn)]), axis=0))]
-        return found
+        return np.asarray(page[np.unique(np.argmax(page @ np.array([np.cos(turn), np.sin(turn)]), axis=0))])
 
 
 @dataclass(frozen=True, eq=False)
@@ -364,5 +363,4 @@ def hanging(ends: FloatArray, spare: float) -> FloatArray:
     """Return a slack rope as a parabola, about as much longer than the straight way as it has to spare."""
     share = np.linspace(0.0, 1.0, 41)[:, None]
     sag = np.sqrt(0.375 * spare * (float(np.linalg.norm(ends[1] - ends[0])) + 0.5 * spare))
-    line: FloatArray = ends[0] + share * (ends[1] - ends[0]) - np.array([0.0, 4.0 * sag]) * share * (1.0 - share)
-    return line
+    return np.asarray(ends[0] + share * (ends[1] - ends[0]) - np.array([0.0, 4.0 * sag]) * share * (1.0 - share))

@@ -102,8 +102,7 @@ class Pen:
             below = base.mean(axis=0) - middle
             middle = middle + below - (below @ axes[0]) * axes[0]
             reach += np.array([-1.0, 1.0]) * shape.size
-        ends: FloatArray = middle + reach[:, None] * axes[0]
-        return ends
+        return np.asarray(middle + reach[:, None] * axes[0])
 
     def _rail(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
         ends = self.rails[shape.part]
@@ -253,8 +252,7 @@ def _zigzag(a: FloatArray, b: FloatArray, half: float, turns: int = 7) -> FloatA
     shares = np.concatenate([[0.0, 0.12], np.linspace(0.12, 0.88, 2 * turns + 1)[1:-1], [0.88, 1.0]])
     sides = np.zeros(len(shares))
     sides[2:-2] = half * np.where(np.arange(len(shares) - 4) % 2 == 0, 1.0, -1.0)
-    line: FloatArray = a + along * (shares * length)[:, None] + across * sides[:, None]
-    return line
+    return np.asarray(a + along * (shares * length)[:, None] + across * sides[:, None])
 
 
 def _rope_line(points: FloatArray, radii: list[float]) -> FloatArray:

@@ -50,8 +50,7 @@ class BodyShape:
         if self.surface is None:
             return self.lump.center
         seen = self.surface.vertices @ self.axes
-        middle: FloatArray = self.axes @ (0.5 * (seen.min(axis=0) + seen.max(axis=0)))
-        return middle
+        return np.asarray(self.axes @ (0.5 * (seen.min(axis=0) + seen.max(axis=0))))
 
     @property
     def axis(self) -> FloatArray:
@@ -61,8 +60,7 @@ class BodyShape:
         outline = self.lump.outline
         if outline is None or outline.axes is None:
             return self.lump.axes[:, 2 if outline is None else outline.axis]
-        turned: FloatArray = self.lump.axes @ outline.axes[:, outline.axis]
-        return turned
+        return np.asarray(self.lump.axes @ outline.axes[:, outline.axis])
 
     @property
     def radius(self) -> float:
@@ -75,8 +73,7 @@ class BodyShape:
     def corners(self) -> FloatArray:
         """Corners of the box that it fits in, in the axes of the body, m."""
         signs = np.array(list(np.ndindex(2, 2, 2))) - 0.5
-        found: FloatArray = self.center + (signs * self.sides) @ self.axes.T
-        return found
+        return np.asarray(self.center + (signs * self.sides) @ self.axes.T)
 
     @property
     def is_long(self) -> bool:
@@ -106,8 +103,7 @@ class BodyShape:
         if self.kind == "round" and not self.is_long:
             across = float(np.hypot(seen[0], seen[1]))
             held[:2] = seen[:2] * min(1.0, half[0] / across if across > 0.0 else 1.0)
-        found: FloatArray = self.center + self.axes @ held
-        return found
+        return np.asarray(self.center + self.axes @ held)
 
     def drawn(self, thinnest: float, thickest: float) -> BodyShape:
         """Return it as it is drawn."""

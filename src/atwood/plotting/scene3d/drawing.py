@@ -77,8 +77,7 @@ def _sideways(stage: Stage, points: FloatArray) -> FloatArray:
     """Return the direction across a line in the plane of the page."""
     across = np.cross(points[-1] - points[0], stage.camera.towards)
     size = np.linalg.norm(across)
-    found: FloatArray = across / size if size > 0.0 else stage.camera.axes[0]
-    return found
+    return np.asarray(across / size if size > 0.0 else stage.camera.axes[0])
 
 
 def _draw_rod(stage: Stage, points: FloatArray, aside: FloatArray) -> None:
@@ -173,8 +172,7 @@ def _from_above(piece: Piece, pose: tuple[FloatArray, FloatArray], mesh: Mesh | 
     if piece.points is not None and len(piece.points) == 1:
         turn = np.linspace(0.0, 2.0 * np.pi, 25)
         circle = np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=-1)
-        around: FloatArray = (origin + piece.points[0] @ axes.T + piece.size * circle)[None]
-        return around
+        return np.asarray((origin + piece.points[0] @ axes.T + piece.size * circle)[None])
     return np.empty((0, 4, 3))
 
 

@@ -39,8 +39,7 @@ def to_rgb(colour: ArrayLike | str) -> FloatArray:
 def lighter(colour: ArrayLike | str, share: float) -> FloatArray:
     """Return a colour mixed with a share of white."""
     plain = to_rgb(colour)
-    found: FloatArray = plain + share * (1.0 - plain)
-    return found
+    return np.asarray(plain + share * (1.0 - plain))
 
 
 @dataclass(frozen=True, eq=False)

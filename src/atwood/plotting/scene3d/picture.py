@@ -63,10 +63,10 @@ class Trail:
         limb = np.outer(np.cos(turn), camera.axes[0]) + np.outer(np.sin(turn), camera.axes[1])
         equator = np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=-1)
         points = limb[(limb[:, 2] >= low - 1e-9) & (limb[:, 2] <= high + 1e-9)]
-        found: FloatArray = camera.project(self.center) + self.radius * hull(
-            camera.project(points if low == -high else np.concatenate([points, equator]))
+        return np.asarray(
+            camera.project(self.center)
+            + self.radius * hull(camera.project(points if low == -high else np.concatenate([points, equator])))
         )
-        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,8 +179,7 @@ def _outermost(corners: FloatArray) -> FloatArray:
         return corners
     ways = np.array([way for way in np.ndindex(3, 3, 3) if way != (1, 1, 1)]) - 1.0
     chosen = {*range(0, len(corners), len(corners) // 60), *np.argmax(corners @ ways.T, axis=0).tolist()}
-    found: FloatArray = corners[sorted(chosen)]
-    return found
+    return np.asarray(corners[sorted(chosen)])
 
 
 def hull(points: FloatArray) -> FloatArray:

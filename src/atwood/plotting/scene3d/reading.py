@@ -60,8 +60,7 @@ class Pose:
 
     def place(self, point: FloatArray) -> FloatArray:
         """Return where a point of the body is along the run, m, shape (times, 3)."""
-        found: FloatArray = self.origin + self.axes @ point
-        return found
+        return np.asarray(self.origin + self.axes @ point)
 
 
 @dataclass(frozen=True, eq=False)
@@ -434,8 +433,7 @@ def _meeting(
 def seen_from(reading: Reading, a: int, b: int) -> FloatArray:
     """Return the way from node a to node b in the axes of the body of a, m, shape (times, 3)."""
     pose = reading.poses[reading.body_of[a]]
-    found: FloatArray = np.einsum("tji,tj->ti", pose.axes, reading.place(b) - reading.place(a))
-    return found
+    return np.asarray(np.einsum("tji,tj->ti", pose.axes, reading.place(b) - reading.place(a)))
 
 
 def _seen_axis(reading: Reading, a: int, b: int) -> FloatArray:

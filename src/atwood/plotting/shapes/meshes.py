@@ -45,8 +45,7 @@ class Mesh:
         a, b, c, d = (self.vertices[self.faces[:, i]] for i in range(4))
         raw = np.cross(c - a, d - b)
         size = np.linalg.norm(raw, axis=1, keepdims=True)
-        found: FloatArray = np.divide(raw, size, out=np.zeros_like(raw), where=size > 0.0)
-        return found
+        return np.asarray(np.divide(raw, size, out=np.zeros_like(raw), where=size > 0.0))
 
     @cached_property
     def edges(self) -> tuple[IndexArray, IndexArray, NDArray[np.bool_]]:
@@ -242,8 +241,7 @@ def joint_step(
 ) -> FloatArray:
     """Return by how much a joint's displacement changes when one of its coordinates goes from zero to a value."""
     ends = [joint_shift(mechanism, joint, shift, {one: place}) for place in (value, 0.0)]
-    found: FloatArray = ends[0] - ends[1]
-    return found
+    return np.asarray(ends[0] - ends[1])
 
 
 _PARTS = 8

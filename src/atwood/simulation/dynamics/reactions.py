@@ -283,8 +283,7 @@ class ReactionSolver:
         if self.assembly.form == "reduced" and self.assembly.balance("reduced").mass_product is not None:
             rates = accelerations_of(self.assembly)
             if rates is not None:
-                found: FloatArray = self.assembly.kernel(rates.program, vectorized=True)(t[None, :], q, u)[-1]
-                return found
+                return np.asarray(self.assembly.kernel(rates.program, vectorized=True)(t[None, :], q, u)[-1])
         form = self.assembly.form
         parts = [
             accelerations_at(self.assembly, form, t[part], q[:, part], u[:, part], kept)
@@ -363,8 +362,7 @@ def _depend_on(assembly: Assembly, known: dict[Expression, float], scales: Float
     def at(multipliers: FloatArray) -> FloatArray:
         numbers = dict(zip(maximal.multipliers, (multipliers * ways.units).tolist(), strict=True))
         numbers |= dict(zip(maximal.speeds, speeds.tolist(), strict=True))
-        found: FloatArray = units * np.array(evaluate(values, {**known, **numbers}))
-        return found
+        return np.asarray(units * np.array(evaluate(values, {**known, **numbers})))
 
     for _ in range(_TRIALS):
         size = 10.0 ** chance.uniform(-2.0, 2.0)

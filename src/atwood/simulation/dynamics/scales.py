@@ -169,8 +169,7 @@ def find_times(
         times = [np.full((*falling.shape, 1), span), falling[..., None]]
         times += [sizes / np.abs(speeds), np.sqrt(sizes / np.abs(accelerations))]
     every = np.concatenate(times, axis=-1)
-    found: FloatArray = np.min(np.where(every > 0.0, every, np.inf), axis=-1)
-    return found
+    return np.asarray(np.min(np.where(every > 0.0, every, np.inf), axis=-1))
 
 
 def total_masses(assembly: Assembly, rows: FloatArray | None = None) -> FloatArray | float:

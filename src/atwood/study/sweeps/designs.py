@@ -88,8 +88,7 @@ def _points(design: str, runs: int, varied: int, seed: int) -> FloatArray:
                 "ignore", UserWarning
             )  # numbers of runs that are no powers of two are as good, nearly
             found = scipy.stats.qmc.Sobol(varied, seed=seed).random(runs)
-    clipped: FloatArray = np.clip(found, _HALF_STEP, 1.0 - _HALF_STEP)
-    return clipped
+    return np.asarray(np.clip(found, _HALF_STEP, 1.0 - _HALF_STEP))
 
 
 def _values(path: str, distribution: Any, shares: FloatArray) -> Any:

@@ -80,8 +80,7 @@ class Motion:
     def accelerations(self, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None) -> FloatArray:
         """Return the accelerations of all speeds, shape (number, samples), at states of the same shape."""
         kernel = with_rows(self.assembly, values).kernel(self.program.program, vectorized=True)
-        found: FloatArray = kernel(t[None, :], q, u)[-1]
-        return found
+        return np.asarray(kernel(t[None, :], q, u)[-1])
 
     def open_directions(
         self, t: FloatArray, q: FloatArray, u: FloatArray, values: FloatArray | None

@@ -161,8 +161,7 @@ class Sweep(Shown):
 
     def end(self, path: str) -> FloatArray:
         """Return a quantity at the last output time of all runs, shape (runs,)."""
-        found: FloatArray = self[path][:, -1]
-        return found
+        return np.asarray(self[path][:, -1])
 
     def grid(self, path: str) -> FloatArray:
         """Return a quantity at the last output time, in the shape of the grid."""

@@ -324,8 +324,7 @@ class LinearScene:
                 turned[..., i, k] = 0.0
             found = rates.copy()
             found[..., : len(self.tangents)] -= turned
-        shifted: FloatArray = self.tangents.inverse(q) @ found
-        return shifted
+        return np.asarray(self.tangents.inverse(q) @ found)
 
 
 @dataclass(frozen=True)

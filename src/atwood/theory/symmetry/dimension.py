@@ -155,8 +155,7 @@ def _rounded(direction: FloatArray) -> FloatArray:
         if np.linalg.norm(direction - unit) < 10.0 * tolerances.MET:
             return unit
     direction = np.where(np.abs(direction) < 1e-12, 0.0, direction)
-    found: FloatArray = direction / np.linalg.norm(direction)
-    return found
+    return np.asarray(direction / np.linalg.norm(direction))
 
 
 def _outward(one: Symmetry) -> tuple[FloatArray, FloatArray]:
@@ -245,8 +244,7 @@ def _speeds(
     ):
         return None
     free = null_space(slopes)
-    found: FloatArray = scene.sizes * (u + pace * (free @ random.uniform(-1.0, 1.0, free.shape[1])))
-    return found
+    return np.asarray(scene.sizes * (u + pace * (free @ random.uniform(-1.0, 1.0, free.shape[1]))))
 
 
 def _slopes(one: Symmetry, bodies: Bodies) -> FloatArray:
