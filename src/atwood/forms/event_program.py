@@ -92,8 +92,7 @@ def solved_reactions(
             value = maximal.graph.zero
         found[one.symbol] = value
     if assembly.form == "reduced":
-        outputs = to_maximal(assembly).outputs
         symbols = (*maximal.coordinates, *maximal.speeds)
-        places = dict(zip(symbols, (*outputs[0].expressions, *outputs[1].expressions), strict=True))
+        places = dict(zip(symbols, to_maximal(assembly).results, strict=True))
         found = dict(zip(found, substitute(list(found.values()), places), strict=True))
     return found

@@ -118,6 +118,12 @@ class Lagrangian:
         return self.equations.graph
 
     @property
+    def course(self) -> dict[Expression, Expression | float]:
+        """The derivatives by time of time, coordinates and velocities, by symbol."""
+        moving = zip((*self.coordinates, *self.velocities), (*self.rates, *self.accelerations), strict=True)
+        return {self.time: 1.0, **dict(moving)}
+
+    @property
     def kinetic(self) -> Expression:
         """The kinetic energy T, J."""
         return self._total([one.kinetic for one in self.parts])
@@ -314,10 +320,7 @@ def rows_by_part(found: Lagrangian) -> dict[str, tuple[Expression, ...]]:
     if found.has_angular_velocities or found.is_restricted:
         return {}
     graph, one = found.graph, found.graph.one
-    along: dict[Expression, Expression | float] = {found.time: 1.0}
-    along |= dict(zip(found.coordinates, found.rates, strict=True))
-    along |= dict(zip(found.velocities, found.accelerations, strict=True))
-    places = [place for place in found.moves if place is not None]
+    along, places = found.course, [place for place in found.moves if place is not None]
     rows: dict[str, tuple[Expression, ...]] = {}
     for part in found.parts:
         momenta = vjp([part.lagrangian], [one], list(found.velocities))

@@ -131,11 +131,7 @@ class FormProgram:
 
 def state_groups(equations: Equations) -> tuple[InputGroup, ...]:
     """Return the input groups (t, q, u) of programs of a state."""
-    return (
-        InputGroup("t", (equations.time,)),
-        InputGroup("q", equations.coordinates),
-        InputGroup("u", equations.speeds),
-    )
+    return equations.inputs[:3]
 
 
 def rate_symbols(equations: Equations) -> tuple[Expression, ...]:

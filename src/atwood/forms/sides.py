@@ -124,9 +124,9 @@ def _make(assembly: Assembly, left: frozenset[int], handed: frozenset[int], laye
     shared.lock = assembly.shared.lock  # there is one graph
     made = _mapped(own, lambda values: relations.taken_out(values, {}))
     if assembly.form == "reduced":  # accelerations of trees are found from the bodies' own equations
-        maximal, outputs = assembly.maximal, to_maximal(assembly).outputs
+        maximal = assembly.maximal
         symbols = (*maximal.coordinates, *maximal.speeds)
-        places = dict(zip(symbols, (*outputs[0].expressions, *outputs[1].expressions), strict=True))
+        places = dict(zip(symbols, to_maximal(assembly).results, strict=True))
         bodies = _mapped(maximal, lambda values: relations.taken_out(values, places))
         shared.get(REDUCED, lambda: made)
         shared.get(MAXIMAL, lambda: bodies)

@@ -76,9 +76,8 @@ def _divided(a: Bounds, b: Bounds) -> Bounds:
 
 
 def _square(a: Bounds) -> Bounds:
-    low, high = np.abs(a[0]), np.abs(a[1])
-    through = (a[0] <= 0.0) & (a[1] >= 0.0)
-    return np.where(through, 0.0, np.minimum(low, high) ** 2), np.maximum(low, high) ** 2
+    low, high = _magnitude(a)
+    return low**2, high**2
 
 
 def _magnitude(a: Bounds) -> Bounds:

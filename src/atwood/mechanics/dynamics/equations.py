@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 
-from atwood.expr import Expression, Graph, Scalar, jvp, substitute, vjp
+from atwood.expr import Expression, Graph, InputGroup, Scalar, jvp, substitute, vjp
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.forces import Forces, Site, constraint_forces, part_forces, place_part
 from atwood.mechanics.dynamics.inertia import Masses, tensor_of, turned_tensor
@@ -249,6 +249,23 @@ class Equations:
     def multipliers(self) -> tuple[Expression, ...]:
         """The symbols of the multipliers."""
         return tuple(one.multiplier for one in self.constraints)
+
+    @property
+    def inputs(self) -> tuple[InputGroup, ...]:
+        """The inputs (t, q, u, a, multipliers) of programs of a state and what follows from it."""
+        return (
+            InputGroup("t", (self.time,)),
+            InputGroup("q", self.coordinates),
+            InputGroup("u", self.speeds),
+            InputGroup("a", self.accelerations),
+            InputGroup("multipliers", self.multipliers),
+        )
+
+    @property
+    def course(self) -> dict[Expression, Expression | float]:
+        """The derivatives by time of time, coordinates and speeds, by symbol."""
+        moving = zip((*self.coordinates, *self.speeds), (*self.rates, *self.accelerations), strict=True)
+        return {self.time: 1.0, **dict(moving)}
 
     @property
     def contact_multipliers(self) -> tuple[Expression, ...]:

@@ -150,10 +150,7 @@ def _joint_reference_in_place(equations: Equations, part: PlacedPart, joint_refe
     value, *rates = part.put(in_joint_coordinates(part.local, part.kinematics, found)[0])
     if not rates:
         return Motion(value=value)
-    course: dict[Expression, Expression | float] = {equations.time: 1.0}
-    course.update(zip(equations.coordinates, equations.rates, strict=True))
-    course.update(zip(equations.speeds, equations.accelerations, strict=True))
-    return Motion(value=value, rate=rates[0], second_rate=lambda: jvp(rates, course)[0])
+    return Motion(value=value, rate=rates[0], second_rate=lambda: jvp(rates, equations.course)[0])
 
 
 def _turned(mechanism: Mechanism, equations: Equations, motion: Motion, node: int, body: int) -> Motion:

@@ -61,7 +61,7 @@ def part_energy_program(mechanism: Mechanism, equations: Equations, parameters: 
     """Return the program of (t, q, u) that gives kinetic and potential energy of each part in turn, J."""
     signals = resolve_signals(mechanism, equations.site, equations.kinematics, equations.read)
     values = [x for path in mechanism.locals_ for x in part_energies(mechanism, equations, path, signals)]
-    return Program("energies by part", _inputs(equations)[:3], tuple(parameters), (OutputGroup("e", tuple(values)),))
+    return Program("energies by part", equations.inputs[:3], tuple(parameters), (OutputGroup("e", tuple(values)),))
 
 
 def part_powers(
@@ -93,23 +93,13 @@ def part_powers(
         for flow, power in _given_at(equations, path, total).items():
             _add(found, flow, -power)
     kept = {flow: value for flow, value in found.items() if not value.is_zero}
-    inputs, values = _inputs(equations), list(kept.values())
+    inputs, values = equations.inputs, list(kept.values())
     if of_impulses:
         inputs = (*inputs, InputGroup("impulses of contacts", equations.contact_multipliers[::2]))
     else:
         values = substitute(values, dict(equations.contact_forces))
     outputs = (OutputGroup("p", tuple(values)),)
     return PartPowers(Program("powers by part", inputs, tuple(parameters), outputs), tuple(kept))
-
-
-def _inputs(equations: Equations) -> tuple[InputGroup, ...]:
-    return (
-        InputGroup("t", (equations.time,)),
-        InputGroup("q", equations.coordinates),
-        InputGroup("u", equations.speeds),
-        InputGroup("a", equations.accelerations),
-        InputGroup("multipliers", equations.multipliers),
-    )
 
 
 def _add(found: dict[Flow, Expression], flow: Flow, power: Expression) -> None:
@@ -151,17 +141,11 @@ def _explicit_rate(
     mechanism: Mechanism, equations: Equations, part: PlacedPart, signals: Mapping[Expression, Expression]
 ) -> Expression:
     """Return how fast the energy of a part changes while nothing moves, W: with time, linked inputs and states."""
-    graph, kinematics, local = equations.graph, equations.kinematics, part.local
-    changing = [*local.potentials, *(-value for value in local.lagrangians)]
-    space = mechanism.space.name
-    changing += [graph.convert(inertial_energy(one, mechanism.gravity, space)) for one in local.varying]
-    placed, _ = in_joint_coordinates(local, kinematics, changing)
-    total = graph.constant(0.0)
+    graph, local = equations.graph, part.local
+    placed, total = _changing(mechanism, equations, local), graph.constant(0.0)
     if not placed:
         return total
-    course: dict[Expression, Expression | float] = {mechanism.time: 1.0}
-    course.update(zip(equations.coordinates, equations.rates, strict=True))
-    course.update(zip(equations.speeds, equations.accelerations, strict=True))
+    course = equations.course
     directions: dict[Expression, Expression | float] = {mechanism.time: 1.0}
     directions.update((one.symbol, course[one.symbol]) for one in local.states if one.symbol in course)
     for symbol in local.signal_symbols.values():
@@ -170,6 +154,14 @@ def _explicit_rate(
     for slope in jvp(placed, directions):
         total = total + part.put([slope])[0]
     return total
+
+
+def _changing(mechanism: Mechanism, equations: Equations, local: LocalPart) -> list[Expression]:
+    """Return the energies of a part that may change with time while nothing moves."""
+    energies = [*local.potentials, *(-value for value in local.lagrangians)]
+    inertial = (inertial_energy(one, mechanism.gravity, mechanism.space.name) for one in local.varying)
+    energies += map(equations.graph.convert, inertial)
+    return in_joint_coordinates(local, equations.kinematics, energies)[0]
 
 
 def applied_power(mechanism: Mechanism, equations: Equations) -> Expression:
@@ -187,10 +179,7 @@ def applied_power(mechanism: Mechanism, equations: Equations) -> Expression:
     for local in mechanism.locals_.values():
         part = place_part(equations.site, local, kinematics, signals)
         part_forces(replace(part, local=replace(local, potentials=(), lagrangians=())), forces)
-        changing = [*local.potentials, *(-value for value in local.lagrangians)]
-        space = mechanism.space.name
-        changing += [graph.convert(inertial_energy(one, mechanism.gravity, space)) for one in local.varying]
-        placed, _ = in_joint_coordinates(local, kinematics, changing)
+        placed = _changing(mechanism, equations, local)
         for slope in jvp(placed, {mechanism.time: 1.0}) if placed else ():
             total = total + part.put([slope])[0]
     for node, force in forces.on_nodes.items():

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, Scalar
+from atwood.expr import Expression, OutputGroup, Program, Scalar
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations, push_body
@@ -56,15 +56,8 @@ def internal_reaction_program(
         value = force[reaction.axis] if reaction.axis < 3 else _counted(torque, reaction.axis - 3, mechanism.space)
         rows[reaction.path] = len(expressions)
         expressions.append(equations.graph.convert(value))
-    groups = (
-        InputGroup("t", (equations.time,)),
-        InputGroup("q", equations.coordinates),
-        InputGroup("u", equations.speeds),
-        InputGroup("a", equations.accelerations),
-        InputGroup("multipliers", equations.multipliers),
-    )
-    program = Program("reactions inside bodies", groups, tuple(parameters), (OutputGroup("r", tuple(expressions)),))
-    return InternalReactions(program, rows)
+    outputs = (OutputGroup("r", tuple(expressions)),)
+    return InternalReactions(Program("reactions inside bodies", equations.inputs, tuple(parameters), outputs), rows)
 
 
 def _counted(torque_W: Vector, axis: int, space: Space) -> Scalar:

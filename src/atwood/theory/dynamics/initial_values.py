@@ -218,12 +218,10 @@ def _expression(assembly: Assembly, motion: Dynamics, path: str) -> Expression:
     """Return a quantity, or a rate of it, as a function of the state and its accelerations."""
     e, (quantity, rates) = motion.equations, _split(path)
     value = assembly.observables[quantity].value
-    course: dict[Expression, Expression | float] = {e.time: 1.0, **dict(zip(e.coordinates, e.rates, strict=True))}
-    course.update(zip(e.speeds, e.accelerations, strict=True))
     for _ in range(rates):
         if depends_on(value, e.accelerations):
             raise UsageError("it depends on accelerations, whose rates are not known", where=path)
-        (value,) = jvp([value], course)
+        (value,) = jvp([value], e.course)
     if depends_on(value, [one.symbol for one in assembly.reactions]):
         raise UsageError("it depends on reactions", where=path, advice="Ask for a place, a speed or an acceleration.")
     return value

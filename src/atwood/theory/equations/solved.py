@@ -94,9 +94,7 @@ def quantity_of(formulas: EquationFormulas, path: str) -> tuple[Expression, dict
     assembly, found = formulas.assembly, formulas.expressions
     (one,) = find_observables(assembly, [path])
     equations, maximal = found.equations, assembly.maximal
-    along: dict[Expression, Expression | float] = {found.time: 1.0}
-    along |= dict(zip(found.coordinates, found.rates, strict=True))
-    along |= dict(zip(found.velocities, found.accelerations, strict=True))
+    along = found.course
     own: dict[Expression, Expression | float] = dict(zip(equations.speeds, found.speeds, strict=True))
     own |= dict(zip(equations.accelerations, jvp(list(found.speeds), along), strict=True))
     own |= {q: -one for q, one in zip(equations.coordinates, found.coordinates, strict=True) if one is not q}

@@ -151,11 +151,7 @@ class _Places:
 def _expressions(scene: LinearScene) -> dict[str, list[Expression]]:
     program = to_maximal(scene.assembly, "regular")
     q, u = (list(group.expressions) for group in program.outputs)
-    e = scene.equations
-    along: dict[Expression, Expression | float] = {e.time: 1.0}
-    along |= dict(zip(e.coordinates, e.rates, strict=True))
-    along |= dict(zip(e.speeds, e.accelerations, strict=True))
-    return {"q": q, "u": u, "a": jvp(u, along)}
+    return {"q": q, "u": u, "a": jvp(u, scene.equations.course)}
 
 
 def _places(scene: LinearScene, now: Variation) -> _Places:

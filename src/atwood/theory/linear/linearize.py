@@ -296,7 +296,10 @@ def refuse_switches(scene: LinearScene, flow: Flow, kept: Sequence[int]) -> None
     if not margins:
         return
     program = Program(
-        f"{scene.assembly.flat.name} switches", scene.groups, scene.assembly.parameters, (OutputGroup("at", margins),)
+        f"{scene.assembly.flat.name} switches",
+        scene.equations.inputs,
+        scene.assembly.parameters,
+        (OutputGroup("at", margins),),
     )
     kernel, now = scene.assembly.kernel(program), flow.variation
     random = np.random.default_rng(5)
@@ -362,7 +365,7 @@ def output_rows(point: OperatingPoint, flow: Flow, minimal: Minimal, paths: Sequ
     by_reaction = jacobian(found, [one.symbol for one in reactions])
     outputs = [OutputGroup(f"quantity by {by}", tuple(matrix.entries)) for by, matrix in parts.places.items()]
     outputs.append(OutputGroup("by reactions", tuple(by_reaction.entries)))
-    groups = (*scene.groups, InputGroup("reactions", tuple(one.symbol for one in reactions)))
+    groups = (*scene.equations.inputs, InputGroup("reactions", tuple(one.symbol for one in reactions)))
     program = Program(f"{point.assembly.flat.name} outputs, varied", groups, point.assembly.parameters, tuple(outputs))
     values, changes = _reactions(point, flow, minimal, [one.path for one in reactions])
     state = (np.array([now.t]), now.q, now.u, now.a, now.multipliers, values)

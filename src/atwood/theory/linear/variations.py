@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.codegen import BoundKernel
 from atwood.codegen.rounding import ROUGHNESS
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, SparseMatrix, jacobian
+from atwood.expr import Expression, OutputGroup, Program, SparseMatrix, jacobian
 from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import dataclass
@@ -156,18 +156,6 @@ class LinearScene:
 
     # -- programs -------------------------------------------------------------------------------------------------
 
-    @property
-    def groups(self) -> tuple[InputGroup, ...]:
-        """The inputs (t, q, u, a, multipliers) of programs of a state."""
-        e = self.equations
-        return (
-            InputGroup("t", (e.time,)),
-            InputGroup("q", e.coordinates),
-            InputGroup("u", e.speeds),
-            InputGroup("a", e.accelerations),
-            InputGroup("multipliers", e.multipliers),
-        )
-
     @cached_property
     def _expressions(self) -> dict[str, list[Expression]]:
         e = self.equations
@@ -220,7 +208,9 @@ class LinearScene:
             outputs += [
                 OutputGroup(f"{part.name} by {by}", tuple(matrix.entries)) for by, matrix in part.places.items()
             ]
-        return Program(f"{self.assembly.flat.name} {name}", self.groups, self.assembly.parameters, tuple(outputs))
+        return Program(
+            f"{self.assembly.flat.name} {name}", self.equations.inputs, self.assembly.parameters, tuple(outputs)
+        )
 
     @property
     def derivatives(self) -> Program:

@@ -115,10 +115,7 @@ class Prover:
     def rest(self, value: Expression, generator: Mapping[int, Expression], with_rates: bool = False) -> Expression:
         """Return what is left of the rate of a quantity without the equations of motion times displacements."""
         found = self.quantities.found
-        along: dict[Expression, Expression | float] = {found.time: 1.0}
-        along |= dict(zip(found.coordinates, found.rates, strict=True))
-        along |= dict(zip(found.velocities, found.accelerations, strict=True))
-        terms = [jvp([value], along)[0]]
+        terms = [jvp([value], found.course)[0]]
         terms += [w * (found.constraint_rows[k] - found.rows[k]) for k, w in generator.items()]
         if with_rates:
             terms += [-(one.multiplier * one.rate) for one in found.constraints]
@@ -130,14 +127,11 @@ class Prover:
             return Proof.NONE
         e = self.quantities.found.equations
         [value] = self.quantities.on_speeds([value])
-        along: dict[Expression, Expression | float] = {e.time: 1.0}
-        along |= dict(zip(e.coordinates, e.rates, strict=True))
-        along |= dict(zip(e.speeds, e.accelerations, strict=True))
         rows = e.rows_with_multipliers or e.rows
         pairs = [
             (w, rows[k], e.constraint_rows[k] if e.constraint_rows else e.graph.zero) for k, w in generator.items()
         ]
-        return self.is_zero(add_up([jvp([value], along)[0], *(w * (held - row) for w, row, held in pairs)]))
+        return self.is_zero(add_up([jvp([value], e.course)[0], *(w * (held - row) for w, row, held in pairs)]))
 
     # -- displacements as formulas ------------------------------------------------------------------------------------
 
