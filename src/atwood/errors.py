@@ -7,7 +7,7 @@ pieces stay apart as attributes, so that a program can act on them, and read as 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Collection, Iterable
 
 __all__ = [
     "AtwoodError",
@@ -21,6 +21,7 @@ __all__ = [
     "TopologyError",
     "UnsupportedError",
     "UsageError",
+    "check_known",
     "is_about",
     "near_matches",
     "suggestion",
@@ -138,6 +139,20 @@ def suggestion(word: str, choices: Iterable[str]) -> str:
 
 
 _SHORT_LIST = 12
+
+
+def check_known(
+    name: str,
+    known: Collection[str],
+    problem: str,
+    *,
+    where: str | None = None,
+    hint: Callable[[str, Iterable[str]], str] = suggestion,
+    error: type[AtwoodError] = UsageError,
+) -> None:
+    """Refuse a name that does not exist, with a hint at what could be meant; without `where` it is about the name."""
+    if name not in known:
+        raise error(problem, where=name if where is None else where, advice=hint(name, known))
 
 
 def suggestion_in_parts(path: str, known: Iterable[str], verb: str = "has") -> str:

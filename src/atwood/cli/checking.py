@@ -16,7 +16,7 @@ from atwood.cli.errors import FAILED
 from atwood.cli.output import print_json, writer
 from atwood.cli.parts import library_parts, looks_like_a_part
 from atwood.cli.scenes import load_file
-from atwood.errors import UsageError, suggestion
+from atwood.errors import UsageError, check_known, suggestion
 from atwood.model.compose.composite import Model
 from atwood.model.declare.component import Component
 from atwood.table import table
@@ -44,8 +44,7 @@ def _components(target: str) -> list[Any]:
         file_text, name = target, ""
     if looks_like_a_part(target):
         parts = library_parts()
-        if target not in parts:
-            raise UsageError(f"no library has a part {target!r}", advice=suggestion(target, parts))
+        check_known(target, parts, f"no library has a part {target!r}", where="")
         return [parts[target]]
     if not file_text.endswith(".py"):
         raise UsageError(f"{target!r} is no file", advice="Write FILE.py, FILE.py:NAME or the name of a part.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Sequence
 from typing import TYPE_CHECKING, Literal
 
-from atwood.errors import ParameterError, suggestion_in_parts
+from atwood.errors import ParameterError, check_known, suggestion_in_parts
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, substitute
 from atwood.forms.caches import Key
 from atwood.forms.program import state_groups
@@ -26,8 +26,7 @@ def find_observables(assembly: Assembly, paths: Sequence[str]) -> list[Observabl
     """Return observables of a scene by path."""
     known = assembly.observables
     for path in paths:
-        if path not in known:
-            raise ParameterError("there is no such quantity", where=path, advice=suggestion_in_parts(path, known))
+        check_known(path, known, "there is no such quantity", hint=suggestion_in_parts, error=ParameterError)
     return [known[path] for path in paths]
 
 

@@ -18,7 +18,7 @@ from typing import cast
 import numpy as np
 
 from atwood.arrays import IndexArray
-from atwood.errors import UsageError, suggestion
+from atwood.errors import UsageError, check_known
 from atwood.expr import (
     Expression,
     InputGroup,
@@ -213,8 +213,7 @@ def dae_form(
     ``index1`` holds the constraints' second derivative and drifts; ``index1-projected`` is the same, with what comes
     out of it projected.
     """
-    if level not in LEVELS:
-        raise UsageError(f"there is no level {level!r} of the dae form", advice=suggestion(level, LEVELS))
+    check_known(level, LEVELS, f"there is no level {level!r} of the dae form", where="")
     multipliers = equations.multipliers
     chosen: Level = "ggl" if level == "ggl" or not multipliers else cast("Level", level)
     constraints = equations.constraints

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, overload
 
 from atwood.arguments import NAME, Kind, check, takes_names
 from atwood.display import count_of, field_text, fitted, listed
-from atwood.errors import DeclarationError, ParameterError, UsageError, suggestion
+from atwood.errors import DeclarationError, ParameterError, UsageError, check_known, suggestion
 from atwood.model.compose.connection_rules import (
     Connection,
     Parts,
@@ -227,8 +227,7 @@ class Model(_State, Component):
             if not isinstance(inner, Model):
                 raise DeclarationError("it has no parts of its own", where=inner.path)
             return inner.replace(last, part)
-        if name not in self._parts:
-            raise DeclarationError(f"it has no part {name!r}", where=where, advice=suggestion(name, self._parts))
+        check_known(name, self._parts, f"it has no part {name!r}", where=where, error=DeclarationError)
         old = self._parts[name]
         check_same_connectors(old, part, f"{self.path or type(self).__name__}.{name}")
         before, new = dict(self._attached), part.copy()

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from atwood.arguments import FILE, MAPPING, NAME, each, instance, takes
-from atwood.errors import AtwoodError, UsageError, suggestion
+from atwood.errors import AtwoodError, UsageError, check_known, suggestion
 from atwood.files import check_readable, write_atomically
 from atwood.model.compose.composite import Model
 from atwood.model.compose.connection_rules import find_end
@@ -335,10 +335,7 @@ def _mapping(data: Any, where: str, known: tuple[str, ...] = ()) -> Mapping[str,
     if not isinstance(data, dict):
         raise UsageError(f"the scene cannot be read: {str(data)[:60]!r} should be entries by name", where=where)
     for key in data if known else ():
-        if key not in known:
-            raise UsageError(
-                f"the scene cannot be read: unknown entry {key!r}", where=where, advice=suggestion(key, known)
-            )
+        check_known(key, known, f"the scene cannot be read: unknown entry {key!r}", where=where)
     return data
 
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Self, dataclass_transform
 
 from atwood.arguments import NAME, check
 from atwood.display import field_text, fitted
-from atwood.errors import DeclarationError, MissingNameError, ParameterError, UsageError, suggestion
+from atwood.errors import DeclarationError, MissingNameError, ParameterError, UsageError, check_known, suggestion
 from atwood.expr import Scalar
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.connectors import Connector, ConnectorSpec, InputRef, Motion, OutputRef, Quantity, connector
@@ -398,8 +398,7 @@ class Component(metaclass=ComponentType):
     def input(self, name: str) -> InputRef:
         """Return an input, to be connected to an output of another component."""
         check(NAME, name, "name", f"{self.path or type(self).__name__}.input", DeclarationError)
-        if name not in self._signals:
-            raise DeclarationError(f"it has no input {name!r}", where=self.path, advice=suggestion(name, self._signals))
+        check_known(name, self._signals, f"it has no input {name!r}", where=self.path, error=DeclarationError)
         return InputRef(self, name)
 
     def output(self, name: str) -> OutputRef:

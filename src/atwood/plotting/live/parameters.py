@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from typing import Any
 
-from atwood.errors import ParameterError, suggestion_in_parts
+from atwood.errors import ParameterError, check_known, suggestion_in_parts
 from atwood.expr import depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.other_values import Slot, find_slots
@@ -29,10 +29,7 @@ def with_sliders(assembly: Assembly, sliders: Sequence[str]) -> tuple[Assembly, 
     slots = {slot.path: slot for _, slot in find_slots(assembly.flat)} | dict(find_slots(assembly.flat))
     zeros: dict[str, Slot] = {}
     for path in sliders:
-        if path not in slots:
-            raise ParameterError(
-                "there is no such parameter", where=path, advice=suggestion_in_parts(path, slots, "has")
-            )
+        check_known(path, slots, "there is no such parameter", hint=suggestion_in_parts, error=ParameterError)
         value = slots[path].read(assembly.flat)
         if isinstance(value, bool) or not isinstance(value, (int, float)) or _is_structural(assembly, slots[path]):
             raise ParameterError(

@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from atwood.arguments import FILE, TEXT, Kind, Refused, each, one_of, optional, takes
-from atwood.errors import AtwoodError, UsageError, suggestion
+from atwood.errors import AtwoodError, UsageError, check_known
 from atwood.files import check_directory, write_atomically
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, replace
@@ -186,8 +186,7 @@ def _result(one: Model | Assembly | Result | SavedResult) -> Result:
 
 def known_path(path: str, known: Sequence[str]) -> str:
     """Return a path, or refuse one that is no quantity."""
-    if path not in known:
-        raise UsageError(f"there is no quantity {path!r}", where="show", advice=suggestion(path, known))
+    check_known(path, known, f"there is no quantity {path!r}", where="show")
     return path
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from atwood.arguments import FILE, TEXT, each as several, instance, number, optional, takes
 from atwood.arrays import FloatArray
-from atwood.errors import UsageError, suggestion
+from atwood.errors import UsageError, check_known
 from atwood.plotting.canvas import COLOURS, GREY, INK, Figure, finished, headed, legend, new_figure, polish
 from atwood.theory.linear import EquilibriumBranches, LinearModel, RootLocus
 
@@ -190,8 +190,7 @@ def plot_branches(
     if path is None:
         spread = {one: np.ptp(np.concatenate([branch.values[one] for branch in branches.branches])) for one in known}
         path = max(spread, key=lambda one: float(spread[one]))
-    if path not in known:
-        raise UsageError("there is no such coordinate", where=path, advice=suggestion(path, known))
+    check_known(path, known, "there is no such coordinate")
     figure = new_figure(6.4, 4.6)
     axes = figure.subplots()
     for branch, colour in zip(branches.branches, _colours(len(branches.branches)), strict=True):

@@ -9,7 +9,7 @@ import numpy as np
 
 from atwood.arguments import FILE, TEXT, each, either, instance, optional, takes, whole
 from atwood.arrays import FloatArray
-from atwood.errors import UsageError, suggestion
+from atwood.errors import UsageError, check_known
 from atwood.plotting.canvas import (
     COLOURS,
     GREY,
@@ -160,8 +160,7 @@ def _draw_reduced(left: Axes, right: Axes, motion: ReducedMotion, azimuth: str |
     if not known:
         raise UsageError("nothing turns about the vertical in it", where=motion.scene, advice="It has one coordinate.")
     path = known[0] if azimuth is None else azimuth
-    if path not in known:
-        raise UsageError("there is no such ignorable angle", where=path, advice=suggestion(path, known))
+    check_known(path, known, "there is no such ignorable angle")
     if motion.kind not in ("libration", "rest"):
         raise UsageError("its polar angle does not come back", where=motion.scene)
     advance = abs(motion.advance[path])

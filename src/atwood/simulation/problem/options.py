@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
-from atwood.errors import AtwoodError, UsageError, suggestion_in_parts
+from atwood.errors import AtwoodError, UsageError, check_known, suggestion_in_parts
 from atwood.expr import evaluate, vjp
 from atwood.forms.assembly import Assembly
 from atwood.integrators.methods import AUTO, METHODS
@@ -227,12 +227,7 @@ def read_nominal(assembly: Assembly, given: Mapping[str, Any] | None) -> dict[st
     """Return nominal sizes in SI units."""
     found = {}
     for path, size in (given or {}).items():
-        if path not in assembly.observables:
-            raise UsageError(
-                "nominal= names no quantity of the scene",
-                where=path,
-                advice=suggestion_in_parts(path, list(assembly.observables)),
-            )
+        check_known(path, assembly.observables, "nominal= names no quantity of the scene", hint=suggestion_in_parts)
         unit = assembly.observables[path].unit
         try:
             value = parse_quantity(size, parse_si_unit(unit), path) if isinstance(size, str) else float(size)

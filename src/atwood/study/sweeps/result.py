@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from atwood.arguments import check
 from atwood.arrays import FloatArray
 from atwood.display import count_of, data_of, listed
-from atwood.errors import ResultError, near_matches, suggestion
+from atwood.errors import ResultError, check_known, near_matches, suggestion
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.connectors import PATH
 from atwood.result.formats.dataset import Dataset, Variable, needed, to_xarray, unique_name
@@ -171,8 +171,7 @@ class Sweep(Shown):
         """Return the values of one axis of the grid."""
         varied = self.varied
         path = str(check(PATH, path, "path", "Sweep.axis"))
-        if path not in varied:
-            raise ResultError("this was not varied", where=path, advice=suggestion(path, varied))
+        check_known(path, varied, "this was not varied", error=ResultError)
         if len(self.shape) == 1:
             return varied[path]
         position = list(varied).index(path)

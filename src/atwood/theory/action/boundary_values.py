@@ -10,7 +10,7 @@ import numpy as np
 from atwood.arguments import BY_PATH, command, optional, takes
 from atwood.arrays import FloatArray
 from atwood.display import count_of
-from atwood.errors import AtwoodError, SolveError, StartError, UnsupportedError, UsageError, suggestion
+from atwood.errors import AtwoodError, SolveError, StartError, UnsupportedError, UsageError, check_known
 from atwood.forms.assembly import Assembly
 from atwood.forms.program import rates_are_speeds
 from atwood.integrators.methods import EXPLICIT, Task
@@ -149,8 +149,7 @@ def _read(given: Mapping[str, Any], names: Sequence[Any], values: FloatArray, wh
     found = np.array(values, dtype=float)
     known = {one.name: (k, one.unit) for k, one in enumerate(names)}
     for path, value in given.items():
-        if path not in known:
-            raise UsageError(f"{path!r} is no coordinate of it", where=where, advice=suggestion(path, list(known)))
+        check_known(path, known, f"{path!r} is no coordinate of it", where=where)
         number, unit = known[path]
         try:
             found[number] = parse_quantity(value, parse_unit(unit), path) if isinstance(value, str) else float(value)

@@ -11,7 +11,7 @@ from numpy.polynomial import legendre
 
 from atwood.arguments import instance, optional, takes
 from atwood.arrays import FloatArray
-from atwood.errors import AtwoodError, UnsupportedError, UsageError, suggestion
+from atwood.errors import AtwoodError, UnsupportedError, UsageError, check_known
 from atwood.expr import OutputGroup, Program, jacobian_by_rows, vjp
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
@@ -525,8 +525,7 @@ Curves: TypeAlias = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 def curves_at(given: Mapping[str, Any], names: Sequence[str], nodes: Nodes, where: str) -> Curves:
     """Return functions of time at points and at both ends; rates of what is no formula are those of polynomials."""
     for path in given:
-        if path not in names:
-            raise UsageError(f"{path!r} is no coordinate of it", where=where, advice=suggestion(path, list(names)))
+        check_known(path, names, f"{path!r} is no coordinate of it", where=where)
     t, ends = nodes.times.ravel(), nodes.edges[[0, -1]]
     values, rates, at_ends, end_rates = (np.zeros((len(names), size)) for size in (len(t), len(t), 2, 2))
     for k, name in enumerate(names):

@@ -13,7 +13,7 @@ import numpy as np
 
 from atwood.arguments import BY_PATH, instance, optional, takes
 from atwood.arrays import FloatArray
-from atwood.errors import AtwoodError, UnsupportedError, UsageError, suggestion
+from atwood.errors import AtwoodError, UnsupportedError, UsageError, check_known
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import mpmath, sympy
@@ -282,8 +282,7 @@ class Separation(Described):
     def _number(self, coordinate: str) -> int:
         """Return which coordinate has a name; refuse where H does not separate."""
         names = [str(one) for one in self.coordinates]
-        if coordinate not in names:
-            raise UsageError("it is none of the coordinates", where=coordinate, advice=suggestion(coordinate, names))
+        check_known(coordinate, names, "it is none of the coordinates")
         if not self.separates:
             raise UsageError(self.sentence, where=self.name)
         return names.index(coordinate)

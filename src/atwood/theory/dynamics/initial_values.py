@@ -11,7 +11,7 @@ import numpy as np
 from atwood.arguments import BY_PATH, PATHS, takes
 from atwood.arrays import FloatArray
 from atwood.display import fitted
-from atwood.errors import AtwoodError, SolveError, UsageError, suggestion_in_parts
+from atwood.errors import AtwoodError, SolveError, UsageError, check_known, suggestion_in_parts
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jvp
 from atwood.forms.assembly import Assembly
 from atwood.forms.program import state_groups
@@ -132,12 +132,7 @@ class _Problem:
     def read(self, path: str, value: Any) -> float:
         """Return the value of a condition."""
         quantity, rates = _split(path)
-        if quantity not in self.first.observables:
-            raise UsageError(
-                "there is no such quantity",
-                where=path,
-                advice=suggestion_in_parts(quantity, self.first.observables),
-            )
+        check_known(quantity, self.first.observables, "there is no such quantity", where=path, hint=suggestion_in_parts)
         if isinstance(value, str):
             unit = self.first.observables[quantity].unit
             if rates:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from atwood.arguments import BY_PATH, Refused
-from atwood.errors import UsageError, suggestion
+from atwood.errors import UsageError, check_known
 from atwood.lazy_dataclasses import replace
 from atwood.lazy_modules import sympy
 from atwood.model.values.letters import LETTER, split_letter
@@ -67,8 +67,7 @@ def _read(given: Any, known: Mapping[str, Symbol], where: str) -> Sum:
 
         def letter(found: re.Match[str]) -> str:
             name = "_".join(split_letter(found[1]))
-            if name not in known:
-                raise UsageError(f"no formula has {found[1]}", where=where, advice=suggestion(name, known))
+            check_known(name, known, f"no formula has {found[1]}", where=where)
             by[f"s{len(by)}_"] = objects.letter(known[name], len(found[2]))
             return f"s{len(by) - 1}_"
 

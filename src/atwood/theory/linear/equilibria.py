@@ -11,7 +11,7 @@ import numpy as np
 from atwood.arguments import BY_PATH, FLAG, optional, takes
 from atwood.arrays import FloatArray
 from atwood.display import count_of, data_of
-from atwood.errors import AtwoodError, ParameterError, UsageError, suggestion
+from atwood.errors import AtwoodError, ParameterError, UsageError, check_known
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import scipy
@@ -313,8 +313,7 @@ def _bounds(point: OperatingPoint, region: Mapping[str, Any]) -> FloatArray:
     ).reshape(len(scene.tangents), 2)
     number = {scene.tangents.names[k]: k for _, k in scene.tangents.plain}
     for path, given in region.items():
-        if path not in number:
-            raise ParameterError("there is no such coordinate", where=path, advice=suggestion(path, list(number)))
+        check_known(path, number, "there is no such coordinate", error=ParameterError)
         k = number[path]
         try:
             low, high = (_in_si(one, scene.tangents.units[k], path) for one in given)

@@ -13,7 +13,7 @@ import numpy as np
 from atwood.arguments import PATHS, takes
 from atwood.arrays import FloatArray
 from atwood.codegen.rounding import ROUGHNESS
-from atwood.errors import AtwoodError, ParameterError, UnsupportedError, UsageError, suggestion_in_parts
+from atwood.errors import AtwoodError, ParameterError, UnsupportedError, UsageError, check_known, suggestion_in_parts
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, jacobian, live
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
@@ -352,8 +352,7 @@ def output_rows(point: OperatingPoint, flow: Flow, minimal: Minimal, paths: Sequ
     """Return how quantities change with minimal states and inputs, shape (quantities, columns of `Minimal`)."""
     found, known = [], point.assembly.start_observables
     for path in paths:
-        if path not in known:
-            raise ParameterError("there is no such quantity", where=path, advice=suggestion_in_parts(path, known))
+        check_known(path, known, "there is no such quantity", hint=suggestion_in_parts, error=ParameterError)
         found.append(known[path].value)
     scene, now, inputs = point.scene, flow.variation, len(point.scene.inputs)
     total = np.zeros((len(found), minimal.states + inputs))

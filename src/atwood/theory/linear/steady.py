@@ -17,7 +17,7 @@ import numpy as np
 from atwood.arguments import PATHS, takes
 from atwood.arrays import FloatArray
 from atwood.display import fitted
-from atwood.errors import AtwoodError, ParameterError, SolveError, suggestion
+from atwood.errors import AtwoodError, ParameterError, SolveError, check_known
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
@@ -482,6 +482,5 @@ def _value_columns(point: OperatingPoint) -> dict[str, list[str]]:
 def _free_numbers(point: OperatingPoint, free: Sequence[str]) -> set[int]:
     names = list(point.scene.tangents.names)
     for path in free:
-        if path not in names:
-            raise ParameterError("there is no such coordinate", where=path, advice=suggestion(path, names))
+        check_known(path, names, "there is no such coordinate", error=ParameterError)
     return {names.index(path) for path in free}

@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import Any
 
 from atwood.display import count_of, data_of, fitted
-from atwood.errors import UnsupportedError, UsageError, suggestion
+from atwood.errors import UnsupportedError, UsageError, check_known, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
@@ -378,8 +378,7 @@ def _start(plain: PlainEquations) -> dict[str, float]:
 
 
 def _in_si(plain: PlainEquations, path: str, value: Any) -> float:
-    if path not in plain.paths:
-        raise UsageError("it is no coordinate", where=path, advice=suggestion(path, plain.paths))
+    check_known(path, plain.paths, "it is no coordinate")
     unit = plain.equations.expressions.names[plain.paths.index(path)].unit
     return float(parse_quantity(value, parse_unit(unit), path)) if isinstance(value, str) else float(value)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from atwood.arguments import ARRAY, BY_PATH, TEXT, check, instance, optional, takes
 from atwood.arrays import FloatArray
-from atwood.errors import UnsupportedError, UsageError, suggestion
+from atwood.errors import UnsupportedError, check_known
 from atwood.expr import depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import observer
@@ -275,8 +275,7 @@ def reduced(
     paths = [one.name for one in found.names]
     left = [path for path in paths if path not in names]
     if coordinate is not None:
-        if coordinate not in paths:
-            raise UsageError("no coordinate has this path", where=coordinate, advice=suggestion(coordinate, paths))
+        check_known(coordinate, paths, "no coordinate has this path")
         left = [*dict.fromkeys([*left, coordinate])]
     if not left and len(paths) == 1:
         left = paths

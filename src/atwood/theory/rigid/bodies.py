@@ -8,7 +8,7 @@ import numpy as np
 
 from atwood.arguments import FLAG, TEXT, one_of, optional, takes
 from atwood.arrays import FloatArray
-from atwood.errors import UnsupportedError, UsageError, suggestion
+from atwood.errors import UnsupportedError, UsageError, check_known
 from atwood.expr import OutputGroup, Program, evaluate
 from atwood.forms.assembly import Assembly
 from atwood.forms.program import state_groups
@@ -78,8 +78,7 @@ def principal_body(assembly: Assembly, body: str | None = None) -> PrincipalBody
         advice = f"Name one with body=: {', '.join([*frames][:6])}." if frames else "Add a RigidBody, or a Box."
         raise UsageError(f"it has {len(frames)} rigid bodies", where=where, advice=advice)
     part = next(iter(frames)) if body is None else body
-    if part not in frames:
-        raise UsageError("there is no such rigid body", where=part, advice=suggestion(part, frames))
+    check_known(part, frames, "there is no such rigid body")
     ends = mechanism.graph, mechanism.bodies, mechanism.locals_, mechanism.space
     carried, graph = CarriedInertia(*ends, part, frames[part]), mechanism.table.graph
     given = [carried.mass, *carried.center_of_mass, *(entry for row in carried.inertia for entry in row)]
