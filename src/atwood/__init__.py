@@ -81,21 +81,12 @@ from atwood.model.values.rotation import FREE, Rotation, normals, turn
 from atwood.model.values.space import Vector, as_vector, cross, dot, norm
 
 if TYPE_CHECKING:
-    from atwood.checking import (
-        CheckReport as CheckReport,
-        check as check,
-    )
+    from atwood.checking import CheckReport as CheckReport, check as check
     from atwood.exchange.c.export import export_c as export_c
     from atwood.exchange.environments.environment import Environment as Environment
-    from atwood.exchange.fmi.export import (
-        ExportedFMU as ExportedFMU,
-        export_fmu as export_fmu,
-    )
+    from atwood.exchange.fmi.export import ExportedFMU as ExportedFMU, export_fmu as export_fmu
     from atwood.exchange.fmi.part import FMU as FMU
-    from atwood.expr.sympy_bridge import (
-        Formula as Formula,
-        formula as formula,
-    )
+    from atwood.expr.sympy_bridge import Formula as Formula, formula as formula
     from atwood.forms.assembly import Assembly as Assembly
     from atwood.model.compose.serialization import (
         from_data as from_data,
@@ -103,23 +94,10 @@ if TYPE_CHECKING:
         save_scene as save_scene,
         to_data as to_data,
     )
-    from atwood.pipeline import (
-        assemble as assemble,
-        simulate as simulate,
-    )
-    from atwood.plotting.diagram import (
-        Diagram as Diagram,
-        diagram as diagram,
-    )
-    from atwood.plotting.drawing import (
-        animate as animate,
-        plot_mechanism as plot_mechanism,
-        plot_mode as plot_mode,
-    )
-    from atwood.plotting.pages.page import (
-        Page as Page,
-        page as page,
-    )
+    from atwood.pipeline import assemble as assemble, simulate as simulate
+    from atwood.plotting.diagram import Diagram as Diagram, diagram as diagram
+    from atwood.plotting.drawing import animate as animate, plot_mechanism as plot_mechanism, plot_mode as plot_mode
+    from atwood.plotting.pages.page import Page as Page, page as page
     from atwood.plotting.pages.viewer import Viewer as Viewer
     from atwood.plotting.plots.energies import plot_energies as plot_energies
     from atwood.plotting.plots.fit import plot_fit as plot_fit
@@ -141,161 +119,146 @@ if TYPE_CHECKING:
         plot_top_path as plot_top_path,
     )
     from atwood.plotting.plots.sweep import plot_sweep as plot_sweep
-    from atwood.plotting.polhodes import (
-        plot_free_rotation as plot_free_rotation,
-        plot_polhodes as plot_polhodes,
-    )
-    from atwood.reporting import (
-        MechanismReport as MechanismReport,
-        report as report,
-    )
-    from atwood.result.files import (
-        SavedResult as SavedResult,
-        load_result as load_result,
-        save_result as save_result,
-    )
+    from atwood.plotting.polhodes import plot_free_rotation as plot_free_rotation, plot_polhodes as plot_polhodes
+    from atwood.reporting import MechanismReport as MechanismReport, report as report
+    from atwood.result.files import SavedResult as SavedResult, load_result as load_result, save_result as save_result
     from atwood.result.result import Result as Result
     from atwood.study.comparison.compare import compare as compare
-    from atwood.study.comparison.found import (
-        Comparison as Comparison,
-        ComparisonRow as ComparisonRow,
-    )
-    from atwood.study.comparison.long_runs import (
-        LongComparison as LongComparison,
-        compare_long as compare_long,
-    )
+    from atwood.study.comparison.found import Comparison as Comparison, ComparisonRow as ComparisonRow
+    from atwood.study.comparison.long_runs import LongComparison as LongComparison, compare_long as compare_long
     from atwood.study.optimal.optimize import Optimum as Optimum, optimize as optimize
     from atwood.study.sensitivities.fit import Fit as Fit, fit as fit
-    from atwood.study.sensitivities.frameworks import (
-        RunFunction as RunFunction,
-        as_jax as as_jax,
-        as_torch as as_torch,
-    )
-    from atwood.study.sensitivities.sensitivities import (
-        Sensitivities as Sensitivities,
-        sensitivities as sensitivities,
-    )
+    from atwood.study.sensitivities.frameworks import RunFunction as RunFunction, as_jax as as_jax, as_torch as as_torch
+    from atwood.study.sensitivities.sensitivities import Sensitivities as Sensitivities, sensitivities as sensitivities
     from atwood.study.sweeps.files import load_sweep as load_sweep
     from atwood.study.sweeps.indices import SobolIndices as SobolIndices
     from atwood.study.sweeps.result import Sweep as Sweep
     from atwood.study.sweeps.sweep import sweep as sweep
-    from atwood.theory.action import (
-        Action as Action,
-        ActionAngle as ActionAngle,
+    from atwood.theory.action.action_angle import ActionAngle as ActionAngle, action_angle as action_angle
+    from atwood.theory.action.adiabatic import (
         AdiabaticInvariant as AdiabaticInvariant,
+        adiabatic_invariant as adiabatic_invariant,
+    )
+    from atwood.theory.action.boundary_values import (
         JoiningMotion as JoiningMotion,
-        PrincipalFunction as PrincipalFunction,
+        boundary_value_motions as boundary_value_motions,
+    )
+    from atwood.theory.action.integral import (
+        Action as Action,
         SecondVariation as SecondVariation,
-        SeparatedMotion as SeparatedMotion,
-        Separation as Separation,
         Variation as Variation,
         action as action,
-        action_angle as action_angle,
-        adiabatic_invariant as adiabatic_invariant,
-        boundary_value_motions as boundary_value_motions,
+    )
+    from atwood.theory.action.principal import (
+        PrincipalFunction as PrincipalFunction,
         principal_function as principal_function,
+    )
+    from atwood.theory.action.separation import (
+        SeparatedMotion as SeparatedMotion,
+        Separation as Separation,
         separation as separation,
     )
-    from atwood.theory.dynamics import (
-        Dynamics as Dynamics,
+    from atwood.theory.dynamics.dynamics import Dynamics as Dynamics, dynamics as dynamics
+    from atwood.theory.dynamics.initial_values import (
         StartSolution as StartSolution,
-        dynamics as dynamics,
         solve_initial_values as solve_initial_values,
     )
-    from atwood.theory.equations import (
+    from atwood.theory.equations.equations import (
         EquationsOfMotion as EquationsOfMotion,
         PartOfEquations as PartOfEquations,
         equations as equations,
     )
-    from atwood.theory.flow import (
+    from atwood.theory.flow.cloud import (
         LiouvilleDensity as LiouvilleDensity,
-        LyapunovExponents as LyapunovExponents,
         PhaseCloud as PhaseCloud,
+        liouville_density as liouville_density,
+        phase_cloud as phase_cloud,
+    )
+    from atwood.theory.flow.phase_portrait import (
         PhasePortrait as PhasePortrait,
         PoincareSection as PoincareSection,
         RestPoint as RestPoint,
         Separatrix as Separatrix,
-        TangentFlow as TangentFlow,
-        liouville_density as liouville_density,
-        lyapunov_exponents as lyapunov_exponents,
-        phase_cloud as phase_cloud,
         phase_portrait as phase_portrait,
         poincare_section as poincare_section,
+    )
+    from atwood.theory.flow.tangent_flow import (
+        LyapunovExponents as LyapunovExponents,
+        TangentFlow as TangentFlow,
+        lyapunov_exponents as lyapunov_exponents,
         tangent_flow as tangent_flow,
     )
-    from atwood.theory.formulas.sheet import (
-        FormulaSheet as FormulaSheet,
-        Statement as Statement,
-    )
-    from atwood.theory.hamiltonian import (
+    from atwood.theory.formulas.sheet import FormulaSheet as FormulaSheet, Statement as Statement
+    from atwood.theory.hamiltonian.conjugate import Conjugate as Conjugate, legendre_transform as legendre_transform
+    from atwood.theory.hamiltonian.flow import (
         Algebra as Algebra,
-        CanonicalTransformation as CanonicalTransformation,
-        Conjugate as Conjugate,
         Flow as Flow,
-        Hamiltonian as Hamiltonian,
-        PointTransformation as PointTransformation,
         bracket_algebra as bracket_algebra,
-        canonical_transformation as canonical_transformation,
         flow_of as flow_of,
+    )
+    from atwood.theory.hamiltonian.hamiltonian import Hamiltonian as Hamiltonian, hamiltonian as hamiltonian
+    from atwood.theory.hamiltonian.point_transformations import (
+        PointTransformation as PointTransformation,
+        point_transformation as point_transformation,
+    )
+    from atwood.theory.hamiltonian.transformations import (
+        CanonicalTransformation as CanonicalTransformation,
+        canonical_transformation as canonical_transformation,
         fundamental_brackets as fundamental_brackets,
         generated_transformation as generated_transformation,
-        hamiltonian as hamiltonian,
-        legendre_transform as legendre_transform,
-        point_transformation as point_transformation,
         poisson_bracket as poisson_bracket,
         poisson_brackets as poisson_brackets,
         total_derivative as total_derivative,
     )
-    from atwood.theory.linear import (
+    from atwood.theory.linear.branches import (
         BranchPoint as BranchPoint,
-        Equilibria as Equilibria,
-        Equilibrium as Equilibrium,
         EquilibriumBranch as EquilibriumBranch,
         EquilibriumBranches as EquilibriumBranches,
-        LinearModel as LinearModel,
+        equilibrium_branches as equilibrium_branches,
+    )
+    from atwood.theory.linear.equilibria import (
+        Equilibria as Equilibria,
+        Equilibrium as Equilibrium,
+        equilibria as equilibria,
+    )
+    from atwood.theory.linear.linear_model import LinearModel as LinearModel
+    from atwood.theory.linear.linearize import linearize as linearize
+    from atwood.theory.linear.normal_modes import (
         NormalModes as NormalModes,
         RootLocus as RootLocus,
-        Trim as Trim,
-        equilibria as equilibria,
-        equilibrium_branches as equilibrium_branches,
-        linearize as linearize,
         normal_modes as normal_modes,
         root_locus as root_locus,
-        trim as trim,
     )
-    from atwood.theory.oscillations import (
+    from atwood.theory.linear.steady import Trim as Trim, trim as trim
+    from atwood.theory.oscillations.equilibria import (
         SymbolicEquilibria as SymbolicEquilibria,
         SymbolicEquilibrium as SymbolicEquilibrium,
-        SymbolicMode as SymbolicMode,
-        SymbolicModes as SymbolicModes,
     )
-    from atwood.theory.reduction import (
-        ReducedMotion as ReducedMotion,
-        Routhian as Routhian,
-        reduced as reduced,
-        routhian as routhian,
-    )
-    from atwood.theory.rigid import (
+    from atwood.theory.oscillations.modes import SymbolicMode as SymbolicMode, SymbolicModes as SymbolicModes
+    from atwood.theory.reduction.reduced import ReducedMotion as ReducedMotion, reduced as reduced
+    from atwood.theory.reduction.routhian import Routhian as Routhian, routhian as routhian
+    from atwood.theory.rigid.angles import rotation_kinematics as rotation_kinematics
+    from atwood.theory.rigid.bodies import rigid_body as rigid_body
+    from atwood.theory.rigid.frames import foucault_formulas as foucault_formulas
+    from atwood.theory.rigid.free import (
         FreeRotation as FreeRotation,
-        SymmetricTop as SymmetricTop,
-        foucault_formulas as foucault_formulas,
         free_body as free_body,
         free_rotation as free_rotation,
-        inertia_tensor as inertia_tensor,
-        rigid_body as rigid_body,
-        rotation_kinematics as rotation_kinematics,
+    )
+    from atwood.theory.rigid.tensors import inertia_tensor as inertia_tensor
+    from atwood.theory.rigid.tops import (
+        SymmetricTop as SymmetricTop,
         symmetric_top as symmetric_top,
         top_formulas as top_formulas,
     )
-    from atwood.theory.symmetry import (
+    from atwood.theory.symmetry.conserved import (
         Conserved as Conserved,
         ConservedQuantity as ConservedQuantity,
-        MovedScene as MovedScene,
-        Symmetry as Symmetry,
         conserved as conserved,
-        galilean as galilean,
-        moved as moved,
     )
+    from atwood.theory.symmetry.galilean import galilean as galilean
+    from atwood.theory.symmetry.moved import MovedScene as MovedScene, moved as moved
+    from atwood.theory.symmetry.stated import Symmetry as Symmetry
 
     __version__: str
 
@@ -328,39 +291,51 @@ _ROOMS = {
     "atwood.study.sensitivities.frameworks": ("RunFunction", "as_jax", "as_torch"),
     "atwood.study.sensitivities.sensitivities": ("Sensitivities", "sensitivities"),
     "atwood.study.comparison.long_runs": ("LongComparison", "compare_long"),
-    "atwood.theory.action": (
-        "Action", "ActionAngle", "AdiabaticInvariant", "JoiningMotion", "PrincipalFunction", "SecondVariation",
-        "SeparatedMotion", "Separation", "Variation", "action", "action_angle", "adiabatic_invariant",
-        "boundary_value_motions", "principal_function", "separation",
+    "atwood.theory.action.action_angle": ("ActionAngle", "action_angle"),
+    "atwood.theory.action.adiabatic": ("AdiabaticInvariant", "adiabatic_invariant"),
+    "atwood.theory.action.boundary_values": ("JoiningMotion", "boundary_value_motions"),
+    "atwood.theory.action.integral": ("Action", "SecondVariation", "Variation", "action"),
+    "atwood.theory.action.principal": ("PrincipalFunction", "principal_function"),
+    "atwood.theory.action.separation": ("SeparatedMotion", "Separation", "separation"),
+    "atwood.theory.hamiltonian.conjugate": ("Conjugate", "legendre_transform"),
+    "atwood.theory.hamiltonian.flow": ("Algebra", "Flow", "bracket_algebra", "flow_of"),
+    "atwood.theory.hamiltonian.hamiltonian": ("Hamiltonian", "hamiltonian"),
+    "atwood.theory.hamiltonian.point_transformations": ("PointTransformation", "point_transformation"),
+    "atwood.theory.hamiltonian.transformations": (
+        "CanonicalTransformation", "canonical_transformation", "fundamental_brackets", "generated_transformation",
+        "poisson_bracket", "poisson_brackets", "total_derivative",
     ),
-    "atwood.theory.hamiltonian": (
-        "Algebra", "CanonicalTransformation", "Conjugate", "Flow", "Hamiltonian", "PointTransformation",
-        "bracket_algebra", "canonical_transformation", "flow_of", "fundamental_brackets", "generated_transformation",
-        "hamiltonian", "legendre_transform", "point_transformation", "poisson_bracket", "poisson_brackets",
-        "total_derivative",
+    "atwood.theory.dynamics.dynamics": ("Dynamics", "dynamics"),
+    "atwood.theory.dynamics.initial_values": ("StartSolution", "solve_initial_values"),
+    "atwood.theory.equations.equations": ("EquationsOfMotion", "PartOfEquations", "equations"),
+    "atwood.theory.flow.cloud": ("LiouvilleDensity", "PhaseCloud", "liouville_density", "phase_cloud"),
+    "atwood.theory.flow.phase_portrait": (
+        "PhasePortrait", "PoincareSection", "RestPoint", "Separatrix", "phase_portrait", "poincare_section",
     ),
-    "atwood.theory.dynamics": ("Dynamics", "StartSolution", "dynamics", "solve_initial_values"),
-    "atwood.theory.equations": ("EquationsOfMotion", "PartOfEquations", "equations"),
-    "atwood.theory.flow": (
-        "LiouvilleDensity", "LyapunovExponents", "PhaseCloud", "PhasePortrait", "PoincareSection", "RestPoint",
-        "Separatrix", "TangentFlow", "liouville_density", "lyapunov_exponents", "phase_cloud", "phase_portrait",
-        "poincare_section", "tangent_flow",
+    "atwood.theory.flow.tangent_flow": ("LyapunovExponents", "TangentFlow", "lyapunov_exponents", "tangent_flow"),
+    "atwood.theory.linear.branches": (
+        "BranchPoint", "EquilibriumBranch", "EquilibriumBranches", "equilibrium_branches",
     ),
-    "atwood.theory.linear": (
-        "BranchPoint", "Equilibria", "Equilibrium", "EquilibriumBranch", "EquilibriumBranches",
-        "LinearModel", "NormalModes",
-        "RootLocus", "Trim", "equilibria", "equilibrium_branches", "linearize", "normal_modes", "root_locus", "trim",
-    ),
-    "atwood.theory.oscillations": ("SymbolicEquilibria", "SymbolicEquilibrium", "SymbolicMode", "SymbolicModes"),
-    "atwood.theory.reduction": ("ReducedMotion", "Routhian", "reduced", "routhian"),
+    "atwood.theory.linear.equilibria": ("Equilibria", "Equilibrium", "equilibria"),
+    "atwood.theory.linear.linear_model": ("LinearModel",),
+    "atwood.theory.linear.linearize": ("linearize",),
+    "atwood.theory.linear.normal_modes": ("NormalModes", "RootLocus", "normal_modes", "root_locus"),
+    "atwood.theory.linear.steady": ("Trim", "trim"),
+    "atwood.theory.oscillations.equilibria": ("SymbolicEquilibria", "SymbolicEquilibrium"),
+    "atwood.theory.oscillations.modes": ("SymbolicMode", "SymbolicModes"),
+    "atwood.theory.reduction.reduced": ("ReducedMotion", "reduced"),
+    "atwood.theory.reduction.routhian": ("Routhian", "routhian"),
     "atwood.theory.formulas.sheet": ("FormulaSheet", "Statement"),
-    "atwood.theory.rigid": (
-        "FreeRotation", "SymmetricTop", "foucault_formulas", "free_body", "free_rotation", "inertia_tensor",
-        "rigid_body", "rotation_kinematics", "symmetric_top", "top_formulas",
-    ),
-    "atwood.theory.symmetry": (
-        *("Conserved", "ConservedQuantity", "MovedScene", "Symmetry", "conserved", "galilean", "moved"),
-    ),
+    "atwood.theory.rigid.angles": ("rotation_kinematics",),
+    "atwood.theory.rigid.bodies": ("rigid_body",),
+    "atwood.theory.rigid.frames": ("foucault_formulas",),
+    "atwood.theory.rigid.free": ("FreeRotation", "free_body", "free_rotation"),
+    "atwood.theory.rigid.tensors": ("inertia_tensor",),
+    "atwood.theory.rigid.tops": ("SymmetricTop", "symmetric_top", "top_formulas"),
+    "atwood.theory.symmetry.conserved": ("Conserved", "ConservedQuantity", "conserved"),
+    "atwood.theory.symmetry.galilean": ("galilean",),
+    "atwood.theory.symmetry.moved": ("MovedScene", "moved"),
+    "atwood.theory.symmetry.stated": ("Symmetry",),
 }  # fmt: skip
 _LATER = {name: room for room, names in _ROOMS.items() for name in names}
 """Names whose modules are imported when they are first used; type checkers read them above."""

@@ -50,7 +50,7 @@ def run_of(request: Request) -> Result:
         check_view(assembly.mechanism.space.name, request.view)
     monitor = None
     if getattr(request, "conserved", False):
-        from atwood.theory.symmetry import conserved
+        from atwood.theory.symmetry.conserved import conserved
 
         monitor = conserved(assembly)
     t_start, t_end = assembly.flat.t_start, assembly.flat.t_end if request.t_end is None else request.t_end

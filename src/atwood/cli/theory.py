@@ -30,7 +30,9 @@ from atwood.theory.formulas.named import NAMED
 from atwood.theory.formulas.notation import notation_of
 from atwood.theory.formulas.tree import Symbol
 from atwood.theory.hamiltonian.hamiltonian import read_hamiltonian
-from atwood.theory.linear import NormalModes, equilibria, equilibrium_branches, normal_modes
+from atwood.theory.linear.branches import equilibrium_branches
+from atwood.theory.linear.equilibria import equilibria
+from atwood.theory.linear.normal_modes import NormalModes, normal_modes
 
 _WRITTEN = ("latex", "markdown", "html", "python")
 """Languages in which results are written down, each an option; Python where they can be."""

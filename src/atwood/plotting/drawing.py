@@ -22,7 +22,7 @@ from atwood.plotting.scene3d.drawing import draw_space, space_panels
 from atwood.plotting.scene3d.picture import SpacePicture, make_space_picture
 from atwood.plotting.sheet import Sheet
 from atwood.result.result import Result
-from atwood.theory.linear import NormalModes
+from atwood.theory.linear.normal_modes import NormalModes
 
 if TYPE_CHECKING:
     from atwood.plotting.figure import Animation

@@ -12,8 +12,8 @@ from atwood.errors import UsageError
 from atwood.plotting.canvas import COLOURS, GREY, INK, Axes, Figure, finished, headed, new_figure
 from atwood.plotting.sphere import SEEN, draw_on_sphere, draw_sphere
 from atwood.result.result import Result
-from atwood.theory.rigid import FreeRotation
 from atwood.theory.rigid.bodies import principal_body
+from atwood.theory.rigid.free import FreeRotation
 
 _EQUAL = 1e-9
 """Moments that differ by less, relative to the largest, are equal."""

@@ -11,7 +11,7 @@ import pytest
 import sympy
 
 from atwood import Scene, UnsupportedError, equations, hamiltonian, separation, simulate
-from atwood.theory.action import Separation
+from atwood.theory.action.separation import Separation
 from atwood.theory.hamiltonian.phase_space import vanishes
 from atwood_library import Charge, Ground, PointMass, PointOnSurface, Potential
 from atwood_library.scenes import SCENES

@@ -10,7 +10,7 @@ import pytest
 from scipy.special import beta, ellipe, ellipk
 
 from atwood import Scene, SolveError, UsageError, action_angle, exp, hamiltonian, separation
-from atwood.theory.action import Separation
+from atwood.theory.action.separation import Separation
 from atwood_library import PointMass, Potential
 from atwood_library.scenes import (
     ChargedParticle,

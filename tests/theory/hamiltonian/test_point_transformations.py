@@ -9,8 +9,8 @@ import pytest
 import sympy
 
 from atwood import Scene, UnsupportedError, dynamics, equations, hamiltonian, point_transformation, reduced, simulate
-from atwood.theory.hamiltonian import PointTransformation
 from atwood.theory.hamiltonian.phase_space import vanishes
+from atwood.theory.hamiltonian.point_transformations import PointTransformation
 from atwood.theory.hamiltonian.tidied import tidied
 from atwood_library import Damper, Drag, Force, Ground, PointMass, Potential
 from atwood_library.scenes import SCENES

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from atwood import Scene, Symmetry, UsageError, conserved, equations
 from atwood.cli import main
-from atwood.theory.symmetry import Conserved
+from atwood.theory.symmetry.conserved import Conserved
 from atwood_library import Charge, Damper, Ground, PairPotential, PointMass, Rod, Spring
 from atwood_library.scenes import SCENES
 

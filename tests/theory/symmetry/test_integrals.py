@@ -10,7 +10,7 @@ import sympy
 
 from atwood import Scene, Symmetry, UsageError, conserved, equations, simulate
 from atwood.functions import cos, sin, sqrt
-from atwood.theory.symmetry import Conserved
+from atwood.theory.symmetry.conserved import Conserved
 from atwood_library import Charge, LorentzForce, PointMass, Potential
 from atwood_library.scenes import SCENES
 

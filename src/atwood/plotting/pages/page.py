@@ -348,7 +348,7 @@ def _shown(value: Any) -> str:
 
 def _equations(result: Result) -> tuple[str, str]:
     """Return the equations of motion as MathML and as LaTeX, or why there are none here."""
-    from atwood.theory.equations import equations
+    from atwood.theory.equations.equations import equations
 
     try:
         size = sum(result.first_plan.program.operations.values())

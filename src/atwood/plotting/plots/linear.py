@@ -12,7 +12,9 @@ from atwood.arguments import FILE, TEXT, each as several, instance, number, opti
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError, check_known
 from atwood.plotting.canvas import COLOURS, GREY, INK, Figure, finished, headed, legend, new_figure, polish
-from atwood.theory.linear import EquilibriumBranches, LinearModel, RootLocus
+from atwood.theory.linear.branches import EquilibriumBranches
+from atwood.theory.linear.linear_model import LinearModel
+from atwood.theory.linear.normal_modes import RootLocus
 
 _POINTS = 600
 

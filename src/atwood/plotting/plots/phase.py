@@ -10,7 +10,8 @@ from atwood.arguments import FILE, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.plotting.canvas import COLOURS, GREY, INK, Axes, Figure, finished, headed, new_figure, polish, with_unit
-from atwood.theory.flow import PhaseCloud, PhasePortrait, PoincareSection
+from atwood.theory.flow.cloud import PhaseCloud
+from atwood.theory.flow.phase_portrait import PhasePortrait, PoincareSection
 
 _HALF_TURNS = {-4: "-2 pi", -3: "-3 pi/2", -2: "-pi", -1: "-pi/2", 0: "0", 1: "pi/2", 2: "pi", 3: "3 pi/2", 4: "2 pi"}
 

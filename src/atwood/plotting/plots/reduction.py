@@ -24,8 +24,8 @@ from atwood.plotting.canvas import (
     with_unit,
 )
 from atwood.plotting.sphere import draw_on_sphere, draw_sphere
-from atwood.theory.reduction import ReducedMotion
-from atwood.theory.rigid import SymmetricTop
+from atwood.theory.reduction.reduced import ReducedMotion
+from atwood.theory.rigid.tops import SymmetricTop
 
 _POINTS = 800
 

@@ -26,7 +26,7 @@ from atwood.simulation.problem.arguments import LIMITS, NAME, PROGRESS
 from atwood.simulation.problem.options import how_solved
 from atwood.study.comparison.found import environment
 from atwood.table import Shown, Table, table
-from atwood.theory.symmetry import conserved
+from atwood.theory.symmetry.conserved import conserved
 
 _WINDOW = 50
 """Samples in the period before each mark."""

@@ -208,7 +208,7 @@ def _by_quadrature(
     e = assembly.reduced
     if assembly.modes or best.events or e.constraints or not 0 < len(e.speeds) <= _FEW:
         return None
-    from atwood.theory.reduction import reduced
+    from atwood.theory.reduction.reduced import reduced
 
     try:
         motion = reduced(assembly)

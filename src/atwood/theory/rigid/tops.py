@@ -18,7 +18,7 @@ from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, smooth_assembly_of
 from atwood.theory.formulas.notation import SYMBOLS
 from atwood.theory.formulas.sheet import FormulaSheet, statements_of
-from atwood.theory.reduction import reduced
+from atwood.theory.reduction.reduced import reduced
 from atwood.theory.rigid.bodies import principal_body
 from atwood.theory.rigid.free import integrated
 
