@@ -21,36 +21,6 @@ from atwood.lazy_dataclasses import dataclass, replace
 if TYPE_CHECKING:
     from pathlib import Path
 
-__all__ = [
-    "ANYTHING",
-    "ARRAY",
-    "BY_PATH",
-    "CALLBACK",
-    "DOC",
-    "FILE",
-    "FLAG",
-    "MAPPING",
-    "NAME",
-    "PATHS",
-    "TEXT",
-    "Kind",
-    "Refused",
-    "check",
-    "check_fields",
-    "command",
-    "each",
-    "either",
-    "instance",
-    "number",
-    "one_of",
-    "optional",
-    "real",
-    "show",
-    "takes",
-    "takes_names",
-    "whole",
-]
-
 _F = TypeVar("_F", bound=Callable[..., Any])
 _T = TypeVar("_T")
 
