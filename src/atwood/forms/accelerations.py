@@ -19,15 +19,7 @@ from operator import add
 from typing import TYPE_CHECKING, Literal, cast
 
 from atwood.errors import AtwoodError
-from atwood.expr import (
-    Expression,
-    OutputGroup,
-    Program,
-    jacobian,
-    live,
-    solve,
-    substitute,
-)
+from atwood.expr import Expression, OutputGroup, Program, jacobian, live, solve, substitute
 from atwood.expr.simplify.alike import Alike
 from atwood.expr.simplify.collect import cost
 from atwood.expr.simplify.polynomial import Effort

@@ -7,14 +7,7 @@ modules, in between, as one does in a notebook.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from types import (
-    BuiltinFunctionType,
-    CodeType,
-    FunctionType,
-    GetSetDescriptorType,
-    MemberDescriptorType,
-    ModuleType,
-)
+from types import BuiltinFunctionType, CodeType, FunctionType, GetSetDescriptorType, MemberDescriptorType, ModuleType
 from typing import Any
 
 _PLAIN = (int, float, complex, str, bytes, type(None))

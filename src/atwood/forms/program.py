@@ -18,17 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
-from atwood.expr import (
-    Expression,
-    InputGroup,
-    OutputGroup,
-    Program,
-    jacobian,
-    jvp,
-    live,
-    substitute,
-    sweeps_exceed,
-)
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, jacobian, jvp, live, substitute, sweeps_exceed
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.stages import stage

@@ -30,11 +30,7 @@ from atwood.mechanics.dynamics.augmented import difference
 from atwood.mechanics.dynamics.equations import Equations, force_rows, motion_rows
 from atwood.mechanics.dynamics.forces import Site, in_joint_coordinates, place_part
 from atwood.mechanics.dynamics.inertia import Masses, add_masses, check_masses
-from atwood.mechanics.kinematics.mechanism import (
-    Derivation,
-    Mechanism,
-    derivation_of,
-)
+from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, derivation_of
 from atwood.mechanics.kinematics.motion import Motion, Movement, motion_in_plane, motion_in_space
 from atwood.mechanics.kinematics.orientation import body_offsets
 from atwood.mechanics.kinematics.positions import BodyShape, Kinematics, shapes

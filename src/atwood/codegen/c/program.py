@@ -10,14 +10,7 @@ from collections.abc import Iterable, Sequence
 from functools import partial
 
 from atwood.codegen.c.printer import literal
-from atwood.codegen.chunks import (
-    CHOICES,
-    FUNCTIONS,
-    ChunkWriter,
-    print_bodies,
-    write_chunks,
-    write_places,
-)
+from atwood.codegen.chunks import CHOICES, FUNCTIONS, ChunkWriter, print_bodies, write_chunks, write_places
 from atwood.codegen.llvm.layout import Body, main_body, prologue_body
 from atwood.codegen.llvm.text import OWN_FUNCTIONS
 from atwood.errors import UnsupportedError

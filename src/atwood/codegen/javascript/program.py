@@ -10,15 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from functools import partial
 
-from atwood.codegen.chunks import (
-    CHOICES,
-    FUNCTIONS,
-    ChunkWriter,
-    Places,
-    print_bodies,
-    write_chunks,
-    write_places,
-)
+from atwood.codegen.chunks import CHOICES, FUNCTIONS, ChunkWriter, Places, print_bodies, write_chunks, write_places
 from atwood.codegen.functions import write_routines
 from atwood.codegen.javascript.printer import literal, print_routines
 from atwood.codegen.llvm.layout import Body, MatrixKey, Unit, main_body, prologue_body

@@ -21,15 +21,7 @@ from atwood.mechanics.dynamics.inertia import CarriedInertia
 from atwood.mechanics.kinematics.mechanism import Mechanism, world_position
 from atwood.mechanics.kinematics.orientation import node_axes, spin_in_world
 from atwood.mechanics.outputs.reactions import Reaction
-from atwood.mechanics.outputs.totals import (
-    Totals,
-    add_totals,
-    add_up,
-    energy_rate,
-    of_mass,
-    part_energies,
-    part_totals,
-)
+from atwood.mechanics.outputs.totals import Totals, add_totals, add_up, energy_rate, of_mass, part_energies, part_totals
 from atwood.model.declare.component import Binding, bind
 from atwood.model.declare.connectors import Frame, JointCoordinate, Motion
 from atwood.model.declare.law_results import call_law, law_value, not_evaluated, one_scalar

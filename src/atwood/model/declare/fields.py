@@ -13,10 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any, Self
 
-from atwood.arguments import (
-    real,
-    show,
-)
+from atwood.arguments import real, show
 from atwood.errors import AtwoodError, ParameterError, near_matches, suggestion
 from atwood.model.declare.function_values import by_name_only, is_sympy, make_function
 from atwood.model.declare.parameter_expressions import ParameterExpression

@@ -14,17 +14,8 @@ from atwood.model.declare.connectors import Frame, JointCoordinate, Motion
 from atwood.model.declare.fields import ParameterSpec
 from atwood.model.declare.function_values import Function
 from atwood.model.local.flatten import FlatScene, Part
-from atwood.model.local.joint_coordinates import (
-    JointCoordinateUse,
-    JointReference,
-    find_joint_references,
-)
-from atwood.model.local.parts import (
-    LocalConnector,
-    LocalPart,
-    contact_states,
-    state_values,
-)
+from atwood.model.local.joint_coordinates import JointCoordinateUse, JointReference, find_joint_references
+from atwood.model.local.parts import LocalConnector, LocalPart, contact_states, state_values
 from atwood.model.values.space import FIXED_AXES, Space, Vector, planar_axes
 
 

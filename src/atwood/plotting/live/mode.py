@@ -12,16 +12,7 @@ from atwood.codegen.javascript.printer import BITS, print_routines
 from atwood.codegen.javascript.program import print_functions, print_program
 from atwood.codegen.llvm.linear_systems import write_elimination
 from atwood.errors import AtwoodError
-from atwood.expr import (
-    Expression,
-    InputGroup,
-    OutputGroup,
-    Program,
-    Scalar,
-    depends_on,
-    read_by,
-    substitute,
-)
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, Scalar, depends_on, read_by, substitute
 from atwood.forms.accelerations import accelerations_of
 from atwood.forms.assembly import Assembly
 from atwood.forms.event_program import solved_reactions

@@ -15,10 +15,7 @@ from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.mechanics.kinematics.orientation import (
-    FARTHEST_COSINE,
-    orientation_margin,
-)
+from atwood.mechanics.kinematics.orientation import FARTHEST_COSINE, orientation_margin
 from atwood.mechanics.outputs.event_functions import EventFunction
 from atwood.topology.orientation_coordinates import Orientation, OrientationCoordinates
 

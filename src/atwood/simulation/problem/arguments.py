@@ -8,20 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from atwood.arguments import (
-    CALLBACK,
-    FLAG,
-    TEXT,
-    Kind,
-    Refused,
-    each,
-    either,
-    number,
-    one_of,
-    optional,
-    show,
-    whole,
-)
+from atwood.arguments import CALLBACK, FLAG, TEXT, Kind, Refused, each, either, number, one_of, optional, show, whole
 from atwood.errors import AtwoodError, UsageError
 from atwood.forms.residuals import LEVELS
 from atwood.integrators.methods import AUTO, GAUSS, METHODS

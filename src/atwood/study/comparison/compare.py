@@ -25,13 +25,7 @@ from atwood.result.result import Result
 from atwood.simulation.problem.arguments import FORM, FORMS, LEVEL, LIMITS, NAME, PROGRESS, RTOL, T_END, check_span
 from atwood.simulation.run.choice import implicit_solver
 from atwood.study.comparison.found import Comparison, ComparisonRow, environment
-from atwood.study.comparison.reference import (
-    Assembled,
-    Reference,
-    errors_by_part,
-    find_reference,
-    run_form,
-)
+from atwood.study.comparison.reference import Assembled, Reference, errors_by_part, find_reference, run_form
 from atwood.study.comparison.work import shares_of
 
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)

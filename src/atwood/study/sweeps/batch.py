@@ -26,13 +26,7 @@ from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.curved_laws import find_curved
 from atwood.study.sweeps.batch_values import ParameterRows, StartRows, read_starts
 from atwood.study.sweeps.modes import find_mode
-from atwood.study.sweeps.motions import (
-    Way,
-    find_way,
-    make_ready,
-    open_lanes,
-    open_places,
-)
+from atwood.study.sweeps.motions import Way, find_way, make_ready, open_lanes, open_places
 from atwood.study.sweeps.readout import read_quantities
 from atwood.study.sweeps.runs import Records, SweepRequest, shared_work
 from atwood.study.sweeps.waves import Waves

@@ -20,16 +20,7 @@ from atwood.lazy_dataclasses import dataclass, replace
 from atwood.table import Shown, Table, table
 from atwood.theory.formulas.mathml import as_mathml
 from atwood.theory.formulas.named import NAMED, with_given_names
-from atwood.theory.formulas.page import (
-    Line,
-    Matrix,
-    Section,
-    as_html,
-    as_latex,
-    as_markdown,
-    as_text,
-    with_names,
-)
+from atwood.theory.formulas.page import Line, Matrix, Section, as_html, as_latex, as_markdown, as_text, with_names
 from atwood.theory.formulas.printers import latex, text
 from atwood.theory.formulas.reading import latex_of, read_formula, text_of
 from atwood.theory.formulas.tree import Name, Symbol, names_in

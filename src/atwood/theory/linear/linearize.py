@@ -22,14 +22,7 @@ from atwood.pipeline import SCENE
 from atwood.simulation.problem.arguments import FORM
 from atwood.theory.linear.displacements import Minimal, find_minimal, image_of, pulled_back
 from atwood.theory.linear.linear_model import LinearModel
-from atwood.theory.linear.operating_point import (
-    AT,
-    At,
-    OperatingPoint,
-    find_operating_point,
-    speed_name,
-    values_at,
-)
+from atwood.theory.linear.operating_point import AT, At, OperatingPoint, find_operating_point, speed_name, values_at
 from atwood.theory.linear.steady import Steady, find_steady, pace_of, still
 from atwood.theory.linear.variations import Flow, LinearScene
 from atwood.tolerances import tolerances

@@ -27,14 +27,7 @@ from atwood.numerics.rank import null_space
 from atwood.pipeline import SCENE, smooth_assembly_of
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.theory.linear.displacements import Minimal
-from atwood.theory.linear.operating_point import (
-    AT,
-    At,
-    OperatingPoint,
-    find_operating_point,
-    moved_to,
-    values_at,
-)
+from atwood.theory.linear.operating_point import AT, At, OperatingPoint, find_operating_point, moved_to, values_at
 from atwood.theory.linear.rest import slopes_at
 from atwood.theory.linear.variations import Flow, LinearScene
 from atwood.tolerances import tolerances
