@@ -61,7 +61,7 @@ def wrong_joint(trial: Trial, law: Law, mode: str) -> Iterator[DeclarationError]
             wrong = True
             yield error
     if not wrong:
-        yield from _wrong_freedom(trial, law, poses, [row for rows in slopes.values() for row in rows], mode)
+        yield from _wrong_freedom(trial, law, poses, [row for rows in slopes.values() for row in rows])
     yield from _wrong_coordinates(trial, law, poses_at, moving)
 
 
@@ -176,7 +176,7 @@ def _unsolved(
 
 
 def _wrong_freedom(
-    trial: Trial, law: Law, poses: Mapping[str, Pose], rows: Sequence[np.ndarray], mode: str
+    trial: Trial, law: Law, poses: Mapping[str, Pose], rows: Sequence[np.ndarray]
 ) -> Iterator[DeclarationError]:
     """Yield an error if the joint leaves fewer ways to move than the constraints that it solves."""
     mover = _mover(law)

@@ -34,14 +34,11 @@ class Node:
         Path of its first connector.
     members
         Its connectors as (part path, connector name).
-    has_frame
-        Whether one of them is a frame.
     """
 
     index: int
     name: str
     members: tuple[tuple[str, str], ...]
-    has_frame: bool
 
 
 @dataclass(frozen=True)
@@ -124,7 +121,7 @@ def build_graph(flat: FlatScene, locals_: Mapping[str, LocalPart]) -> MechanismG
     nodes, node_of = _nodes(flat)
     for path, local in locals_.items():
         node_of.update({(path, full): node_of[end] for full, end in local.borrowed.items()})
-    joints = tuple(_joint(path, local, joint, node_of) for path, local in locals_.items() for joint in local.joints)
+    joints = tuple(_joint(path, joint, node_of) for path, local in locals_.items() for joint in local.joints)
     return MechanismGraph(nodes, node_of, joints)
 
 
@@ -152,12 +149,12 @@ def _nodes(flat: FlatScene) -> tuple[tuple[Node, ...], dict[tuple[str, str], int
         meeting |= {a: None, b: None}
     met = connected_groups(meeting, connections)
     _check_frames(met, connections, frames, set(owners) - frames)
-    nodes = [Node(WORLD, "world", (), True)]
+    nodes = [Node(WORLD, "world", ())]
     node_of: dict[tuple[str, str], int] = {}
     order = {name: i for i, name in enumerate(owners)}
     groups = [[name for name in group if name in owners] for group in met]
     for group in sorted((sorted(g, key=order.__getitem__) for g in groups if g), key=lambda g: order[g[0]]):
-        node = Node(len(nodes), group[0], tuple(owners[name] for name in group), any(n in frames for n in group))
+        node = Node(len(nodes), group[0], tuple(owners[name] for name in group))
         nodes.append(node)
         node_of.update({owners[name]: node.index for name in group})
     return tuple(nodes), node_of
@@ -184,7 +181,7 @@ def _check_frames(
             )
 
 
-def _joint(path: str, local: LocalPart, joint: LocalJoint, node_of: Mapping[tuple[str, str], int]) -> Joint:
+def _joint(path: str, joint: LocalJoint, node_of: Mapping[tuple[str, str], int]) -> Joint:
     options, placement = joint.law.options, joint.placement
     ends = []
     for name in (options.a, options.b):

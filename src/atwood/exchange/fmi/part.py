@@ -126,7 +126,7 @@ def _class_of(path: Path, kind: str, _changed: int, _size: int) -> type[FMU]:
     left_out = dict(description.left_out)
     roles = _roles(description, chosen == "model exchange", left_out)
     history = History(Binary(path, description, chosen), roles)
-    fields = _names(roles, chosen)
+    fields = _names(roles)
     body: dict[str, Any] = {
         "__doc__": f"{description.name}, an FMU of FMI {description.version} as {chosen}.",
         "__module__": __name__,
@@ -166,7 +166,7 @@ def _roles(description: Description, is_exchange: bool, left_out: dict[str, str]
     return Roles(states, derivatives, tuple(inputs), tuple(outputs), tuple(parameters), indicators)
 
 
-def _names(roles: Roles, kind: str) -> dict[Variable, str]:
+def _names(roles: Roles) -> dict[Variable, str]:
     """Return the field of each variable, told apart from each other and from what every part has."""
     taken = {*dir(FMU), "moment", "next_event", "communication_step", "start_up", "time_event"}
     found: dict[Variable, str] = {}

@@ -62,8 +62,6 @@ class Masses:
         Inertia of each body that has mass and is not fixed.
     coupled
         Masses spread between nodes.
-    fixed_parts
-        Parts whose inertia cannot move.
     varying
         Rigid bodies whose inertia changes with time, with the paths of their parts; single points that do are among
         the coupled masses.
@@ -71,7 +69,6 @@ class Masses:
 
     bodies: Mapping[int, RigidMass]
     coupled: tuple[CoupledMass, ...]
-    fixed_parts: tuple[str, ...]
     varying: tuple[tuple[str, BodyInertia], ...] = ()
 
 
@@ -85,15 +82,11 @@ def add_masses(
     """Add up the inertia of all parts, with the parallel-axis theorem (Goldstein, section 5.3)."""
     shares: dict[int, list[RigidMass]] = {}
     coupled: list[CoupledMass] = []
-    fixed: list[str] = []
     varying: list[tuple[str, BodyInertia]] = []
 
     def share(part: str, node: int, mass: Scalar, center: Vector, moment: Scalar | Axes) -> None:
         body = bodies.body_of[node]
-        if is_zero(mass) and _is_nothing(moment):
-            return
-        if body == 0:
-            fixed.append(part)
+        if (is_zero(mass) and _is_nothing(moment)) or body == 0:
             return
         offsets, turns = layouts[body]
         turn = turns[node]
@@ -107,20 +100,17 @@ def add_masses(
             nodes = tuple(mechanism.node_of[(path, p.name)] for p in point.points)
             if len(nodes) == 1 and point not in local.varying:
                 share(path, nodes[0], point.masses[0][0], Vector(0.0, 0.0, 0.0), nothing)
-            elif not all(is_zero(m) for row in point.masses for m in row):
-                if all(bodies.body_of[node] == 0 for node in nodes):
-                    fixed.append(path)
-                else:
-                    coupled.append(CoupledMass(path, nodes, tuple(tuple(row) for row in point.masses)))
+            elif not all(is_zero(m) for row in point.masses for m in row) and any(map(bodies.body_of.get, nodes)):
+                coupled.append(CoupledMass(path, nodes, tuple(tuple(row) for row in point.masses)))
         for body in local.body_inertias:
             node = mechanism.node_of[(path, body.frame.name)]
             if body in local.varying:
-                varying.append((path, body)) if bodies.body_of[node] else fixed.append(path)
+                varying += [(path, body)] if bodies.body_of[node] else []
                 continue
             moment = tensor_of(path, body) if space.is_spatial else body.moment
             share(path, node, body.mass, body.center_of_mass, moment)
     merged = {index: _merge(found) for index, found in shares.items()}
-    return Masses(merged, tuple(coupled), tuple(fixed), tuple(varying))
+    return Masses(merged, tuple(coupled), tuple(varying))
 
 
 def tensor_of(path: str, body: BodyInertia) -> Axes:

@@ -162,7 +162,7 @@ def motion_in_plane(mechanism: Mechanism, forest: SpanningForest, shape_of: Mapp
     graph, space = mechanism.table.graph, mechanism.space
     every = _all_symbols(mechanism, forest)
     origin = tuple(graph.symbol(f"origin:{axis}") for axis in space.axis_names)
-    movable = place(graph, mechanism.graph, mechanism.bodies, forest, shape_of, mechanism.locals_, every, space, origin)
+    movable = place(graph, mechanism.bodies, forest, shape_of, every, space, origin)
     placements = _substituted(movable, dict.fromkeys(origin, graph.zero))
 
     def finish(solution: Solution, speeds: Solution = _NONE) -> Movement:

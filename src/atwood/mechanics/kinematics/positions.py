@@ -15,11 +15,11 @@ from atwood.errors import UnsupportedError
 from atwood.expr import Expression, Graph, Scalar, affine_coefficients, depends_on, jvp, live, substitute
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.kinematics.orientation import NodeTurn, node_axes, rotate
-from atwood.model.local.parts import LocalJoint, LocalPart
+from atwood.model.local.parts import LocalJoint
 from atwood.model.values.rotation import Axes, from_axes
 from atwood.model.values.space import Space, Vector, cross
 from atwood.topology.bodies import Bodies, Body
-from atwood.topology.graph import WORLD, Joint, MechanismGraph
+from atwood.topology.graph import WORLD, Joint
 from atwood.topology.spanning_forest import Attachment, SpanningForest
 
 Components = tuple[Expression, ...]
@@ -116,11 +116,9 @@ def shapes(
 
 def place(
     graph: Graph,
-    mechanism: MechanismGraph,
     bodies: Bodies,
     forest: SpanningForest,
     shape_of: Mapping[int, BodyShape],
-    locals_: Mapping[str, LocalPart],
     coordinates: Sequence[Expression],
     space: Space,
     origin: Components,

@@ -147,7 +147,7 @@ def _model(
     names += [name + mark for k in moved for name in [list(inputs)[k]] for mark in ("", "'")]
     shown = tuple(f"{name}''" if k in moved else name for k, name in enumerate(inputs))
     units |= _units(point, minimal) | {path: point.assembly.start_observables[path].unit for path in outputs}
-    about = "motion" if point.is_from_result else "steady motion" if _moves(point, flow) else "rest"
+    about = "motion" if point.is_from_result else "steady motion" if _moves(point) else "rest"
     driven = np.ones(2 * len(moved))
     return LinearModel(
         A=a,
@@ -198,7 +198,7 @@ def _places_bodies(point: OperatingPoint, number: int) -> bool:
     return any(node is value for node in live(found))
 
 
-def _moves(point: OperatingPoint, flow: Flow) -> bool:
+def _moves(point: OperatingPoint) -> bool:
     sizes = point.scene.sizes
     return bool(np.any(np.abs(point.u) > 1e-12 * sizes * max(1.0, float(np.max(np.abs(point.u) / sizes, initial=0.0)))))
 
@@ -246,7 +246,7 @@ class StateSpace:
 def find_state_space(scene: LinearScene, flow: Flow, steady: Steady, kept: Sequence[int]) -> StateSpace:
     """Return the linear model about a state in minimal states."""
     minimal = find_minimal(scene, flow, kept)
-    matrix = _matrix(scene, flow, steady, minimal)
+    matrix = _matrix(flow, steady, minimal)
     random, largest = np.random.default_rng(1974), np.zeros_like(matrix)
     now = flow.variation
     pace = pace_of(scene, flow)
@@ -255,7 +255,7 @@ def find_state_space(scene: LinearScene, flow: Flow, steady: Steady, kept: Seque
         by = ROUGHNESS * scene.displacement_sizes * random.uniform(-1.0, 1.0, len(scene.tangents))
         faster = ROUGHNESS * pace * scene.sizes * random.uniform(-1.0, 1.0, len(now.u))
         found = other.flow(now.t, scene.tangents.moved(now.q, by), now.u + faster, kept)
-        near = _matrix(other, found, steady, find_minimal(other, found, kept, minimal))
+        near = _matrix(found, steady, find_minimal(other, found, kept, minimal))
         largest = np.maximum(largest, np.abs(near - matrix))
     n = len(minimal.displacements)
     own = scene.displacement_sizes[list(minimal.displacements)], scene.sizes[list(minimal.speeds)]
@@ -265,7 +265,7 @@ def find_state_space(scene: LinearScene, flow: Flow, steady: Steady, kept: Seque
     return StateSpace(minimal, matrix, tolerances.CERTAIN * largest, sizes)
 
 
-def _matrix(scene: LinearScene, flow: Flow, steady: Steady, minimal: Minimal) -> FloatArray:
+def _matrix(flow: Flow, steady: Steady, minimal: Minimal) -> FloatArray:
     size = len(flow.field)
     moved = (flow.matrix[:, :size] - steady.moving) @ minimal.state
     moved[:, minimal.states :] += flow.matrix[:, size + 1 :]
