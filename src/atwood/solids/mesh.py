@@ -394,10 +394,6 @@ def mesh_solid(mesh: TriangleMesh, *, density: float | None = None, mass: float 
     if (density is None) == (mass is None):
         found = "neither is given" if mass is None else "both are given"
         raise ParameterError(f"a mesh needs a density or a mass, and {found}", advice="Give density= or mass=.")
-    given = density if mass is None else mass
-    name = "density" if mass is None else "mass"
-    if given is None or not np.isfinite(given) or given <= 0:
-        raise ParameterError(f"the {name} is {given}", advice="It must be positive and finite.")
     middle = (np.min(mesh.vertices, axis=0) + np.max(mesh.vertices, axis=0)) / 2
     a, b, c = (mesh.vertices[mesh.triangles[:, corner]] - middle for corner in range(3))
     six_volumes = np.einsum("ij,ij->i", a, np.cross(b, c))
@@ -407,7 +403,7 @@ def mesh_solid(mesh: TriangleMesh, *, density: float | None = None, mass: float 
     squares = sum(np.einsum("i,ij,ik->jk", six_volumes, side, side) for side in (sums, a, b, c)) / 120
     about_centre = squares - volume * np.outer(centre, centre)
     inertia = np.trace(about_centre) * np.eye(3) - about_centre
-    scale = float(given) if mass is None else float(given) / volume
+    scale = (mass or 0.0) / volume if density is None else density
     return MassProperties(scale * volume, middle + centre, scale * (inertia + inertia.T) / 2)
 
 
@@ -445,7 +441,5 @@ def stl_solid(
     ParameterError
         If the file cannot be read or its mesh is not closed.
     """
-    if not (np.isfinite(scale) and scale > 0):
-        raise ParameterError(f"the scale is {scale}", where=str(path), advice="It must be positive and finite.")
     mesh = closed_mesh(read_stl(path) * scale, tolerance=tolerance, where=str(path))
     return mesh_solid(mesh, density=density, mass=mass)
