@@ -5,15 +5,28 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TypeVar
 
 from atwood.errors import UsageError
 
-__all__ = ["check_directory", "check_readable", "read_checked", "write_atomically"]
-
 T = TypeVar("T")
+
+
+def by_suffix(target: Path, known: Mapping[str, T], advice: str = "") -> T:
+    """Return what a suffix stands for; refuse a file whose suffix stands for nothing."""
+    suffix = target.suffix.lower()
+    if suffix not in known:
+        problem = f"the suffix {target.suffix!r} is not known" if suffix else "the name has no suffix"
+        raise UsageError(problem, where=str(target), advice=advice or f"Use {' or '.join(known)}.")
+    return known[suffix]
+
+
+def check_target(target: Path, suffixes: Iterable[str], advice: str = "") -> None:
+    """Refuse a file with another suffix, or in a directory that does not exist."""
+    by_suffix(target, dict.fromkeys(suffixes), advice)
+    check_directory(target)
 
 
 def check_directory(target: Path) -> None:

@@ -16,7 +16,7 @@ from atwood.cli.scenes import prepare
 from atwood.errors import UsageError
 from atwood.pipeline import assemble, simulate
 from atwood.plotting.diagram import diagram
-from atwood.plotting.pages.page import Page, check_target, page
+from atwood.plotting.pages.page import Page, check_page, page
 
 
 def write_page(request: Request) -> None:
@@ -32,7 +32,7 @@ def write_page(request: Request) -> None:
         Show the page in the browser.
     """
     target = Path(f"{Path(request.scene).stem}.html") if request.file is None else request.file
-    check_target(target)
+    check_page(target)
     shown = request.show or ()
     if request.mode is None:
         made = page(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
-from atwood.files import check_directory, write_atomically
+from atwood.files import check_target, write_atomically
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes as Axes
@@ -34,11 +34,7 @@ ANIMATED = (".gif", ".webp", ".mp4")
 def check_picture(file: str | os.PathLike[str], suffixes: tuple[str, ...] = SUFFIXES) -> None:
     """Refuse a picture that could not be made, before the work is done."""
     need_matplotlib()
-    target = Path(file)
-    if target.suffix.lower() not in suffixes:
-        problem = f"the suffix {target.suffix!r} is not known" if target.suffix else "the name has no suffix"
-        raise UsageError(problem, where=str(file), advice=f"Use {' or '.join(suffixes)}.")
-    check_directory(target)
+    check_target(Path(file), suffixes)
 
 
 def need_matplotlib() -> None:

@@ -10,8 +10,7 @@ import numpy as np
 
 from atwood.arguments import FILE, instance, optional, takes
 from atwood.arrays import FloatArray, IndexArray
-from atwood.errors import UsageError
-from atwood.files import check_directory, write_atomically
+from atwood.files import check_target, write_atomically
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
@@ -76,9 +75,7 @@ def diagram(scene: Model | Assembly, file: str | os.PathLike[str] | None = None)
     """
     target = None if file is None else Path(file)
     if target is not None:
-        if target.suffix.lower() != ".svg":
-            raise UsageError(f"the suffix {target.suffix!r} is not known", where=str(file), advice="Use .svg.")
-        check_directory(target)
+        check_target(target, [".svg"])
     assembly = scene if isinstance(scene, Assembly) else assemble(scene)
     svg = draw_diagram(assembly)
     if target is not None:

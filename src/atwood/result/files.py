@@ -29,7 +29,7 @@ from atwood.arguments import FILE, instance, takes
 from atwood.arrays import FloatArray
 from atwood.display import count_of, listed
 from atwood.errors import UsageError
-from atwood.files import check_directory, read_checked, write_atomically
+from atwood.files import by_suffix, check_directory, read_checked, write_atomically
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.model.declare.connectors import PATHS, Quantity
@@ -386,12 +386,5 @@ _FORMATS: dict[str, tuple[_Write, _Read]] = {
 
 
 def _format_of(file: Path) -> tuple[_Write, _Read]:
-    suffix = file.suffix.lower()
-    if suffix not in _FORMATS:
-        problem = f"the suffix {suffix!r} is not known" if suffix else "the name has no suffix"
-        raise UsageError(
-            problem,
-            where=str(file),
-            advice="Use .nc (NetCDF-3), .npz (NumPy), .mat (MATLAB) or .csv; of a run .glb (glTF) too.",
-        )
-    return _FORMATS[suffix]
+    advice = "Use .nc (NetCDF-3), .npz (NumPy), .mat (MATLAB) or .csv; of a run .glb (glTF) too."
+    return by_suffix(file, _FORMATS, advice)

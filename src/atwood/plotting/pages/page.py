@@ -15,7 +15,7 @@ import numpy as np
 
 from atwood.arguments import FILE, TEXT, Kind, Refused, each, one_of, optional, takes
 from atwood.errors import AtwoodError, UsageError, check_known
-from atwood.files import check_directory, write_atomically
+from atwood.files import check_target, write_atomically
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.compose.composite import Model
@@ -75,7 +75,7 @@ class Page:
     def save(self, file: str | os.PathLike[str]) -> Page:
         """Save it as a file, and return the page with it."""
         target = Path(file)
-        check_target(target)
+        check_page(target)
         write_atomically(target, lambda part: part.write_text(self.html, encoding="utf-8"))
         return replace(self, file=target)
 
@@ -139,7 +139,7 @@ def page(
     """
     target = None if file is None else Path(file)
     if target is not None:
-        check_target(target)
+        check_page(target)
     results = _results(scene)
     for one in results.values():
         if one.assembly.mechanism.space.name != next(iter(results.values())).assembly.mechanism.space.name:
@@ -156,12 +156,9 @@ def page(
     return made if target is None else made.save(target)
 
 
-def check_target(file: Path) -> None:
+def check_page(file: Path) -> None:
     """Refuse a file that could not be written, before any work is done."""
-    if file.suffix.lower() not in (".html", ".htm"):
-        problem = f"the suffix {file.suffix!r} is not known" if file.suffix else "the name has no suffix"
-        raise UsageError(problem, where=str(file), advice="Use .html.")
-    check_directory(file)
+    check_target(file, (".html", ".htm"), "Use .html.")
 
 
 def _results(scene: Any) -> dict[str, Result]:

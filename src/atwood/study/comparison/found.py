@@ -18,8 +18,7 @@ import numpy as np
 
 from atwood.arguments import FILE, takes
 from atwood.display import count_of, data_of, duration, fitted
-from atwood.errors import UsageError
-from atwood.files import check_directory
+from atwood.files import check_target
 from atwood.lazy_dataclasses import dataclass, names_of
 from atwood.result.about import versions
 from atwood.result.formats.companion import write_with_companion
@@ -247,9 +246,7 @@ def write_rows(comparisons: Sequence[Comparison], file: str | os.PathLike[str]) 
 def check_rows_file(file: str | os.PathLike[str]) -> Path:
     """Return a file for rows, or refuse one that they cannot be written to."""
     target = Path(file)
-    if target.suffix.lower() != ".csv":
-        raise UsageError(f"the suffix {target.suffix!r} is not known", where=str(file), advice="Use .csv.")
-    check_directory(target)
+    check_target(target, [".csv"])
     return target
 
 

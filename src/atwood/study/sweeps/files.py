@@ -20,8 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arguments import FILE, instance, takes
-from atwood.errors import UsageError
-from atwood.files import check_directory, read_checked, write_atomically
+from atwood.files import by_suffix, check_directory, read_checked, write_atomically
 from atwood.result.formats.companion import digest, read_with_companion, write_with_companion
 from atwood.result.formats.dataset import Dataset, Variable
 from atwood.result.formats.matlab import read_matlab, write_matlab
@@ -237,8 +236,4 @@ _FORMATS: dict[str, tuple[_Write, _Read]] = {
 
 
 def _format_of(target: Path) -> tuple[_Write, _Read]:
-    suffix = target.suffix.lower()
-    if suffix not in _FORMATS:
-        problem = f"the suffix {target.suffix!r} is not known" if target.suffix else "the name has no suffix"
-        raise UsageError(problem, where=str(target), advice=f"Use {', '.join(_FORMATS)}.")
-    return _FORMATS[suffix]
+    return by_suffix(target, _FORMATS, f"Use {', '.join(_FORMATS)}.")
