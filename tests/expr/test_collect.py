@@ -6,9 +6,9 @@ from hypothesis import given, settings
 
 from atwood import expr as ex
 from atwood.expr.simplify.collect import collect, cost
-from atwood.expr.sympy_bridge import to_sympy
 
 from . import graphs
+from .to_sympy import to_sympy
 
 _TRIGONOMETRIC = ("sin", "cos", "tan")
 

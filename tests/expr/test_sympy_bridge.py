@@ -7,9 +7,10 @@ from hypothesis import given, settings
 
 from atwood import expr as ex
 from atwood.errors import AtwoodError
-from atwood.expr.sympy_bridge import from_sympy, to_sympy, to_sympy_shared
+from atwood.expr.sympy_bridge import from_sympy
 
 from . import graphs
+from .to_sympy import to_sympy, to_sympy_shared
 
 
 @settings(derandomize=True, max_examples=25, deadline=None)
