@@ -12,7 +12,6 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.display import data_of
 from atwood.errors import AtwoodError
-from atwood.expr import evaluate
 from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import coordinate_program, state_program
 from atwood.lazy_dataclasses import dataclass, replace
@@ -101,12 +100,10 @@ def _offer(assembly: Assembly, start: Start, found: Symmetry) -> Offer:
 
 def _other_moment(assembly: Assembly) -> str:
     """Return the part whose moment of inertia in a plane is not that of its tensor; empty if there is none."""
-    table = assembly.mechanism.table
     for path, local in assembly.mechanism.locals_.items():
         for one in local.body_inertias:
             if one.tensor is not None:
-                pair = [table.graph.convert(value) for value in (one.moment, one.tensor[1][1])]
-                plane, space = evaluate(pair, assembly.mechanism.known_at_start())
+                plane, space = assembly.mechanism.values_at_start([one.moment, one.tensor[1][1]])
                 if not math.isclose(plane, space, rel_tol=1e-12):
                     return path
     return ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from atwood.expr import Expression, Scalar, evaluate
+from atwood.expr import Expression, Scalar
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.kinematics.mechanism import Mechanism
@@ -100,21 +100,17 @@ def list_bodies(assembly: Assembly) -> tuple[tuple[BodyEntry, ...], tuple[str, .
             continue
         mass = masses.bodies.get(body.index)
         if mass is not None:
-            found.append(BodyEntry(body.name, _number(mechanism, mass.mass), mass.parts))
+            found.append(BodyEntry(body.name, mechanism.value_at_start(mass.mass), mass.parts))
         elif body.index not in spread:
             massless.append(body.name)
     for part in dict.fromkeys(one.part for one in masses.coupled):
         entries = [m for one in masses.coupled if one.part == part for row in one.masses for m in row]
-        total = sum(_number(mechanism, entry) for entry in entries)
+        total = sum(mechanism.value_at_start(entry) for entry in entries)
         found.append(BodyEntry(part, total, (part,)))
-    found += [BodyEntry(path, _number(mechanism, one.mass), (path,)) for path, one in masses.varying]
+    found += [BodyEntry(path, mechanism.value_at_start(one.mass), (path,)) for path, one in masses.varying]
     order = {path: i for i, path in enumerate(assembly.flat.parts)}
     found.sort(key=lambda one: order.get(one.path, len(order)))
     return tuple(found), tuple(massless)
-
-
-def _number(mechanism: Mechanism, value: Scalar) -> float:
-    return float(evaluate([mechanism.table.graph.convert(value)], mechanism.known_at_start())[0])
 
 
 def list_joints(assembly: Assembly) -> tuple[JointEntry, ...]:

@@ -93,9 +93,9 @@ def unary(operation: str, a: Expression) -> Expression:
         opposite = plainer_opposite(a)
         if opposite is not None:
             return unary(operation, opposite)
-        if operation == "absolute" and (a.operation in _NEVER_NEGATIVE or _is_square(a)):
+        if operation == "absolute" and (a.operation in _NEVER_NEGATIVE or is_square(a)):
             return a
-    elif operation == "sqrt" and _is_square(a):
+    elif operation == "sqrt" and is_square(a):
         return unary("absolute", a.arguments[0])
     elif operation == "logical_not" and a.operation == "logical_not":
         inner = a.arguments[0]
@@ -116,7 +116,8 @@ def unary(operation: str, a: Expression) -> Expression:
     return graph.node(operation, (a,))
 
 
-def _is_square(a: Expression) -> bool:
+def is_square(a: Expression) -> bool:
+    """Return whether a value is the product of one with itself."""
     return a.operation == "mul" and a.arguments[0] is a.arguments[1]
 
 

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from atwood.errors import AtwoodError, UnsupportedError
-from atwood.expr import Expression, absolute, depends_on, evaluate, jacobian, select, solve, sqrt, substitute, vjp
+from atwood.expr import Expression, absolute, depends_on, jacobian, select, solve, sqrt, substitute, vjp
 from atwood.lazy_dataclasses import replace
 from atwood.mechanics.dynamics.augmented import SymmetricSystem, back_substitute, eliminate, fill_of, minimum_degree
 from atwood.mechanics.dynamics.equations import Constraint, ContactRow, Equations
@@ -220,7 +220,7 @@ def _has_inertia(
     place = dict(zip(symbols, random.uniform(-1.0, 1.0, len(symbols)).tolist(), strict=True))
     number = {i: k for k, i in enumerate(sorted({i for one in mass for i in one}))}
     full = np.zeros((len(number), len(number)))
-    for (i, j), entry in zip(mass, evaluate(list(mass.values()), {**mechanism.known_at_start(), **place}), strict=True):
+    for (i, j), entry in zip(mass, mechanism.values_at_start(mass.values(), place), strict=True):
         full[number[i], number[j]] = entry
     own = np.diag(full)
     if not (np.isfinite(full).all() and np.all(own > 0.0)):

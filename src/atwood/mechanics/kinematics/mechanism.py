@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from atwood.arrays import FloatArray
 from atwood.errors import TopologyError
 from atwood.expr import Expression, Scalar, evaluate
 from atwood.expr.core.relations import TimeRelations, values_just_after
@@ -129,6 +130,16 @@ class Mechanism:
         held = {one.symbol: starts[one.path] for one in discrete_states_of(self)} if parts else {}
         return {**values, **held, self.time: self.t_start, **dict(zip(symbols, after, strict=True))}
 
+    def value_at_start(self, given: Scalar) -> float:
+        """Return the value of an expression of what is known at the start."""
+        return float(self.values_at_start([given])[0])
+
+    def values_at_start(self, given: Iterable[Scalar], also: Mapping[Expression, float] | None = None) -> FloatArray:
+        """Return the values of expressions of what is known at the start, and of further symbols with these values."""
+        convert = self.table.graph.convert
+        values = evaluate([convert(one) for one in given], {**self.known_at_start(), **(also or {})})
+        return np.array(values, dtype=float)
+
     @property
     def relations(self) -> TimeRelations:
         """The relations of functions of time alone in its laws."""
@@ -180,7 +191,7 @@ def decide(derivation: Derivation, how: Callable[[Mechanism], T]) -> T:
 
 def place_of_largest(values: Sequence[Expression], mechanism: Mechanism) -> int:
     """Return which of some values is the largest at the start, to be decided by."""
-    return int(np.argmax(np.abs(evaluate(list(values), mechanism.known_at_start()))))
+    return int(np.argmax(np.abs(mechanism.values_at_start(values))))
 
 
 def from_start(derivation: Derivation, name: str, form: str, value: Expression) -> Expression:

@@ -20,7 +20,7 @@ from atwood.plotting.canvas import COLOURS, GREY, INK, PALE
 from atwood.plotting.planar.geometry import Picture, Shape, make_picture
 from atwood.plotting.planar.strokes import Pen, seen_from_front
 from atwood.plotting.scene3d.picture import SpacePicture, make_space_picture
-from atwood.plotting.shapes.meshes import Mesh, numbers
+from atwood.plotting.shapes.meshes import Mesh
 from atwood.result.result import Result
 
 Item = dict[str, Any]
@@ -203,7 +203,7 @@ def _turned(mechanism: Mechanism, keys: Sequence[int]) -> tuple[tuple[int, ...],
         offsets = (
             body_offsets(mechanism.bodies.bodies[body_of[key]], mechanism.space)[1] if mechanism.space.is_planar else {}
         )
-        turns.append(float(numbers(mechanism, [plain(offsets[key])])[0]) if key in offsets else 0.0)
+        turns.append(mechanism.value_at_start(plain(offsets[key])) if key in offsets else 0.0)
     return tuple(body_of[key] for key in keys), tuple(turns)
 
 

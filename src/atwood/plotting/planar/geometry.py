@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError, suggestion
-from atwood.expr import Expression, Scalar, depends_on, evaluate
+from atwood.expr import Expression, Scalar, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.kinematics.mechanism import Mechanism, world_position
@@ -21,7 +21,7 @@ from atwood.model.declare.connectors import Groove
 from atwood.model.local.parts import LocalPart
 from atwood.model.values.outline import Outline
 from atwood.plotting.planar.columns import spread_columns
-from atwood.plotting.shapes.meshes import Mesh, joint_curve, numbers, outline_mesh, outline_of
+from atwood.plotting.shapes.meshes import Mesh, joint_curve, outline_mesh, outline_of
 from atwood.result.result import Result
 from atwood.result.segment_quantities import shown_values
 
@@ -282,7 +282,7 @@ def _shapes_of(mechanism: Mechanism, path: str, local: LocalPart) -> list[Shape]
         if line is not None and joint.law.options.a != "world":
             return [Shape(path, "curve", (nodes[joint.law.options.a],), line=line[:, [0, 2]])]
     masses = [one for one in local.point_inertias if len(one.points) == 1]
-    weight = sum(_value(mechanism, one.masses[0][0]) for one in masses)
+    weight = sum(mechanism.value_at_start(one.masses[0][0]) for one in masses)
     joints = [joint.law.options for joint in local.joints]
     if any(options.rigid and options.a == "world" for options in joints):
         return [Shape(path, "ground", tuple(ends))]
@@ -304,8 +304,8 @@ def _bodies(mechanism: Mechanism, path: str, local: LocalPart, node: int) -> lis
     """Return bodies that do not say what they look like: uniform discs of their masses and moments."""
     found = []
     for body in local.body_inertias:
-        mass, moment = _value(mechanism, body.mass), _value(mechanism, body.moment)
-        center = numbers(mechanism, tuple(body.center_of_mass))
+        mass, moment = mechanism.values_at_start([body.mass, body.moment])
+        center = mechanism.values_at_start(body.center_of_mass)
         if mass > 0.0 and moment > 0.0:
             radius = float(np.sqrt(2.0 * moment / mass))
             profile = [(0.0, -0.1 * radius), (radius, -0.1 * radius), (radius, 0.1 * radius), (0.0, 0.1 * radius)]
@@ -341,10 +341,6 @@ def _between(
         rolls = float(radius) if isinstance(radius, (int, float)) else 0.0
         return [Shape(path, "rod", ends) if is_rod else Shape(path, "rail", ends, rolls)]
     return []
-
-
-def _value(mechanism: Mechanism, value: Scalar) -> float:
-    return float(evaluate([mechanism.table.graph.convert(value)], mechanism.known_at_start())[0])
 
 
 def pulling(result: Result, part: str) -> NDArray[np.bool_]:

@@ -26,7 +26,6 @@ from atwood.plotting.shapes.meshes import (
     joint_curve,
     joint_shift,
     joint_step,
-    numbers,
     outline_of,
 )
 from atwood.result.result import Result
@@ -250,8 +249,8 @@ def _layouts(mechanism: Mechanism) -> tuple[dict[int, FloatArray], dict[int, Flo
         for node, place in places.items():
             turn = axes[node]
             assert isinstance(turn, tuple)
-            offsets[node] = numbers(mechanism, tuple(place))
-            turns[node] = np.column_stack([numbers(mechanism, tuple(axis)) for axis in turn])
+            offsets[node] = mechanism.values_at_start(place)
+            turns[node] = np.column_stack([mechanism.values_at_start(axis) for axis in turn])
     return offsets, turns
 
 
@@ -286,12 +285,12 @@ def _lumps(reading: Reading, mechanism: Mechanism, path: str, local: LocalPart, 
     for one in local.point_inertias:
         if len(one.points) == 1:
             node = nodes[one.points[0].name]
-            (mass,) = numbers(mechanism, [one.masses[0][0]])
-            found.append(_lump(reading, path, node, float(mass), np.zeros(3), np.zeros((3, 3))))
+            mass = mechanism.value_at_start(one.masses[0][0])
+            found.append(_lump(reading, path, node, mass, np.zeros(3), np.zeros((3, 3))))
     for body in local.body_inertias:
-        center = numbers(mechanism, tuple(body.center_of_mass))
-        (mass,) = numbers(mechanism, [body.mass])
-        lump = _lump(reading, path, nodes[body.frame.name], float(mass), center, _tensor(mechanism, body))
+        center = mechanism.values_at_start(body.center_of_mass)
+        mass = mechanism.value_at_start(body.mass)
+        lump = _lump(reading, path, nodes[body.frame.name], mass, center, _tensor(mechanism, body))
         found.append(replace(lump, outline=outline, origin=reading.offsets[lump.node]))
     if outline is not None and not local.body_inertias:
         lump = _lump(reading, path, nodes[outline.frame or next(iter(nodes))], 0.0, np.zeros(3), np.zeros((3, 3)))
@@ -302,7 +301,7 @@ def _lumps(reading: Reading, mechanism: Mechanism, path: str, local: LocalPart, 
 def _tensor(mechanism: Mechanism, body: BodyInertia) -> FloatArray:
     if body.tensor is None:
         return np.zeros((3, 3))
-    return numbers(mechanism, [entry for row in body.tensor for entry in row]).reshape(3, 3)
+    return mechanism.values_at_start([entry for row in body.tensor for entry in row]).reshape(3, 3)
 
 
 def _lump(reading: Reading, path: str, node: int, mass: float, center: FloatArray, tensor: FloatArray) -> Lump:
@@ -415,7 +414,7 @@ def _turning_axes(mechanism: Mechanism, rotation: object) -> list[FloatArray]:
         return []
     assert isinstance(rotation, (int, float, Expression, Rotation))
     turns = as_rotation(rotation).turns
-    return [numbers(mechanism, tuple(one.axis)) for one in turns]
+    return [mechanism.values_at_start(one.axis) for one in turns]
 
 
 def _meeting(

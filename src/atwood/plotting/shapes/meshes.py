@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from atwood.arrays import FloatArray, IndexArray
-from atwood.expr import Expression, Scalar, depends_on, evaluate
+from atwood.expr import Expression, depends_on
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.model.declare.component import Binding, bind
@@ -177,15 +177,6 @@ def ring(radius: float, thickness: float, around: int = 64, corners: int = 14) -
     return revolved(profile, around, closed=True)
 
 
-def numbers(
-    mechanism: Mechanism, given: Sequence[Scalar], also: Mapping[Expression, float] | None = None
-) -> FloatArray:
-    """Return the values of expressions of parameters, and of further symbols with the values given."""
-    graph = mechanism.table.graph
-    values = {**mechanism.known_at_start(), **(also or {})}
-    return np.array(evaluate([graph.convert(one) for one in given], values), dtype=float)
-
-
 def joint_curve(mechanism: Mechanism, path: str, joint: LocalJoint) -> FloatArray | None:
     """Return the curve on which a joint moves its second node, from the first one, m, shape (points, 3).
 
@@ -233,7 +224,7 @@ def joint_shift(
     known = {**dict.fromkeys((*joint.coordinates, *mechanism.relations.roots), 0.0), **values}
     for axes in joint.axes:  # whichever way they are turned, the step along a coordinate is the same
         known.update((c, float(i == k)) for i, axis in enumerate(axes) for k, c in enumerate(axis))
-    return numbers(mechanism, shift, known)
+    return mechanism.values_at_start(shift, known)
 
 
 def joint_step(

@@ -127,10 +127,7 @@ def as_data(eq: EquationsOfMotion) -> dict[str, Any]:
     if not eq.is_readable:
         return made
     written = eq.written_by_part if eq.by_part else eq.written
-    made["symbols"] = [
-        {"symbol": one.name, "path": one.path, "unit": one.unit, "value": one.value, "kind": one.kind}
-        for one in eq.legend
-    ]
+    made["symbols"] = page.symbols_data(eq.legend)
     made["kinetic_energy"], made["potential_energy"] = _both(written.kinetic), _both(written.potential)
     made["linear_terms"], made["rayleigh_function"] = _both(written.linear), _both(written.rayleigh)
     for key, several in (

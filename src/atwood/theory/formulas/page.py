@@ -206,6 +206,13 @@ def terms_data(formula: Sum) -> dict[str, list[dict[str, Any]]]:
     return {"terms": terms} if any(one.owners for one in formula.terms) else {}
 
 
+def symbols_data(legend: Sequence[Symbol]) -> list[dict[str, Any]]:
+    """Return what symbols stand for as plain data."""
+    return [
+        {"symbol": one.name, "path": one.path, "unit": one.unit, "value": one.value, "kind": one.kind} for one in legend
+    ]
+
+
 def _latex_rows(line: Line | Matrix, by_part: bool = False) -> list[str]:
     """Return the rows of an aligned block."""
     if isinstance(line, Matrix):

@@ -360,10 +360,7 @@ class Hamiltonian(Paged):
         made["hamiltonian"] = None if self._written is None else latex.formula(self.formula)
         made["momenta"] = [] if self._written is None else [latex.formula(one) for one in self._definitions]
         made |= page.terms_data(self.formula) if self._written is not None and self.formulas.by_part else {}
-        made["symbols"] = [
-            {"symbol": one.name, "path": one.path, "unit": one.unit, "value": one.value, "kind": one.kind}
-            for one in self.formulas.legend
-        ]
+        made["symbols"] = page.symbols_data(self.formulas.legend)
         return made
 
     @property

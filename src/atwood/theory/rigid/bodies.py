@@ -9,7 +9,7 @@ import numpy as np
 from atwood.arguments import FLAG, TEXT, one_of, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UnsupportedError, UsageError, check_known
-from atwood.expr import OutputGroup, Program, evaluate
+from atwood.expr import OutputGroup, Program
 from atwood.forms.assembly import Assembly
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import observer
@@ -80,9 +80,9 @@ def principal_body(assembly: Assembly, body: str | None = None) -> PrincipalBody
     part = next(iter(frames)) if body is None else body
     check_known(part, frames, "there is no such rigid body")
     ends = mechanism.graph, mechanism.bodies, mechanism.locals_, mechanism.space
-    carried, graph = CarriedInertia(*ends, part, frames[part]), mechanism.table.graph
+    carried = CarriedInertia(*ends, part, frames[part])
     given = [carried.mass, *carried.center_of_mass, *(entry for row in carried.inertia for entry in row)]
-    found = np.array(evaluate([graph.convert(one) for one in given], mechanism.known_at_start()))
+    found = mechanism.values_at_start(given)
     moments, axes = MassProperties(found[0], found[1:4], found[4:].reshape(3, 3)).principal()
     order: list[int] = []
     for k in range(3):  # each axis has the number of the part's axis that it is nearest to

@@ -19,6 +19,7 @@ from atwood.codegen import compile_program
 from atwood.codegen.rounding import ROUGHNESS
 from atwood.errors import AtwoodError, SolveError
 from atwood.expr import Expression, OutputGroup, Program, jvp, vjp
+from atwood.expr.core.algebra import is_square
 from atwood.expr.core.analysis import dependents, live
 from atwood.expr.core.relations import Relation, TimeRelations
 from atwood.forms.assembly import Assembly
@@ -378,15 +379,11 @@ def _follows(value: Expression, found: Mapping[Expression, None]) -> bool:
     one = value
     while one is value or one not in found:
         moving = [part for part in one.arguments if not part.is_parametric]
-        above_square = one.operation in ("add", "sub") and len(moving) == 1 and _is_square(moving[0])
-        if not (_is_square(one) or above_square or (one.operation in ("mul", "div", "neg") and len(moving) == 1)):
+        above_square = one.operation in ("add", "sub") and len(moving) == 1 and is_square(moving[0])
+        if not (is_square(one) or above_square or (one.operation in ("mul", "div", "neg") and len(moving) == 1)):
             return False
         one = moving[0]
     return True
-
-
-def _is_square(value: Expression) -> bool:
-    return value.operation == "mul" and value.arguments[0] is value.arguments[1]
 
 
 def _summands(laws: Sequence[Expression]) -> list[Expression]:
