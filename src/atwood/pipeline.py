@@ -162,9 +162,9 @@ def assembly_of(scene: Model | Assembly, name: str | None = None, **asked: str |
     return scene
 
 
-def smooth_assembly_of(scene: Model | Assembly, name: str | None = None, **asked: str | None) -> Assembly:
+def smooth_assembly_of(scene: Model | Assembly, **asked: str | None) -> Assembly:
     """Return the same for what reads equations that hold everywhere; see `refuse_contacts`."""
-    assembly = assembly_of(scene, name, **asked)
+    assembly = assembly_of(scene, **asked)
     refuse_contacts(assembly)
     return assembly
 

@@ -111,14 +111,14 @@ def _is_zero(value: Scalar) -> bool:
     return bool(value.is_zero) if isinstance(value, Expression) else bool(value == 0.0)
 
 
-def quaternion_axes(quaternion: Sequence[Scalar], square: Scalar | None = None) -> Axes:
+def quaternion_axes(quaternion: Sequence[Scalar]) -> Axes:
     """Return the axes of a frame from its quaternion, scalar part first, of whatever size it is.
 
     Divided by the square of its size, so that the size means nothing and cannot drift (Goldstein, section 4.5, with
     e0 to e3 of any sum of squares).
     """
     w, x, y, z = quaternion
-    twice = 2.0 / (w * w + x * x + y * y + z * z if square is None else square)
+    twice = 2.0 / (w * w + x * x + y * y + z * z)
     xs, ys, zs = x * twice, y * twice, z * twice
     wx, wy, wz, xx, xy, xz = w * xs, w * ys, w * zs, x * xs, x * ys, x * zs
     yy, yz, zz = y * ys, y * zs, z * zs

@@ -100,7 +100,6 @@ def live_program(
     scene: Model | Assembly,
     form: str | None = None,
     sliders: Sequence[str] = (),
-    quantities: Sequence[str] | None = None,
     drag: bool = False,
 ) -> LiveProgram:
     """Return a scene as JavaScript, or why it is not live.
@@ -113,14 +112,12 @@ def live_program(
         See `atwood.assemble`.
     sliders
         Parameters that are to be changed: they stay in the equations where they are zero.
-    quantities
-        Paths of the quantities that can be asked for; all if not given.
     drag
         Whether bodies can be pulled by a damped spring, which its equations then have.
     """
     assembly, zeros = with_sliders(assembly_of(scene, form=form), sliders)
     try:
-        every, start = live_modes(assembly, zeros, quantities, drag)
+        every, start = live_modes(assembly, zeros, drag=drag)
         data = _data(every[0], start)
         modes = [(one.text(), one.data) for one in every]
         texts = ", ".join(f"{{data: {_json(own)},\nopen: {text}}}" for text, own in modes)
@@ -144,7 +141,9 @@ def live_modes(
         The scene.
     zeros
         Names of symbols of parameters that stay in the equations, and are zero.
-    quantities, drag
+    quantities
+        Paths of the quantities that can be asked for; all if not given.
+    drag
         See `live_program`.
 
     Raises

@@ -192,10 +192,10 @@ def _symmetric(fields: Sequence[_Field], states: Sequence[Flow], sizes: FloatArr
 # -- candidates ------------------------------------------------------------------------------------------------------
 
 
-def _constant(value: FloatArray, matrix: FloatArray | None = None, is_time: bool = False) -> _Field:
+def _constant(value: FloatArray, is_time: bool = False) -> _Field:
     size = len(value)
     still = np.zeros(size)
-    return _Field(lambda _: value, lambda _: still, np.zeros((size, size)) if matrix is None else matrix, is_time)
+    return _Field(lambda _: value, lambda _: still, np.zeros((size, size)), is_time)
 
 
 def _time_shift(scene: LinearScene) -> _Field:
