@@ -10,10 +10,11 @@ from numpy.testing import assert_array_equal
 
 from atwood import Model, Scene, assemble, select, simulate, sin
 from atwood.integrators.embedded.stepper import CompiledStepper
+from atwood.integrators.explicit_session import ExplicitSession
 from atwood.simulation.run.run import Walk
 from atwood.simulation.run.session import KeptSession
 from atwood_library import Force, Ground, PointMass, Rod
-from atwood_library.scenes import CartPole
+from atwood_library.scenes import CartPole, FourBar, Kepler, SliderCrank
 
 
 def switched() -> Scene:
@@ -96,3 +97,27 @@ def test_an_update_that_raises_leaves_nothing_behind() -> None:
     with pytest.raises(RuntimeError, match="enough"):
         simulate(scene, t_end=0.5, progress=stop)
     assert_array_equal(simulate(scene, t_end=0.5)["hinge.angle"], expected)
+
+
+@pytest.mark.parametrize("make", [FourBar, SliderCrank, Kepler])
+@pytest.mark.parametrize("solver", ["taylor", "explicit"])
+def test_the_next_run_goes_on_with_formulas_of_loops_and_judged_steps(
+    make: Callable[[], Model], solver: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It gives the bits of a run that begins anew, also where it is longer, and where others came between."""
+    made: list[float] = []
+    first = ExplicitSession.__init__
+
+    def counted(self: ExplicitSession, *given: object, **named: object) -> None:
+        made.append(1)
+        first(self, *given, **named)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(ExplicitSession, "__init__", counted)
+    scene = assemble(make())
+    found = [simulate(scene, t_end=end, solver=solver, outputs=11) for end in (0.3, 0.3, 0.7, 0.3)]
+    assert len(made) == (4 if (make, solver) == (Kepler, "taylor") else 3)  # of another length, and then anew
+    for one, end in zip(found, (0.3, 0.3, 0.7, 0.3), strict=True):
+        anew = simulate(assemble(make()), t_end=end, solver=solver, outputs=11)
+        for path, values in anew.table().items():
+            assert_array_equal(one[path], values, err_msg=path)
+        assert one.statistics.steps == anew.statistics.steps

@@ -44,6 +44,7 @@ from atwood.integrators.protocol import CompiledRates, SolverOptions, StepGuard,
 from atwood.integrators.stepper import (
     LANE_FIELDS,
     WIDTH,
+    Counts,
     Memory,
     NativeStepper,
     Routines,
@@ -52,7 +53,7 @@ from atwood.integrators.stepper import (
     open_routine as session_routine,
     routines_of,
 )
-from atwood.lazy_dataclasses import dataclass, replace
+from atwood.lazy_dataclasses import dataclass, names_of, replace
 
 if TYPE_CHECKING:
     from atwood.expr.series.taylor import TaylorPrograms
@@ -401,6 +402,13 @@ class CompiledStepper(NativeStepper):
             self._set(guard=guard.function, guard_data=guard.data)
         self._parameters = recurrences.addresses["start_prologue"], derived.ctypes.data, base + 8 * at["scratch"]
         self._outputs = base + 8 * at["values"], base + 8 * (at["values"] + n)
+
+    def renew(self, horizon: float, absolute: FloatArray | None = None) -> None:
+        """Count from zero again, for a run of another typical length, s, and perhaps with other tolerances."""
+        if absolute is not None:
+            found = np.maximum(absolute, np.finfo(float).tiny) / self._options.relative_tolerance
+            self._arrays[ROWS["floors"], : self._size] = found
+        self._set(**dict.fromkeys(names_of(Counts), 0), horizon=horizon, longest=self._options.max_step or inf)
 
     def batch_places(self) -> BatchPlaces:
         """Return the addresses with which many runs can be made in one call.

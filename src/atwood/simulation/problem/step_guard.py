@@ -28,6 +28,7 @@ _SHORTEST = 1e-13
 _PROGRAM: Key[Program] = Key("how far functions in laws change over a step")
 _NEEDED: Key[bool] = Key("whether a function in a law may change fast in a run")
 _CODE: Key[object] = Key("machine code of that")
+_GUARD: Key[StepGuard] = Key("what judges steps")
 
 
 def step_guard(
@@ -93,10 +94,22 @@ def _by_bounds(
     curved, key = find_curved(assembly, is_estimated), (span, reach, is_estimated)
     if not curved or not assembly.kept.get(_NEEDED, lambda: is_needed(assembly, curved, span, reach), *key):
         return None
-    form, values = closed or (None, assembly.parameter_values)
+    if closed is None:  # of a session that the next run goes on with
+        about = (assembly.form, *key)
+        return assembly.kept.get(_GUARD, lambda: _bound(assembly, curved, None, key, assembly.parameter_values), *about)
+    return _bound(assembly, curved, closed[0], key, closed[1])
 
+
+def _bound(
+    assembly: Assembly,
+    curved: Sequence[Curved],
+    form: ClosedForm | None,
+    key: tuple[tuple[float, float], float, bool],
+    values: FloatArray,
+) -> StepGuard:
     from atwood.integrators.step_guard import GuardCode, compile_guard
 
+    span, reach, is_estimated = key
     program = guard_program(assembly, curved, form, is_estimated)
     code = assembly.shared.get(_CODE, lambda: compile_guard(program), program)
     assert isinstance(code, GuardCode)

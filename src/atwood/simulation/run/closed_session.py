@@ -199,6 +199,20 @@ class ClosedLoopSession(Session):
         low, near = levels(solved)
         shifts = np.repeat([-low, -near, 0.0], [margins, margins, counted])
         directions = (*probe.directions, *(-1 for _ in range(2 * margins)), *(0 for _ in range(counted)))
+        given, guard = self._on_stiff, request.guard(self._method, (solved.form, solved.values))
+
+        def on_stiff(t: float, y: FloatArray) -> bool:
+            return given is not None and given(t, self._solved.state(t, y))
+
+        asked, longest = None if given is None else on_stiff, np.inf
+        if not solved.is_clear:
+            longest = self._longest_step(solved, t, y)
+        can_go_on = self._method.tableau is not None or self._method.kind == "series"
+        is_kept = can_go_on and not (directions or self._before.steps) and guard is None
+        known = request.kept.begin_again(request, self._method, t, y, asked, solved) if is_kept else None
+        if known is not None:
+            known.limit_steps(longest)
+            return known
         problem = explicit_problem_of(
             assembly, found, solved.values, self._function(solved, shifts) if directions else None, directions
         )
@@ -207,21 +221,13 @@ class ClosedLoopSession(Session):
         ends = (*range(first, first + margins), *range(first + 2 * margins, len(directions)))
         own = self.handed_on if self._before.steps else probe.handed
         signs = (*own, *(0 for _ in directions[first:])) if own else ()
-        guard = request.guard(self._method, (solved.form, solved.values))
         problem = replace(problem, event_rough=(*probe.rough, *ends), event_signs=signs, guard=guard)
         self._events = None
         if directions and problem.compiled is not None:
             problem = self._with_compiled(problem, solved, shifts)
         settings, budget = self._settings(t, solved), self._budget()
-        longest = np.inf if solved.is_clear else self._longest_step(solved, t, y)
         if self._before.steps and np.isfinite(longest):  # steps grow by themselves from one that is surely short
             settings = replace(settings, first_step=min(_FIRST * longest, settings.horizon))
-        given = self._on_stiff
-
-        def on_stiff(t: float, y: FloatArray) -> bool:
-            return given is not None and given(t, self._solved.state(t, y))
-
-        asked = None if given is None else on_stiff
         series, canonical = equations_of(request, problem, (t, y), solved)
         task = Task(
             settings,
@@ -235,6 +241,8 @@ class ClosedLoopSession(Session):
             hamiltonian=canonical,
         )
         session = self._method.open(task)
+        if is_kept and problem.compiled is not None:
+            request.kept.keep(request, self._method, asked, session, lambda _: None, solved)
         if np.isfinite(longest):
             session.limit_steps(longest)
         return session

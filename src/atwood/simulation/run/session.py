@@ -243,6 +243,8 @@ def _with_events(problem: ImplicitProblem, probe: EventProbe) -> ImplicitProblem
     return replace(problem, events=found.function(), native=native)
 
 
+_SESSIONS_KEPT = 4
+
 _SESSIONS: Key[list[Opened]] = Key("sessions of explicit methods")
 
 
@@ -263,7 +265,7 @@ class Opened:
     objects: tuple[object, ...]
     values: tuple[object, ...]
     session: ExplicitSession
-    fill: Filling
+    fill: Callable[[SolverRequest], None]
 
 
 class KeptSession:
@@ -313,13 +315,15 @@ class KeptSession:
 
     def filling_of(self, session: Session | None) -> Filling | None:
         """Return what gives a session its parameters; None where it is not kept."""
-        return next((one.fill for one in self.kept if one.session is session), None)
+        found = next((one.fill for one in self.kept if one.session is session), None)
+        return found if isinstance(found, Filling) else None
 
     def sets(self, plan: SceneProblem) -> SetJumps | None:
         """Return the changes of sets of a session that is kept for a plan; None where there are none."""
         own = plan.program, plan.scales, plan.sizes, plan.finding
         for one in self.kept:
-            jumps, (_, shared, _, *objects) = one.fill.problem.jumps, one.objects
+            jumps = one.fill.problem.jumps if isinstance(one.fill, Filling) else None
+            _, shared, _, *objects = one.objects
             if jumps is not None and shared is plan.assembly.shared and all(map(is_, objects, own)):
                 from atwood.integrators.set_jumps import SetJumps
 
@@ -328,12 +332,14 @@ class KeptSession:
         return None
 
     def begin_again(
-        self, request: SolverRequest, method: Method, t: float, y: FloatArray, on_stiff: OnStiff | None
+        self, request: SolverRequest, method: Method, t: float, y: FloatArray, on_stiff: OnStiff | None, *more: object
     ) -> ExplicitSession | None:
-        """Return the session at the start of another segment; None where none was opened for it."""
+        """Return the session at the start of another segment; None where none was opened for it, and for more."""
         objects, values = _opened_with(request, method, on_stiff) if self.kept else ((), ())
+        objects = *objects, *more
         for one in self.kept:
-            if all(map(is_, one.objects, objects)) and one.values == values:
+            is_same = len(one.objects) == len(objects) and all(map(is_, one.objects, objects))
+            if is_same and one.values == values:
                 one.fill(request)
                 session, signs = one.session, request.probe.handed
                 session.begin_again(t, y, request.horizon(t), request.budget, on_stiff, request.end, signs=signs)
@@ -341,11 +347,18 @@ class KeptSession:
         return None
 
     def keep(
-        self, request: SolverRequest, method: Method, on_stiff: OnStiff | None, session: Session, fill: Filling
+        self,
+        request: SolverRequest,
+        method: Method,
+        on_stiff: OnStiff | None,
+        session: Session,
+        fill: Callable[[SolverRequest], None],
+        *more: object,
     ) -> None:
-        """Keep a session for what comes next, with the one before it."""
+        """Keep a session for what comes next, with a few before it: those of other modes, and of other contacts."""
         assert isinstance(session, ExplicitSession)
-        self.kept[:] = [*self.kept[-1:], Opened(*_opened_with(request, method, on_stiff), session, fill)]
+        objects, values = _opened_with(request, method, on_stiff)
+        self.kept[:] = [*self.kept[1 - _SESSIONS_KEPT :], Opened((*objects, *more), values, session, fill)]
 
 
 def _opened_with(
@@ -357,13 +370,16 @@ def _opened_with(
     steps = options.relative_tolerance, options.absolute_tolerance, options.first_step, options.max_step, options.order
     asked = options.step, options.max_order, options.impacts, options.nominal, options.conditions
     told = is_loose(plan.assembly), on_stiff is None, request.kept.jumps(plan.assembly), request.kept.is_undisturbed
-    return (method, *scene, plan.program, plan.scales, plan.sizes, plan.finding), (steps, asked, told)
+    end = request.end if method.kind == "series" else None  # no series goes beyond it
+    seen = plan.program, plan.scales, plan.sizes, plan.finding, request.guard(method)
+    return (method, *scene, *seen), (steps, asked, told, end)
 
 
 def _can_be_kept(problem: ExplicitProblem, method: Method) -> bool:
     """Return whether a session can be begun again: nothing in Python belongs to the segment that it was opened for."""
     is_watched = problem.events is not None and problem.compiled_events is None
-    return method.tableau is not None and problem.guard is None and not is_watched
+    is_judged = problem.guard is not None and not problem.guard.function
+    return method.tableau is not None and not (is_judged or is_watched)
 
 
 def _open_tree(request: SolverRequest, method: Method, t: float, y: FloatArray, on_stiff: OnStiff | None) -> Session:
