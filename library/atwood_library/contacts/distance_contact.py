@@ -23,6 +23,9 @@ class DistanceContact(Bounded):
     restitution: Number = parameter(
         0.0, minimum=0.0, maximum=1.0, doc="Share of the speed with which a bound is reached that is left after it."
     )
+    impact_law: str = parameter(
+        "newton", choices=("newton", "poisson"), doc="Whether restitution is a share of the speed, or of the impulse."
+    )
     a: Point = connector(Point, "One point.")
     b: Point = connector(Point, "The other point.")
 
@@ -32,14 +35,22 @@ class DistanceContact(Bounded):
         return self.distance(self.a, self.b)
 
     @unilateral(
-        reaction="pressure", restitution="restitution", given=["lower"], doc="Force that pushes the points apart."
+        reaction="pressure",
+        restitution="restitution",
+        impact_law="impact_law",
+        given=["lower"],
+        doc="Force that pushes the points apart.",
     )
     def above_lower(self) -> Scalar:
         """Distance above the lower bound."""
         return self.distance(self.a, self.b) - self.lower
 
     @unilateral(
-        reaction="tension", restitution="restitution", given=["upper"], doc="Force that pulls the points together."
+        reaction="tension",
+        restitution="restitution",
+        impact_law="impact_law",
+        given=["upper"],
+        doc="Force that pulls the points together.",
     )
     def below_upper(self) -> Scalar:
         """Distance below the upper bound."""

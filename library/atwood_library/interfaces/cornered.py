@@ -17,6 +17,7 @@ class Cornered(Model):
         (0.0, 0.0, 1.0), direction=True, doc="Normal of the plane in its frame, towards the body."
     )
     restitution: Number = parameter(0.0, minimum=0.0, maximum=1.0, doc="Of each corner; see VertexContact.")
+    impact_law: str = parameter("newton", choices=("newton", "poisson"), doc="Of each corner; see VertexContact.")
     friction: Number = parameter(0.0, minimum=0.0, doc="Coefficient of friction while a corner slips.")
     static_friction: Number = parameter(None, minimum=0.0, doc="The same while it sticks.")
     stiffness: Number = parameter(None, unit="N/m", above=0.0, doc="How corners share a load; see VertexContact.")
@@ -33,7 +34,7 @@ class Cornered(Model):
         places
             Where its corners are, in the axes of that frame, m.
         """
-        names = "normal", "restitution", "friction", "static_friction", "stiffness", "surface_velocity"
+        names = "normal", "restitution", "impact_law", "friction", "static_friction", "stiffness", "surface_velocity"
         common = {name: getattr(self, name) for name in names}
         for one in self.add("corner", [VertexContact(place=place, **common) for place in places]):
             self.connect(self.plane, one.plane)

@@ -48,6 +48,9 @@ class Touching(Component):
     restitution: Number = parameter(
         0.0, minimum=0.0, maximum=1.0, doc="Share of the speed of approach with which it opens after an impact."
     )
+    impact_law: str = parameter(
+        "newton", choices=("newton", "poisson"), doc="Whether restitution is a share of the speed, or of the impulse."
+    )
     friction: Number = parameter(0.0, minimum=0.0, doc="Coefficient of friction while it slips.")
     static_friction: Number = parameter(
         None, minimum=0.0, doc="Coefficient of friction while it sticks; that of slipping if not given."
@@ -79,6 +82,7 @@ class Touching(Component):
         reaction="normal_force",
         unit="N",
         restitution="restitution",
+        impact_law="impact_law",
         stiffness="stiffness",
         doc="Force along the normal; it only pushes.",
     )

@@ -61,8 +61,8 @@ class Woodpecker(Scene):
             "beak": (bird, (-self.beak_reach, 0.0, self.beak_height), self.restitution),
         }
         for name, (body, place, restitution) in touching.items():
-            values = {"place": place, "restitution": restitution, "friction": self.friction}
-            contact = self.add(name, VertexContact(normal=(1.0, 0.0, 0.0), **values))
+            own = VertexContact(normal=(1.0, 0.0, 0.0), place=place, restitution=restitution, friction=self.friction)
+            contact = self.add(name, own)
             self.connect(pole.frame, contact.plane)
             self.connect(body.frame, contact.body)
 

@@ -63,11 +63,11 @@ ROWS = {
     for k, name in enumerate(
         (
             *("rates", "wanted", "forces", "motions", "acting", "slot", "right", "solution", "across"),
-            *("impulses", "again", "after", "work"),
+            *("impulses", "again", "after", "work", "pressed"),
         )
     )
 }
-"""Numbers of each row: a gap has one, a slip one or two."""
+"""Numbers of each row: a gap has one, a slip one or two. Impulses that act already, which rub, are `pressed`."""
 
 CLOSES, OPENS, YIELDS, STOPS = range(1, 5)
 """What has happened to a gap or a slip."""
@@ -199,7 +199,8 @@ def _is_loose(r: Routine, m: Sets, k: Value) -> Value:
     """Tell whether a slip is one at a gap that is open."""
     at = m.unit("at")[k]
     gap = r.truncated(r.most(at, 0.0))
-    return (at >= 0.0) & (m.unit("next")[gap] == float(OPEN))
+    pressed = m.row("pressed")[r.truncated(m.unit("first")[gap])]
+    return (at >= 0.0) & (m.unit("next")[gap] == float(OPEN)) & ~(pressed > 0.0)
 
 
 def _limit(r: Routine, m: Sets, k: Value, group: Operand) -> Value:
@@ -207,7 +208,8 @@ def _limit(r: Routine, m: Sets, k: Value, group: Operand) -> Value:
     count, size = m.count, m.size
     place = (k * 0 + group) * count + k
     own: Value = m.result("limits")[place] * m.finite
-    return own + _sum(r, size, m.shares.at(place * size), m.row("forces"))
+    shares = m.shares.at(place * size)
+    return own + _sum(r, size, shares, m.row("forces")) + _sum(r, size, shares, m.row("pressed"))
 
 
 # -- linear systems -------------------------------------------------------------------------------------------------
@@ -332,7 +334,8 @@ def _equations() -> Routine:
                 with r.count(n.now) as j:
                     own[j] = part * shares[which * size + r.truncated(acting[j])]
                 own[place] = own[place] + 1.0
-                right[place] = (0.0 - part) * (limits[which] * m.finite)
+                pressed = _sum(r, size, shares.at(which * size), m.row("pressed"))
+                right[place] = (0.0 - part) * (limits[which] * m.finite + pressed)
     r.give(n.now)
     return r
 
@@ -666,7 +669,9 @@ def _strike() -> Routine:
             impulses[i] = impulses[i] + again[i]
         with r.count(size) as i:
             free[i] = free[i] + _sum(r, size, response.at(i * size), impulses)
+        r.copy(m.row("pressed"), again, size)
         do_or_return(r, "find_impulses")
+        r.clear(m.row("pressed"), m.row("pressed").at(size))
     do_or_return(r, "account")
     r.call("push", place, impulses)
     r.give(0)
@@ -1024,8 +1029,9 @@ def _resolve() -> Routine:
     r, m, (t, checks, sums) = _open("resolve", {"t": NUMBER, "checks": INTEGER, "sums": INTEGER}, exported=True)
     m.finite, m.blur, m.pace, m.logged, m.stops, m.shared = 1.0, 1.0, 1.0, 0, 0, 0
     do_or_return(r, "read_contacts", t)
-    series = m.unit("series")
+    series, pressed = m.unit("series"), m.row("pressed")
     r.clear(series, series.at(m.count))
+    r.clear(pressed, pressed.at(m.size))
     with r.when(sums != 0):
         r.call("series", r.arguments[0], t, result=None)
     with r.when(checks != 0):

@@ -27,6 +27,7 @@ from atwood_library import (
     Spring,
     SurfaceContact,
     Universal,
+    VertexContact,
 )
 
 G = 9.81
@@ -160,6 +161,36 @@ def test_a_start_inside_is_refused_with_the_part_and_the_depth() -> None:
     start_at(scene, 0.0, -0.25, 0.0, 0.0)
     with pytest.raises(aw.StartError, match=r"c: it starts inside, by 0\.25 m"):
         simulate(scene, t_end=1.0)
+
+
+def strut(friction: float, law: str) -> Scene:
+    """Return a rod on a hinge that turns at 1 rad/s until its end hits a floor 0.9 below, with a restitution of 0.5."""
+    scene = Scene(gravity=0.0)
+    ground, floor = scene.add("ground", Ground()), scene.add("floor", Ground(position=(0.0, 0.0, -0.9)))
+    pivot, rod = scene.add("pivot", Pivot()), scene.add("rod", Link(length=1.0, mass=1.0))
+    tip = scene.add("tip", VertexContact(friction=friction, restitution=0.5, impact_law=law))
+    for ends in ((ground.frame, pivot.a), (pivot.b, rod.a), (floor.frame, tip.plane), (rod.b, tip.body)):
+        scene.connect(*ends)
+    scene.start.update({"pivot.angle": -0.8, "pivot.angular_velocity": -1.0})
+    return scene
+
+
+@FORMS
+@pytest.mark.parametrize("friction", [0.3, 2.0])
+def test_friction_acts_on_both_impulses_of_poisson_s_law(form: str, friction: float) -> None:
+    """The rate is a share e (c - mu s)/(c + mu s) of what it was, c and s those of its slope; steep friction locks it.
+
+    Friction turns round with the motion: it is with the first impulse, and against the second.
+    """
+    c, s = math.sqrt(1.0 - 0.81), 0.9
+    result = run(strut(friction, "poisson"), form, 0.5)
+    share = max(0.0, 0.5 * (c - friction * s) / (c + friction * s))
+    assert result["pivot.angular_velocity"][-1] == pytest.approx(share, abs=1e-12)
+    assert result.impacts[0].loss == pytest.approx((1.0 - share**2) / 6.0, rel=1e-9)
+    if friction > c / s:  # by Newton's law it turns back, and no friction lets it
+        with pytest.raises(aw.SolveError, match="no impulses satisfy") as said:
+            run(strut(friction, "newton"), form, 0.5)
+        assert "impact_law='poisson'" in str(said.value)
 
 
 def turned_run(turned: float) -> tuple[float, list[float]]:

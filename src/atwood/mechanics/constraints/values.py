@@ -158,9 +158,9 @@ def contact_rows(
             values, _ = in_joint_coordinates(local, state.kinematics, given)
             mask, force, *more = part.put(values)
             rest = iter(more)
-            found.append(
-                ContactRow(row, one.read, mask, force, one.law, *(None if x is None else next(rest) for x in limits))
-            )
+            is_poisson = not one.is_slip and one.law.options.is_poisson(local.part.values)
+            way, most, static, share = (None if x is None else next(rest) for x in limits)
+            found.append(ContactRow(row, one.read, mask, force, one.law, way, most, static, share, is_poisson))
     return tuple(found)
 
 

@@ -92,6 +92,8 @@ class ContactRow:
         The largest force of friction, and that while it sticks; of a gap None, and what it bears that is pulled open.
     restitution
         Of a gap.
+    is_poisson
+        Whether its law of impact is Poisson's.
     """
 
     row: Constraint
@@ -103,6 +105,7 @@ class ContactRow:
     limit: Expression | None
     static_limit: Expression | None
     restitution: Expression | None
+    is_poisson: bool = False
 
     @property
     def is_slip(self) -> bool:

@@ -34,6 +34,9 @@ class Told(NamedTuple):
         return str(values.get(self.target, self.target))
 
 
+IMPACT_LAWS = "newton", "poisson"
+
+
 @dataclass(frozen=True)
 class UnilateralOptions:
     """See `unilateral`."""
@@ -56,6 +59,16 @@ class UnilateralOptions:
     def is_closed_at_start(self, values: Mapping[str, Any]) -> bool:
         """Return whether a start is to close it, by the parameters of the part."""
         return bool(self.starts and self.closes and values.get(self.starts) == self.closes.target)
+
+    def is_poisson(self, values: Mapping[str, Any]) -> bool:
+        """Return whether its law of impact is Poisson's, by the parameters of the part."""
+        law = values.get(self.impact_law, self.impact_law)
+        if law not in IMPACT_LAWS:
+            raise DeclarationError(
+                f"a law of impact is {' or '.join(map(repr, IMPACT_LAWS))}, or a choice parameter of both, not {law!r}",
+                advice=suggestion(str(law), [*values, *IMPACT_LAWS]),
+            )
+        return bool(law == "poisson")
 
 
 @dataclass(frozen=True)
@@ -167,7 +180,7 @@ _TOLD = each(TEXT, "a name, a target and a message", single=False)
     unit=TEXT,
     doc=DOC,
     restitution=either(NAME, number("a number from 0 to 1", least=0.0, most=1.0)),
-    impact_law=one_of(("newton", "poisson")),
+    impact_law=NAME,
     level=one_of(("position", "velocity")),
     adhesion=TEXT,
     stiffness=TEXT,
@@ -184,7 +197,7 @@ def unilateral(
     unit: str = "N",
     doc: str,
     restitution: str | float = 0.0,
-    impact_law: Literal["newton", "poisson"] = "newton",
+    impact_law: str = "newton",
     level: Literal["position", "velocity"] = "position",
     adhesion: str = "",
     stiffness: str = "",
@@ -211,8 +224,8 @@ def unilateral(
     restitution
         Share of the approach with which a gap opens again after an impact, a number or the name of a parameter.
     impact_law
-        What restitution is a share of: of the speed of approach (Newton), or of the impulse until it has ended
-        (Poisson).
+        What restitution is a share of: of the speed of approach (``"newton"``), or of the impulse until it has ended
+        (``"poisson"``); or the name of a choice parameter that says which of both.
     level
         What the method reads: positions, angles and time, or also velocities, in which it is affine then.
     adhesion

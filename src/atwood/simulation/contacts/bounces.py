@@ -30,8 +30,8 @@ def _gaps(plan: SceneProblem) -> list[ContactRow]:
 def _plain(plan: SceneProblem) -> dict[tuple[str, str], int]:
     """Return the numbers of the gaps without friction whose impacts are Newton's, and told of as such."""
     rubs = {(one.row.key[0], one.law.options.at) for one in plan.assembly.own_equations.contacts if one.is_slip}
-    own = {i: (one.row.key[:2], one.law.options) for i, one in enumerate(_gaps(plan))}
-    return {key: i for i, (key, x) in own.items() if x.impact_law == "newton" and not x.closes and key not in rubs}
+    own = [one for one in enumerate(_gaps(plan)) if not one[1].is_poisson and not one[1].law.options.closes]
+    return {one.row.key[:2]: i for i, one in own if one.row.key[:2] not in rubs}
 
 
 def has_plain_impacts(plan: SceneProblem) -> bool:

@@ -75,6 +75,8 @@ MOST_TURNS = 50
 
 CONTRADICT = "Contacts contradict each other here: look at what moves them, and at their friction."
 
+_POISSON = "Choose Poisson's law for the part, with impact_law='poisson' for it or for its gap"
+
 _UNDETERMINED = "friction depends on how forces are shared, which nothing determines"
 _SHARES = "Give each of them a stiffness, as a place that gives way a little has, or one of them no friction."
 
@@ -297,7 +299,7 @@ class _Moment:
         chosen = [*touching, *self.slips_at(touching)]
         share = values.restitution
         gaps = [self.units[k][0] for k in touching]
-        poisson = [i for i in gaps if self.contacts[i].law.options.impact_law == "poisson"]
+        poisson = [i for i in gaps if self.contacts[i].is_poisson]
         free = rates.copy()
         for i in gaps:
             if i not in poisson:
@@ -307,7 +309,7 @@ class _Moment:
             again = np.zeros(count)
             again[poisson] = share[poisson] * impulses[poisson]
             impulses = impulses + again
-            impulses = impulses + self._impulses(chosen, free + values.response @ impulses)
+            impulses = impulses + self._impulses(chosen, free + values.response @ impulses, again)
         after = rates + values.response @ impulses
         work, size = 0.5 * impulses * (rates + after), 0.5 * np.abs(impulses) * (np.abs(rates) + np.abs(after))
         if float(np.sum(work)) > GAIN * float(np.sum(size)):
@@ -315,7 +317,7 @@ class _Moment:
             raise SolveError(
                 f"at t = {self.t:.9g} Newton's law of impact would make energy, {float(np.sum(work)):.3g} J",
                 where=self.first[worst].row.key[0],
-                advice="Choose Poisson's law of impact for the part, or declare its gap with impact_law='poisson'.",
+                advice=f"{_POISSON}.",
             )
         self.u = self.u + values.speeds_by(impulses)
         for k in touching:
@@ -332,14 +334,21 @@ class _Moment:
         speeds, loss = (float(before[i]), float(after[i])), -float(np.sum(work[[i, *rubs]]))
         self.events.append(told_impact(self.t, one.row.key[:2], one.law.options.unit, tuple(acting), speeds, loss))
 
-    def _impulses(self, chosen: list[int], free: FloatArray) -> FloatArray:
-        """Return the impulses of all rows: velocities take the place of accelerations, and limits are of impulses."""
+    def _impulses(self, chosen: list[int], free: FloatArray, pressed: FloatArray | None = None) -> FloatArray:
+        """Return the impulses of all rows: velocities take the place of accelerations, and limits are of impulses.
+
+        Where gaps have impulses already, `pressed`, what slips there is rubbed by these too, also if they open.
+        """
         values, found = self.values, np.zeros(len(self.contacts))
+        pressed = np.zeros(len(self.contacts)) if pressed is None else pressed
         for _ in range(MOST_TURNS):
-            limits = _of_impulses(values.limits_at(found))
-            solved = find_states(values.chosen(chosen, free, {}, limits), self._at_rest(chosen))
+            limits = _of_impulses(values.limits_at(found + pressed), pressed)
+            asked = values.chosen(chosen, free, {}, limits, pressed)
+            solved = find_states(asked, self._at_rest(chosen))
             if solved is None:
-                raise self._contradiction("no impulses satisfy the laws of impact and friction", chosen)
+                opens = any(values.restitution[self.units[k][0]] > 0.0 and not self.first[k].is_poisson for k in chosen)
+                advice = f"{_POISSON}: by it what locks stays where it is. {CONTRADICT}" if opens else CONTRADICT
+                raise self._contradiction("no impulses satisfy the laws of impact and friction", chosen, advice)
             self._check_determined(chosen, solved)
             last, found = found, self._on_all(chosen, solved)
             if not self.layout.is_curved or is_same(last, found):
@@ -688,10 +697,15 @@ def in_own_words(
     return found
 
 
-def _of_impulses(limits: tuple[Limits, Limits]) -> tuple[Limits, Limits]:
-    """Return limits of impulses: finite forces have none, and what follows from other forces is a share of these."""
-    none = np.zeros_like(limits[0].free)
-    ahead, back = (Limits(none, one.shares, none, one.static_shares) for one in limits)
+def _of_impulses(limits: tuple[Limits, Limits], pressed: FloatArray | None = None) -> tuple[Limits, Limits]:
+    """Return limits of impulses: finite forces have none, and what follows from other forces is a share of these.
+
+    Those of impulses that act already are known.
+    """
+    known = np.zeros(limits[0].shares.shape[1]) if pressed is None else pressed
+    ahead, back = (
+        Limits(one.shares @ known, one.shares, one.static_shares @ known, one.static_shares) for one in limits
+    )
     return ahead, back
 
 

@@ -132,7 +132,7 @@ def _units(layout: Layout, plan: SceneProblem) -> FloatArray:
             "slip": one.is_slip,
             "at": layout.gap_of[k],
             "speed": one.is_speed,
-            "poisson": not one.is_slip and one.law.options.impact_law == "poisson",
+            "poisson": one.is_poisson,
             "part": parts[one.row.key[0]],
             "small": size,
             "slow": size / plan.scales.time,

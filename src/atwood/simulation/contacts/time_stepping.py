@@ -74,7 +74,7 @@ def _check(plan: SceneProblem, probe: EventProbe, impacts: str) -> None:
     refused += [
         (one.row.key[0], "time stepping knows no impacts of Poisson's law")
         for one in plan.assembly.own_equations.contacts
-        if not one.is_slip and one.law.options.impact_law == "poisson"
+        if one.is_poisson
     ]
     if impacts != "together":
         what = f"time stepping does not tell impacts in a step apart, so that impacts={impacts!r} means nothing"

@@ -329,12 +329,18 @@ class ContactValues:
         return Limits(*found[:4]), Limits(*found[4:])
 
     def chosen(
-        self, chosen: list[int], free: FloatArray, given: dict[int, tuple[float, ...]], limits: tuple[Limits, Limits]
+        self,
+        chosen: list[int],
+        free: FloatArray,
+        given: dict[int, tuple[float, ...]],
+        limits: tuple[Limits, Limits],
+        pressed: FloatArray | None = None,
     ) -> Contacts:
-        """Return what is asked of some units."""
+        """Return what is asked of some units; what slips at gaps that are pressed already rubs whether they open."""
         rows = [row for k in chosen for row in self.units[k]]
         place = {row: i for i, row in enumerate(rows)}
-        number = {k: i for i, k in enumerate(chosen)}
+        is_pressed = [pressed is not None and pressed[self.units[k][0]] > 0.0 for k in chosen]
+        number = {k: i for i, k in enumerate(chosen) if not is_pressed[i]}
         units = tuple(
             Unit(
                 tuple(place[row] for row in self.units[k]),

@@ -60,7 +60,7 @@ def pushes_of(assembly: Assembly, loose: Assembly) -> tuple[Push, ...]:
             why = "impacts take energy"
         elif evaluate([one.restitution], known)[0] != 1.0:
             why = "impacts take energy, with a restitution below 1"
-        elif one.law.options.impact_law == "poisson" and len(rows) > 1:
+        elif one.is_poisson and len(rows) > 1:
             why = "several impacts at once may take energy by Poisson's law"
         found.append(Push(f"{part}.{law}", tuple(vjp([rate], [e.graph.one], list(e.speeds))), why))
     return tuple(found)
