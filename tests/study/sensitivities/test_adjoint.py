@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.study.sensitivities.test_events import in_wind, pushed, slack_rope
+from tests.study.sensitivities.test_events import in_wind, pushed, slack_rope, stops
 from tests.study.sensitivities.test_inputs import NODES, pendulum, sampled
 
 from atwood import assemble, sensitivities
@@ -38,6 +38,7 @@ CASES = [
     (CartPole, ["rail.displacement"], ["lean"], [], 0.1),
     (NewtonsCradle, ["rod5.angle"], ["ball5.mass"], [], 0.8),
     (slack_rope, ["bob.position.x"], ["rope.length"], ["bob.velocity.x"], 1.5),
+    (stops, ["bob.position.x"], ["floor.friction"], ["bob.velocity.x"], 1.0),
     (pushed, ["bob.position.x"], ["source.start_time", "source.width"], [], 1.0),
     (in_wind, ["bob.position.x"], ["wind.place"], ["bob.velocity.x"], 1.0),
 ]

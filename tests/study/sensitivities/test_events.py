@@ -9,6 +9,7 @@ from atwood import (
     Point,
     Scene,
     SolveError,
+    UnsupportedError,
     assemble,
     connector,
     force,
@@ -17,7 +18,7 @@ from atwood import (
     sensitivities,
     simulate,
 )
-from atwood_library import Force, Ground, PointMass, Pulse, Rod, Rope
+from atwood_library import Force, Ground, PointContact, PointMass, Pulse, Rod, Rope, Sine
 from atwood_library.scenes import BouncingBall, CartPole, NewtonsCradle, RockingBlock, StickSlip, Woodpecker
 
 
@@ -67,6 +68,35 @@ def in_wind():
     return scene
 
 
+def sliding(speed=(0.0, 0.0), static=None, pushes=()):
+    """A body on a rough floor in space, with a speed and with pushes: direction, size, angular frequency and phase."""
+    scene = Scene(space="space")
+    ground, bob = scene.add("ground", Ground()), scene.add("bob", PointMass(mass=1.0))
+    floor = scene.add("floor", PointContact(friction=0.3, static_friction=static))
+    scene.connect(ground.frame, floor.plane)
+    scene.connect(floor.point, bob.point)
+    for k, (direction, size, frequency, phase) in enumerate(pushes):
+        push = scene.add(f"push{k}", Force(direction=direction))
+        source = scene.add(f"source{k}", Sine(amplitude=size, angular_frequency=frequency, phase=phase))
+        scene.connect(push.point, bob.point)
+        scene.connect(source.output("value"), push.input("value"))
+    for axis, one in zip("xyz", (*speed, 0.0), strict=True):
+        scene.start.update({f"bob.position.{axis}": 0.0, f"bob.velocity.{axis}": one})
+    return scene
+
+
+def stops():
+    return sliding((0.6, 0.3), pushes=[((1.0, 0.0, 0.0), 1.0, 2.0, 0.5)])
+
+
+def yields():
+    return sliding(pushes=[((1.0, 0.0, 0.0), 5.0, 3.0, 0.0), ((0.0, 1.0, 0.0), 3.0, 4.4, 0.3)])
+
+
+def breaks_away():
+    return sliding(static=0.4, pushes=[((1.0, 0.0, 0.0), 5.0, 3.0, 0.0), ((0.0, 1.0, 0.0), 3.0, 4.4, 0.3)])
+
+
 CASES = [
     (BouncingBall, "ball.position.z", "height", None, False, 0.8),
     (StickSlip, "body.position.x", "belt_speed", None, False, 3.0),
@@ -79,6 +109,11 @@ CASES = [
     (pushed, "bob.position.x", "source.start_time", 0.2, False, 1.0),
     (pushed, "bob.position.x", "source.width", 0.4, False, 1.0),
     (in_wind, "bob.position.x", "wind.place", 0.3, False, 1.0),
+    (stops, "bob.position.y", "bob.velocity.x", 0.6, True, 1.0),
+    (stops, "bob.position.x", "floor.friction", 0.3, False, 1.0),
+    (yields, "bob.position.x", "floor.friction", 0.3, False, 0.8),
+    (breaks_away, "bob.position.y", "floor.friction", 0.3, False, 0.8),
+    (breaks_away, "bob.position.x", "source0.amplitude", 5.0, False, 2.0),
 ]
 
 
@@ -102,7 +137,16 @@ def test_meets_differences(make, quantity, path, value, is_start, t_end, form):
     h = 2e-4
     slopes = [(at(one) - at(-one)) / (2.0 * one) for one in (h, h / 2.0)]
     near = (4.0 * slopes[1] - slopes[0]) / 3.0
+    assert np.max(np.abs(near)) > 1e-3
     assert found[quantity, path] == pytest.approx(near, abs=1e-7 * max(1.0, np.max(np.abs(near))))
+
+
+def test_slips_in_two_directions_that_begin_are_not_gone_back_over():
+    about = {"parameters": ["floor.friction"], "t_end": 0.8, "outputs": [0.8]}
+    with pytest.raises(UnsupportedError, match=r"floor: at t = 0\.1.* a slip in two directions begins"):
+        sensitivities(breaks_away(), ["bob.position.x"], mode="adjoint", **about)
+    found = sensitivities(breaks_away(), ["bob.position.x"], inputs={}, **about)
+    assert found.derivatives.shape == (1, 1, 1)
 
 
 def test_of_a_bounce():

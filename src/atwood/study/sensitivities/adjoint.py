@@ -10,16 +10,22 @@ from __future__ import annotations
 import numpy as np
 
 from atwood.arrays import FloatArray, IndexArray
+from atwood.errors import UnsupportedError
 from atwood.expr import Expression
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
+from atwood.mechanics.outputs.event_functions import ALONG
+from atwood.numerics.contact_sets import GOES_ON
 from atwood.simulation.contacts.values import layout_of
 from atwood.study.sensitivities.augmented import Augmented
 from atwood.study.sensitivities.changes import Leg
 from atwood.study.sensitivities.columns import Column
-from atwood.study.sensitivities.passage import Passage
+from atwood.study.sensitivities.passage import Passage, set_apart
 from atwood.study.sensitivities.pulled import Pulled, Recorded, read
-from atwood.study.sensitivities.quantities import written
+from atwood.study.sensitivities.quantities import derivatives, written
+
+_BEGINS = 1e-3
+"""In the scene's speeds: a slip that is slower at the begin of a stretch begins there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +139,8 @@ class Adjoint(Passage):
     def _stretch(self, number: int, leg: Leg) -> _Stretch:
         segment, begin = self.segments[leg.number], np.concatenate(leg.begin[1:])
         self._refuse_singular(segment)
+        if leg.plan.assembly.own_equations.contacts:
+            self._refuse_beginning(leg)
         none = np.zeros((len(self.columns), len(leg.assembly.discrete_states)))
         seeds = self._seeds(leg, none)
         pulled = Pulled(Augmented(leg.plan, leg.begin[0], begin, seeds))
@@ -159,6 +167,36 @@ class Adjoint(Passage):
         tangent = pulled.tangent(leg.begin[0], begin)
         return _Stretch(pulled, made, expressions, times[shown], states, rows, seeds, held, tangent, over, apart)
 
+    def _refuse_beginning(self, leg: Leg) -> None:
+        """Refuse slips in two directions that begin: changes across the slip die away within steps of the motion."""
+        layout, contacts = layout_of(leg.assembly), leg.plan.assembly.own_equations.contacts
+        states = leg.assembly.held_now
+        begun = [
+            rows
+            for rows, places in zip(layout.units, layout.places, strict=True)
+            if len(rows) == 2 and states[places[0]] == GOES_ON
+        ]
+        if not begun:
+            return
+        still = np.zeros((1, 1, len(np.concatenate(leg.begin[1:]))))
+        rates, _ = derivatives(
+            leg.plan.assembly,
+            [contacts[i].row.rate for rows in begun for i in rows],
+            np.array([leg.begin[0]]),
+            np.concatenate(leg.begin[1:])[None, :],
+            still,
+            np.zeros((1, len(leg.plan.assembly.parameters))),
+        )
+        for rows, speed in zip(begun, np.hypot(rates[::2, 0], rates[1::2, 0]), strict=True):
+            part, unit = contacts[rows[0]].row.key[0], f"{ALONG[contacts[rows[0]].law.options.unit]}/s"
+            if speed <= _BEGINS * leg.plan.scales.of(unit):
+                raise UnsupportedError(
+                    f"at t = {leg.begin[0]:.9g} s a slip in two directions begins, over which derivatives go forward "
+                    "alone",
+                    where=part,
+                    advice="Ask with mode='forward'.",
+                )
+
     def _across(
         self, leg: Leg, after: Leg, pulled: Pulled, seeds: FloatArray, held: list[int]
     ) -> tuple[FloatArray, FloatArray]:
@@ -166,7 +204,7 @@ class Adjoint(Passage):
         end = np.concatenate(leg.end[1:])
         n, count, columns = len(end), len(held), self.columns
         every = np.zeros((n + count + len(columns), seeds.shape[1]))
-        moving = [k for k in range(count) if k not in _set_apart(leg.assembly)]
+        moving = [k for k in range(count) if k not in set_apart(leg.assembly)]
         every[[n + k for k in moving], [held[k] for k in moving]] = 1.0
         every[n + count :] = seeds
         tangent, slopes = pulled.tangent(leg.end[0], end)
@@ -180,13 +218,6 @@ class Adjoint(Passage):
         finally:
             self.columns = columns
         return found
-
-
-def _set_apart(assembly: Assembly) -> set[int]:
-    """Return the discrete states that are one of a few numbers: whether gaps and slips hold, and signs of slips."""
-    if not assembly.own_equations.contacts:
-        return set()
-    return {place for some in layout_of(assembly).places for place in (some if len(some) < 3 else some[:1])}
 
 
 def _still() -> Column:

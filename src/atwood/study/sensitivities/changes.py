@@ -20,7 +20,7 @@ from atwood.errors import UnsupportedError
 from atwood.expr import Expression
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, replace
-from atwood.mechanics.outputs.event_functions import CONTACT, UPDATE
+from atwood.mechanics.outputs.event_functions import CONTACT, RUNS, UPDATE
 from atwood.simulation.contacts.changes import resolve
 from atwood.simulation.events.impacts_in_time import jumped
 from atwood.simulation.events.mode_change import enter_mode
@@ -166,6 +166,8 @@ class WatchedWalk(Walk):
     def _settled(self, plan: SceneProblem) -> SceneProblem:
         triggers, assembly, before = self._unsettled, self.assembly, (self.u, self.held)
         made = super()._settled(plan)
+        if triggers and all(one.target == RUNS for one in triggers) and np.array_equal(self.u, before[0]):
+            return made  # it goes on as it has begun to, and friction is against that already
         if triggers and (self.u is not before[0] or self.held != before[1]):
             self.changes.append(self._contact(plan, assembly, triggers))
         return made

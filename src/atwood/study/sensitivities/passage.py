@@ -13,6 +13,7 @@ from atwood.expr import Expression, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.result.result import Result
+from atwood.simulation.contacts.values import layout_of
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales
 from atwood.simulation.events.sampling import find_sampler
 from atwood.simulation.events.time_events import find_schedule
@@ -205,8 +206,10 @@ class Passage:
         for j, column in enumerate(self.columns):
             if not column.is_start:
                 seeds[j, own] = self._parameters(plain, column)[kept]
+        apart = set_apart(plain)
         for k, one in enumerate(plain.discrete_states):
-            seeds[:, places[one.symbol]] = held[:, k]
+            if k not in apart:
+                seeds[:, places[one.symbol]] = held[:, k]
         return seeds
 
     def _pattern(self, leg: Leg, seeds: FloatArray) -> tuple[tuple[int, ...], ...]:
@@ -304,7 +307,7 @@ class Passage:
 
             def beside(one: Assembly) -> Assembly:
                 made = self._beside(one, column, share)
-                return made.with_held(tuple(now + share * kept)) if len(kept) else made
+                return made.with_held(tuple((now + share * kept).tolist())) if len(kept) else made
 
             there = state + share * by
             q, u, values = change.apply(beside, (t + share * later, there[:n], there[n:]))
@@ -414,6 +417,16 @@ class Passage:
         except AtwoodError as error:
             raise UnsupportedError(f"its times do not follow it: {error.message}", where=column.path) from error
         return self._times[about][:2]
+
+
+def set_apart(assembly: Assembly) -> set[int]:
+    """Return the discrete states that have no derivatives: whether gaps and slips hold, and ways in which slips go.
+
+    These are one of a few numbers, or that which the speeds say.
+    """
+    if not assembly.own_equations.contacts:
+        return set()
+    return {place for some in layout_of(assembly).places for place in some}
 
 
 def _only_leg(segment: SegmentRecord) -> Leg:

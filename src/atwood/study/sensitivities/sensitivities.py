@@ -11,7 +11,7 @@ import numpy as np
 
 from atwood.arguments import PATHS, one_of, optional, takes, whole
 from atwood.arrays import FloatArray
-from atwood.errors import SolveError, UsageError
+from atwood.errors import SolveError, UnsupportedError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import find_observables
 from atwood.lazy_dataclasses import dataclass
@@ -208,7 +208,13 @@ def derivatives_of(
     )
     paths = tuple(expand_paths(assembly, quantities or None))
     goes_back = mode == "adjoint" or (mode == "auto" and _DEARER * len(paths) * len(result.time) < len(columns))
-    values, found = (_gone_back if goes_back else _gone)(result, columns, paths, rtol, max_steps)
+    about = result, columns, paths, rtol, max_steps
+    try:
+        values, found = (_gone_back if goes_back else _gone)(*about)
+    except UnsupportedError:
+        if mode != "auto" or not goes_back:
+            raise
+        values, found = _gone(*about)
     scales = np.array([one.scale for one in columns])
     units = {one.path: one.unit for one in find_observables(assembly, paths)}
     return Sensitivities(
