@@ -14,7 +14,7 @@ from atwood.errors import UnsupportedError
 from atwood.expr import Expression
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
-from atwood.mechanics.outputs.event_functions import ALONG
+from atwood.model.values.units import ALONG
 from atwood.numerics.contact_sets import GOES_ON
 from atwood.simulation.contacts.values import layout_of
 from atwood.study.sensitivities.augmented import Augmented
