@@ -241,12 +241,13 @@ def make_form_program(
         return Program(f"{name} residual", groups, tuple(parameters), (OutputGroup("residual", tuple(rows())),))
 
     # With loops, rows are chosen anew along a run, by functions that are written entry by entry.
-    by_columns = form == "reduced" and not independent
+    by_columns = (form == "reduced" or bool(equations.contacts)) and not independent
+    few = _FEW_AT_CONTACTS if equations.contacts else _FEW
     return FormProgram(
         form,
         level,
         write,
-        lambda residual: derive(f"{name} Jacobian", residual, by_columns),
+        lambda residual: derive(f"{name} Jacobian", residual, by_columns, few),
         len(equations.coordinates),
         len(equations.speeds),
         len(multipliers),
@@ -264,6 +265,9 @@ which is little beside the 5 ms of a factorisation; to derive and compile them t
 
 _LOOKED = 64
 """Of many more columns than these some are looked at, evenly spread: how full they are is seen in them."""
+
+_FEW, _FEW_AT_CONTACTS = 50, 4
+"""Entries for so few unknowns are written out; forces of gaps and slips, as functions of the state, are long."""
 
 _FULL = 0.05
 """A Jacobian is full if a column visits more than this share of the nodes; where it is not, a product wastes work."""
@@ -290,10 +294,10 @@ class Derivative:
 
 
 def is_too_long(
-    outputs: Sequence[Expression], wrt: Sequence[Expression | dict[Expression, Expression | float]]
+    outputs: Sequence[Expression], wrt: Sequence[Expression | dict[Expression, Expression | float]], few: int = _FEW
 ) -> bool:
     """Return whether a Jacobian is better done by columns than entry by entry."""
-    if len(wrt) < 50:
+    if len(wrt) < few:
         return False
     every = max(1, len(wrt) // _LOOKED)
     return sweeps_exceed(outputs, wrt[::every], max(_LONGEST, int(_FULL * len(wrt) * len(live(outputs)))) // every)
@@ -304,7 +308,7 @@ def directions(symbols: Sequence[Expression]) -> InputGroup:
     return InputGroup("direction", tuple(s.graph.symbol(f"direction:{s.name}") for s in symbols))
 
 
-def derive(name: str, program: Program, may_go_by_columns: bool) -> Derivative:
+def derive(name: str, program: Program, may_go_by_columns: bool, few: int = _FEW) -> Derivative:
     """Return the Jacobian of a residual."""
     groups, parameters, residual = program.inputs, program.parameters, program.results
     _, (_, y), (_, yp) = groups
@@ -313,7 +317,7 @@ def derive(name: str, program: Program, may_go_by_columns: bool) -> Derivative:
     inputs = (*groups, InputGroup("cj", (cj,)))
     wrt: list[dict[Expression, Expression | float]] = [{a: 1.0, b: cj} for a, b in zip(y, yp, strict=True)]
     n = len(y)
-    if may_go_by_columns and is_too_long(residual, wrt):
+    if may_go_by_columns and is_too_long(residual, wrt, few):
         along = directions(y)
         seeds: dict[Expression, Expression | float] = {}
         for a, b, v in zip(y, yp, along.symbols, strict=True):

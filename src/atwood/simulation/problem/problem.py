@@ -282,7 +282,7 @@ class SceneProblem:
             event_count=len(directions),
             event_directions=directions,
             native=self._native(),
-            pivots=self._pivots if self.program.form == "dae" else None,
+            pivots=self._pivots if self.program.form == "dae" and not self._present.derivative.by_columns else None,
         )
 
     def _pivots(self, samples: Sequence[FloatArray]) -> FixedPivots | None:
