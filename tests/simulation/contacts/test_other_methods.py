@@ -14,10 +14,13 @@ from atwood_library import (
     BallContact,
     Damper,
     Ground,
+    Inertia,
     Link,
     PointContact,
     PointMass,
     Rope,
+    RotationalFriction,
+    RotationalSource,
     Sphere,
     Spring,
     SurfaceContact,
@@ -169,3 +172,19 @@ def test_what_is_stiff_is_given_to_ida(form: str) -> None:
 def test_symplectic_methods_say_what_to_do(solver: str) -> None:
     with pytest.raises(UsageError, match=r"belt: .* gaps that are closed .*'explicit' or 'taylor' or 'ida'"):
         simulate(StickSlip(), solver=solver)
+
+
+def test_what_turns_out_stiff_when_something_slips_is_given_to_ida() -> None:
+    """A shaft that slips under 2 t N m from 0.5 s on follows ``1 + 100 w = 2 t`` but for what is gone in 10 us."""
+    scene = Scene()
+    shaft = scene.add("shaft", Inertia(moment=1e-3))
+    brake = scene.add("brake", RotationalFriction(sliding="1", viscous=100.0, against="ground"))
+    motor = scene.add("motor", RotationalSource(value=lambda t: 2.0 * t, against="ground"))
+    scene.connect(motor.b, shaft.flange)
+    scene.connect(brake.b, shaft.flange)
+    scene.start.update({"shaft.angle": 0.0, "shaft.angular_velocity": 0.0})
+    result = simulate(scene, t_end=20.0)
+    assert "SUNDIALS IDA: it has turned out stiff" in result.solver
+    assert times(result, "slips") == [pytest.approx(0.5, abs=1e-9)]
+    assert result["shaft.angular_velocity"][-1] == pytest.approx(0.39 - 2e-7, abs=1e-9)
+    assert result.statistics.steps < 1000

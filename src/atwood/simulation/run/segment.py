@@ -52,6 +52,9 @@ if TYPE_CHECKING:
 _BLOCKS = 50
 """Progress is told about so many times."""
 
+_Jumps = tuple[FloatArray, FloatArray]
+"""Times, and states before and after."""
+
 _PARTS = 5
 """So often it is seen to that coordinates of orientations keep their size."""
 
@@ -131,6 +134,7 @@ class _Runner:
         self.request: SolverRequest | None = None
         self.opened: StepResult | None = None
         self.noted: list[EventRecord | ToldLater] = []
+        self.jumped: list[_Jumps] = []
 
     @property
     def method(self) -> Method:
@@ -339,6 +343,8 @@ class _Runner:
             monitor.look_in_python()
 
     def _is_stiff(self, t: float, y: FloatArray) -> bool:
+        if self.session is not None and (made := self._take_jumps(self.session)) is not None:
+            self.jumped.append(made)  # the plan is that of the present set
         plan = self.segment.plan
         found = stiffness_of(plan, self.segment.options, t, *plan.program.split(y), goes_on=True)
         if found is None or not found.is_stiff:
@@ -375,7 +381,7 @@ class _Runner:
             if strayed is not None:  # what comes behind is done again
                 y, step_result = y[: strayed + 1], session.here
             count = len(y)
-            jumps = self._take_jumps(session)
+            jumps = self._all_jumps(session)
             shows = isinstance(segment.options.outputs, (int, np.integer))  # or just the times that were asked for
             self.recorder.take_many(times[:count], y, segment.samples.shown[done : done + count], jumps, shows)
             done += count
@@ -396,7 +402,15 @@ class _Runner:
         needs = plan.balance.kinematic_map.needs_normalization
         return next((int(k) - 1 for k in ends if needs(plan.program.split(y[k - 1])[0])), None)
 
-    def _take_jumps(self, session: Session) -> tuple[FloatArray, FloatArray] | None:
+    def _all_jumps(self, session: Session) -> _Jumps | None:
+        """Return the jumps since the last states were recorded."""
+        made, last = self.jumped, self._take_jumps(session)
+        if not made:
+            return last
+        self.jumped, made = [], made if last is None else [*made, last]
+        return np.concatenate([one[0] for one in made]), np.concatenate([one[1] for one in made])
+
+    def _take_jumps(self, session: Session) -> _Jumps | None:
         """Return times and states of the jumps since this was last asked, and note what is told of them."""
         if not self.method.looks_for_events:
             from atwood.integrators.time_stepping.session import TimeSteppingSession  # few runs step over events
