@@ -228,10 +228,10 @@ class RankMeasure:
         self.plan = plan
         self.rows = np.zeros(plan.balance.constraints)
 
-    def learn(self, t: FloatArray, q: FloatArray) -> FloatArray:
-        """Learn from states how much constraints change, and return the measure there; see `at`."""
+    def learn(self, t: FloatArray, q: FloatArray, known: int | None = None) -> FloatArray:
+        """Learn from states, the first if so many are given, how much constraints change; return the measure of all."""
         now = self._constraints(t, q)
-        np.maximum(self.rows, np.max(now.rows, axis=0), out=self.rows)
+        np.maximum(self.rows, np.max(now.rows[:known], axis=0), out=self.rows)
         return self._of(now)
 
     def at(self, t: FloatArray, q: FloatArray) -> FloatArray:
@@ -244,9 +244,9 @@ class RankMeasure:
             slopes = (now.jacobian * share[:, :, None])[:, now.kept]
             if not slopes.shape[1]:
                 return np.ones(count)  # what constraints there are follow from what is eliminated
-            if not np.all(np.isfinite(slopes)):
-                return np.full(count, np.nan)
-            return np.asarray(singular_values(slopes)[:, -1])
+            found, is_known = np.full(count, np.nan), np.isfinite(slopes).all(axis=(1, 2))
+            found[is_known] = singular_values(slopes[is_known])[:, -1] if is_known.any() else np.nan
+            return found
         right = np.sin(_GOLDEN * np.arange(1.0, now.value.shape[1] + 1.0)) * np.ones((count, 1))
         with np.errstate(all="ignore"):
             step = now.step(right / share)

@@ -105,6 +105,8 @@ class SingularityMonitor(Branches):
         self._compiled: MonitorData | None = None
         self._start, self._is_behind = step_result, False
         self._starts_low = False
+        self._best: tuple[float, FloatArray] | None = None
+        self._seen_ahead: tuple[FloatArray, FloatArray] | None = None
         about = step_result.t, step_result.y.tobytes(), step_result.yp.tobytes(), self._whole, plan.finding.kept
         self._about: tuple[object, ...] | None = about
         begun = plan.assembly.kept.get(_BEGUN, self._first_looks, *about)
@@ -193,7 +195,7 @@ class SingularityMonitor(Branches):
             return None
         began = time.perf_counter()
         try:
-            self._measure()
+            self._measure(looks_ahead=not (at_end or ended))
             failed = step_result.status is Status.FAILED
             found = self._first_minimum(at_end or ended, failed)
             if found is None and not (at_end or ended):
@@ -217,8 +219,7 @@ class SingularityMonitor(Branches):
         if not compiled.has_seen_low and not ended:
             return False
         self._samples, self._away = [Sample(*one) for one in compiled.take()], []
-        t, q = compiled.best
-        self._largest = max(self._largest, float(self._measures.learn(np.array([t]), q[:, None])[0]))
+        self._best = compiled.best
         return True
 
     def ahead_of_start(self) -> SingularCrossing | None:
@@ -255,8 +256,10 @@ class SingularityMonitor(Branches):
         stride = stride_from(self.plan, last, np.inf)
         if not (self._away[-1] > 0.0 and stride < np.inf):
             return None
-        times = last.t + stride * np.linspace(*_AHEAD)
-        near = zero_ahead(times, self._measures.at(self._in_run(times), going_on(self.plan, last, times)[: self._n]))
+        times, away = self._seen_ahead or (self._times_ahead(last, stride), None)
+        if away is None:
+            away = self._measures.at(self._in_run(times), going_on(self.plan, last, times)[: self._n])
+        near = zero_ahead(times, away)
         if near is None or not near > now:
             return None
         self.plan.compiles_columns = True
@@ -276,12 +279,31 @@ class SingularityMonitor(Branches):
                 return found
         return None
 
-    def _measure(self) -> None:
-        if new := self._samples[len(self._away) :]:
-            t = np.array([one.t for one in new])
-            q = np.stack([one.y[: self._n] for one in new], axis=1)
-            self._away += self._measures.learn(t, q).tolist()
-            self._largest = max([self._largest, *(one for one in self._away[-len(new) :] if np.isfinite(one))])
+    @staticmethod
+    def _times_ahead(last: Sample, stride: float) -> FloatArray:
+        return last.t + stride * np.linspace(*_AHEAD)
+
+    def _measure(self, looks_ahead: bool = False) -> None:
+        """Measure what was noted, the best look that is not noted any more, and what may be ahead, all at once."""
+        new, best, n = self._samples[len(self._away) :], self._best, self._n
+        self._best, self._seen_ahead = None, None
+        if not new:
+            return
+        parts = [(np.array([one.t for one in new]), np.stack([one.y[:n] for one in new], axis=1))]
+        if best is not None:
+            parts.append((np.array([best[0]]), best[1][:, None]))
+        known, last = sum(len(one[0]) for one in parts), self._samples[-1]
+        stride = stride_from(self.plan, last, np.inf) if looks_ahead else np.inf
+        times = self._times_ahead(last, stride) if stride < np.inf else np.zeros(0)
+        if len(times):
+            parts.append((self._in_run(times), going_on(self.plan, last, times)[:n]))
+        t, q = (np.concatenate(each, axis=-1) for each in zip(*parts, strict=True))
+        away = self._measures.learn(t, q, known)
+        own = away[: len(new)] if np.isfinite(away[: len(new)]).all() else np.full(len(new), np.nan)
+        self._away += own.tolist()
+        self._largest = max([self._largest, *(one for one in away[:known].tolist() if np.isfinite(one))])
+        if len(times):
+            self._seen_ahead = times, away[known:]
 
     def _forget(self) -> None:
         """Drop looks that are not needed any more."""
