@@ -61,6 +61,10 @@ if TYPE_CHECKING:
 _Walk = TypeVar("_Walk", bound="Walk")
 
 _AT_START: Key[Changed] = Key("what becomes of gaps and slips at the start")
+_FIRST_EVENT: Key[list[float]] = Key("until when what touches nothing at the start is disturbed")
+
+_SURELY = 1e-3
+"""Of the time to the first event: so much later it has happened, whatever the end makes of the steps."""
 
 _CHATTER, _MOST_CONTACTS = 50, 2000
 """So many changes of mode without time passing end a run, and so many of gaps and slips."""
@@ -257,7 +261,11 @@ class Walk:
         self._kept.impacts = None if self.sampler.updates else self._impacts
         self._kept.shortest = shortest_mode(self.plan, options, self.start.time)
         contacts = bool(self.plan.assembly.own_equations.contacts)
-        self._kept.is_undisturbed = not contacts or not (self.segments or has_touched(self.plan.assembly))
+        tries = contacts and not (self.segments or has_touched(self.plan.assembly))
+        first = self._first_event() if tries else [np.inf]
+        self._kept.is_undisturbed = not contacts or (tries and not first[0] < options.t_end)
+        if tries and not self._kept.is_undisturbed:
+            self._disturb()
         limit = min(schedule.next(t, options.t_end), self.sampler.next(t, options.t_end))
         ahead = self.samples.until(t, limit)
         if limit < options.t_end or (t < limit and self.sampler.due_at(limit)):  # the state just after it is shown
@@ -270,11 +278,9 @@ class Walk:
         if (
             contacts and self._kept.is_undisturbed and goes_on(outcome, options.t_end)
         ):  # it was tried as without contacts
-            self._kept.is_undisturbed, self.statistics = False, self.statistics + outcome.statistics
-            self.plan = self._whole(self.plan)
-            if self.probe is None:
-                self.probe = EventProbe(self.plan, t, q, u, options.relative_tolerance, options.conditions)
-                self.probe.follow(())
+            self.statistics = self.statistics + outcome.statistics
+            first[0] = outcome.t + _SURELY * (outcome.t - t)
+            self._disturb()
             recorder = Recorder(self.plan)
             segment = replace(segment, plan=self.plan, probe=self.probe, spent=self.statistics)
             outcome = run_segment(segment, recorder, t, q, u)
@@ -286,6 +292,26 @@ class Walk:
         self.segments.append(self._sides.recorded(record, self.plan, self.assembly, bool(outcome.sides)))
         self._follow(outcome)
         return recorder, outcome
+
+    def _first_event(self) -> list[float]:
+        """Return until when what touches nothing at the start is known to be disturbed; infinity where it is not."""
+        options = self.options
+        if options.max_steps is not None or options.conditions or options.on_step is not None:
+            return [np.inf]
+        steps = options.relative_tolerance, options.absolute_tolerance, options.max_step, options.first_step
+        asked = options.solver, options.order, options.step, options.nominal
+        state = self.t, self.q.tobytes(), self.u.tobytes()
+        return self.assembly.kept.get(_FIRST_EVENT, lambda: [np.inf], *state, *steps, *asked)
+
+    def _disturb(self) -> None:
+        """Go on as where gaps and slips decide what happens."""
+        assert self.plan is not None
+        self._kept.is_undisturbed = False
+        self.plan = self._whole(self.plan)
+        if self.probe is None:
+            options = self.options
+            self.probe = EventProbe(self.plan, self.t, self.q, self.u, options.relative_tolerance, options.conditions)
+            self.probe.follow(())
 
     def _follow(self, outcome: Outcome) -> None:
         """Take over what a stretch has changed and chosen."""
