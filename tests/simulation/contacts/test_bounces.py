@@ -285,3 +285,28 @@ def test_what_only_passes_near_by_does_not_rest_where_impacts_accumulate(form: s
     assert set(told) == {("floor", "rests"), ("floor", "closes"), ("wall", "impact")}
     assert told["wall", "impact"] == pytest.approx(rest + away / speed, abs=1e-10)
     assert result["m.velocity.x"][-1] == pytest.approx(-0.5 * speed, rel=1e-9)
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+def test_what_time_events_make_of_a_set_is_the_same_by_the_routine_and_in_python(
+    form: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A start is looked at once, and its first session finds what follows each of two switches without Python."""
+    in_python, plain = [], changes.resolve
+
+    def counted(*given: object) -> changes.Changed:
+        in_python.append(given)
+        return plain(*given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(changes, "resolve", counted)
+    assembly, found = aw.assemble(SCENES["clutches"](), form=form), []
+    for counts in (1, 0, 2):
+        in_python.clear()
+        found.append([one for one in simulate(assembly, t_end=1.2, rtol=1e-10).events if one.kind != "event"])
+        assert len(in_python) == counts
+        if counts == 0:
+            monkeypatch.setattr(compiled, "resolved", lambda *_: None)
+    assert len(found[0]) == 8
+    for other in found[1:]:
+        assert [(one.part, one.kind) for one in other] == [(one.part, one.kind) for one in found[0]]
+        assert [one.time for one in other] == pytest.approx([one.time for one in found[0]], abs=1e-12)

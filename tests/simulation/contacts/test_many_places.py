@@ -148,3 +148,26 @@ def test_shares_are_looked_at_where_sets_change_without_python_too(form: str) ->
     scene.start.update({"ball.velocity.x": 1.0, "ball.velocity.z": 0.0})
     with pytest.raises(SolveError, match=r"at t = 0\.782.*depends on how forces are shared.*\(c0, c1, c2\)"):
         simulate(scene, form=form, t_end=0.9, rtol=1e-9)
+
+
+@FORMS
+def test_floors_that_are_never_met_change_nothing(form: str) -> None:
+    """With many their forces are solved for in numbers, and with one by formulas."""
+
+    def over(count: int) -> np.ndarray:
+        scene = Scene()
+        mass = scene.add("m", PointMass(mass=1.5))
+        for i in range(count):
+            ground = scene.add(f"ground{i}", Ground(position=(0.0, 0.0, -10.0 * i)))
+            floor = scene.add(
+                f"floor{i}", PointContact(normal=(-math.sin(0.1 * i), 0.0, math.cos(0.1 * i)), friction=0.3)
+            )
+            scene.connect(ground.frame, floor.plane)
+            scene.connect(mass.point, floor.point)
+        scene.start.update({"m.position.x": 0.0, "m.position.z": 0.1, "m.velocity.x": 1.0, "m.velocity.z": 0.0})
+        result = simulate(scene, form=form, t_end=1.0, rtol=1e-10)
+        assert [one.kind for one in result.events] == ["impact", "closes", "slips", "sticks"][: len(result.events)]
+        names = "m.position.x", "floor0.normal_force", "floor0.friction_force"
+        return np.array([result[name][-1] for name in names] + [one.time for one in result.events])
+
+    assert over(7) == pytest.approx(over(1), abs=1e-11)
