@@ -96,7 +96,7 @@ def build_equations(mechanism: Mechanism, forest: SpanningForest) -> Equations:
         contacts=contact_rows(derivation, site, state, signals),
     )
     read = _read_multipliers(derivation, signals) if derivation.can_read_multipliers else []
-    if forest.form == "reduced" and not are_own(derivation, made, read):
+    if read and forest.form == "reduced" and not are_own(derivation, made, read):
         return replace(made, read=dict(zip(read, read, strict=True)), decisions=tuple(derivation.decided))
     with derivation.relations.reading(False):
         made = with_known(made, known_multipliers(derivation, made, read)) if read else made

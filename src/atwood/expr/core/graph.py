@@ -9,6 +9,7 @@ topologically and nothing ever needs recursion.
 from __future__ import annotations
 
 import numbers
+from collections import defaultdict
 from typing import TYPE_CHECKING, Any
 
 from atwood.clock import check_time
@@ -240,7 +241,7 @@ class Graph:
     def __init__(self) -> None:
         self.relations: TimeRelations | None = None
         self.nodes: list[Expression] = []
-        self._table: dict[tuple[Any, ...], Expression] = {}
+        self._table: defaultdict[str, dict[Any, Expression]] = defaultdict(dict)  # by operation, then by `_key`
         self.zero = self.constant(0.0)
         self.one = self.constant(1.0)
 
@@ -258,8 +259,8 @@ class Graph:
         number = float(value)
         if number == 0.0:
             number = 0.0
-        key = ("constant", number if number == number else "nan")
-        found = self._table.get(key)
+        key = number if number == number else "nan"
+        found = self._table["constant"].get(key)
         return self._insert(key, "constant", (), number) if found is None else found
 
     def symbol(self, name: str) -> Expression:
@@ -271,19 +272,19 @@ class Graph:
 
         Products and sums are arranged so that what depends on parameters alone stays together.
         """
-        key = ("symbol", (), name)
-        found = self._table.get(key)
+        key = _key((), name)
+        found = self._table["symbol"].get(key)
         return self._insert(key, "symbol", (), name, is_parameter=True) if found is None else found
 
     def node(self, operation: str, arguments: tuple[Expression, ...], payload: Any = None) -> Expression:
         """Return the node of an operation as it stands, without any folding."""
-        key = (operation, arguments, payload)
-        found = self._table.get(key)
+        key = arguments if payload is None else (arguments, payload)
+        found = self._table[operation].get(key)
         return self._insert(key, operation, arguments, payload) if found is None else found
 
     def find(self, operation: str, arguments: tuple[Expression, ...], payload: Any = None) -> Expression | None:
         """Return the node of an operation if it is there already."""
-        return self._table.get((operation, arguments, payload))
+        return self._table[operation].get(_key(arguments, payload))
 
     def convert(self, value: Expression | float) -> Expression:
         """Return a number as a constant of this graph, and an expression of this graph as it is."""
@@ -319,11 +320,11 @@ class Graph:
                 self.constant(payload)
                 continue
             arguments = tuple(nodes[place] for place in places)
-            self._insert((operation, arguments, payload), operation, arguments, payload, is_parametric)
+            self._insert(_key(arguments, payload), operation, arguments, payload, is_parametric)
 
     def _insert(
         self,
-        key: tuple[Any, ...],
+        key: Any,
         operation: str,
         arguments: tuple[Expression, ...],
         payload: Any,
@@ -337,9 +338,14 @@ class Graph:
                 known = False
                 break
         created = Expression(self, operation, arguments, payload, len(self.nodes), known)
-        self._table[key] = created
+        self._table[operation][key] = created
         self.nodes.append(created)
         return created
+
+
+def _key(arguments: tuple[Expression, ...], payload: Any) -> Any:
+    """Return what a node is told from others of its operation by: mostly the tuple that it has anyhow."""
+    return arguments if payload is None else (arguments, payload)
 
 
 def _operand(own: Expression, other: object) -> Expression | None:
