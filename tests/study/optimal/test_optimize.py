@@ -65,8 +65,19 @@ def test_least_time_of_a_bounded_force():
 
 def test_bound_along_the_motion():
     found = optimize(block(), **SQUARE, end=AT_REST, bounds={"rail.speed": (-2.0, 1.2)})
-    assert np.max(found.result["rail.speed"]) <= 1.2 + 1e-3
+    assert np.max(found.result["rail.speed"]) <= 1.2 + 1e-6
     assert 12.0 < found.cost < 36.0
+
+
+@pytest.mark.parametrize(("most", "size"), [(1 / 9, 1.0), (0.15, 1.0), (0.12, 1e3), (0.3, 1.0)])
+def test_bound_that_is_touched_between_nodes(most, size):
+    """There and back within a length: A. E. Bryson, Y.-C. Ho, Applied Optimal Control, 1975, section 3.11."""
+    scene, least = block(), 4.0 / (9.0 * most) if most <= 1 / 6 else 2.0
+    scene.start.update({"rail.displacement": 0.0, "rail.speed": size})
+    end = {"rail.displacement": 0.0, "rail.speed": -size}
+    found = optimize(scene, **SQUARE, end=end, bounds={"rail.displacement": (-size, most * size)})
+    assert np.max(found.result["rail.displacement"]) <= (most + 1e-6) * size
+    assert found.cost == pytest.approx(2.0 * least * size**2, rel=1e-4)
 
 
 def test_cost_of_the_end():

@@ -33,6 +33,9 @@ from atwood.table import Shown, Table, table
 _ROUNDS = 8
 """A mesh is refined so often at most."""
 
+_BEYOND = 1e-6
+"""In sizes of the quantities: what goes no further beyond a bound keeps to it."""
+
 _WIDEST = 0.1
 """Intervals whose error is estimated as this share of the largest are halved."""
 
@@ -133,7 +136,7 @@ def optimize(
 
     States at Gauss's points and inputs at nodes are unknowns, the equations of motion are equations between them
     (direct collocation), and all derivatives are those of the scene's expressions. The mesh is refined until
-    `atwood.simulate` with these inputs ends in the same state.
+    `atwood.simulate` with these inputs ends in the same state, and keeps to the bounds.
 
     Parameters
     ----------
@@ -148,7 +151,8 @@ def optimize(
     end
         What is to hold at the end: quantities by path with a value, or the least and the largest.
     bounds
-        The least and the largest value of quantities along the motion, by path; they hold at the nodes.
+        The least and the largest value of quantities along the motion, by path. They are conditions at the nodes; where
+        the run goes beyond one in between by more than a millionth of the quantity's size, the mesh is refined.
     at_end
         A function as `objective` is, whose value at the end is added to the cost.
     t_end
@@ -305,14 +309,33 @@ def _task(
         span,
         (sizes, np.ones(len(made)), span[1]),
     )
-    return replace(task, sizes=(sizes, _input_sizes(task, made, time), span[1]))
+    task = replace(task, sizes=(_reached(task, made, len(equations.coordinates)), *task.sizes[1:]))
+    return replace(task, sizes=(task.sizes[0], _input_sizes(task, made, time), span[1]))
+
+
+def _reached(task: Task, made: Sequence[Driven], coordinates: int) -> FloatArray:
+    """Return sizes of states that are no smaller than what is to be reached with them; speeds follow coordinates."""
+    sizes, point = task.sizes[0], _at_start(task, made)
+    found = np.ones(len(sizes))
+    for functions, given in ((task.ends, task.targets), (task.along, task.limits)):
+        slopes = np.abs(functions.slopes(point).toarray()[: len(given), : len(sizes)]) * sizes
+        largest = np.max(slopes, axis=1, initial=0.0)
+        reach = np.max(np.abs(np.where(np.isfinite(given), given, 0.0)), axis=1, initial=0.0) / or_one(largest)
+        moves = (slopes > 0.0) & (slopes >= 0.5 * largest[:, None])
+        found = np.maximum(found, np.max(np.where(moves, reach[:, None], 0.0), axis=0, initial=0.0))
+    if 2 * coordinates == len(found):
+        found = np.tile(np.max(found.reshape(2, -1), axis=0), 2)
+    return sizes * found
+
+
+def _at_start(task: Task, made: Sequence[Driven]) -> FloatArray:
+    return np.concatenate([task.start, [one.values[0] for one in made], [task.begin]])[None, :]
 
 
 def _input_sizes(task: Task, made: Sequence[Driven], time: float) -> FloatArray:
     """Return sizes of inputs: their bounds, or what changes a speed by its size within a time."""
     n, m, sizes = len(task.start), len(made), task.sizes[0]
-    point = np.concatenate([task.start, [one.values[0] for one in made], [task.begin]])[None, :]
-    slopes = np.abs(task.motion.slopes(point).toarray()[:n, n : n + m]) * time / sizes[:, None]
+    slopes = np.abs(task.motion.slopes(_at_start(task, made)).toarray()[:n, n : n + m]) * time / sizes[:, None]
     effect = slopes.max(axis=0, initial=0.0)
     bounds = np.where(np.all(np.isfinite(task.inputs), axis=1), np.abs(task.inputs).max(axis=1), 0.0)
     return np.where(bounds > 0.0, bounds, 1.0 / or_one(effect))
@@ -360,16 +383,39 @@ def _refined(assembly: Assembly, task: Task, made: Sequence[Driven], intervals: 
         last = result.run.segments[-1]
         end = np.concatenate([last.coordinates[:, -1], last.speeds[:, -1]])
         error = float(np.max(np.abs(end - states[-1]) / task.sizes[0]))
-        if error <= tolerance:
+        beyond = _beyond(task, result, times, inputs)
+        if error <= tolerance and np.max(beyond) <= _BEYOND:
             cost = problem.values(found.x)[0] * problem.cost_size
             return Optimum(result, nodes, cost, float(span), error, len(mesh) - 1, steps)
-        before, problem = problem, Collocation(task, _halved(problem, every))
+        finer = mesh if error <= tolerance else _halved(problem, every)
+        worst = np.flatnonzero(beyond > _BEYOND)
+        before, problem = problem, Collocation(task, np.union1d(finer, 0.5 * (mesh[worst] + mesh[worst + 1])))
         every = _moved(before, problem, every)
+    ends = f"the run still ends {error:.2g} of the scene's sizes beside the collocation"
+    beyond_by = f"the run still goes {np.max(beyond):.2g} of their sizes beyond bounds"
     raise SolveError(
-        f"on {len(mesh) - 1} intervals the run still ends {error:.2g} of the scene's sizes beside the collocation",
+        f"on {len(mesh) - 1} intervals {ends if error > tolerance else beyond_by}",
         where=assembly.flat.name,
         advice="Ask for a larger tolerance, or bound the inputs.",
     )
+
+
+def _beyond(task: Task, result: Result, times: FloatArray, inputs: FloatArray) -> FloatArray:
+    """Return by how much a run goes beyond bounds in each interval, in sizes of the quantities, at its samples."""
+    found = np.zeros(len(times) - 1)
+    if not len(task.limits):
+        return found
+    segments = result.run.segments
+    t = np.concatenate([one.time for one in segments])
+    states = np.concatenate([np.concatenate([one.coordinates, one.speeds]) for one in segments], axis=1).T
+    place = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 2)
+    share = (not task.is_held) * (t - times[place]) / np.diff(times)[place]
+    drive = inputs[place] + share[:, None] * (inputs[place + 1] - inputs[place])
+    values = task.along.values(np.column_stack([states, drive, t]))
+    low, high = task.limits.T
+    size = or_one(np.max(np.abs(values), axis=0))
+    np.maximum.at(found, place, np.max(np.maximum(low - values, values - high) / size, axis=1))
+    return found
 
 
 def _solved(problem: Collocation, every: FloatArray, assembly: Assembly, barrier: float) -> Found:
