@@ -215,7 +215,8 @@ def test_looks_are_measured_once_and_the_largest_is_remembered() -> None:
     one._samples += [Sample(2.0 + k, np.array([float(k), 0.0]), np.zeros(2)) for k in range(3)]
     seen: list[np.ndarray] = []
 
-    def learn(t: np.ndarray, q: np.ndarray) -> np.ndarray:
+    def learn(t: np.ndarray, q: np.ndarray, known: int) -> np.ndarray:
+        assert known == 3
         seen.append(t)
         assert q.shape == (1, 3)
         return np.array([0.1, 0.9, np.inf])

@@ -268,7 +268,7 @@ def test_what_cannot_be_followed_is_told(monkeypatch: pytest.MonkeyPatch, failed
 def test_a_failed_solver_is_helped_over_what_lay_ahead(status: Status) -> None:
     one, found = given([1.0] * 3), crossing(2.5)
     one._take = lambda *_: True  # type: ignore[method-assign]
-    one._measure = lambda: None  # type: ignore[method-assign]
+    one._measure = lambda **_: None  # type: ignore[method-assign]
     one._first_minimum = Asked(None)  # type: ignore[method-assign]
     one._ahead, one._from_start = Asked(None), Asked(found)  # type: ignore[method-assign]
     one._coming = Asked(None)  # type: ignore[method-assign]

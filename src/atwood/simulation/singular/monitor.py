@@ -96,6 +96,9 @@ class SingularityMonitor(Branches):
         When somebody should look next, s; infinite where a session does.
     """
 
+    _best: tuple[float, FloatArray] | None = None
+    _seen_ahead: tuple[FloatArray, FloatArray] | None = None
+
     def __init__(self, plan: SceneProblem, tolerance: float, end: float, step_result: StepResult) -> None:
         super().__init__(plan, tolerance, end - step_result.t)
         self.seconds = 0.0
@@ -105,8 +108,6 @@ class SingularityMonitor(Branches):
         self._compiled: MonitorData | None = None
         self._start, self._is_behind = step_result, False
         self._starts_low = False
-        self._best: tuple[float, FloatArray] | None = None
-        self._seen_ahead: tuple[FloatArray, FloatArray] | None = None
         about = step_result.t, step_result.y.tobytes(), step_result.yp.tobytes(), self._whole, plan.finding.kept
         self._about: tuple[object, ...] | None = about
         begun = plan.assembly.kept.get(_BEGUN, self._first_looks, *about)
@@ -299,8 +300,7 @@ class SingularityMonitor(Branches):
             parts.append((self._in_run(times), going_on(self.plan, last, times)[:n]))
         t, q = (np.concatenate(each, axis=-1) for each in zip(*parts, strict=True))
         away = self._measures.learn(t, q, known)
-        own = away[: len(new)] if np.isfinite(away[: len(new)]).all() else np.full(len(new), np.nan)
-        self._away += own.tolist()
+        self._away += away[: len(new)].tolist()
         self._largest = max([self._largest, *(one for one in away[:known].tolist() if np.isfinite(one))])
         if len(times):
             self._seen_ahead = times, away[known:]
