@@ -256,8 +256,8 @@ def _set_going(draft: Draft, motion: str) -> Draft:
     return Draft(draft.space, tuple(bodies), draft.touches)
 
 
-def make(draft: Draft) -> Scene:
-    """Return the scene of a draft."""
+def make(draft: Draft, law: str = "newton") -> Scene:
+    """Return the scene of a draft, with a law of impact."""
     scene, plane = Scene(space=draft.space, gravity=G), draft.space == "plane"
     for k, one in enumerate(draft.bodies):
         body = scene.add(
@@ -287,6 +287,7 @@ def make(draft: Draft) -> Scene:
                 friction=touch.friction,
                 static_friction=touch.static,
                 restitution=touch.restitution,
+                impact_law=law,
                 surface_velocity=touch.belt,
             ),
         )
@@ -498,7 +499,7 @@ def _looked_at(draft: Draft, oracle: Oracle, form: str) -> tuple[list[str], list
             warnings.simplefilter("ignore")
             result = simulate(make(draft), form=form, t_end=END, rtol=1e-9, outputs=7)
     except AtwoodError as error:
-        return _refused(oracle, before, error)
+        return _refused(oracle, before, error, form)
     if result.status != "finished":
         return ["not finished"], [Finding("hang", str(result.status))]
     after, forces = _taken(draft, oracle, result)
@@ -543,8 +544,10 @@ def _among_all(
     return ["one set" if len(every) == 1 else "several sets"]
 
 
-def _refused(oracle: Oracle, before: np.ndarray, error: AtwoodError) -> tuple[list[str], list[Finding]]:
+def _refused(oracle: Oracle, before: np.ndarray, error: AtwoodError, form: str) -> tuple[list[str], list[Finding]]:
     said = str(error)
+    if "t = 0 " not in said and "impact_law='poisson'" in said and _runs_by_poisson(oracle.draft, form):
+        return ["refused: Newton's law has no impulses, Poisson's has"], []
     for words in ("how forces are shared", "would make energy"):
         if words in said:
             return [f"refused: {words}"], []
@@ -559,6 +562,16 @@ def _refused(oracle: Oracle, before: np.ndarray, error: AtwoodError) -> tuple[li
     if is_impact and "impulses" not in said:
         return ["refused after an impact"], [Finding("refused", f"{type(error).__name__} after an impact", said)]
     return ["refused"], [Finding("refused", f"{type(error).__name__} though a set contradicts nothing", said)]
+
+
+def _runs_by_poisson(draft: Draft, form: str) -> bool:
+    """Return whether a scene, that Newton's law of impact leaves without impulses, runs by Poisson's."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return simulate(make(draft, "poisson"), form=form, t_end=END, rtol=1e-9, outputs=7).status == "finished"
+    except AtwoodError:
+        return False
 
 
 def _taken(draft: Draft, oracle: Oracle, result: aw.Result) -> tuple[np.ndarray, np.ndarray]:
