@@ -14,6 +14,7 @@ from atwood.simulation.events.modes import find_event_functions
 from atwood_library import (
     Box,
     BoxContact,
+    Drive,
     Force,
     Ground,
     Link,
@@ -161,6 +162,16 @@ def test_a_start_inside_is_refused_with_the_part_and_the_depth() -> None:
     start_at(scene, 0.0, -0.25, 0.0, 0.0)
     with pytest.raises(aw.StartError, match=r"c: it starts inside, by 0\.25 m"):
         simulate(scene, t_end=1.0)
+
+
+@FORMS
+def test_a_contact_of_what_cannot_move_by_itself_is_refused(form: str) -> None:
+    scene = on_plane(Box(mass=1.0, length_x=1.0, length_z=0.1), VertexContact(friction=0.3))
+    drive = scene.add("drive", Drive(axis=(1.0, 0.0, 0.0), motion=lambda t: 0.5 * t))
+    scene.connect(scene.ground.frame, drive.a)
+    scene.connect(drive.b, scene.m.frame)
+    with pytest.raises(aw.UnsupportedError, match="c: nothing in the scene can move by itself"):
+        run(scene, form, 1.0)
 
 
 def strut(friction: float, law: str) -> Scene:

@@ -89,6 +89,12 @@ def known_multipliers(
     rows, speeds, accelerations = equations.rows, equations.speeds, equations.accelerations
     constraints, contacts = equations.constraints, equations.contacts
     graph, n = equations.graph, len(speeds)
+    if contacts and not n:
+        raise UnsupportedError(
+            "nothing in the scene can move by itself, so that no force of a contact follows from a motion",
+            where=contacts[0].row.key[0],
+            advice="Let what touches move by the forces that act on it, or leave the contact out.",
+        )
     number = {one.multiplier: n + i for i, one in enumerate((*constraints, *(one.row for one in contacts)))}
     own = {one.row.multiplier: graph.zero for one in contacts}
     number |= {one.read: number[one.row.multiplier] for one in contacts}
