@@ -346,8 +346,12 @@ class _Moment:
             asked = values.chosen(chosen, free, {}, limits, pressed)
             solved = find_states(asked, self._at_rest(chosen))
             if solved is None:
-                opens = any(values.restitution[self.units[k][0]] > 0.0 and not self.first[k].is_poisson for k in chosen)
-                advice = f"{_POISSON}: by it what locks stays where it is. {CONTRADICT}" if opens else CONTRADICT
+                is_newton = any(
+                    values.restitution[self.units[k][0]] > 0.0 and not self.first[k].is_poisson for k in chosen
+                )
+                plastic = values.chosen(chosen, self.rates(), {}, limits) if is_newton else None
+                locks = plastic is not None and find_states(plastic, self._at_rest(chosen)) is not None
+                advice = f"{_POISSON}: by it what locks stays where it is." if locks else CONTRADICT
                 raise self._contradiction("no impulses satisfy the laws of impact and friction", chosen, advice)
             self._check_determined(chosen, solved)
             last, found = found, self._on_all(chosen, solved)
