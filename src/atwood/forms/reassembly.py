@@ -149,6 +149,8 @@ def other_mode(
 
     about = tuple(sorted(modes.items())), tuple(sorted(line_signs.items())), coordinates
     known = assembly.shared.family.get(_OTHER_MODE, make, *about)
+    if known.flat is assembly.flat and known.source is assembly.source and not known.why_new:
+        return known  # with what is kept of it
     mechanism, _ = moved_to(known, assembly.flat)
     if mechanism is None:
         return make()
