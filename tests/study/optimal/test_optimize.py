@@ -97,6 +97,18 @@ def test_swing_up_ends_where_the_run_does():
     assert "58.8" in found.as_text()
 
 
+def test_begins_from_motions_that_are_guessed():
+    end = {"rail.displacement": 1.0, "rail.speed": 0.0, "hinge.angle": 0.5 * math.pi, "hinge.angular_velocity": 0.0}
+    about = {"inputs": {"push.value": (-20.0, 20.0)}, "end": end, "tolerance": 1e-6}
+    found = optimize(cart_pole(), SQUARE["objective"], **about)
+    nodes = found.result.time[::10]
+    guess = {path: np.column_stack([nodes, found.result[path][::10]]) for path in end}
+    guess["push.value"] = np.column_stack(found.inputs["push.value"])
+    again = optimize(cart_pole(), SQUARE["objective"], **about, guess=guess)
+    assert again.cost == pytest.approx(found.cost, rel=1e-5)
+    assert again.steps < found.steps
+
+
 def test_duration_is_chosen_too():
     end = {"rail.displacement": 1.0, "rail.speed": 0.0, "hinge.angle": 0.5 * math.pi, "hinge.angular_velocity": 0.0}
     about = {"inputs": {"push.value": (-20.0, 20.0)}, "end": end, "t_end": (0.5, 3.0)}
@@ -212,6 +224,9 @@ def test_interior_point():
         ({"t_end": (2.0, 1.0)}, "no time"),
         ({"t_end": -1.0}, "no time"),
         ({"guess": {"pull.value": 1.0}}, "pull.value"),
+        ({"guess": {"rail.speed": [(1.0, 0.0), (0.0, 1.0)]}}, "rail.speed: its guess"),
+        ({"guess": {"rail.speed": np.nan}}, "rail.speed: its guess"),
+        ({"end": {"rail.displacement": np.inf}}, "rail.displacement: its range"),
         ({"inputs": {"push.value": (-1.0, 1.0)}, "end": AT_REST}, "no motion was found"),
     ],
 )

@@ -52,6 +52,8 @@ class Task:
         Of the states, the inputs and the duration.
     is_held
         Whether inputs are held between the nodes, and not linear.
+    guessed, courses
+        Functions along the motion that the search begins from, and rows of time and value of each.
     """
 
     motion: PointFunctions
@@ -65,6 +67,8 @@ class Task:
     duration: tuple[float, float]
     sizes: tuple[FloatArray, FloatArray, float]
     is_held: bool = False
+    guessed: PointFunctions | None = None
+    courses: tuple[FloatArray, ...] = ()
 
 
 class Collocation:

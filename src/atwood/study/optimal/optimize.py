@@ -158,7 +158,8 @@ def optimize(
     t_end
         When the motion ends, s; or the earliest and the latest such time; the scene's own end when not given.
     guess
-        Inputs to begin from, by path: a number, or rows of time and value.
+        What to begin from: inputs, and quantities along the motion, by path: a number, or rows of time and value. The
+        states of the first mesh are those nearest to a straight line in which these quantities have their values.
     between
         What an input is between two nodes: ``"linear"`` or ``"held"``.
     intervals
@@ -186,17 +187,30 @@ def optimize(
     if not paths:
         raise UsageError("no inputs are given that could be chosen", where=assembly.flat.name)
     span = _duration(assembly, t_end)
-    nodes: dict[str, Any] = dict.fromkeys(paths, 0.0) | dict(guess or {})
-    unknown = sorted(set(nodes) - set(paths))
-    if unknown:
-        raise UsageError("it is no input that is to be chosen", where=unknown[0], advice="Give it with inputs=, too.")
+    given = dict(guess or {})
+    courses = {path: _course(path, given[path]) for path in given if path not in paths}
+    nodes: dict[str, Any] = {path: given.get(path, 0.0) for path in paths}
     first = begin + span[1]
     rows = {path: one if np.ndim(one) else [(begin, one), (first, one)] for path, one in nodes.items()}
     driven, made = with_inputs(assembly, rows, LINEAR, first)
     refuse_contacts(driven)
-    task = _task(driven, made, objective, at_end, end or {}, bounds or {}, paths, span)
+    task = _task(driven, made, objective, at_end, end or {}, bounds or {}, paths, span, courses)
     task = replace(task, is_held=between == HELD)
     return _refined(assembly, task, made, intervals, tolerance)
+
+
+def _course(path: str, given: Any) -> FloatArray:
+    """Return rows of time and value of a quantity that is guessed."""
+    try:
+        found = np.array(given, dtype=float)
+    except (TypeError, ValueError):
+        found = np.array(np.nan)
+    rows = np.array([[0.0, float(found)]]) if found.ndim == 0 else found
+    if not (rows.ndim == 2 and rows.shape[1] == 2 and np.all(np.isfinite(rows)) and np.all(np.diff(rows[:, 0]) > 0.0)):
+        raise UsageError(
+            f"its guess is {given!r}", where=path, advice="Give a number, or rows of time and value whose times rise."
+        )
+    return rows
 
 
 def _duration(assembly: Assembly, t_end: Any) -> tuple[float, float]:
@@ -227,7 +241,7 @@ def _ranges(given: Mapping[str, Any], units: Mapping[str, str]) -> FloatArray:
             continue
         pair = one if isinstance(one, (tuple, list)) and len(one) == 2 else (one, one)
         found[k] = [_number(value, units[path], path) for value in pair]
-        if not found[k, 0] <= found[k, 1]:
+        if not found[k, 0] <= found[k, 1] or (np.isinf(found[k, 0]) and found[k, 0] == found[k, 1]):
             raise UsageError(f"its range from {found[k, 0]:g} to {found[k, 1]:g} is empty", where=path)
     return found
 
@@ -259,6 +273,7 @@ def _task(
     bounds: Mapping[str, Any],
     inputs: Mapping[str, Any],
     span: tuple[float, float],
+    courses: Mapping[str, FloatArray],
 ) -> Task:
     """Return what is to be least, with all functions and their derivatives."""
     begin = assembly.flat.t_start
@@ -308,6 +323,8 @@ def _task(
         begin,
         span,
         (sizes, np.ones(len(made)), span[1]),
+        guessed=make([seen[path] for path in courses]),
+        courses=tuple(courses.values()),
     )
     task = replace(task, sizes=(_reached(task, made, len(equations.coordinates)), *task.sizes[1:]))
     return replace(task, sizes=(task.sizes[0], _input_sizes(task, made, time), span[1]))
@@ -449,22 +466,34 @@ def _guessed(problem: Collocation, made: Sequence[Driven]) -> FloatArray:
     shares = [(np.array(one.times) - task.begin) / task.duration[1] for one in made]
     inputs = np.array([np.interp(mesh, share, one.values) for share, one in zip(shares, made, strict=True)]).T
     share = np.concatenate([mesh, (mesh[:-1, None] + np.diff(mesh)[:, None] * problem.nodes).ravel()])
-    states = task.start + share[:, None] * (_goal(task, inputs[-1], span) - task.start)
+    goal = _met(task, task.ends, task.targets, task.start, np.append(inputs[-1], task.begin + span))
+    states = task.start + share[:, None] * (goal - task.start)
+    if task.guessed is not None and task.courses:
+        for k in np.flatnonzero(share > 0.0):
+            t = task.begin + span * share[k]
+            wanted = np.array([np.interp(t, *one.T) for one in task.courses])
+            given = np.append([np.interp(share[k], mesh, one) for one in inputs.T], t)
+            states[k] = _met(task, task.guessed, np.column_stack([wanted, wanted]), states[k], given)
     return _with_slacks(problem, np.concatenate([states.ravel(), inputs.ravel(), [span]]))
 
 
-def _goal(task: Task, inputs: FloatArray, span: float) -> FloatArray:
-    """Return a state near the start in which holds what is to hold at the end; the start where none is found."""
-    state, n = task.start.copy(), len(task.start)
+def _met(
+    task: Task, functions: PointFunctions, targets: FloatArray, start: FloatArray, given: FloatArray
+) -> FloatArray:
+    """Return a state near another in which functions are within ranges; the other one where none is found.
+
+    `given` are the inputs, and the time.
+    """
+    state, n, count = start.copy(), len(start), len(targets)
     for _ in range(30):
-        point = np.concatenate([state, inputs, [task.begin + span]])[None, :]
-        values = task.ends.values(point)[0, :-1]
-        miss = np.clip(values, *task.targets.T) - values
+        point = np.concatenate([state, given])[None, :]
+        values = functions.values(point)[0, :count]
+        miss = np.clip(values, *targets.T) - values
         if np.max(np.abs(miss), initial=0.0) <= 1e-9 * (1.0 + np.max(np.abs(values), initial=0.0)):
             return state
-        slopes = task.ends.slopes(point).toarray()[:-1, :n] * task.sizes[0]
+        slopes = functions.slopes(point).toarray()[:count, :n] * task.sizes[0]
         state = state + task.sizes[0] * least_norm(slopes, miss)
-    return task.start
+    return start
 
 
 def _with_slacks(problem: Collocation, main: FloatArray) -> FloatArray:
