@@ -427,8 +427,8 @@ class _Moment:
 
     def _is_shared(self, states: list[State], holding: list[int]) -> bool:
         """Return whether the forces that are reported contradict no law, and hold what has to stay."""
-        values = self.values.with_held(values_of_states(self.layout, self.held, states))
-        forces = values.least_forces(states)
+        values = self.values
+        forces = forces_in(values, states)
         limits, small = values.limits_at(forces)[0], _SHARED * SLACK * float(np.max(np.abs(forces)))
         free = values.accelerations()
         moved, moves = free + values.response @ forces, np.abs(free) + np.abs(values.response) @ np.abs(forces)
@@ -776,9 +776,9 @@ def forces_in(values: ContactValues, states: Sequence[State], rates: FloatArray 
                     matrix[row] = matrix[row] + part * side.shares[number]
                     right[row] = -part * side.free[number]
         more = np.zeros((0, count))
-        if values.compliance.any():
-            holding = [row for rows, one in zip(values.units, states, strict=True) if one[0] == STICKS for row in rows]
-            by_springs = elastic(values.response[np.ix_(holding, holding)], values.compliance[holding])
+        holding = [row for rows, one in zip(values.units, states, strict=True) if one[0] == STICKS for row in rows]
+        if len(holding) > 1:
+            by_springs = elastic(values.response[np.ix_(holding, holding)], values.gives[holding])
             more = np.zeros((len(by_springs), count))
             more[:, holding] = by_springs / or_one(np.max(np.abs(by_springs), axis=1, initial=0.0))[:, None]
         last, forces = forces, least_norm(np.vstack([matrix, more]), np.append(right, np.zeros(len(more))))

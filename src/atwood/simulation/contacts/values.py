@@ -6,7 +6,6 @@ A unit force along a row i makes accelerations ``X_i``, with the joints holding:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
 
@@ -20,9 +19,9 @@ from atwood.forms.loose import state_paths
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import to_maximal
 from atwood.lazy_dataclasses import dataclass, replace
-from atwood.mechanics.dynamics.equations import ContactRow, Equations
+from atwood.mechanics.dynamics.equations import ContactRow
 from atwood.model.values.units import ALONG
-from atwood.numerics.contact_sets import GOES_ON, NOTHING, Contacts, Limits, State, Unit, is_back
+from atwood.numerics.contact_sets import NOTHING, Contacts, Limits, Unit
 from atwood.numerics.matrices import least_norm, or_one, to_array
 from atwood.simulation.dynamics.balance import LIGHT, BalanceValues, balance_of, even_balance
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
@@ -30,7 +29,6 @@ from atwood.simulation.dynamics.scales import Scales, motion_scales
 from atwood.simulation.problem.problem import SceneProblem
 
 _LAYOUT: Key[Layout] = Key("gaps and slips")
-_FORCES: Key[Program] = Key("forces of gaps and slips")
 _OWN_SIZES: Key[Scales] = Key("sizes of forces of gaps and slips")
 
 _LIMITS = ("limits", "static limits", "limits backwards", "static limits backwards")
@@ -142,12 +140,6 @@ def _compliance(one: ContactRow) -> Expression:
     return one.row.multiplier.graph.zero if stiffness is None else 1.0 / stiffness
 
 
-def _forces(equations: Equations, parameters: tuple[Expression, ...]) -> Program:
-    """Return the program of the multipliers of all rows."""
-    found = substitute([one.row.multiplier for one in equations.contacts], dict(equations.read))
-    return Program("forces of contacts", state_groups(equations), parameters, (OutputGroup("forces", tuple(found)),))
-
-
 def with_own_sizes(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> SceneProblem:
     """Return a plan that knows sizes of the forces of its gaps and slips.
 
@@ -206,31 +198,11 @@ class ContactValues:
         if u is self.u or np.array_equal(u, self.u):
             return self
         made = copy(self)
-        for name in ("_now", "_free"):
+        for name in ("_now", "_free", "gives"):
             made.__dict__.pop(name, None)
         made.u = u.copy()
         made._take(made.u)
         return made
-
-    def with_held(self, held: Sequence[float]) -> ContactValues:
-        """Return the same with other values of the discrete states."""
-        made = copy(self)
-        made.assembly = self.assembly.with_held(tuple(held))
-        return made
-
-    def least_forces(self, states: Sequence[State]) -> FloatArray:
-        """Return the forces of all rows as they are reported in states, of which the discrete states are the values."""
-        equations, assembly = self.assembly.maximal, self.assembly
-        program = assembly.shared.get(_FORCES, lambda: _forces(equations, assembly.parameters))
-        (found,) = assembly.kernel(program)([self.t], self.q, self.u)
-        forces = np.array(found)
-        for _ in range(len(self.units)):  # limits may read other friction
-            limits = self.limits_at(forces)
-            for k, (rows, (state, way)) in enumerate(zip(self.units, states, strict=True)):
-                if state == GOES_ON:
-                    side = limits[is_back(way)]
-                    forces[list(rows)] = -(side.free[k] + float(side.shares[k] @ forces)) * np.array(way)
-        return forces
 
     def _take(self, u: FloatArray) -> None:
         found = [np.array(x) for x in self._kernel([self.t], self.q, u, self.read)]
@@ -295,6 +267,20 @@ class ContactValues:
         """A: how the rows move by a unit of each force."""
         found: FloatArray = self.slopes @ self._by_each[: len(self.u)]
         return found
+
+    @cached_property
+    def gives(self) -> FloatArray:
+        """By how much rows give way as far as forces are shared that nothing determines.
+
+        Those without a stiffness do as in `read_multipliers`, so that forces here are those that are reported.
+        """
+        own = np.diag(to_array(self._now.mass))
+        squares, has_mass = self.slopes**2, own > 0.0
+        inverse = np.divide(1.0, own, out=np.zeros(len(own)), where=has_mass)
+        some = (squares > 0.0) & has_mass
+        usual = some @ inverse / np.maximum(np.sum(some, axis=1), 1)
+        weights = squares @ inverse + usual * (squares @ (~has_mass).astype(float))
+        return np.where(self.compliance > 0.0, self.compliance, weights)
 
     def accelerations(self) -> FloatArray:
         """Return how the rows accelerate without these forces."""
