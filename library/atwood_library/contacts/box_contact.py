@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from itertools import product
 
-from atwood import Frame, Number, connector, parameter
-from atwood_library.interfaces.cornered import Cornered
+from atwood import Frame, Number, ParameterError, connector, parameter
+from atwood_library.contacts.vertex_contact import VertexContact
+from atwood_library.interfaces.cornered import Cornered, CornerInPlane
 
 __all__ = ["BoxContact"]
 
@@ -24,8 +25,19 @@ class BoxContact(Cornered):
     corners: int = parameter(4, minimum=4, maximum=8, integer=True, doc="How many corners: 4 in a plane, 8 in space.")
     box: Frame = connector(Frame, "The frame of the box, at its middle.")
 
+    def check_values(self) -> None:
+        """Refuse boxes of other numbers of corners."""
+        if self.corners not in (4, 8):
+            raise ParameterError(
+                f"a box has no {self.corners} corners",
+                where=f"{self.path}.corners",
+                advice="Give 4 in a plane, 8 in space.",
+            )
+
     def build(self) -> None:
         """Give each corner its contact."""
         half = 0.5 * self.length, 0.5 * self.width, 0.5 * self.height
-        signs = product((-1, 1), (-1, 1) if self.corners == 8 else (0,), (-1, 1))
-        self.add_corners(self.box, (tuple(sign * one for sign, one in zip(some, half, strict=True)) for some in signs))
+        in_space = self.corners == 8
+        signs = product((-1, 1), (-1, 1) if in_space else (0,), (-1, 1))
+        places = (tuple(sign * one for sign, one in zip(some, half, strict=True)) for some in signs)
+        self.add_corners(self.box, places, VertexContact if in_space else CornerInPlane)

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import ClassVar
 
 from atwood import Frame, Model, Number, Triple, connector, parameter
 from atwood_library.contacts.vertex_contact import VertexContact
 
-__all__ = ["Cornered"]
+__all__ = ["CornerInPlane", "Cornered"]
+
+
+class CornerInPlane(VertexContact):
+    """A corner of a body in a plane, which stands for the edge behind it; in space there are more of them."""
+
+    spaces: ClassVar[tuple[str, ...]] = ("plane",)
 
 
 class Cornered(Model):
@@ -24,7 +31,9 @@ class Cornered(Model):
     surface_velocity: Number = parameter(0.0, unit="m/s", doc="Velocity of the surface over the plane.")
     plane: Frame = connector(Frame, "The frame that carries the plane; its origin is in it.")
 
-    def add_corners(self, body: Frame, places: Iterable[tuple[float, ...]]) -> None:
+    def add_corners(
+        self, body: Frame, places: Iterable[tuple[float, ...]], kind: type[VertexContact] = VertexContact
+    ) -> None:
         """Give each corner its contact.
 
         Parameters
@@ -33,9 +42,11 @@ class Cornered(Model):
             The frame of the body.
         places
             Where its corners are, in the axes of that frame, m.
+        kind
+            What they are.
         """
         names = "normal", "restitution", "impact_law", "friction", "static_friction", "stiffness", "surface_velocity"
         common = {name: getattr(self, name) for name in names}
-        for one in self.add("corner", [VertexContact(place=place, **common) for place in places]):
+        for one in self.add("corner", [kind(place=place, **common) for place in places]):
             self.connect(self.plane, one.plane)
             self.connect(body, one.body)

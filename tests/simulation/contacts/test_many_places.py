@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from atwood import Scene, SolveError, simulate
+from atwood import AtwoodError, ParameterError, Scene, SolveError, simulate
 from atwood_library import (
     BallContact,
     Box,
@@ -40,6 +40,37 @@ def crate(spin: float = 0.0) -> Scene:
     scene.start.update({f"box.velocity.{axis}": value for axis, value in speed.items()})
     scene.start.update({f"box.angular_velocity.{axis}": spin * (axis == "z") for axis in "xyz"})
     return scene
+
+
+def test_a_box_in_space_has_eight_corners() -> None:
+    scene = Scene(space="space")
+    ground, box = scene.add("ground", Ground()), scene.add("box", Box(mass=1.0))
+    floor = scene.add("floor", BoxContact(friction=0.3))
+    scene.connect(ground.frame, floor.plane)
+    scene.connect(box.frame, floor.box)
+    with pytest.raises(AtwoodError, match=r"floor.corner\[0\]: CornerInPlane exists in a plane only"):
+        simulate(scene, t_end=0.1)
+    scene.add("other", BoxContact(corners=5))
+    with pytest.raises(ParameterError, match="other.corners: a box has no 5 corners"):
+        simulate(scene, t_end=0.1)
+
+
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("seed", [3, 5])
+def test_a_crate_that_is_thrown_comes_to_rest_on_a_face(seed: int) -> None:
+    """On its last way it slides and turns at once, and each corner would stop for itself."""
+    rng = np.random.default_rng(seed)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    scene = crate()
+    named = {"position": (0.0, 0.0, 0.6), "x_axis": turn[0], "z_axis": np.cross(turn[0], turn[1])}
+    named |= {"velocity": rng.normal(size=3), "angular_velocity": 2.0 * rng.normal(size=3)}
+    scene.start.update(
+        {f"box.{name}.{axis}": float(x) for name, each in named.items() for axis, x in zip("xyz", each, strict=True)}
+    )
+    result = simulate(scene, t_end=1.2, rtol=1e-8, max_seconds=60.0)
+    assert result.status == "finished"
+    assert np.all(np.diff(result.energy.total) < 1e-6)
+    assert sum(result[f"floor.corner[{k}].normal_force"][-1] for k in range(8)) == pytest.approx(G, abs=1e-8)
 
 
 @pytest.mark.sample(1)
