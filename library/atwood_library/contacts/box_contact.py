@@ -25,17 +25,14 @@ class BoxContact(Cornered):
     corners: int = parameter(4, minimum=4, maximum=8, integer=True, doc="How many corners: 4 in a plane, 8 in space.")
     box: Frame = connector(Frame, "The frame of the box, at its middle.")
 
-    def check_values(self) -> None:
-        """Refuse boxes of other numbers of corners."""
+    def build(self) -> None:
+        """Give each corner its contact."""
         if self.corners not in (4, 8):
             raise ParameterError(
                 f"a box has no {self.corners} corners",
                 where=f"{self.path}.corners",
                 advice="Give 4 in a plane, 8 in space.",
             )
-
-    def build(self) -> None:
-        """Give each corner its contact."""
         half = 0.5 * self.length, 0.5 * self.width, 0.5 * self.height
         in_space = self.corners == 8
         signs = product((-1, 1), (-1, 1) if in_space else (0,), (-1, 1))
