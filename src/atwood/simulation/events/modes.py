@@ -50,7 +50,7 @@ _NEEDS: Key[_Needs] = Key("what event functions read")
 _EVENTS: Key[Program] = Key("events")
 _EVENT_CODE: Key[EventCode | None] = Key("machine code of events")
 _REACTIONS: Key[ReactionSolver] = Key("reactions that events read")
-_AT_START: Key[FloatArray] = Key("values of events at the start of a mode")
+_AT_START: Key[dict[str, Any]] = Key("what events know at the start of a mode")
 _RATES: Key[Program] = Key("rates of gaps")
 _IS_THERE: Key[Program] = Key("whether an event is there")
 
@@ -259,12 +259,20 @@ class EventProbe:
         """Look at the start when somebody asks for what is seen there: most changes of a set are followed by others."""
         if name not in _SEEN:
             raise AttributeError(name)
+        (t, q, u, tolerance), plan = self._start, self.plan
+        about = t, q.tobytes(), u.tobytes(), tolerance, plan.scales, plan.finding.kept, self._about
+        seen = self.assembly.kept.get(_AT_START, self._seen, *about)
+        vars(self).update(seen)
+        return seen[name]
+
+    def _seen(self) -> dict[str, Any]:
+        """Return what is seen at the start."""
         self.shift = self._sides = np.zeros(0)
         self.needs = _NOTHING
         self.reactions = self.kernel = self.broken = None
         if self.event_functions:
             self._look(*self._start)
-        return vars(self)[name]
+        return {name: vars(self)[name] for name in _SEEN}
 
     def _look(self, t: float, q: FloatArray, u: FloatArray, tolerance: float) -> None:
         """See where the events are at the start of the mode."""
@@ -279,8 +287,7 @@ class EventProbe:
         sizes = [plan.scales.of_law(one.part, one.law, one.unit) for one in self.event_functions]
         small = MARGIN * tolerance * np.array(sizes)
         self.shift = np.zeros(len(small))
-        about = *state, plan.finding.kept, self._about
-        values = assembly.kept.get(_AT_START, lambda: self.values(t, q, u), *about)
+        values = self.values(t, q, u)
         happened, self.shift = margins_at_start(self.event_functions, values, small)
         self._sides = np.where(np.abs(values) > small, np.sign(values), 0.0)
         sided = np.array([one.target == SIDE for one in self.event_functions], dtype=np.bool_)
