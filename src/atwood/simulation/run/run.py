@@ -244,7 +244,8 @@ class Walk:
             has_passed = True
             self._sampled = self.t
             self._update(due)
-        if self.ended is None:
+        is_ready = not (has_passed or self.segments) and self._unsettled is None and self.probe is not None
+        if self.ended is None and not is_ready:
             self.prepare()
         return has_passed
 
