@@ -30,7 +30,7 @@ class BoxContact(Cornered):
         if self.corners not in (4, 8):
             raise ParameterError(
                 f"a box has no {self.corners} corners",
-                where=f"{self.path}.corners",
+                where=f"{self.path or type(self).__name__}.corners",
                 advice="Give 4 in a plane, 8 in space.",
             )
         half = 0.5 * self.length, 0.5 * self.width, 0.5 * self.height

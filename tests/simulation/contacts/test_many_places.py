@@ -50,10 +50,8 @@ def test_a_box_in_space_has_eight_corners() -> None:
     scene.connect(box.frame, floor.box)
     with pytest.raises(AtwoodError, match=r"floor.corner\[0\]: CornerInPlane exists in a plane only"):
         simulate(scene, t_end=0.1)
-    flat = Scene()
-    flat.add("floor", BoxContact(corners=5))
-    with pytest.raises(ParameterError, match=r"floor.corners: a box has no 5 corners"):
-        simulate(flat, t_end=0.1)
+    with pytest.raises(ParameterError, match=r"corners: a box has no 5 corners"):
+        Scene().add("floor", BoxContact(corners=5))
 
 
 @pytest.mark.sample(1)
