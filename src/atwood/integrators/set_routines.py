@@ -7,7 +7,7 @@ A program gives rates, accelerations, responses and limits, and the speeds chang
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from math import inf
 
@@ -27,7 +27,7 @@ from atwood.codegen.routines import (
     place_of,
 )
 from atwood.integrators.event_routines import do_or_return
-from atwood.numerics.contact_sets import CLEAR, GOES_ON, OPEN, OWN, SLACK, STICKS, STILL, TURNS
+from atwood.numerics.contact_sets import CLEAR, GOES_ON, OPEN, SLACK, STICKS, STILL, TURNS
 
 FIELDS: dict[str, Kind] = {
     **dict.fromkeys(("program", "derived", "scratch", "y", "out", "units", "rows", "matrix", "left"), ADDRESS),
@@ -425,7 +425,7 @@ class _Worst:
 def _contradiction() -> Routine:
     """Find the unit whose state contradicts most, and the state it has then; -1 where none does."""
     r, m, () = _open("contradiction")
-    forces, free, size = m.row("forces"), m.row("wanted"), m.size
+    forces, motions, free, size = m.row("forces"), m.row("motions"), m.row("wanted"), m.size
     response, worst = m.result("response"), _Worst(r, m)
     pushes, moves, total = r.variable(0.0), r.variable(0.0), r.variable(0.0)
     with _each(r, m, "chosen") as (k, _, _):
@@ -438,44 +438,16 @@ def _contradiction() -> Routine:
                 total.now = total.now + r.size(by[j] * forces[j])
             moves.now = r.most(r.size(free[row]), r.most(total.now, moves.now))
     push, move = (r.choose(one.now > 0.0, one.now, 1.0) for one in (pushes, moves))
-    _judge(r, m, worst, lambda k, row, is_pair: (push, move))
-    with r.when(m.number < 0):  # what is far lighter than others, or is moved far less, is judged by itself
-        _judge(r, m, worst, lambda k, row, is_pair: _own_sizes(r, m, (k, row, is_pair), total, (push, move)))
-    r.give(0)
-    return r
-
-
-def _judge(r: Routine, m: Sets, worst: _Worst, sizes: Callable[[Value, Value, Value], tuple[Value, Value]]) -> None:
-    """Look for contradictions, with forces and motions by their sizes for each unit."""
-    forces, motions = m.row("forces"), m.row("motions")
     with _each(r, m, "chosen") as (k, row, is_pair), r.when(~_is_loose(r, m, k)):
-        second, (push, move) = row + is_pair.integer(), sizes(k, row, is_pair)
+        second = row + is_pair.integer()
         f = forces[row] / push, r.choose(is_pair, forces[second] / push, 0.0)
         a = motions[row] / move, r.choose(is_pair, motions[second] / move, 0.0)
         with r.when(m.unit("slip")[k] == 0.0):
             _check_gap(r, m, worst, k, f[0], a[0], _limit(r, m, k, 1) / push)
         with r.otherwise():
             _check_slip(r, m, worst, k, (f, a, push, is_pair))
-
-
-def _own_sizes(
-    r: Routine, m: Sets, unit: tuple[Value, Value, Value], total: Variable, sizes: tuple[Value, Value]
-) -> tuple[Value, Value]:
-    """Return the sizes of forces and of motions of a unit by itself; those of all units are given, too."""
-    (k, _, _), (pushes, moves) = unit, sizes
-    forces, free, response, size = m.row("forces"), m.row("wanted"), m.result("response"), m.size
-    move, by, push = r.variable(0.0), r.variable(0.0), r.variable(0.0)
-    for group in range(4):
-        push.now = r.most(r.size(_limit(r, m, k, group)), push.now)
-    with _rows(r, m, k) as (_, row):
-        own = response.at(row * size)
-        total.now = 0.0
-        with r.count(size) as j:
-            total.now = total.now + r.size(own[j] * forces[j])
-        move.now = r.most(r.size(free[row]), r.most(total.now, move.now))
-        by.now, push.now = r.most(own[row], by.now), r.most(r.size(forces[row]), push.now)
-    alone = r.choose(move.now < by.now * pushes, move.now / by.now, pushes)
-    return r.least(r.most(r.most(alone, push.now), pushes * OWN), pushes), r.most(move.now, moves * OWN)
+    r.give(0)
+    return r
 
 
 def _check_gap(r: Routine, m: Sets, worst: _Worst, k: Value, f: Value, a: Value, static: Value) -> None:

@@ -29,9 +29,6 @@ OPEN, GOES_ON, STICKS = 0, 1, 2
 SLACK = 1e-9
 """Of the largest force, and of the largest motion: by so much an inequality may be missed, by rounding."""
 
-OWN = 1e-4
-"""Of the largest force, and of the largest motion: those of a unit by itself count as no smaller."""
-
 _MOST_SETS = 20_000
 """More sets than these are not looked through."""
 
@@ -563,37 +560,21 @@ def _contradiction(
         return number, better
     size = max(abs(_limits(contacts.sides[0], k, forces)[0]) for k in range(len(contacts.units)))
     pushes = max(max(map(abs, forces)), size) or 1.0
-    each = [
+    moves = max(
         max(abs(free), sum(abs(by * force) for by, force in zip(row, forces, strict=True)))
         for free, row in zip(contacts.free, contacts.response, strict=True)
-    ]
-    moves = max(each) or 1.0
-    for is_own in (False, True):  # what is far lighter than others, or is moved far less, is then judged by itself
-        for k, (unit, state) in enumerate(zip(contacts.units, states, strict=True)):
-            if _is_loose(states, unit):
-                continue
-            push, move = _own_sizes(contacts, k, forces, each, pushes, moves) if is_own else (pushes, moves)
-            f, a = [forces[i] / push for i in unit.rows], [motions[i] / move for i in unit.rows]
-            side = contacts.sides[is_back(state[1] if state[0] == GOES_ON else tuple(-x for x in f))]
-            limit, static = (one / push for one in _limits(side, k, forces))
-            for miss, other in _misses(unit, state, f, a, limit, static, any(side[1][k])):
-                if miss > worst:
-                    worst, number, better = miss, k, other
-        if number >= 0:
-            break
+    )
+    moves = moves or 1.0
+    for k, (unit, state) in enumerate(zip(contacts.units, states, strict=True)):
+        if _is_loose(states, unit):
+            continue
+        f, a = [forces[i] / pushes for i in unit.rows], [motions[i] / moves for i in unit.rows]
+        side = contacts.sides[is_back(state[1] if state[0] == GOES_ON else tuple(-x for x in f))]
+        limit, static = (one / pushes for one in _limits(side, k, forces))
+        for miss, other in _misses(unit, state, f, a, limit, static, any(side[1][k])):
+            if miss > worst:
+                worst, number, better = miss, k, other
     return number, better
-
-
-def _own_sizes(
-    contacts: _Listed, k: int, forces: Sequence[float], each: Sequence[float], pushes: float, moves: float
-) -> tuple[float, float]:
-    """Return the sizes of forces and of motions of a unit by itself; those of all units are given, too."""
-    rows = contacts.units[k].rows
-    move = max(each[i] for i in rows)
-    by = max(contacts.response[i][i] for i in rows)
-    limits = (abs(one) for side in contacts.sides for one in _limits(side, k, forces))
-    push = max(move / by if move < by * pushes else pushes, *(abs(forces[i]) for i in rows), *limits)
-    return min(max(push, OWN * pushes), pushes), max(move, OWN * moves)
 
 
 def _limits(side: _Side, k: int, forces: Sequence[float]) -> tuple[float, float]:
