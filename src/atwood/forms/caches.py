@@ -34,7 +34,7 @@ T = TypeVar("T")
 
 
 @contextmanager
-def _without_collection() -> Iterator[None]:
+def without_collection() -> Iterator[None]:
     """Leave cycles of objects alone: graphs of expressions have none, and to look for them is a sixth of deriving."""
     was_enabled = gc.isenabled()
     gc.disable()
@@ -119,7 +119,7 @@ class Shared:
         try:
             found: T = self._made[place]
         except KeyError:
-            with self.lock, stage("equations"), _without_collection():
+            with self.lock, stage("equations"), without_collection():
                 if place not in self._made:
                     self._made[place] = make()
                 found = self._made[place]

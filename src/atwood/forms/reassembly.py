@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from atwood.errors import UsageError
-from atwood.forms.caches import Key, Shared
+from atwood.forms.caches import Key, Shared, without_collection
 from atwood.forms.law_code import law_code
 from atwood.forms.other_values import Source, moved_to, with_constants_of_start
 from atwood.lazy_dataclasses import replace
@@ -54,7 +54,7 @@ def assembled(
 ) -> Assembly:
     """Assembly of a scene in one form, with equations of its own."""
     all_modes = modes_of(flat) | dict(modes or {})
-    with stage("mechanism"):
+    with stage("mechanism"), without_collection():
         mechanism = read_mechanism(flat, all_modes, line_signs, **origin)
     made = kind(flat, mechanism, form, level, all_modes, source, orientation=Orientation(orientation))
     return with_constants_of_start(made)
