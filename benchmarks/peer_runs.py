@@ -4,13 +4,24 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
 import peers
 from mechanisms import GRAVITY, FloatArray, Mechanism
 
-__all__ = ["exudyn_run", "heyoka_rates", "heyoka_run", "kane_run", "mujoco_run", "pinocchio_rk4_run", "pinocchio_run"]
+__all__ = [
+    "diffrax_run",
+    "drake_run",
+    "exudyn_run",
+    "heyoka_rates",
+    "heyoka_run",
+    "kane_run",
+    "mujoco_run",
+    "pinocchio_rk4_run",
+    "pinocchio_run",
+]
 
 Run = Callable[[], tuple[float, FloatArray]]
 
@@ -23,21 +34,25 @@ def _start(mechanism: Mechanism) -> FloatArray:
 
 
 def heyoka_rates(heyoka: Any, mechanism: Mechanism) -> tuple[list[Any], list[Any]]:
-    """Return the unknowns (q, u) and their rates as heyoka's expressions, with numbers for the parameters.
+    """Return the unknowns (q, u) and their rates as heyoka's expressions, with numbers for the parameters."""
+    q, u = ([heyoka.expression(f"{letter}{i}") for i in range(mechanism.links)] for letter in "qu")
+    return [*q, *u], _rates(q, u, heyoka.sin, heyoka.cos, mechanism)
+
+
+def _rates(q: Any, u: Any, sin: Any, cos: Any, mechanism: Mechanism) -> list[Any]:
+    """Return the rates of (q, u), in whatever numbers or expressions they come.
 
     The double pendulum is in closed form; longer chains have the O(N) elimination of the rods' tensions that the C by
-    hand has (`hand/chain.c`), since heyoka has no models of chains and no linear solver of its own.
+    hand has (`hand/chain.c`): heyoka, like JAX, has no models of chains and no linear solver for them.
     """
     n, l, m = mechanism.links, mechanism.length, mechanism.mass
-    sin, cos = heyoka.sin, heyoka.cos
-    q, u = ([heyoka.expression(f"{letter}{i}") for i in range(n)] for letter in "qu")
     if n == 2:
         d = q[0] - q[1]
         s, c = sin(d), cos(d)
         r1 = u[1] * u[1] * s + 2.0 * (GRAVITY / l) * sin(q[0])
         r2 = u[0] * u[0] * s - (GRAVITY / l) * sin(q[1])
         over = 1.0 / (2.0 - c * c)
-        return [*q, *u], [*u, -(r1 + c * r2) * over, (2.0 * r2 + c * r1) * over]
+        return [*u, -(r1 + c * r2) * over, (2.0 * r2 + c * r1) * over]
     w = 1.0 / m
     turned = [q[i + 1] - q[i] for i in range(n - 1)]
     ws, wc = [w * sin(d) for d in turned], [w * cos(d) for d in turned]
@@ -57,7 +72,7 @@ def heyoka_rates(heyoka: Any, mechanism: Mechanism) -> tuple[list[Any], list[Any
     for i in range(n):
         pulled = ws[i] * tension[i + 1] if i < n - 1 else 0.0
         rates.append((pulled - (ws[i - 1] * tension[i - 1] if i else GRAVITY * sin(q[0]))) / l)
-    return [*q, *u], [*u, *rates]
+    return [*u, *rates]
 
 
 def heyoka_run(heyoka: Any, mechanism: Mechanism, tolerance: float) -> Run:
@@ -179,6 +194,79 @@ def exudyn_run(exudyn: Any, mechanism: Mechanism, steps: int) -> Run:
         spent = time.perf_counter() - began
         joints = np.asarray(mbs.GetNodeOutput(0, exudyn.OutputVariableType.Coordinates))
         return spent, mechanism.from_angles(-np.cumsum(joints))
+
+    return run
+
+
+# -- Drake --------------------------------------------------------------------------------------------------------
+
+
+def drake_run(drake: Any, mechanism: Mechanism, accuracy: float) -> Run:
+    """Return a run with Drake: a continuous plant, and its Runge-Kutta method of order 5."""
+    plant = peers.drake_plant(drake, mechanism.links, mechanism.length, mechanism.mass)
+    simulator = drake.Simulator(plant)
+    drake.ResetIntegratorFromFlags(simulator, "runge_kutta5", 0.1 * mechanism.t_end)
+    simulator.get_mutable_integrator().set_target_accuracy(accuracy)
+    context = simulator.get_mutable_context()
+    start = np.diff(mechanism.angles_at_start(), prepend=0.0)
+
+    def run() -> tuple[float, FloatArray]:
+        began = time.perf_counter()
+        context.SetTime(0.0)
+        plant.SetPositions(context, start)
+        plant.SetVelocities(context, np.zeros(mechanism.links))
+        simulator.Initialize()
+        simulator.AdvanceTo(mechanism.t_end)
+        spent = time.perf_counter() - began
+        return spent, mechanism.from_angles(np.cumsum(plant.GetPositions(context)))
+
+    return run
+
+
+# -- JAX and diffrax ----------------------------------------------------------------------------------------------
+
+
+@cache
+def _diffrax(diffrax: Any, mechanism: Mechanism) -> Callable[[Any, float], Any]:
+    """Return what gives the end from the start and a tolerance, compiled once a mechanism."""
+    import jax
+    import jax.numpy as jnp
+
+    jax.config.update("jax_enable_x64", True)
+    n, at_end = mechanism.links, diffrax.SaveAt(t1=True)
+
+    def rates(_: Any, y: Any, __: Any) -> Any:
+        return jnp.stack(_rates(y[:n], y[n:], jnp.sin, jnp.cos, mechanism))
+
+    term = diffrax.ODETerm(rates)
+
+    @jax.jit
+    def end(start: Any, tolerance: Any) -> Any:
+        steps = diffrax.PIDController(rtol=tolerance, atol=tolerance)
+        made = diffrax.diffeqsolve(
+            term,
+            diffrax.Dopri8(),
+            0.0,
+            mechanism.t_end,
+            None,
+            start,
+            saveat=at_end,
+            stepsize_controller=steps,
+            max_steps=None,
+        )
+        return made.ys[-1]
+
+    return end
+
+
+def diffrax_run(diffrax: Any, mechanism: Mechanism, tolerance: float) -> Run:
+    """Return a run with diffrax's Dormand-Prince method of order 8(7), compiled by JAX, in double precision."""
+    end, start = _diffrax(diffrax, mechanism), _start(mechanism)
+
+    def run() -> tuple[float, FloatArray]:
+        began = time.perf_counter()
+        found = end(start, tolerance).block_until_ready()
+        return time.perf_counter() - began, mechanism.from_angles(np.asarray(found))
 
     return run
 

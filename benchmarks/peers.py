@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 __all__ = [
+    "drake_plant",
     "exudyn_accelerations",
     "exudyn_tree",
     "kane_chain",
@@ -105,6 +106,23 @@ def pinocchio_chain(pinocchio: Any, links: int) -> Callable[[], float]:
         return (time.perf_counter() - began) / 1000
 
     return measure
+
+
+def drake_plant(drake: Any, links: int, length: float, mass: float) -> Any:
+    """Return Drake's continuous plant of a chain."""
+    plant = drake.MultibodyPlant(time_step=0.0)
+    point = drake.RotationalInertia(_TINY, _TINY, _TINY)
+    bob = drake.SpatialInertia.MakeFromCentralInertia(mass, [0.0, 0.0, -length], point)
+    above = plant.world_frame()
+    for i in range(links):
+        body = plant.AddRigidBody(f"b{i}", bob)
+        place = drake.RigidTransform([0.0, 0.0, -length if i else 0.0])
+        hinge = plant.AddFrame(drake.FixedOffsetFrame(f"h{i}", above, place))
+        plant.AddJoint(drake.RevoluteJoint(f"j{i}", hinge, body.body_frame(), [0.0, -1.0, 0.0]))
+        above = body.body_frame()
+    plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -9.81])
+    plant.Finalize()
+    return plant
 
 
 def exudyn_tree(exudyn: Any, links: int, length: float, mass: float, start: float) -> Any:

@@ -8,6 +8,7 @@ whole public call on an assembled scene: start, run, 400 samples, result.
 
 from __future__ import annotations
 
+import importlib
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -93,6 +94,10 @@ def others(mechanism: Mechanism) -> dict[str, tuple[list[float], Make]]:
         found["Exudyn, RK67"] = [h for h in steps if h > 2e-5], fixed(partial(other.exudyn_run, exudyn, mechanism))
     if mujoco := peer("mujoco"):
         found["MuJoCo RK4"] = steps, fixed(partial(other.mujoco_run, mujoco, mechanism))
+    if peer("pydrake"):
+        found["Drake, RK5"] = powers(3, 13), partial(other.drake_run, importlib.import_module("pydrake.all"), mechanism)
+    if diffrax := peer("diffrax"):
+        found["JAX, diffrax Dopri8"] = powers(2, 13), partial(other.diffrax_run, diffrax, mechanism)
     if mechanism.links <= 10 and peer("sympy"):
         found["sympy Kane, SciPy DOP853"] = powers(2, 13), partial(other.kane_run, mechanism)
     return found
