@@ -288,7 +288,7 @@ def test_a_list_takes_values_together() -> None:
         ({"vary": {"mass1": [1.0]}, "threads": 0}, UsageError, "thread"),
         ({"vary": {"mass1": [1.0]}, "t_end": -1.0}, UsageError, "after the start"),
         ({"vary": {"mass1": [1.0]}, "solver": "explict"}, UsageError, "explicit"),
-        ({"vary": {"mass1": [1.0]}, "solver": "taylor", "form": "dae"}, UsageError, "reduced form"),
+        ({"vary": {"mass1": [1.0]}, "solver": "gauss", "form": "dae"}, UsageError, "reduced form"),
         ({"vary": {"mass1": [1.0]}, "rtol": 2.0}, UsageError, "between 0 and 1"),
         ({"vary": {"mass1": [1.0]}, "rtol": 1e-6, "accuracy": 1e-6}, UsageError, "two things"),
         ({}, UsageError, "nothing is varied"),

@@ -17,7 +17,6 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.loose import has_touched
 from atwood.forms.program import FormProgram
-from atwood.forms.pulled import form_at_contacts, null_space_at_contacts
 from atwood.forms.residuals import NullSpaceProgram, keep_constraints, null_space_program
 from atwood.integrators.methods import Method
 from atwood.integrators.protocol import ImplicitProblem, LinearSolver, NativeCallbacks
@@ -162,6 +161,8 @@ class SceneProblem:
         """The form's programs for the present dependent coordinates, and for what touches."""
         chosen = kept_rows(self.finding), self.dependent, self.dependent_speeds
         if self.assembly.own_equations.contacts:
+            from atwood.forms.pulled import form_at_contacts  # few scenes have gaps
+
             return form_at_contacts(self.assembly, *chosen)
         return self.assembly.form_program(*chosen) if self.dependent_speeds else self.program
 
@@ -386,6 +387,8 @@ def _restored(
 
 def _null_space_program(assembly: Assembly, kept: tuple[int, ...]) -> NullSpaceProgram:
     if assembly.own_equations.contacts:
+        from atwood.forms.pulled import null_space_at_contacts  # few scenes have gaps
+
         return null_space_at_contacts(assembly, kept)
     equations = keep_constraints(assembly.own_equations, kept)
     return null_space_program(f"{assembly.flat.name} (reduced)", equations, assembly.parameters, assembly.rows)
