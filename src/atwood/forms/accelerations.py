@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Literal, cast
 
 from atwood.errors import AtwoodError
 from atwood.expr import Expression, OutputGroup, Program, jacobian, live, solve, substitute
-from atwood.expr.simplify.alike import Alike
 from atwood.expr.simplify.collect import cost
 from atwood.expr.simplify.polynomial import Effort
 from atwood.forms.caches import Key, derive_once
@@ -227,6 +226,8 @@ class _Tree:
     """The balance of forces of a tree in the speeds of its bodies, at a state of the generalized coordinates."""
 
     def __init__(self, assembly: Assembly) -> None:
+        from atwood.expr.simplify.alike import Alike  # a scene that was run before is not derived
+
         self.reduced, self.maximal = assembly.reduced, assembly.maximal
         self.graph = self.reduced.graph
         self.parameters = assembly.parameters
