@@ -6,6 +6,7 @@ from tests.study.sensitivities.test_events import in_wind, pushed, slack_rope, s
 from tests.study.sensitivities.test_inputs import NODES, pendulum, sampled
 
 from atwood import assemble, sensitivities
+from atwood.study.sensitivities import passage
 from atwood.study.sensitivities.columns import find_columns
 from atwood.study.sensitivities.pulled import Pulled
 from atwood_library.scenes import (
@@ -22,6 +23,7 @@ from atwood_library.scenes import (
     RollingDisc,
     SliderCrank,
     StickSlip,
+    Woodpecker,
 )
 
 CASES = [
@@ -69,6 +71,14 @@ def test_by_inputs_is_alike(kind, between):
     about = {"inputs": {"push.value": NODES}, "between": between, "t_end": 1.2, "form": "reduced"}
     found = both(kind(), ["bob.position.x", "push.force"], parameters=["bob.mass"], outputs=[0.5, 1.2], **about)
     assert_alike(*found)
+
+
+def test_states_are_moved_no_farther_than_impacts_are_smooth(monkeypatch):
+    about = {"parameters": ["spring.stiffness"], "t_end": 0.15, "outputs": [0.15], "rtol": 1e-12}
+    found = sensitivities(Woodpecker(), ["sleeve.position.z"], **about)
+    monkeypatch.setattr(passage, "_MOVED", (1e-2, *passage._MOVED))  # here a hundredth is too far
+    far = sensitivities(Woodpecker(), ["sleeve.position.z"], mode="adjoint", **about)
+    assert far.derivatives == pytest.approx(found.derivatives, rel=1e-8)
 
 
 def test_goes_back_once_for_any_number_of_columns(monkeypatch):

@@ -136,8 +136,8 @@ def test_updates_that_are_arithmetic_are_derived_on_the_graph(kind, form, monkey
         return sensitivities(controlled(kind), ["bob.position.x"], **about)
 
     about = {"parameters": ["control.most", "rod.length"], "start": ["rod.angle"]}
-    calls, differences = [], passage.extrapolated
-    monkeypatch.setattr(passage, "extrapolated", lambda function: calls.append(1) or differences(function))
+    calls, differences = [], passage.differentiated
+    monkeypatch.setattr(passage, "differentiated", lambda function: calls.append(1) or differences(function))
     found, graph = run(**about), len(calls)
     assert run(mode="adjoint", **about).derivatives == pytest.approx(found.derivatives, abs=1e-9)
     calls.clear()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -22,7 +22,7 @@ from atwood.simulation.run.recorder import SegmentRecord
 from atwood.simulation.run.run import walked
 from atwood.study.sensitivities.augmented import Augmented, Stretch
 from atwood.study.sensitivities.changes import Beside, Change, Leg, WatchedWalk
-from atwood.study.sensitivities.columns import SHARES, Column, extrapolated
+from atwood.study.sensitivities.columns import SHARES, Column, differentiated, extrapolated
 from atwood.study.sensitivities.inputs import NodeColumn
 from atwood.study.sensitivities.quantities import derivatives, written
 from atwood.study.sensitivities.starts import exact_changes
@@ -39,8 +39,11 @@ _GRAZING = 1e-7
 _TANGENT = 1e-5
 """In the scene's sizes: columns that miss constraints by more do not belong to motions on them."""
 
-_MOVED = 1e-3
+_MOVED = (1e-3, 1e-4, 1e-5)
 """In the scene's sizes: so far states are moved at most to see what an impact or an update makes of them."""
+
+_SMOOTH = 1e-5
+"""So far two differences may be apart, as a share, that what happens is smooth."""
 
 _EVENTS: Key[tuple[Expression, ...]] = Key("events as functions of the state")
 
@@ -316,14 +319,33 @@ class Passage:
         found = []
         plain: Beside = lambda one: one  # noqa: E731
         base = np.concatenate(change.apply(plain, (t, state[:n], state[n:])))
+        still = [len(base) - len(now) + k for k in set_apart(change.assembly)]
         for j, column in enumerate(self.columns):
             own = columns[j], held[j], float(moments[j])
             size = max(1.0, float(np.max(np.abs(columns[j] / sizes), initial=0.0)))
-            scale = _MOVED / (SHARES[0] * size)
-            found.append(extrapolated(partial(moved, column, *own, scale)) / scale)
+            found.append(self._differences(partial(moved, column, *own), size, t, still))
         count = len(base) - len(now)
         made = np.array(found)
         return made[:, :count], made[:, count:], base[:count]
+
+    def _differences(
+        self, moved: Callable[[float, float], FloatArray], size: float, t: float, still: list[int]
+    ) -> FloatArray:
+        """Return the derivative of what a change makes, from states so near that it is smooth among them.
+
+        What has no derivatives of itself is `still`.
+        """
+        for nearer in _MOVED:
+            scale = nearer / (SHARES[0] * size)
+            found, apart = (one / scale for one in differentiated(partial(moved, scale)))
+            apart[still] = found[still] = 0.0
+            if np.max(np.abs(apart), initial=0.0) <= _SMOOTH * max(size, float(np.max(np.abs(found), initial=0.0))):
+                return found
+        raise SolveError(
+            f"what happens at t = {t:.9g} s changes with the state before it by leaps: there are no derivatives",
+            where=self.where,
+            advice="Change the scene or its start a little, or let the run end before.",
+        )
 
     def _held_at_start(self, column: Column) -> FloatArray:
         if isinstance(column, NodeColumn):
