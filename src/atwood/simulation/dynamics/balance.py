@@ -234,8 +234,8 @@ def is_wide(program: BalanceProgram) -> bool:
 
 
 def _accelerations(assembly: Assembly, program: BalanceProgram) -> BoundKernel | None:
-    """Return what gives accelerations where a mass matrix is better never made, and formulas give them."""
-    found = accelerations_of(assembly) if is_wide(program) else None
+    """Return what gives accelerations where a mass matrix is better never made, and formulas without contacts do."""
+    found = accelerations_of(assembly) if is_wide(program) and not assembly.reduced.contacts else None
     return None if found is None else assembly.kernel(found.program)
 
 
