@@ -56,8 +56,9 @@ CASES: dict[str, tuple[Callable[[], Scene], dict[str, float]]] = {
 
 @pytest.fixture(autouse=True)
 def compiled_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Compile programs in Python at their first call, so that what is compiled later is new."""
+    """Compile programs at their first call, so that what is compiled later is new."""
     monkeypatch.setattr(python_backend, "WALKS", 0)
+    monkeypatch.setattr("atwood.simulation.problem.problem._MANY_STATES", -1)
 
 
 @pytest.mark.parametrize("name", CASES)
