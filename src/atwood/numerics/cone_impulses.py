@@ -223,25 +223,36 @@ def _sweeps(rows: int, speeds: int) -> list[Routine]:
     entries = [(bodies[s], s * rows * speeds, k) for s in (0, 1) for k in range(speeds)]
 
     def rate(r: int) -> Value:
-        first, *rest = (row[3 + start + r * speeds + k] * body[k] for body, start, k in entries)
+        first, *rest = (row[3 + start + r * speeds + k] * body[k] for body, start, k in entries if turns(r, k))
         return sum(rest, first)
 
-    def push(r: int, by: Value) -> None:
-        for body, start, k in entries:
-            body[k] = body[k] + row[3 + 2 * rows * speeds + start + r * speeds + k] * by
+    def turns(r: int, k: int) -> bool:
+        return rows > 2 or r > 0 or k < 2  # the normals of discs go through their centres
 
-    old = own[0]
+    def push(by: dict[int, Value]) -> None:
+        for body, start, k in entries:
+            moves = (row[3 + 2 * rows * speeds + start + r * speeds + k] * x for r, x in by.items() if turns(r, k))
+            body[k] = sum(moves, body[k])
+
+    old, before = own[0], [own[r] for r in range(1, rows)]
     normal = old - (rate(0) - least) / gives
     normal = one.choose(normal > 0.0, normal, 0.0)
-    own[0] = normal
-    push(0, normal - old)
-    before = [own[r] for r in range(1, rows)]
+    pushed = {0: normal - old}
+    if rows > 2:
+        push(pushed)
     slips = [one_before - rate(r) / yields for r, one_before in enumerate(before, 1)]
-    size = one.sqrt(sum((x * x for x in slips[1:]), slips[0] * slips[0]))
-    share = one.choose(size > friction * normal, friction * normal / one.choose(size > 0.0, size, 1.0), 1.0)
-    for r, (slip, was) in enumerate(zip(slips, before, strict=True), 1):
-        own[r] = slip * share
-        push(r, slip * share - was)
+    most = friction * normal
+    if rows > 2:
+        size = one.sqrt(sum((x * x for x in slips[1:]), slips[0] * slips[0]))
+        share = one.choose(size > most, most / one.choose(size > 0.0, size, 1.0), 1.0)
+        slips = [slip * share for slip in slips]
+    else:
+        slips = [one.choose(slips[0] > most, most, one.choose(slips[0] < 0.0 - most, 0.0 - most, slips[0]))]
+    rubbed = {r: slip - was for r, (slip, was) in enumerate(zip(slips, before, strict=True), 1)}
+    push(rubbed if rows > 2 else pushed | rubbed)
+    own[0] = normal
+    for r, slip in enumerate(slips, 1):
+        own[r] = slip
     one.give(0)
     every = Routine(
         f"sweeps_{rows}",
