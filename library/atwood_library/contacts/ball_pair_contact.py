@@ -26,7 +26,8 @@ class BallPairContact(Touching):
     b: Frame = connector(Frame, "The frame of ball b, at its centre.")
 
     def check_values(self) -> None:
-        """Refuse balls of no size, and what does not fit into the other."""
+        """Refuse balls of no size, what does not fit into the other, and what Touching refuses."""
+        super().check_values()
         if self.touches == "inside" and not self.radius_b < self.radius_a:
             raise ParameterError(
                 f"a ball of {self.radius_b:g} m has no room in a hole of {self.radius_a:g} m",

@@ -1,12 +1,12 @@
-"""A value between a lower and an upper bound, of which a part has one or both."""
+"""Bounds that are parameters: a lower and an upper one, of which a part has one or both, and that of static friction."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 from atwood import Component, ParameterError
 
-__all__ = ["Bounded"]
+__all__ = ["Bounded", "check_static_friction"]
 
 
 class Bounded(Component):
@@ -24,3 +24,20 @@ class Bounded(Component):
             raise ParameterError(
                 f"the upper bound {upper:g} is not above the lower one, {lower:g}", where=f"{self.path}.upper"
             )
+
+
+class _Rubs(Protocol):
+    path: str
+    friction: Any
+    static_friction: Any
+
+
+def check_static_friction(part: _Rubs) -> None:
+    """Refuse static friction below that of slipping: what slips would stop and could not stay."""
+    sticks, slips = part.static_friction, part.friction
+    if sticks is not None and sticks < slips:
+        raise ParameterError(
+            f"the coefficient while it sticks, {sticks:g}, is below that while it slips, {slips:g}",
+            where=f"{part.path}.static_friction",
+            advice=f"Give one from {slips:g} on, or none.",
+        )

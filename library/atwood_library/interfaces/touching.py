@@ -15,6 +15,7 @@ from atwood import (
     parameter,
     unilateral,
 )
+from atwood_library.interfaces.bounds import check_static_friction
 
 __all__ = ["Touching", "across"]
 
@@ -61,6 +62,10 @@ class Touching(Component):
         above=0.0,
         doc="How more places than are needed share a load: as springs of such stiffnesses. Nothing gives way.",
     )
+
+    def check_values(self) -> None:
+        """Refuse static friction below that of slipping."""
+        check_static_friction(self)
 
     def normal_in_world(self) -> Vector:
         """Return the unit normal, towards what the force acts on, in world axes."""

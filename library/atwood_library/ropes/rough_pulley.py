@@ -21,6 +21,7 @@ from atwood import (
     tanh,
     unilateral,
 )
+from atwood_library.interfaces.bounds import check_static_friction
 from atwood_library.interfaces.spans import rate_of_span
 
 __all__ = ["RoughPulley"]
@@ -54,6 +55,10 @@ class RoughPulley(Component):
     over: Groove = connector(Groove, "The pulley.")
     b: Point = connector(Point, "The other end of the rope.")
     shaft: Shaft = connector(Shaft, "The angle of the pulley.", when={"turns": ("shaft",)})
+
+    def check_values(self) -> None:
+        """Refuse static friction below that of slipping."""
+        check_static_friction(self)
 
     @unilateral(reaction="tension", unit="N", doc="Mean of the tensions at both ends.")
     def slack(self) -> Scalar:

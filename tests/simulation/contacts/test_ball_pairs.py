@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 from scipy.special import ellipk
 
 import atwood as aw
 from atwood import Scene, simulate
-from atwood_library import BallPairContact, Ground, Link, Pivot, RigidBody, Slider, Sphere
+from atwood_library import (
+    BallContact,
+    BallPairContact,
+    Ground,
+    Link,
+    Pivot,
+    PointContact,
+    RigidBody,
+    RoughPulley,
+    Slider,
+    Sphere,
+)
 
 FORMS = pytest.mark.parametrize("form", ["reduced", "dae"])
 
@@ -171,3 +183,11 @@ def test_a_pin_with_clearance(friction: float) -> None:
         assert one.time == pytest.approx(other.time, abs=1e-9)
     for path in ("crank.angle", "guide.displacement", "rod.angle"):
         assert float(found[0][path][-1]) == pytest.approx(float(found[1][path][-1]), abs=1e-9)
+
+
+@pytest.mark.parametrize("part", [PointContact, BallContact, BallPairContact, RoughPulley])
+def test_static_friction_below_that_of_slipping_is_refused(part: Any) -> None:
+    """What slips would stop and could not stay: it would creep in ever shorter steps."""
+    made = part(friction=0.4, static_friction=0.3)
+    with pytest.raises(aw.ParameterError, match=r"while it sticks, 0\.3, is below that while it slips, 0\.4"):
+        made.check_values()
