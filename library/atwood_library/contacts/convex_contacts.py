@@ -24,13 +24,17 @@ def _read(value: Any, where: str) -> Any:
     given = (value,) if isinstance(value, (list, tuple)) and value and isinstance(value[0], str) else value
     if not isinstance(given, (list, tuple)) or not given or not isinstance(given[0], (list, tuple)):
         raise _none(value, where)
-    if not any(isinstance(one[0], str) for one in given if one):
+    if not any(isinstance(one, (list, tuple)) and one and isinstance(one[0], str) for one in given):
+        if not all(isinstance(one, (list, tuple)) and len(one) == 5 for one in given):
+            raise _none(value, where)
         return value  # rows that have been read
     return tuple((float(i), *row) for i, one in enumerate(given) for row in _rows(one, where))
 
 
 def _rows(one: Any, where: str) -> list[tuple[float, ...]]:
     kind, *sizes = one if isinstance(one, (list, tuple)) and one else (None,)
+    if not isinstance(kind, str):
+        raise _none(one, where)
     try:
         if kind == "hull":
             (corners,) = sizes
@@ -38,7 +42,7 @@ def _rows(one: Any, where: str) -> list[tuple[float, ...]]:
             if len(points) > 3 and all(len(point) == 3 for point in points):
                 return [(0.0, *point) for point in points]
         numbers = [float(one) for one in sizes] if kind in _KINDS and kind != "hull" else []
-    except (TypeError, ValueError):
+    except Exception:  # a value of somebody else's class may raise anything
         raise _none(one, where) from None
     if not numbers or not all(number > 0.0 for number in numbers):
         raise _none(one, where)
@@ -55,7 +59,8 @@ def _rows(one: Any, where: str) -> list[tuple[float, ...]]:
 
 def _none(one: Any, where: str) -> ParameterError:
     kinds = "; ".join(f"({kind!r}, {what})" for kind, what in _KINDS.items())
-    return ParameterError(f"{one!r} is no shape", where=where, advice=f"A shape is one of {kinds}.")
+    said = f"{one!r} is" if isinstance(one, (str, int, float)) else "that is"
+    return ParameterError(f"{said} no shape", where=where, advice=f"A shape is one of {kinds}.")
 
 
 class ConvexContacts(ContactGroup):
