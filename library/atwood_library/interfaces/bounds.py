@@ -1,4 +1,4 @@
-"""Bounds that are parameters: a lower and an upper one, of which a part has one or both, and that of static friction."""
+"""Bounds that are parameters: lower and upper ones, of which a part has one or both, and that of static friction."""
 
 from __future__ import annotations
 
