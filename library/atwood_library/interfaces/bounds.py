@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
 from atwood import Component, ParameterError
 
@@ -26,18 +26,11 @@ class Bounded(Component):
             )
 
 
-class _Rubs(Protocol):
-    path: str
-    friction: Any
-    static_friction: Any
-
-
-def check_static_friction(part: _Rubs) -> None:
+def check_static_friction(sticks: Any, slips: Any, path: str) -> None:
     """Refuse static friction below that of slipping: what slips would stop and could not stay."""
-    sticks, slips = part.static_friction, part.friction
     if sticks is not None and sticks < slips:
         raise ParameterError(
             f"the coefficient while it sticks, {sticks:g}, is below that while it slips, {slips:g}",
-            where=f"{part.path}.static_friction",
+            where=f"{path}.static_friction",
             advice=f"Give one from {slips:g} on, or none.",
         )

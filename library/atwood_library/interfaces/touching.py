@@ -65,7 +65,7 @@ class Touching(Component):
 
     def check_values(self) -> None:
         """Refuse static friction below that of slipping."""
-        check_static_friction(self)
+        check_static_friction(self.static_friction, self.friction, self.path)
 
     def normal_in_world(self) -> Vector:
         """Return the unit normal, towards what the force acts on, in world axes."""

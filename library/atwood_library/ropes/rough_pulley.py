@@ -58,7 +58,7 @@ class RoughPulley(Component):
 
     def check_values(self) -> None:
         """Refuse static friction below that of slipping."""
-        check_static_friction(self)
+        check_static_friction(self.static_friction, self.friction, self.path)
 
     @unilateral(reaction="tension", unit="N", doc="Mean of the tensions at both ends.")
     def slack(self) -> Scalar:
