@@ -15,6 +15,8 @@ from atwood_library import (
     Disc,
     Force,
     Ground,
+    Link,
+    Pivot,
     PointContact,
     PointMass,
     RigidBody,
@@ -201,3 +203,22 @@ def test_floors_that_are_never_met_change_nothing(form: str) -> None:
         return np.array([result[name][-1] for name in names] + [one.time for one in result.events])
 
     assert over(7) == pytest.approx(over(1), abs=1e-11)
+
+
+def test_places_on_a_hinged_body_share_a_load_alike_in_both_forms() -> None:
+    """What is not determined is weighed by masses of bodies, not of the hinge's angle, about which levers may vanish."""
+    shares = []
+    for form in ("reduced", "dae"):
+        scene = Scene()
+        link, hinge = scene.add("link", Link(length=1.0, mass=2.0)), scene.add("hinge", Pivot())
+        scene.connect(scene.add("ground", Ground()).frame, hinge.a)
+        scene.connect(hinge.b, link.a)
+        for name, normal, friction in (("flat", (0.0, 0.0, 1.0), 0.9), ("steep", (-0.6, 0.0, 0.8), 0.5)):
+            contact = scene.add(name, PointContact(normal=normal, friction=friction))
+            scene.connect(scene.add(f"{name}_ground", Ground(position=(1.0, 0.0, 0.0))).frame, contact.plane)
+            scene.connect(link.b, contact.point)
+        scene.start.update({"link.angle": 0.0, "link.angular_velocity": 0.0})
+        result = simulate(scene, form=form, t_end=0.1)
+        shares.append([result[f"{name}.normal_force"][0] for name in ("flat", "steep")])
+    np.testing.assert_allclose(shares[0], shares[1], rtol=1e-9)
+    np.testing.assert_allclose(0.5 * 2.0 * G, shares[0] @ np.array([1.0, 0.8]), rtol=1e-9)

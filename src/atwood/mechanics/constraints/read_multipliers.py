@@ -14,7 +14,7 @@ of Inverse Problems, section 5.1), since no choice of independent constraints ne
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -66,11 +66,16 @@ def _check_reads(mechanism: Mechanism, read: Sequence[Expression], equations: Eq
 def are_own(mechanism: Derivation, equations: Equations, read: Sequence[Expression]) -> bool:
     """Return whether multipliers that forces read follow in generalized coordinates alone, without other joints'.
 
-    They are those of gaps and slips then, nothing else is held, and everything has inertia. Where no body hangs on a
-    joint, maximal coordinates are these, too.
+    They are those of gaps and slips then, nothing else is held, everything has inertia, and none may repeat others: how
+    these share a load is weighed by the masses of bodies, while a place near a joint has next to no lever. Where no
+    body hangs on a joint, maximal coordinates are these, too.
     """
     hangs = any(one.joint is not None for one in equations.forest.attachments)
     if not hangs or equations.constraints or not {*read} <= {*equations.contact_multipliers}:
+        return False
+    rows = [one.row for one in equations.contacts]
+    slopes = jacobian([one.rate for one in rows], list(equations.speeds)).by_place
+    if _close_loops(mechanism, rows) or _are_crowded(slopes):
         return False
     mass = jacobian(list(equations.rows), list(equations.accelerations)).by_place
     symbols = (*equations.coordinates, *equations.speeds)
@@ -113,7 +118,7 @@ def known_multipliers(
     held = [*constraints, *(one.row for one in contacts)]
     system.sharing = _sharing(mechanism, held, n) if system.stiffness else []
     can_repeat = _close_loops(mechanism, held)
-    can_repeat = can_repeat or (bool(contacts) and _are_crowded(system))
+    can_repeat = can_repeat or (bool(contacts) and _are_crowded(system.slopes))
     if can_repeat:
         symbols = (*equations.coordinates, *speeds)
         system.has_inertia = decide(mechanism, partial(_has_inertia, dict(system.mass), symbols))
@@ -275,10 +280,10 @@ def _sharing(mechanism: Mechanism, constraints: Sequence[Constraint], first: int
     return list(found.values())
 
 
-def _are_crowded(system: _System) -> bool:
+def _are_crowded(slopes: Iterable[tuple[int, int]]) -> bool:
     """Return whether some rows hold fewer speeds than they are, as two brakes on one shaft (Koenig's matching)."""
     columns: dict[int, list[int]] = {}
-    for row, column in system.slopes:
+    for row, column in slopes:
         columns.setdefault(row, []).append(column)
     holder: dict[int, int] = {}
 
