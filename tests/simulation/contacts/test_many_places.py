@@ -206,7 +206,7 @@ def test_floors_that_are_never_met_change_nothing(form: str) -> None:
 
 
 def test_places_on_a_hinged_body_share_a_load_alike_in_both_forms() -> None:
-    """What is not determined is weighed by masses of bodies, not of the hinge's angle, about which levers may vanish."""
+    """What is not determined is weighed by masses of bodies, not by that of an angle, about which levers may vanish."""
     shares = []
     for form in ("reduced", "dae"):
         scene = Scene()
