@@ -12,7 +12,7 @@ import numpy as np
 from atwood.arguments import ANYTHING, BY_PATH, number, one_of, optional, takes, whole
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError, UnsupportedError, UsageError
-from atwood.expr import Expression, substitute
+from atwood.expr import Expression, Graph, substitute
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.compose.composite import Model
@@ -289,17 +289,11 @@ def _task(
 
     drive = dict(zip((one.path for one in made), symbols, strict=True))
     seen = _Seen({**drive, "time": equations.time}, find, plan.assembly)
-    graph = equations.graph
+    cost = partial(_cost, seen, equations.graph)
     units = {
         path: plan.assembly.observables[path].unit for path in (*end, *bounds) if path in plan.assembly.observables
     }
     units |= {one.path: one.unit for one in made}
-
-    def cost(function: Any, what: str) -> Expression:
-        made = graph.one if isinstance(function, str) else graph.zero if function is None else function(seen)
-        if not isinstance(made, (int, float, Expression)):
-            raise UsageError(f"it returned {made!r}", where=what, advice="Return one number in plain arithmetic.")
-        return graph.convert(made)
 
     if not callable(objective) and objective != "time":
         raise UsageError(f"{objective!r} is no objective", advice="Give a function of what is seen, or 'time'.")
@@ -308,10 +302,9 @@ def _task(
     make = partial(PointFunctions, plan.assembly, parameters, augmented.values, groups)
     motion = make([*rates, cost(objective, "objective")])
     ends, along = ([seen[path] for path in some] for some in (end, bounds))
-    length = scene_length(assembly)
+    length, count = scene_length(assembly), len(equations.coordinates)
     sizes = np.concatenate([one(equations, length) for one in (coordinate_scales, motion_scales)])
-    time = span[0]
-    sizes[len(equations.coordinates) :] /= time
+    sizes[count:] /= span[0]
     task = Task(
         motion,
         make([*ends, cost(at_end, "at_end")]),
@@ -326,8 +319,16 @@ def _task(
         guessed=make([seen[path] for path in courses]),
         courses=tuple(courses.values()),
     )
-    task = replace(task, sizes=(_reached(task, made, len(equations.coordinates)), *task.sizes[1:]))
-    return replace(task, sizes=(task.sizes[0], _input_sizes(task, made, time), span[1]))
+    task = replace(task, sizes=(_reached(task, made, count), *task.sizes[1:]))
+    return replace(task, sizes=(task.sizes[0], _input_sizes(task, made, span[0]), span[1]))
+
+
+def _cost(seen: _Seen, graph: Graph, function: Any, where: str) -> Expression:
+    """Return what a function makes of what is seen: one for the time, zero for no function."""
+    made = graph.one if isinstance(function, str) else graph.zero if function is None else function(seen)
+    if not isinstance(made, (int, float, Expression)):
+        raise UsageError(f"it returned {made!r}", where=where, advice="Return one number in plain arithmetic.")
+    return graph.convert(made)
 
 
 def _reached(task: Task, made: Sequence[Driven], coordinates: int) -> FloatArray:
