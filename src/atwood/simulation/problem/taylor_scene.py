@@ -35,7 +35,7 @@ def recurrences(assembly: Assembly) -> TaylorPrograms:
     found = accelerations_of(assembly)
     if found is None or not len(assembly.reduced.coordinates):
         raise UsageError(
-            "the Taylor-series method needs a scene without closed loops in which something can move",
+            "the Taylor-series method needs accelerations as formulas, and a scene in which something can move",
             where=assembly.flat.name,
             advice=advise(IDA),
         )
