@@ -18,7 +18,7 @@ from itertools import compress, product
 
 import numpy as np
 
-from atwood.arrays import FloatArray
+from atwood.arrays import BoolArray, FloatArray
 from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.matrices import least_norm, or_one
 from atwood.numerics.rank import decompose, null_space
@@ -378,13 +378,17 @@ def elastic(response: FloatArray, compliance: FloatArray) -> FloatArray:
     With ``A + e C`` in the place of A, the limit for small e has ``C f`` square to all forces that balance each other,
     of the rows that give way: the least elastic energy ``f C f/2``.
     """
-    soft = np.flatnonzero(compliance > 0.0)
-    own = np.diag(response)
+    return (compliance[:, None] * balancing(response, compliance > 0.0)).T
+
+
+def balancing(response: FloatArray, gives: BoolArray) -> FloatArray:
+    """Return forces that balance each other, of the rows that give way, a column each."""
+    soft, own = np.flatnonzero(gives), np.diag(response)
     every = np.sqrt(np.where(own > NOTHING * np.max(own, initial=0.0), own, np.inf))
     scaled = response[:, soft] / every[:, None] / every[soft]
-    balancing = null_space(scaled, CLEAR) / np.where(np.isfinite(every[soft]), every[soft], 1.0)[:, None]
-    found = np.zeros((balancing.shape[1], len(own)))
-    found[:, soft] = (compliance[soft, None] * balancing).T
+    some = null_space(scaled, CLEAR) / np.where(np.isfinite(every[soft]), every[soft], 1.0)[:, None]
+    found = np.zeros((len(own), some.shape[1]))
+    found[soft] = some
     return found
 
 

@@ -45,7 +45,7 @@ from atwood.numerics.contact_sets import (
     Limits,
     State,
     all_states,
-    elastic,
+    balancing,
     find_states,
     is_back,
 )
@@ -775,13 +775,16 @@ def forces_in(values: ContactValues, states: Sequence[State], rates: FloatArray 
                     side = limits[is_back(way)]
                     matrix[row] = matrix[row] + part * side.shares[number]
                     right[row] = -part * side.free[number]
-        more = np.zeros((0, count))
+        more, least = np.zeros((0, count)), np.zeros(0)
         holding = [row for rows, one in zip(values.units, states, strict=True) if one[0] == STICKS for row in rows]
         if len(holding) > 1:
-            by_springs = elastic(values.response[np.ix_(holding, holding)], values.gives[holding])
-            more = np.zeros((len(by_springs), count))
-            more[:, holding] = by_springs / or_one(np.max(np.abs(by_springs), axis=1, initial=0.0))[:, None]
-        last, forces = forces, least_norm(np.vstack([matrix, more]), np.append(right, np.zeros(len(more))))
+            slopes, offset = values.sharing
+            gives = np.diag(slopes)[holding] > 0.0
+            alone = balancing(values.response[np.ix_(holding, holding)], gives).T
+            more, least = alone @ slopes[holding], alone @ (offset[holding] if rates is None else 0.0 * offset[holding])
+            size = or_one(np.max(np.abs(more), axis=1, initial=0.0))
+            more, least = more / size[:, None], least / size
+        last, forces = forces, least_norm(np.vstack([matrix, more]), np.append(right, -least))
         if not values.layout.is_curved or is_same(last, forces):
             break
     return forces

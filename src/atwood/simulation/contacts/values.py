@@ -198,7 +198,7 @@ class ContactValues:
         if u is self.u or np.array_equal(u, self.u):
             return self
         made = copy(self)
-        for name in ("_now", "_free", "gives"):
+        for name in ("_now", "_free", "sharing"):
             made.__dict__.pop(name, None)
         made.u = u.copy()
         made._take(made.u)
@@ -269,18 +269,27 @@ class ContactValues:
         return found
 
     @cached_property
-    def gives(self) -> FloatArray:
-        """By how much rows give way as far as forces are shared that nothing determines.
+    def sharing(self) -> tuple[FloatArray, FloatArray]:
+        """The slopes of what is least where nothing determines how forces are shared: ``S f + s``.
 
-        Those without a stiffness do as in `read_multipliers`, so that forces here are those that are reported.
+        It is ``f W f/2``, with the multipliers of joints, which follow from the forces, among the f: as much as rows
+        give way in `read_multipliers`, so that forces here are those that are reported. Springs share a load alone.
         """
+        n, soft = len(self.u), self.compliance > 0.0
+        weights = np.where(soft, self.compliance, self._gives(self.slopes))
+        by_each, free = self._by_each[n:], self._free[n:]
+        joints = by_each.T * (0.0 if soft.any() else self._gives(to_array(self._now.jacobian)))
+        return np.diag(weights) + joints @ by_each, joints @ free
+
+    def _gives(self, slopes: FloatArray) -> FloatArray:
+        """Return by how much rows give way that have no stiffness."""
         own = np.diag(to_array(self._now.mass))
-        squares, has_mass = self.slopes**2, own > 0.0
+        squares, has_mass = slopes**2, own > 0.0
         inverse = np.divide(1.0, own, out=np.zeros(len(own)), where=has_mass)
         some = (squares > 0.0) & has_mass
         usual = some @ inverse / np.maximum(np.sum(some, axis=1), 1)
-        weights = squares @ inverse + usual * (squares @ (~has_mass).astype(float))
-        return np.where(self.compliance > 0.0, self.compliance, weights)
+        found: FloatArray = squares @ inverse + usual * (squares @ (~has_mass).astype(float))
+        return found
 
     def accelerations(self) -> FloatArray:
         """Return how the rows accelerate without these forces."""
