@@ -310,9 +310,12 @@ def _solve(size: int, entries: Sequence[float], right: Sequence[float]) -> Seque
 
 def _solve_samples(size: int, entries: Sequence[Any], right: Sequence[Any]) -> Sequence[Any]:
     """Solve one linear system for each sample; all nan for a sample with a singular matrix."""
-    items = np.broadcast_arrays(*entries, *right)
-    matrices = np.stack(items[: size * size], axis=-1).reshape(*items[0].shape, size, size)
-    sides = np.stack(items[size * size :], axis=-1)[..., None]
+    shape = np.broadcast_shapes(*{np.shape(one) for one in (*entries, *right)})
+    matrices, sides = (np.empty((*shape, len(some))) for some in (entries, right))
+    for whole, some in ((matrices, entries), (sides, right)):
+        for i, one in enumerate(some):
+            whole[..., i] = one
+    matrices, sides = matrices.reshape(*shape, size, size), sides[..., None]
     try:
         solution = np.linalg.solve(matrices, sides)
     except np.linalg.LinAlgError:
