@@ -205,25 +205,26 @@ def play(view: View, form: str) -> Pairs:
     return [("6th impact", Run(draft, form, 1.3).times("impact")[5], 1.2060082305)]
 
 
-def circle(view: View, form: str) -> Pairs:
-    """A ball bounces within a circle, with 0.9 of its speed."""
+def _at_a_surface(view: View, contact: SurfaceContact, place: tuple[float, float, float], speed: float) -> Draft:
+    """Return a point mass at a surface, which is thrown to the right."""
     draft = Draft(view)
-    contact = SurfaceContact(function=f"{0.25 * view.size**2!r} - x**2 - z**2", restitution=0.9)
     draft.parts = {"ground": Ground(position=view.point(0.0, 0.0, 0.0)), "m": PointMass(mass=1.0), "c": contact}
     draft.joins = [("ground.frame", "c.a"), ("m.point", "c.b")]
-    draft.place("m", 0.1, 0.0, 0.0)
-    draft.throw("m", 0.3, 0.0, 0.0)
+    draft.place("m", *place)
+    draft.throw("m", speed, 0.0, 0.0)
+    return draft
+
+
+def circle(view: View, form: str) -> Pairs:
+    """A ball bounces within a circle, with 0.9 of its speed."""
+    contact = SurfaceContact(function=f"{0.25 * view.size**2!r} - x**2 - z**2", restitution=0.9)
+    draft = _at_a_surface(view, contact, (0.1, 0.0, 0.0), 0.3)
     return [("6th impact", Run(draft, form, 2.2).times("impact")[5], 2.1345199766)]
 
 
 def bead(view: View, form: str) -> Pairs:
     """A bead leaves a sphere."""
-    draft = Draft(view)
-    contact = SurfaceContact(function=f"x**2 + z**2 - {view.size**2!r}")
-    draft.parts = {"ground": Ground(position=view.point(0.0, 0.0, 0.0)), "m": PointMass(mass=1.0), "c": contact}
-    draft.joins = [("ground.frame", "c.a"), ("m.point", "c.b")]
-    draft.place("m", 0.0, 0.0, 1.0)
-    draft.throw("m", 0.5, 0.0, 0.0)
+    draft = _at_a_surface(view, SurfaceContact(function=f"x**2 + z**2 - {view.size**2!r}"), (0.0, 0.0, 1.0), 0.5)
     return [("leaves", Run(draft, form, 1.0).times("opens")[0], 0.7542388380)]
 
 

@@ -258,8 +258,7 @@ def _judged(contacts: Contacts, found: Found) -> Found:
     if not acting:
         return found
     # A motion of each row by the force that would make it alone: no unit has a say.
-    own = np.diag(contacts.response)
-    every = np.sqrt(np.where(own > NOTHING * np.max(own), own, np.inf))
+    every = sizes_of(np.diag(contacts.response))
     size = np.where(np.isfinite(every), every, 1.0)[acting]
     matrix = np.where(np.isfinite(every[acting]), 1.0, 0.0)[:, None] * np.array(rows) / size
     matrix = matrix / or_one(np.max(np.abs(matrix), axis=1, keepdims=True))
@@ -372,32 +371,32 @@ def _sticking(units: Sequence[Unit], states: Sequence[State]) -> set[int]:
     return {row for unit, (state, _) in zip(units, states, strict=True) if state == STICKS for row in unit.rows}
 
 
-def elastic(response: FloatArray, compliance: FloatArray) -> FloatArray:
-    """Return what more is asked of forces that hold some rows, as equations whose right-hand sides are zero.
-
-    With ``A + e C`` in the place of A, the limit for small e has ``C f`` square to all forces that balance each other,
-    of the rows that give way: the least elastic energy ``f C f/2``.
-    """
-    return (compliance[:, None] * balancing(response, compliance > 0.0)).T
+def sizes_of(own: FloatArray) -> FloatArray:
+    """Return by what rows are scaled, from how each moves by its own force; infinite where joints hold it."""
+    return np.sqrt(np.where(own > NOTHING * np.max(own, initial=0.0), own, np.inf))
 
 
 def balancing(response: FloatArray, gives: BoolArray) -> FloatArray:
     """Return forces that balance each other, of the rows that give way, a column each."""
-    soft, own = np.flatnonzero(gives), np.diag(response)
-    every = np.sqrt(np.where(own > NOTHING * np.max(own, initial=0.0), own, np.inf))
+    soft, every = np.flatnonzero(gives), sizes_of(np.diag(response))
     scaled = response[:, soft] / every[:, None] / every[soft]
     some = null_space(scaled, CLEAR) / np.where(np.isfinite(every[soft]), every[soft], 1.0)[:, None]
-    found = np.zeros((len(own), some.shape[1]))
+    found = np.zeros((len(every), some.shape[1]))
     found[soft] = some
     return found
 
 
 def _by_springs(contacts: _Listed, acting: Sequence[int], holding: Collection[int]) -> FloatArray:
-    """Return the same for some of the rows that act, which hold, as equations for all that act."""
+    """Return what more is asked of forces that act, as equations whose right-hand sides are zero, where some rows hold.
+
+    With ``A + e C`` in the place of A, the limit for small e has ``C f`` square to all forces that balance each other,
+    of the rows that give way: the least elastic energy ``f C f/2``.
+    """
     found, places = np.zeros((0, len(acting))), [i for i, row in enumerate(acting) if row in holding]
     if contacts.compliance is not None and places:
         rows = [acting[i] for i in places]
-        more = elastic(np.array(contacts.response)[np.ix_(rows, rows)], contacts.compliance[rows])
+        gives = contacts.compliance[rows]
+        more = (gives[:, None] * balancing(np.array(contacts.response)[np.ix_(rows, rows)], gives > 0.0)).T
         found = np.zeros((len(more), len(acting)))
         found[:, places] = more
     return found

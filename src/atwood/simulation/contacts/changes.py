@@ -48,6 +48,7 @@ from atwood.numerics.contact_sets import (
     balancing,
     find_states,
     is_back,
+    sizes_of,
 )
 from atwood.numerics.matrices import least_norm, or_one
 from atwood.numerics.rank import rank
@@ -452,10 +453,9 @@ class _Moment:
 
     def _rank(self, states: list[State]) -> int:
         """Return how many of the rows that hold are independent."""
-        held = [row for rows, one in zip(self.units, states, strict=True) if one[0] == STICKS for row in rows]
+        held = _holding(self.units, states)
         response = self.values.response[np.ix_(held, held)]
-        own = np.diag(response)
-        size = np.sqrt(np.where(own > NOTHING * np.max(own, initial=0.0), own, np.inf))
+        size = sizes_of(np.diag(response))
         return rank(response / size / size[:, None], CLEAR) if held else 0
 
     def _hold(self, states: list[State], going: Collection[int]) -> None:
@@ -752,6 +752,11 @@ def states_of(layout: Layout, held: Sequence[float]) -> list[State]:
     return found
 
 
+def _holding(units: Sequence[Sequence[int]], states: Sequence[State]) -> list[int]:
+    """Return the rows that hold."""
+    return [row for rows, one in zip(units, states, strict=True) if one[0] == STICKS for row in rows]
+
+
 def forces_in(values: ContactValues, states: Sequence[State], rates: FloatArray | None = None) -> FloatArray:
     """Return the forces of all rows in some states of the units, or impulses, whatever their signs and sizes are.
 
@@ -776,12 +781,14 @@ def forces_in(values: ContactValues, states: Sequence[State], rates: FloatArray 
                     matrix[row] = matrix[row] + part * side.shares[number]
                     right[row] = -part * side.free[number]
         more, least = np.zeros((0, count)), np.zeros(0)
-        holding = [row for rows, one in zip(values.units, states, strict=True) if one[0] == STICKS for row in rows]
+        holding = _holding(values.units, states)
         if len(holding) > 1:
             slopes, offset = values.sharing
             gives = np.diag(slopes)[holding] > 0.0
             alone = balancing(values.response[np.ix_(holding, holding)], gives).T
-            more, least = alone @ slopes[holding], alone @ (offset[holding] if rates is None else 0.0 * offset[holding])
+            more, least = alone @ slopes[holding], np.zeros(len(alone))
+            if rates is None:  # joints have no impulses before
+                least = alone @ offset[holding]
             size = or_one(np.max(np.abs(more), axis=1, initial=0.0))
             more, least = more / size[:, None], least / size
         last, forces = forces, least_norm(np.vstack([matrix, more]), np.append(right, -least))

@@ -21,7 +21,7 @@ from atwood.forms.quantities import to_maximal
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.dynamics.equations import ContactRow
 from atwood.model.values.units import ALONG
-from atwood.numerics.contact_sets import NOTHING, Contacts, Limits, Unit
+from atwood.numerics.contact_sets import Contacts, Limits, Unit, sizes_of
 from atwood.numerics.matrices import least_norm, or_one, to_array
 from atwood.simulation.dynamics.balance import LIGHT, BalanceValues, balance_of, even_balance
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
@@ -153,8 +153,7 @@ def with_own_sizes(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -
 
     def make() -> Scales:
         values = ContactValues(assembly, t, q, u, scales.length)
-        own = np.diag(values.response)
-        size = np.sqrt(np.where(own > NOTHING * np.max(own), own, np.inf))
+        size = sizes_of(np.diag(values.response))
         inverse = least_norm(values.response / size / size[:, None], np.eye(len(size)), errors=LIGHT)
         falls = [scales.of(ALONG[one.law.options.unit]) / scales.time**2 for one in layout.contacts]
         each = np.abs(inverse / size / size[:, None]) @ np.array(falls)
