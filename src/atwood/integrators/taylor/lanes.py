@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from math import inf, log2
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from atwood.codegen.llvm.build import Built, RoutineSource, build_code, once
 from atwood.codegen.llvm.module import CodeOptions
-from atwood.codegen.routines import INTEGER, Routine
+from atwood.codegen.routines import INTEGER, Routine, Value
 from atwood.integrators.lanes import LanePlaces, failures, write_batch
 from atwood.integrators.protocol import SolverOptions
 from atwood.integrators.stepper import LANE_FIELDS, Memory
@@ -126,8 +127,12 @@ def _read(runs: int) -> Routine:
         r.copy(trial, y, m.padded)
         r.give(0)
     share = (time - m.t_old) / m.unit
-    with m.parts() as j:
-        trial[j] = r.choose(inside, m.lanes(first, j) + horner(r, m, j, share)[0], m.lanes(y, j))
+
+    def states(parts: Sequence[Value]) -> None:
+        for j, moved in zip(parts, horner(r, m, parts, share, slopes=False)[0], strict=True):
+            trial[j] = r.choose(inside, m.lanes(first, j) + moved, m.lanes(y, j))
+
+    m.each(states)
     code = r.call(m.start, m.trial_in, m.start_derived, m.scratch, m.trial_out)
     r.give(failures(code, within))
     return r

@@ -8,7 +8,7 @@ Convolutions of Taylor coefficients: their terms are written out for each order;
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import inf
 
 from atwood.codegen.routines import ADDRESS, BOOLEAN, INTEGER, NUMBER, Lanes, Routine, Value
@@ -185,22 +185,22 @@ def _choose(runs: int) -> Routine:
     return r
 
 
-def horner(r: Routine, m: Memory, j: Value, share: Value) -> tuple[Value, Value]:
-    """Return the polynomial less its first term at a share of its unit, and its slope, by Horner's scheme."""
-    order = m.order
-    value, turn, k = (
-        r.variable(m.lanes(m.row(order), j), m.part),
-        r.variable(0.0, m.part),
-        r.variable(order - 1, INTEGER),
-    )
+def horner(r: Routine, m: Memory, parts: Sequence[Value], share: Value, slopes: bool = True) -> list[list[Value]]:
+    """Return polynomials of parts less their first terms at a share of the unit, and slopes, by Horner's scheme."""
+    order, zero = m.order, r.value(0.0, m.part)
+    values = [r.variable(m.lanes(m.row(order), j), m.part) for j in parts]
+    turns, k = [r.variable(zero, m.part) for _ in parts if slopes], r.variable(order - 1, INTEGER)
     with r.forever() as terms:
-        now = value.now
-        turn.now = turn.now * share + now
-        value.now = now * share + m.lanes(m.row(k.now), j)
+        row, now = m.row(k.now), [value.now for value in values]
+        for turn, one in zip(turns, now, strict=False):
+            turn.now = turn.now * share + one
+        for j, value, one in zip(parts, values, now, strict=True):
+            value.now = one * share + m.lanes(row, j)
         k.now = k.now - 1
         with r.when(k.now <= 0):
             r.leave(terms)
-    return value.now * share, turn.now * share + value.now
+    moved = [value.now * share for value in values]
+    return [moved, [turn.now * share + value.now for value, turn in zip(values, turns, strict=False)]]
 
 
 def _move(runs: int) -> Routine:
@@ -209,17 +209,20 @@ def _move(runs: int) -> Routine:
     names = ("y", "y_low", "new", "new_low", "slope")
     y, y_low, new, new_low, slopes = (m.row(name) for name in names)
     spread = r.value(share, m.part)
-    with m.parts() as j:
-        moved, slope = horner(r, m, j, spread)
-        slopes[j] = slope
-        high = m.lanes(y, j)
-        total = high + moved
-        part = total - high
-        lost = (high - (total - part)) + (moved - part)
-        low = m.lanes(y_low, j) + lost
-        rounded = total + low
-        new[j] = rounded
-        new_low[j] = low - (rounded - total)
+
+    def end(parts: Sequence[Value]) -> None:
+        for j, moved, slope in zip(parts, *horner(r, m, parts, spread), strict=True):
+            slopes[j] = slope
+            high = m.lanes(y, j)
+            total = high + moved
+            part = total - high
+            lost = (high - (total - part)) + (moved - part)
+            low = m.lanes(y_low, j) + lost
+            rounded = total + low
+            new[j] = rounded
+            new_low[j] = low - (rounded - total)
+
+    m.each(end)
     return r
 
 
@@ -256,10 +259,13 @@ def _guarded() -> Routine:
     with r.count(PARTS + 1, start=1) as i:
         since = i.number() * (1.0 / PARTS) * h
         end, share = t + since, r.value(since / unit, m.part)
-        with m.parts() as j:
-            moved, slope = horner(r, m, j, share)
-            trial[j] = m.lanes(first, j) + moved
-            slopes[j] = slope * pace
+
+        def states(parts: Sequence[Value], share: Value = share) -> None:
+            for j, moved, slope in zip(parts, *horner(r, m, parts, share), strict=True):
+                trial[j] = m.lanes(first, j) + moved
+                slopes[j] = slope * pace
+
+        m.each(states)
         code = r.call(guard, begin.now, kept, kept_slopes, end, trial, slopes, m.guard_data)
         with r.when(code != 0):
             r.give(1)
@@ -333,8 +339,12 @@ def _interpolate() -> Routine:
     m.time = time
     first, trial = m.row(0), m.row("trial")
     share = r.value((time - m.t_old) / m.unit, m.part)
-    with m.parts() as j:
-        trial[j] = m.lanes(first, j) + horner(r, m, j, share)[0]
+
+    def states(parts: Sequence[Value]) -> None:
+        for j, moved in zip(parts, horner(r, m, parts, share, slopes=False)[0], strict=True):
+            trial[j] = m.lanes(first, j) + moved
+
+    m.each(states)
     code = r.call("evaluate", m.session, m.trial_in, m.trial_out)
     r.copy(y_out, trial, m.size)
     r.copy(yp_out, m.row("trial_rates"), m.size)
