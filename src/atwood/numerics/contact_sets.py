@@ -35,6 +35,9 @@ _MOST_SETS = 20_000
 CLEAR = 1e-8
 """A pivot of scaled rows that is no larger may be rounding: rows then depend on each other."""
 
+FIRM = 1e-5
+"""A pivot of scaled rows of which a share is chosen is larger: forces of what is less are a hundred times the load."""
+
 NOTHING = 1e-14
 """What moves by so small a share of what others do is held by joints but for rounding."""
 

@@ -9,14 +9,15 @@ what has not converged has no value.
 Where joints close a loop, constraints may be redundant. Then some multipliers are not determined, and what forces make
 of them must not depend on these, which is checked in numbers. A small multiple of its diagonal is added to
 ``G M^-1 G^T`` and taken back by iteration (iterated Tikhonov regularization: Engl, Hanke and Neubauer, Regularization
-of Inverse Problems, section 5.1), since no choice of independent constraints need hold all along a motion.
+of Inverse Problems, section 5.1), since no choice of independent constraints need hold all along a motion. It is so
+small that rows which nearly repeat others have their forces, as a place next to a hinge.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -34,14 +35,17 @@ _ITERATIONS = 6
 _CONVERGED = 1e-9
 """Relative to the multipliers: what is further from a solution after all steps is none."""
 
-_ADDED = 1e-6
+_ADDED = 1e-10
 """Relative to the diagonal of ``G M^-1 G^T``: what is added to it where constraints may be redundant."""
 
-_TIMES = 4
-"""So often the system is solved with it; of a direction with an eigenvalue of 1e-4 a share of 1e-8 is missing then."""
+_TIMES = 3
+"""So often the system is solved with it; of a direction with an eigenvalue of 1e-7 a share of 1e-9 is missing then."""
 
 _LEAST_INERTIA = 1e-9
 """In units of the diagonal of the mass matrix: what has less in some direction has none there."""
+
+Number = TypeVar("Number", Expression, float)
+"""A formula, or its value."""
 
 _LARGEST_FILL, _MANY_CONTACTS, _FILL_OF_CONTACTS = 20_000, 8, 5
 """Beyond so many products it is solved in numbers; with more gaps and slips than that beyond so many an unknown."""
@@ -169,7 +173,7 @@ class _System:
     masses
         Number of accelerations.
     stiffness, bare
-        Of rows that share loads as springs do, and their entries of G without masks.
+        Stiffness of rows that share loads as springs do, and the entries of G without masks.
     sharing
         Groups of rows among which forces that balance each other stay, as far as is known.
     of_contacts
@@ -205,7 +209,7 @@ class _System:
         self.stiffness = {
             self.masses + i: one.stiffness for i, one in enumerate(rows_held) if one.stiffness is not None
         }
-        self.bare = {(self.masses + r, c): e for r, c, e in held.triples if self.masses + r in self.stiffness}
+        self.bare = {(self.masses + r, c): e for r, c, e in held.triples}
         self.is_regular = self.has_inertia = False
         self.sharing: list[list[int]] = []
         self.of_contacts = range(self.masses + count, len(self.right)) if contacts else range(0)
@@ -300,23 +304,61 @@ def _are_crowded(slopes: Iterable[tuple[int, int]]) -> bool:
 
 
 def _without_choice(system: _System, speeds: Sequence[Expression]) -> list[Expression]:
-    """Return accelerations and multipliers, of which those that are not determined have any value that fits."""
+    """Return accelerations and multipliers, of which those that are not determined are as small as can be.
+
+    With ``A + d D`` in the place of ``A = G M^-1 G^T`` multipliers are found to what rounding has made of those that
+    balance each other, 1/d times as large. So they are put as ``D^-1 G y``, which has none of these: the same system
+    gives y.
+    """
     graph, n = speeds[0].graph, system.masses
-    diagonal = [graph.zero] * (len(system.right) - n)
-    own: dict[int, list[Expression]] = {}
-    for (r, c), entry in system.slopes.items():
-        if (c, c) in system.mass:
-            own.setdefault(r, []).append(1.0 / system.mass[c, c])
-            diagonal[r - n] = diagonal[r - n] + entry * entry / system.mass[c, c]
-    for (r, c), entry in system.slopes.items():  # what has no inertia counts as what has some in the same row
-        if (c, c) not in system.mass and r in own:
-            diagonal[r - n] = diagonal[r - n] + entry * entry * (sum(own[r], graph.zero) / float(len(own[r])))
-    added = [_ADDED * one if not one.is_zero else graph.constant(_ADDED) for one in diagonal]
+    slopes = {(r - n, c): entry for (r, c), entry in system.bare.items()}
+    inertia = {c: entry for (r, c), entry in system.mass.items() if r == c}
+    weights = weights_of(slopes, inertia, [graph.zero] * (len(system.right) - n))
+    weights = [graph.one if one.is_zero else one for one in weights]
     for row, one in _give_way(system).items():
-        added[row - n] = _ADDED * one
-    masked = system.diagonal or [graph.zero] * len(added)
+        weights[row - n] = one
+    masked = system.diagonal or [graph.zero] * len(weights)
     system.is_regular = True
-    system.diagonal = [more if one.is_zero else one + more for one, more in zip(masked, added, strict=True)]
+    system.diagonal = [one + _ADDED * weight for one, weight in zip(masked, weights, strict=True)]
+    solved = _iterated(system, masked)
+    system.right = [*([graph.zero] * n), *(x * weight for x, weight in zip(solved[n:], weights, strict=True))]
+    within = _iterated(system, masked)
+    least = [graph.zero] * len(weights)
+    for (r, c), entry in system.slopes.items():
+        least[r - n] = least[r - n] + entry * within[c]
+    return [*solved[:n], *(x / weight for x, weight in zip(least, weights, strict=True))]
+
+
+def weights_of(
+    slopes: Mapping[tuple[int, int], Number], inertia: Mapping[int, Number], none: list[Number]
+) -> list[Number]:
+    """Return by which weights D the least forces ``f D f`` are meant, where nothing else says how forces are shared.
+
+    They are by how much rows move by their own forces with nothing else held. So in one row coordinates without inertia
+    count as those that have some.
+
+    Parameters
+    ----------
+    slopes
+        Entries of the slopes of rows along speeds, by row and speed.
+    inertia
+        The diagonal of the mass matrix, where there is some.
+    none
+        A zero for each row.
+    """
+    found, own = list(none), dict[int, list[Number]]()
+    for (r, c), entry in slopes.items():
+        if c in inertia:
+            own.setdefault(r, []).append(1.0 / inertia[c])
+            found[r] = found[r] + entry * entry / inertia[c]
+    for (r, c), entry in slopes.items():
+        if c not in inertia and r in own:
+            found[r] = found[r] + entry * entry * (sum(own[r], none[r]) / float(len(own[r])))
+    return found
+
+
+def _iterated(system: _System, masked: Sequence[Expression]) -> list[Expression]:
+    """Return what solves a system with another diagonal, from solutions with its own."""
     solved, right = _solve_system(system), list(system.right)
     for _ in range(_TIMES - 1):
         system.right = [side - one for side, one in zip(right, system.times(solved, masked), strict=True)]
@@ -333,7 +375,7 @@ def _give_way(system: _System) -> dict[int, Expression]:
     found: dict[int, Expression] = {}
     own = dict.fromkeys(system.stiffness, system.right[0].graph.zero)
     for (row, column), entry in system.bare.items():
-        if (column, column) in system.mass:
+        if row in own and (column, column) in system.mass:
             own[row] = own[row] + entry * entry / system.mass[column, column]
     for group in system.sharing:
         some = [row for row in group if row in own and not own[row].is_zero]

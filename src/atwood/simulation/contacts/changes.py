@@ -36,6 +36,7 @@ from atwood.mechanics.outputs.event_functions import CLOSES, OPENS, RESTS, STOPS
 from atwood.model.values.units import ALONG
 from atwood.numerics.contact_sets import (
     CLEAR,
+    FIRM,
     GOES_ON,
     NOTHING,
     OPEN,
@@ -422,7 +423,7 @@ class _Moment:
         least = self._rank(states)
         for gone in islice(some, _MOST_SHARES):
             tried = self._without(states, gone)
-            if self._rank(tried) == least and self._is_shared(tried, holding):
+            if self._rank(tried, FIRM) == least and self._is_shared(tried, holding):
                 return replace(found, states=tuple(tried[k] for k in chosen))
         raise self._contradiction(_UNDETERMINED, chosen, _SHARES)
 
@@ -451,12 +452,12 @@ class _Moment:
         gone = {*let_go, *(k for k, gap in enumerate(self.values.gap_of) if gap in let_go)}
         return [(OPEN, (0.0,) * len(one[1])) if k in gone else one for k, one in enumerate(states)]
 
-    def _rank(self, states: list[State]) -> int:
+    def _rank(self, states: list[State], clear: float = CLEAR) -> int:
         """Return how many of the rows that hold are independent."""
         held = _holding(self.units, states)
         response = self.values.response[np.ix_(held, held)]
         size = sizes_of(np.diag(response))
-        return rank(response / size / size[:, None], CLEAR) if held else 0
+        return rank(response / size / size[:, None], clear) if held else 0
 
     def _hold(self, states: list[State], going: Collection[int]) -> None:
         """Take away the rates of what holds from now on; what begins to slip in two directions has those of soon."""

@@ -6,6 +6,7 @@ A unit force along a row i makes accelerations ``X_i``, with the joints holding:
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from copy import copy
 from functools import cached_property
 
@@ -19,6 +20,7 @@ from atwood.forms.loose import state_paths
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import to_maximal
 from atwood.lazy_dataclasses import dataclass, replace
+from atwood.mechanics.constraints.read_multipliers import weights_of
 from atwood.mechanics.dynamics.equations import ContactRow
 from atwood.model.values.units import ALONG
 from atwood.numerics.contact_sets import Contacts, Limits, Unit, sizes_of
@@ -275,20 +277,18 @@ class ContactValues:
         give way in `read_multipliers`, so that forces here are those that are reported. Springs share a load alone.
         """
         n, soft = len(self.u), self.compliance > 0.0
-        weights = np.where(soft, self.compliance, self._gives(self.slopes))
+        jacobian = to_array(self._now.jacobian)
+        weights = np.where(soft, self.compliance, self._gives(self.slopes, zip(*self.layout.slopes, strict=True)))
         by_each, free = self._by_each[n:], self._free[n:]
-        joints = by_each.T * (0.0 if soft.any() else self._gives(to_array(self._now.jacobian)))
+        joints = by_each.T * (0.0 if soft.any() else self._gives(jacobian, zip(*np.nonzero(jacobian), strict=True)))
         return np.diag(weights) + joints @ by_each, joints @ free
 
-    def _gives(self, slopes: FloatArray) -> FloatArray:
+    def _gives(self, slopes: FloatArray, pattern: Iterable[tuple[int, int]]) -> FloatArray:
         """Return by how much rows give way that have no stiffness."""
-        own = np.diag(to_array(self._now.mass))
-        squares, has_mass = slopes**2, own > 0.0
-        inverse = np.divide(1.0, own, out=np.zeros(len(own)), where=has_mass)
-        some = (squares > 0.0) & has_mass
-        usual = some @ inverse / np.maximum(np.sum(some, axis=1), 1)
-        found: FloatArray = squares @ inverse + usual * (squares @ (~has_mass).astype(float))
-        return found
+        own = np.diag(to_array(self._now.mass)).tolist()
+        inertia = {i: one for i, one in enumerate(own) if one > 0.0}
+        entries = {(r, c): float(slopes[r, c]) for r, c in pattern}
+        return np.array(weights_of(entries, inertia, [0.0] * len(slopes)))
 
     def accelerations(self) -> FloatArray:
         """Return how the rows accelerate without these forces."""
