@@ -332,6 +332,14 @@ def test_a_count_that_would_tear_a_connection_is_refused():
     refuses(row, aw.ConnectError, lambda r: setattr(r, "n", 1), "would no longer be there")
 
 
+def test_connectors_of_an_array_have_the_names_that_it_counts():
+    bar = Bar(length=1.0, count=12)
+    names = [*bar.connectors(), "hooks", "hooks[12]", "hooks[07]", "hooks[-1]", "hooks[]", "hooks[1", "hooks[\u0663]"]
+    names += ["a[0]", "hooks[1][2]", "hooks[" + 5000 * "9" + "]"]
+    found = [name for name in names if bar._connector_named(name) is not None]
+    assert found == ["a", "b", *(f"hooks[{i}]" for i in range(12))]
+
+
 def test_a_failing_build_changes_nothing():
     class Fragile(aw.Model):
         n: int = aw.parameter(1, integer=True, doc="How many.")

@@ -15,7 +15,8 @@ from atwood.numerics.sparse import csr_of, free_columns, smallest_direction, sol
 from atwood.numerics.sparse_batch import Borders, Elimination, Normal, Pattern
 from atwood.pipeline import assemble
 from atwood.simulation.dynamics import balance
-from atwood_library import Ground, PointMass, Rod
+from atwood.simulation.initialization.start import Start, find_start
+from atwood_library import Ground, PointMass, Rod, Sphere
 from atwood_library.scenes.chain import Chain
 from atwood_library.scenes.four_bar import FourBar
 from atwood_library.scenes.mass_spring_chain import MassSpringChain
@@ -73,13 +74,30 @@ def test_same_motion_and_forces(name: str, form: str, request: pytest.FixtureReq
 
 
 def test_start_says_the_same(by_entries: None) -> None:
-    from atwood.simulation.initialization.start import find_start
-
     scene = Chain(links=5)
     scene.start = {"rod[1].angle": 0.4, "bob[4].position.x": 0.3, "rod[0].angular_velocity": 0.0}
     start = find_start(assemble(scene))
     assert set(start.free_coordinates) == {f"rod[{i}].angle" for i in (0, 2, 3, 4)}
     assert set(start.free_speeds) == {f"rod[{i}].angle" for i in (1, 2, 3, 4)}
+
+
+def test_free_bodies_in_space_start_alike(request: pytest.FixtureRequest) -> None:
+    def start(joined: bool) -> Start:
+        scene = Scene(space="space")
+        first, other = scene.add("a", Sphere()), scene.add("b", Sphere())
+        told = {"a.position.x": 0.2, "a.psi": 0.4, "a.theta": 0.3, "a.phi": 0.1, "b.position.z": -1.0}
+        scene.start.update(told)
+        if joined:
+            rod = scene.add("rod", Rod(length=1.0))
+            scene.connect(rod.a, first.frame)
+            scene.connect(rod.b, other.frame)
+        return find_start(assemble(scene))
+
+    expected = [start(False), start(True)]
+    request.getfixturevalue("by_entries")
+    for one, other in zip([start(False), start(True)], expected, strict=True):
+        assert (one.free_coordinates, one.free_speeds) == (other.free_coordinates, other.free_speeds)
+        np.testing.assert_allclose(one.coordinates, other.coordinates, rtol=0.0, atol=1e-10)
 
 
 def test_a_full_mass_matrix_of_many_bodies_is_never_made(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -146,6 +164,25 @@ def test_independent_rows() -> None:
     full[17] = 1e-5 * np.eye(70)[60] + full[3]  # nearly, and still independent
     at = np.nonzero(full)
     assert independent_rows(csr_of(*at, full[at], full.shape), exact) == list(range(30))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_independent_rows_of_parts_that_share_nothing(seed: int) -> None:
+    """Rows in any order, of parts whose ranks are those of products of random factors."""
+    random = np.random.default_rng(seed)
+    whole, rank, at = np.zeros((420, 500)), 0, np.zeros(2, dtype=int)
+    order = random.permutation(420), random.permutation(500)
+    while np.all(at + 7 < whole.shape):
+        size, own = random.integers(1, 7, 2), int(random.integers(0, 4))
+        part = random.standard_normal((size[0], own)) @ random.standard_normal((own, size[1]))
+        whole[np.ix_(order[0][at[0] : at[0] + size[0]], order[1][at[1] : at[1] + size[1]])] = part
+        rank, at = rank + min(own, *size.tolist()), at + size
+    places = np.nonzero(whole)
+    first = random.uniform(size=420) < 0.3
+    errors = 1e-14 * np.linalg.norm(whole, axis=1)
+    kept = independent_rows(csr_of(*places, whole[places], whole.shape), errors, first=first)
+    assert len(kept) == rank == np.linalg.matrix_rank(whole[kept])
+    assert np.sum(first[kept]) == np.linalg.matrix_rank(whole[first])  # those that come first are kept first
 
 
 def test_free_columns() -> None:

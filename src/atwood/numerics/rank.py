@@ -25,8 +25,8 @@ from atwood.arrays import BoolArray, FloatArray, IntArray
 from atwood.clock import within_time
 from atwood.codegen.rounding import ROUGHNESS
 from atwood.lazy_dataclasses import dataclass
-from atwood.numerics.matrices import Matrix, is_full, least_squares, or_one, scaled, to_array
-from atwood.numerics.sparse import csr_made_of, csr_row_sizes, rows_are_independent
+from atwood.numerics.matrices import Matrix, is_best_full, is_full, least_squares, or_one, scaled, to_array
+from atwood.numerics.sparse import csr_blocks, csr_made_of, csr_row_sizes, rows_are_independent
 from atwood.tolerances import tolerances
 
 Errors: TypeAlias = float | FloatArray | None
@@ -185,13 +185,32 @@ def independent_rows(
     """Return the numbers of independent rows, as many as there are, and rather the first than the last ones."""
     errors = _at_least(errors, row_sizes(matrix, np.ones(matrix.shape[1])))
     if not is_full(matrix):
-        if most is None and _is_clear(matrix, errors):
-            return list(range(matrix.shape[0]))
+        if most is None:
+            return _of_blocks(matrix, errors, first)
         matrix = to_array(matrix)
     # In these units a row of the size of the terms that it was computed from has size one.
     units = np.where(errors > 0.0, errors / ROUGHNESS, 1.0)
     most = min(matrix.shape) if most is None else min(*matrix.shape, most)
     return _chosen(matrix / units[:, None], errors / units, most, first)
+
+
+def _of_blocks(matrix: Matrix, errors: FloatArray, first: NDArray[np.bool_] | None) -> list[int]:
+    """Return the independent rows of a large matrix: those of each part of it that shares no unknown with others."""
+    if _is_clear(matrix, errors):
+        return list(range(matrix.shape[0]))
+    blocks = csr_blocks(matrix)
+    alone = np.array([block[0] for block in blocks if len(block) == 1], dtype=np.intp)
+    lengths = np.sqrt((matrix * matrix).sum(axis=1))
+    kept = alone[lengths[alone] > tolerances.CERTAIN * errors[alone]].tolist()
+    for block in blocks:
+        if len(block) == 1:
+            continue
+        rows = matrix[block]
+        part, own = rows[:, np.unique(rows.indices)], None if first is None else first[block]
+        is_small = is_best_full(part.shape, part.nnz) or len(blocks) == 1
+        found = independent_rows(part.toarray() if is_small else part, errors[block], first=own)
+        kept += block[found].tolist()
+    return sorted(kept)
 
 
 def _chosen(rows: FloatArray, errors: FloatArray, most: int, first: NDArray[np.bool_] | None) -> list[int]:

@@ -73,6 +73,15 @@ def csr_least_norm(matrix: Any, right: FloatArray) -> FloatArray:
     return found
 
 
+def csr_blocks(matrix: Any) -> list[NDArray[np.intp]]:
+    """Return the rows of each part of a matrix that shares no unknown with the others."""
+    uses: Any = scipy.sparse.csr_array(matrix != 0.0)
+    both: Any = scipy.sparse.block_array([[None, uses], [uses.T, None]])
+    part_of = scipy.sparse.csgraph.connected_components(both, directed=False)[1][: matrix.shape[0]]
+    order = np.argsort(part_of, kind="stable")
+    return np.split(order, np.nonzero(np.diff(part_of[order]))[0] + 1)
+
+
 def _row_normalised(matrix: Any) -> csr_array | None:
     sizes = np.sqrt((matrix * matrix).sum(axis=1))
     return None if np.any(sizes == 0.0) else scipy.sparse.csr_array(scipy.sparse.diags_array(1.0 / sizes) @ matrix)

@@ -382,7 +382,7 @@ class Component(metaclass=ComponentType):
     def _connector_named(self, name: str) -> Connector | None:
         """Return a connector by its name, such as ``point[2]``; None where there is none."""
         spec = self._connectors.get(name.partition("[")[0])
-        if spec is None or name not in spec.names(self):
+        if spec is None or not spec.has(self, name):
             return None
         motions = self._bound.motions if self._bound is not None else {}
         return spec.kind(self, name, motions.get(name))

@@ -346,10 +346,23 @@ class ConnectorSpec:
 
     def names(self, component: Component) -> tuple[str, ...]:
         """Return the names of the connectors it declares on a component: one, none, or an array of them."""
+        count = self._size(component)
+        return (self.name,) if count is None else tuple(f"{self.name}[{i}]" for i in range(count))
+
+    def has(self, component: Component, name: str) -> bool:
+        """Return whether a name is one of `names`."""
+        count, index = self._size(component), name[len(self.name) + 1 : -1]
+        if count is None:
+            return name == self.name
+        is_number = index.isdecimal() and len(index) <= len(str(count)) and int(index) < count
+        return is_number and name == f"{self.name}[{int(index)}]"
+
+    def _size(self, component: Component) -> int | None:
+        """Return how many there are on a component; None for one that is no array."""
         if self.when and not any(component._value(choice) in words for choice, words in self.when.items()):
-            return ()
+            return 0
         if self.count is None:
-            return (self.name,)
+            return None
         count = component._value(self.count)
         if not isinstance(count, int):
             raise DeclarationError(
@@ -357,7 +370,7 @@ class ConnectorSpec:
                 where=component.path or type(component).__name__,
                 advice="Connect them in a method build(self), where the parameters have their values.",
             )
-        return tuple(f"{self.name}[{i}]" for i in range(count))
+        return count
 
     def absent(self, component: Component) -> DeclarationError:
         """Return the error that says that a component, as it is set, does not have this connector."""

@@ -18,7 +18,8 @@ from atwood.expr import Program
 from atwood.forms.assembly import Assembly, Coordinates
 from atwood.forms.balance_program import RatesProgram
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.numerics.matrices import least_squares
+from atwood.numerics.matrices import Matrix, from_entries, is_full, least_squares, to_array
+from atwood.numerics.sparse import csr_of
 
 
 class KinematicMap:
@@ -63,14 +64,27 @@ class KinematicMap:
         program = self.program.program
         return u if program is None else np.asarray(self._kernel(program, True)(t[None, :], q, u)[0])
 
-    def matrix(self, t: float, q: FloatArray) -> FloatArray:
+    def matrix(self, t: float, q: FloatArray) -> Matrix:
         """Return B, of shape (coordinates, speeds)."""
         made = self.program
         if made.program is None:
             return np.eye(len(q))
-        matrix = np.zeros((made.coordinates, made.speeds))
-        matrix[made.rows, made.columns] = self._kernel(made.program, False)([t], q, np.zeros(made.speeds))[1]
-        return matrix
+        entries = self._kernel(made.program, False)([t], q, np.zeros(made.speeds))[1]
+        return from_entries(made.rows, made.columns, entries, (made.coordinates, made.speeds))
+
+    def reach(self, t: float, q: FloatArray) -> Matrix:
+        """Return B with each coordinate of an orientation moved as any of them: whichever shows it, all of it turns."""
+        matrix = self.matrix(t, q)
+        orientations = [list(one.coordinates) for one in self.program.orientation_coordinates]
+        if is_full(matrix):
+            for one in orientations:
+                matrix[one] = np.max(np.abs(matrix[one]), axis=0)
+            return matrix
+        count = matrix.shape[0]
+        first = np.arange(count)
+        for one in orientations:
+            first[one] = one[0]
+        return (csr_of(first, np.arange(count), np.ones(count), (count, count)) @ abs(matrix))[first]
 
     def moved(self, t: float, q: FloatArray, displacement: FloatArray) -> FloatArray:
         """Return coordinates after a small displacement along the speeds; exact to its first order."""
@@ -99,7 +113,7 @@ class KinematicMap:
                 kind == "quaternion" and q[orientation] @ other[orientation] < 0.0
             ):  # either sign is the same orientation
                 target[orientation] *= -1.0
-        return least_squares(self.matrix(t, q), target - q)
+        return least_squares(to_array(self.matrix(t, q)), target - q)
 
     def normalized(self, q: FloatArray) -> FloatArray:
         """Return coordinates with orientations of size one: one state, or many of shape (coordinates, samples)."""

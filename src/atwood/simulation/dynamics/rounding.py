@@ -18,6 +18,7 @@ from atwood.codegen.rounding import ROUGHNESS, RoughProgram, roughly
 from atwood.expr import Program
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
+from atwood.numerics.matrices import Matrix, from_entries, is_full, scaled
 from atwood.simulation.dynamics.kinematic_map import KinematicMap
 from atwood.tolerances import tolerances
 
@@ -72,7 +73,8 @@ class RowErrors:
         self._of_coordinates = of_coordinates and not kinematic_map.is_plain
         self._first: float | None = None
         self._reach = self._passed = 0.0
-        self._values = self._entries = self._tangent = np.zeros(0)
+        self._values = self._entries = np.zeros(0)
+        self._tangent: Matrix | None = None
         self._known: tuple[FloatArray, FloatArray] | None = None
 
     @property
@@ -111,7 +113,8 @@ class RowErrors:
             values = np.maximum(values, rounds * (float(np.max(sizes)) / fastest))
         if len(self._entries):
             values, entries = np.maximum(values, self._values), np.maximum(entries, self._entries)
-            tangent = np.maximum(tangent, self._tangent)
+            if tangent is not None and self._tangent is not None:
+                tangent = np.maximum(tangent, self._tangent) if is_full(tangent) else tangent.maximum(self._tangent)
         self._values, self._entries, self._tangent = values, entries, tangent
 
     def of_jacobian(
@@ -164,16 +167,16 @@ class RowErrors:
         symbols = self._program.parameters, *(group.symbols for group in self._program.inputs)
         return RoughProgram(symbols, tuple(one for name in self._groups for one in by_name[name]))
 
-    def _kinematic_matrix(self, t: float, q: FloatArray) -> FloatArray:
-        return np.abs(self._kinematic_map.matrix(t, q)) if self._of_coordinates else np.zeros(0)
+    def _kinematic_matrix(self, t: float, q: FloatArray) -> Matrix | None:
+        return abs(self._kinematic_map.matrix(t, q)) if self._of_coordinates else None
 
-    def _of_rows(self, entries: FloatArray, tangent: FloatArray, scales: FloatArray) -> FloatArray:
+    def _of_rows(self, entries: FloatArray, tangent: Matrix | None, scales: FloatArray) -> FloatArray:
         """Return the sizes of rows from those of their entries."""
         count = len(self._laws)
-        if len(tangent):
-            full = np.zeros((count, len(tangent)))
-            full[self._rows, self._columns] = entries
-            return np.asarray(np.linalg.norm(full @ tangent * scales, axis=1))
+        if tangent is not None:
+            places = from_entries(self._rows, self._columns, entries, (count, tangent.shape[0]), is_full(tangent))
+            rows = scaled(places @ tangent, scales)
+            return np.asarray(np.linalg.norm(rows, axis=1) if is_full(rows) else np.sqrt((rows * rows).sum(axis=1)))
         squares = np.bincount(self._rows, (entries * scales[self._columns]) ** 2, count)
         return np.asarray(np.sqrt(squares))
 

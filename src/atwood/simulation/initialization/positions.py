@@ -94,12 +94,7 @@ def solve_positions(
         q, matrix = _elsewhere(failed, system)
     q = unwound(assembly, equations, every, True, scales, length, t, near_to, q)
     errors = system.errors.of_jacobian(t, q, scales)
-    tangent = None if kinematic_map.is_plain else kinematic_map.matrix(t, q)
-    for (
-        orientation
-    ) in equations.orientation_coordinates:  # what turns at all has no orientation, whichever coordinate shows it here
-        assert tangent is not None
-        tangent[list(orientation.coordinates)] = np.max(np.abs(tangent[list(orientation.coordinates)]), axis=0)
+    tangent = None if kinematic_map.is_plain else kinematic_map.reach(t, q)
     names = [one.name for one in equations.names[: equations.placing]]
     tangent = None if tangent is None else tangent[: equations.placing]
     return Positions(q, rough, *counted(names, tangent, level.fixed, system.constraints, matrix, errors))

@@ -23,7 +23,6 @@ from atwood.numerics.matrices import (
     from_entries,
     is_full,
     scaled,
-    to_array,
 )
 from atwood.numerics.newton import Missing, newton
 from atwood.numerics.rank import certain, independent_rows, open_directions, row_scales
@@ -117,7 +116,7 @@ class System:
         values, entries = self.kernel([t], q, u)
         matrix = from_entries(self.rows, self.columns, entries, self.shape)
         if self.kinematic_map is not None and not self.kinematic_map.is_plain:
-            matrix = to_array(matrix) @ self.kinematic_map.matrix(t, q)
+            matrix = matrix @ self.kinematic_map.matrix(t, q)
         residual = np.asarray(values, dtype=float)
         for i, target in enumerate(self.targets, start=self.constraints):
             residual[i] -= target.value
@@ -161,7 +160,7 @@ def nearest(
 
 def counted(
     names: Sequence[str],
-    tangent: FloatArray | None,
+    tangent: Matrix | None,
     fixed: Sequence[Target],
     constraints: int,
     matrix: Matrix,
@@ -171,12 +170,14 @@ def counted(
     if 0 in matrix.shape:
         return tuple(names), ()
     kept = independent_rows(matrix, errors, first=np.arange(matrix.shape[0]) < constraints)
-    repeated = tuple(t.path for i, t in enumerate(fixed, start=constraints) if i not in set(kept))
+    known = set(kept)
+    repeated = tuple(t.path for i, t in enumerate(fixed, start=constraints) if i not in known)
     if len(kept) == matrix.shape[1]:
         return (), repeated
     if not is_full(matrix):
         rows = row_scales(matrix, np.ones(matrix.shape[1]), errors)
         found = free_columns(scaled(matrix, np.ones(matrix.shape[1]), rows))
+        found = found if tangent is None else abs(tangent) @ found > tolerances.FREE
         return tuple(n for n, is_free in zip(names, found, strict=True) if is_free), repeated
     directions = open_directions(matrix[kept])
     moved = np.abs(directions if tangent is None else directions @ tangent.T)
