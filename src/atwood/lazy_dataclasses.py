@@ -201,8 +201,8 @@ def _is_done(base: type) -> bool:
 
 def _constructor(cls: Any, fields: dict[str, Any], frozen: bool) -> Any:
     """Return the constructor of a class with these fields."""
-    known: dict[str, Any] = {"_set": object.__setattr__, "_from_factory": _FROM_FACTORY}
-    arguments, lines = ["self"], []
+    known: dict[str, Any] = {"_from_factory": _FROM_FACTORY}
+    arguments, lines, values = ["self"], [], {}
     for name, one in fields.items():
         value, makes = name, one.default_factory is not _MISSING
         if makes:
@@ -215,7 +215,11 @@ def _constructor(cls: Any, fields: dict[str, Any], frozen: bool) -> Any:
             arguments.append(f"{name}{default}")
         elif not makes:
             continue  # its default is that of the class
-        lines.append(f" _set(self, {name!r}, {value})" if frozen else f" self.{name} = {value}")
+        values[name] = value
+    if frozen:  # all at once, in half the time
+        lines.append(f" self.__dict__.update({', '.join(f'{name}={value}' for name, value in values.items())})")
+    else:
+        lines += [f" self.{name} = {value}" for name, value in values.items()]
     if hasattr(cls, "__post_init__"):
         lines.append(" self.__post_init__()")
     exec(f"def __init__({', '.join(arguments)}):\n" + ("\n".join(lines) or " pass"), known)

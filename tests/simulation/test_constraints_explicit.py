@@ -15,12 +15,12 @@ from atwood.arrays import FloatArray
 from atwood.integrators.embedded.stepper import CompiledStepper
 from atwood.integrators.explicit_session import ExplicitSession
 from atwood.integrators.methods.dormand_prince import TABLEAU
-from atwood.integrators.protocol import ExplicitProblem, SolverOptions
+from atwood.integrators.protocol import ExplicitProblem, Nearest, SolverOptions
 from atwood.simulation.initialization.start import find_start, own_state
 from atwood.simulation.problem.explicit_scene import constrained_problem
 from atwood.simulation.problem.preparation import make_problem
 from atwood.simulation.problem.problem import SceneProblem
-from atwood.simulation.problem.projection import misses_of, project_states
+from atwood.simulation.problem.projection import misses_of, project_rows, project_states
 from atwood_library import PointMass
 from atwood_library.scenes import (
     BenchmarkBicycle,
@@ -273,21 +273,21 @@ def test_outputs_taken_onto_constraints_by_machine_code_are_the_nearest_states(s
     )
     missed: list[int] = []
 
-    def every_third_is_left(t: FloatArray, rows: FloatArray) -> Any:
-        met = session.nearest(t, rows)
-        if met is not None:
-            assert met.all()
-            missed.append(len(met[::3]))
-            met[::3] = False
-        return met
+    def every_third_is_left(t: FloatArray, rows: FloatArray, sizes: FloatArray) -> Nearest | None:
+        made = session.nearest(t, rows, sizes)
+        if made is not None:
+            assert made.met.all()
+            missed.append(len(made.met[::3]))
+            made.met[::3] = False
+        return made
 
-    plain = project_states(plan, t, q, u)
-    by_code = project_states(plan, t, q, u, session.nearest)
-    mixed = project_states(plan, t, q, u, every_third_is_left)
+    plain, rows = project_states(plan, t, q, u), np.ascontiguousarray(rough.T)
+    by_code = project_rows(plan, t, rows, session.nearest)
+    mixed = project_rows(plan, t, rows, every_third_is_left)
     assert bool(missed) == bool(plan.balance.constraints)
     for one in (by_code, mixed):
         assert not one.doubtful.any()
-        assert_allclose(one.misses(), plain.misses(), rtol=1e-12)
+        assert_allclose(one.misses(), plain.misses(), rtol=1e-12, atol=1e-15)
         miss = (one.coordinates - plain.coordinates) / plan.coordinate_sizes[:, None]
         assert np.max(np.abs(miss), initial=0.0) < 1e-7  # of second order in how far they were taken
         assert np.max(misses_of(plan, t, one.coordinates, one.speeds), initial=0.0) < 1e-11

@@ -12,7 +12,6 @@ from math import inf, isfinite
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.errors import StartError, UsageError
@@ -22,6 +21,7 @@ from atwood.integrators.jumps import JumpLog
 from atwood.integrators.protocol import (
     Budget,
     ExplicitProblem,
+    Nearest,
     SolverOptions,
     State,
     Statistics,
@@ -179,9 +179,9 @@ class ExplicitSession(SteppingSession):
             self._compiled = CompiledLocator(problem, events, read, horizon, signs)
         return self._compiled or super()._new_locator(horizon, signs)
 
-    def nearest(self, t: FloatArray, y: FloatArray) -> NDArray[np.bool_] | None:
-        """Take states, one row each, onto the constraints as steps are; return which could be, None where none can."""
-        return self._stepper.nearest(t, y)
+    def nearest(self, t: FloatArray, y: FloatArray, sizes: FloatArray) -> Nearest | None:
+        """Take states, one row each, onto the constraints as steps are; None where none can be taken so."""
+        return self._stepper.nearest(t, y, sizes)
 
     def through(self, changes: Changes) -> Moments | None:
         """Return a way through moments at which parameters change, from the start on; None where there is none."""

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 
-from atwood.arrays import FloatArray, IndexArray
+from atwood.arrays import BoolArray, FloatArray, IndexArray
 from atwood.errors import UsageError
 from atwood.lazy_dataclasses import dataclass
 from atwood.tolerances import tolerances
@@ -293,6 +293,25 @@ def choose_linear_solver(problem: ImplicitProblem, options: SolverOptions, has_f
         if pivots is not None and (wanted or 3 * pivots.operations["factorise"] < FIXED_SHARE * problem.size**3):
             return "fixed"
     return "sparse" if problem.size >= SPARSE_SIZE and problem.density < SPARSE_DENSITY else "dense"
+
+
+@dataclass(frozen=True, eq=False)
+class Nearest:
+    """States that were taken onto constraints as the ends of steps are.
+
+    Attributes
+    ----------
+    states
+        One row each.
+    met
+        Which of them could be.
+    moved
+        By how much of its size one of the unknowns of each has moved at most; nan where that is no number.
+    """
+
+    states: FloatArray
+    met: BoolArray
+    moved: FloatArray
 
 
 @dataclass(frozen=True, eq=False)

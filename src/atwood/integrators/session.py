@@ -9,7 +9,6 @@ from math import inf
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, UsageError
@@ -19,6 +18,7 @@ from atwood.integrators.protocol import (
     Budget,
     ExplicitProblem,
     ImplicitProblem,
+    Nearest,
     State,
     Statistics,
     Status,
@@ -55,8 +55,8 @@ class Session(ABC):
         happen again.  Explicit methods find the rates by themselves.
         """
 
-    def nearest(self, t: FloatArray, y: FloatArray) -> NDArray[np.bool_] | None:
-        """Take states, one row each, onto the constraints as steps are; return which could be, None where none can."""
+    def nearest(self, t: FloatArray, y: FloatArray, sizes: FloatArray) -> Nearest | None:
+        """Take states, one row each, onto the constraints as steps are; None where none can be taken so."""
         return None
 
     @property

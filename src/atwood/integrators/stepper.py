@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.arrays import FloatArray
+from atwood.arrays import FloatArray, address_of
 from atwood.codegen.llvm.build import Built, RoutineSource, build_code
 from atwood.codegen.llvm.module import CodeOptions
 from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Kind, Lanes, Operand, Record, Routine, Value
 from atwood.errors import KernelEvaluationError, UsageError
-from atwood.integrators.protocol import State, StepMonitor
+from atwood.integrators.protocol import Nearest, State, StepMonitor
 from atwood.lazy_dataclasses import dataclass, names_of
 
 if TYPE_CHECKING:
@@ -142,8 +142,8 @@ class Stepper(ABC):
         """Come back with `Outcome.NOTICED` whenever the problem seems stiff, where that can be told."""
         return
 
-    def nearest(self, t: FloatArray, y: FloatArray) -> NDArray[np.bool_] | None:
-        """Take states, one row each, onto the constraints as steps are; return which could be, None where none can."""
+    def nearest(self, t: FloatArray, y: FloatArray, sizes: FloatArray) -> Nearest | None:
+        """Take states, one row each, onto the constraints as steps are; None where none can be taken so."""
         return None
 
     def set_monitor(self, monitor: StepMonitor) -> bool:
@@ -422,7 +422,7 @@ class NativeStepper(Stepper):
         y, yp = np.empty((2, len(times), self._size))
         last, filled, code = self._count("steps") + min(steps, _UNLIMITED), 0, None
         while code is None:
-            left, *tables = (array[filled:].ctypes.data for array in (times, y, yp))
+            left, *tables = (address_of(array[filled:]) for array in (times, y, yp))
             code = self._go_on(last, "sample", left, len(times) - filled, *tables)
             filled += self._count("filled")
         if code == _NO_VALUE:

@@ -12,7 +12,7 @@ from itertools import accumulate
 import numpy as np
 from numpy.typing import ArrayLike
 
-from atwood.arrays import FloatArray
+from atwood.arrays import FloatArray, address_of
 from atwood.clock import check_time
 from atwood.codegen.llvm.build import Built, RoutineSource, build_code, default_options
 from atwood.codegen.llvm.module import Part
@@ -72,9 +72,9 @@ class ColumnKernel:
         given = [_full(one, (size, states)) for one, size in zip(groups, code.inputs, strict=True)]
         found = [np.empty((size, states)) for size in code.outputs]
         room, scratch = np.empty(sum(code.inputs) + sum(code.outputs)), np.empty(code.built.scratch)
-        lists = [(c_void_p * len(arrays))(*[one.ctypes.data for one in arrays]) for arrays in (given, found)]
+        lists = [(c_void_p * len(arrays))(*map(address_of, arrays)) for arrays in (given, found)]
         work = (self._derived, scratch, room)
-        code.call(*lists, *[one.ctypes.data for one in work], states)
+        code.call(*lists, *map(address_of, work), states)
         return tuple(found)
 
 

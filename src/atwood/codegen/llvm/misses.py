@@ -12,7 +12,7 @@ from math import nan
 import numpy as np
 from numpy.typing import ArrayLike
 
-from atwood.arrays import FloatArray, IndexArray
+from atwood.arrays import FloatArray, IndexArray, address_of
 from atwood.clock import check_time
 from atwood.codegen.llvm.build import Built, RoutineSource, build_code, default_options
 from atwood.codegen.llvm.module import Part
@@ -64,7 +64,7 @@ class MissProgram:
         room, found = np.empty(self._room + self._built.scratch), np.empty((2, len(t)))
         y, t, least = (np.ascontiguousarray(one) for one in (y, t, least))
         arrays = t, y, sizes, least, derived, room, self._places, found
-        self._call((c_void_p * len(arrays))(*[one.ctypes.data for one in arrays]), len(t))
+        self._call((c_void_p * len(arrays))(*map(address_of, arrays)), len(t))
         return found
 
 

@@ -11,11 +11,13 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Sequence
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from atwood.arrays import address_of
 from atwood.codegen.llvm.build import Built, RoutineSource, build_code, default_options, once
 from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.codegen.routines import (
@@ -118,7 +120,11 @@ class MonitorCode:
         numbers = {"move": rate.move, "whole": rate.whole, "idle": rate.idle, "low": rate.low**2}
         numbers["worn"] = rate.worn**2
         arrays["state"][[AT[name] for name in numbers]] = list(numbers.values())
-        return MonitorData(self, arrays)
+        shared = {name: arrays.pop(name) for name in SHARED}
+        ends = [0, *accumulate(one.size for one in arrays.values())]
+        places = {name: (slice(*ends[k : k + 2]), one.shape) for k, (name, one) in enumerate(arrays.items())}
+        memory = np.concatenate([one.ravel() for one in arrays.values()])
+        return MonitorData(self, shared, places, memory)
 
 
 class MonitorData:
@@ -128,28 +134,41 @@ class MonitorData:
     ----------
     code
         The functions.
-    arrays
-        Their data.
+    shared
+        Arrays that no look changes.
+    places
+        Where each other array is in the memory, and its shape.
+    memory
+        The numbers of these.
 
     Attributes
     ----------
     rows
         The most that each condition has changed so far with a displacement of the size that counts; starts where it is
         set.
+    due_at
+        The address of the time of the next look.
     """
 
-    def __init__(self, code: MonitorCode, arrays: dict[str, NDArray[Any]]) -> None:
-        self.code, self._arrays = code, arrays
+    def __init__(
+        self,
+        code: MonitorCode,
+        shared: dict[str, NDArray[Any]],
+        places: dict[str, tuple[slice, tuple[int, ...]]],
+        memory: NDArray[np.float64],
+    ) -> None:
+        self.code, self._given, self._memory = code, (shared, places), memory
+        self._arrays = arrays = {name: memory[place].reshape(shape) for name, (place, shape) in places.items()}
         self.rows: NDArray[np.float64] = arrays["rows"]
-        self._state = arrays["state"]
-        pointers = [arrays[name].ctypes.data for name in FIELDS]
-        self._pointers = (ctypes.c_void_p * len(pointers))(*pointers)
-        self.address = ctypes.addressof(self._pointers)
+        self._state, begin = arrays["state"], address_of(memory)
+        pointers = {name: address_of(one) for name, one in shared.items()}
+        pointers |= {name: begin + 8 * place.start for name, (place, _) in places.items()}
+        self._pointers = (ctypes.c_void_p * len(FIELDS))(*[pointers[name] for name in FIELDS])
+        self.address, self.due_at = ctypes.addressof(self._pointers), pointers["state"] + 8 * AT["next"]
 
     def copied(self) -> MonitorData:
         """Return the same for another run, from what was noted on."""
-        own = {name: one if name in LISTS else one.copy() for name, one in self._arrays.items()}
-        return MonitorData(self.code, own)
+        return MonitorData(self.code, *self._given, self._memory.copy())
 
     def restart(self) -> None:
         """Forget what was noted; not how much conditions have changed."""
@@ -166,16 +185,11 @@ class MonitorData:
         if count and t <= self._arrays["notes"][count - 1, 0]:
             return
         y, yp = np.ascontiguousarray(y), np.ascontiguousarray(yp)
-        self.code.look(t, y.ctypes.data, yp.ctypes.data, self.address)
+        self.code.look(t, address_of(y), address_of(yp), self.address)
 
     def due(self) -> float:
         """Return when the next look is to be taken."""
         return float(self._state[AT["next"]])
-
-    @property
-    def due_at(self) -> int:
-        """The address of that time."""
-        return self._state.ctypes.data + 8 * AT["next"]
 
     @property
     def has_seen_low(self) -> bool:
@@ -187,7 +201,7 @@ class MonitorData:
         """The least that the last look left of a condition, as a share of the most that it has been."""
         pivots, most = self._arrays["pivots"], self._arrays["most"]
         with np.errstate(all="ignore"):
-            return float(np.sqrt(np.nanmin(pivots / most, initial=1.0)))
+            return float(np.sqrt(np.fmin.reduce(pivots / most, initial=1.0)))
 
     def take(self) -> list[tuple[float, NDArray[np.float64], NDArray[np.float64]]]:
         """Return what was noted, time, y and y' each; it is not asked about again."""
@@ -254,6 +268,7 @@ _LATER = 2
 _ARRAYS: tuple[str, ...] = ("derived", "scratch", "sizes", "values", "slopes", "drifts", "rows", "changes", "matrix")
 _ARRAYS += ("pivots", "first", "most", "least", "earlier", "known")
 LISTS = ("kept", "row", "column", "one", "other", "product")
+SHARED = ("derived", "sizes", *LISTS)
 FIELDS = (*_ARRAYS, *LISTS, "notes", "best", "state")
 STATE = ("next", "count", "is_low", "falls", "later", "move", "whole", "idle", "low", "worn", "best")
 AT = {name: number for number, name in enumerate(STATE)}

@@ -17,9 +17,8 @@ from math import inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from atwood.arrays import FloatArray
+from atwood.arrays import FloatArray, address_of
 from atwood.codegen.llvm.build import RoutineSource, once
 from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Kind, Routine, Value
 from atwood.errors import KernelEvaluationError
@@ -29,6 +28,7 @@ from atwood.integrators.protocol import (
     RATES,
     CompiledRates,
     ExplicitProblem,
+    Nearest,
     SolverOptions,
     StepMonitor,
     absolute_tolerances,
@@ -218,14 +218,14 @@ class CompiledStepper(NativeStepper):
         """Take the last step anew to just behind an event, where that finds it better; whether it was."""
         return self._call("shorten", event) != 0
 
-    def nearest(self, t: FloatArray, y: FloatArray) -> NDArray[np.bool_] | None:
-        """Take states, one row each, onto the constraints as steps are; return which could be, None where none can."""
+    def nearest(self, t: FloatArray, y: FloatArray, sizes: FloatArray) -> Nearest | None:
+        """Take states, one row each, onto the constraints as steps are; None where none can be taken so."""
         if self._calls_python or not self._count("project"):
             return None
-        left = np.empty(len(t), dtype=np.int64)
-        times = np.ascontiguousarray(t)
-        self._call("project_each", *(one.ctypes.data for one in (times, y, left)), len(t))
-        return np.asarray(left == 0)
+        times, y = np.ascontiguousarray(t), np.ascontiguousarray(y)
+        found, left, moved = np.empty(y.shape), np.empty(len(t), dtype=np.int64), np.empty(len(t))
+        self._call("project_each", *map(address_of, (times, y, found, sizes, left, moved)), len(t))
+        return Nearest(found, left == 0, moved)
 
     def set_monitor(self, monitor: StepMonitor) -> bool:
         """Let the motion be looked at, and come back with `Outcome.NOTICED` where something is seen."""
@@ -329,4 +329,4 @@ _FILES = (
 def _routines(pair: Tableau) -> Routines:
     """Return the routines of a pair."""
     source = RoutineSource("integrators.embedded.steps", _FILES, (pair,))
-    return routines_of(source, project_each=(c_void_p, c_void_p, c_void_p, c_int64), shorten=(c_double,))
+    return routines_of(source, project_each=(*[c_void_p] * 6, c_int64), shorten=(c_double,))

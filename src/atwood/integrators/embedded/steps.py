@@ -8,7 +8,7 @@ comes in through addresses, so that they are compiled once and kept.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from math import inf, prod
+from math import inf, nan, prod
 
 from atwood.codegen.routines import ADDRESS, BOOLEAN, INTEGER, NUMBER, Record, Routine, Value
 from atwood.integrators.compiled_location import FIELDS as LOCATOR, FOUND, NO_STATE, ROWS
@@ -471,12 +471,23 @@ def _sample(pair: Tableau) -> Routine:
 
 
 def _project_each(pair: Tableau) -> Routine:
-    """Take states, one row each, onto the constraints; where that fails, a number that is not zero is left."""
-    states = {"times": ADDRESS, "ys": ADDRESS, "left": ADDRESS, "count": INTEGER}
-    r, m, (times, ys, left, count) = open_routine(pair, "project_each", states, exported=True)
+    """Take states, one row each, onto the constraints; where that fails, a number that is not zero is left.
+
+    It says by how much of its size one of the unknowns of a state has moved at most; nan where that is no number.
+    """
+    states = dict.fromkeys(("times", "given", "ys", "sizes", "left", "moved"), ADDRESS) | {"count": INTEGER}
+    r, m, (times, given, ys, sizes, left, farthest, count) = open_routine(pair, "project_each", states, exported=True)
     project, data, width = m.project, m.project_data, m.size
+    most, total = r.variable(0.0), r.variable(0.0)
     with r.count(count) as i:
-        left.write(i, r.call(project, times[i], ys.at(i * width), data).integer(), INTEGER)
+        before, y = given.at(i * width), ys.at(i * width)
+        most.now = total.now = 0.0
+        r.copy(y, before, width)
+        left.write(i, r.call(project, times[i], y, data).integer(), INTEGER)
+        with r.count(width) as j:
+            moved = r.size(y[j] - before[j]) / sizes[j]
+            most.now, total.now = r.most(moved, most.now), total.now + moved
+        farthest[i] = r.choose(r.is_finite(total.now), most.now, nan)
     r.give(0)
     return r
 

@@ -12,7 +12,7 @@ from functools import cache
 
 import numpy as np
 
-from atwood.arrays import FloatArray
+from atwood.arrays import BoolArray, FloatArray
 from atwood.codegen import BoundKernel
 from atwood.expr import Program
 from atwood.forms.assembly import Assembly, Coordinates
@@ -38,6 +38,9 @@ class KinematicMap:
         homogeneous = [orientation for orientation in program.orientation_coordinates if orientation.is_homogeneous]
         self._homogeneous = [np.asarray(orientation.coordinates, dtype=np.intp) for orientation in homogeneous]
         self._kinds = [orientation.kind for orientation in homogeneous]
+        # Those with equally many coordinates are worked on together, shape (orientations, coordinates).
+        counts = sorted({len(one) for one in self._homogeneous})
+        self._alike = [np.array([one for one in self._homogeneous if len(one) == count]) for count in counts]
 
     @property
     def is_plain(self) -> bool:
@@ -120,13 +123,18 @@ class KinematicMap:
         if not self._homogeneous:
             return q
         q = np.array(q, dtype=float)
-        for orientation in self._homogeneous:
-            q[orientation] /= np.sqrt(np.sum(q[orientation] ** 2, axis=0))
+        for alike in self._alike:
+            found = q[alike]
+            q[alike] = found / np.sqrt(np.sum(found**2, axis=1))[:, None]
         return q
 
-    def needs_normalization(self, q: FloatArray) -> bool:
-        """Return whether the size of an orientation has gone far from one, where tolerances mean something else."""
-        return any(not 0.25 < float(q[orientation] @ q[orientation]) < 4.0 for orientation in self._homogeneous)
+    def needs_normalization(self, q: FloatArray) -> BoolArray:
+        """Return whether the size of an orientation has gone far from one, where tolerances mean something else.
+
+        Of one state, or of each of many of shape (coordinates, states).
+        """
+        squares = np.concatenate([np.sum(q[alike] ** 2, axis=1) for alike in self._alike or [np.zeros((0, 1), int)]])
+        return np.asarray(~((squares > 0.25) & (squares < 4.0)).all(axis=0))
 
 
 def reference_coordinates(equations: Equations) -> FloatArray:

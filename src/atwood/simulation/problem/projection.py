@@ -12,9 +12,8 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from atwood.arrays import FloatArray
+from atwood.arrays import BoolArray, FloatArray
 from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.matrices import is_best_full
@@ -24,6 +23,7 @@ from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
     from atwood.codegen.llvm.misses import MissProgram
+    from atwood.integrators.protocol import Nearest
     from atwood.numerics.sparse_batch import Normal, Pattern
 
 
@@ -46,6 +46,9 @@ _EXACT = 1e-14
 _FAR = 1e-11
 """What moves by more of the sizes to meet the constraints has missed them."""
 
+_LOOKED_AT = 16
+"""Of states that were taken onto constraints so many are taken there again."""
+
 _FEW, _MANY = 12, 100
 """Of so many entries for each state the largest is found one after another."""
 
@@ -56,8 +59,9 @@ _CHUNK = 4_000_000
 Misses: TypeAlias = Callable[[], FloatArray]
 """Gives by how much states miss the constraints on position and velocity, shape (2, states)."""
 
-Nearest: TypeAlias = Callable[[FloatArray, FloatArray], NDArray[np.bool_] | None]
-"""Takes states, one row each, onto the constraints, and says for which it could; None where it can for none."""
+TakesNearest: TypeAlias = Callable[[FloatArray, FloatArray, FloatArray], "Nearest | None"]
+"""Takes states at times, one row each, onto the constraints, and says for which it could, and how far they move in
+units of their sizes; None where it can for none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +81,7 @@ class Projected:
     coordinates: FloatArray
     speeds: FloatArray
     misses: Misses
-    doubtful: NDArray[np.bool_]
+    doubtful: BoolArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,16 +128,27 @@ class ConstraintsAt:
         return lambda right: dense(right[:, kept])
 
 
-def project_states(
-    plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray, nearest: Nearest | None = None
-) -> Projected:
-    """Return the nearest states that fulfil the constraints on position and velocity.
+def project_states(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray) -> Projected:
+    """Return the nearest states that fulfil the constraints on position and velocity."""
+    return _in_chunks(plan, len(t), lambda one: _project(plan, t[one], q[:, one], u[:, one]))
+
+
+def project_rows(plan: SceneProblem, t: FloatArray, y: FloatArray, nearest: TakesNearest | None) -> Projected:
+    """Return the same of states of a solver, one row each, in C order.
 
     What machine code finds, if it is given, is taken where it misses nothing.
     """
+    normalized = plan.balance.kinematic_map.normalized
+    if plan.balance.kinematic_map.has_homogeneous:
+        q, u = plan.program.split(y.T)
+        y = np.ascontiguousarray(np.concatenate([normalized(normalized(q)), u]).T)
+    return _in_chunks(plan, len(t), lambda one: _project_rows(plan, t[one], y[one], nearest))
+
+
+def _in_chunks(plan: SceneProblem, states: int, project: Callable[[slice], Projected]) -> Projected:
+    """Return states that are projected so many at a time."""
     chunk = _chunk(plan)
-    places = [slice(i, i + chunk) for i in range(0, len(t), chunk)]
-    parts = [_project(plan, t[one], q[:, one], u[:, one], nearest) for one in places]
+    parts = [project(slice(i, i + chunk)) for i in range(0, states, chunk)]
     if len(parts) == 1:
         return parts[0]
     joined = (
@@ -181,11 +196,17 @@ def nearly_projected(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatA
     return ProjectedStates(q, hold(u), hold)
 
 
-def misses_of(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatArray:
-    """Return by how much states miss the constraints on position and velocity, shape (2, states)."""
+def misses_of(
+    plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray, rows: FloatArray | None = None
+) -> FloatArray:
+    """Return by how much states miss the constraints on position and velocity, shape (2, states).
+
+    `rows` are the states one row each, if they are there.
+    """
     held = plan.balance.program
     if plan.pays(held.constraints_alone, len(t)):
-        return _misses(plan)(t, np.concatenate([q, u]).T, plan.sizes, tolerances.TRUSTED * _errors(plan, t, q))
+        rows = np.concatenate([q, u]).T if rows is None else rows
+        return _misses(plan)(t, rows, plan.sizes, tolerances.TRUSTED * _errors(plan, t, q))
     chunk = _chunk(plan)
     found = np.zeros((2, len(t)))
     for i in range(0, len(t), chunk):
@@ -208,7 +229,7 @@ def _misses(plan: SceneProblem) -> Callable[..., FloatArray]:
 
 def _errors(plan: SceneProblem, t: FloatArray, q: FloatArray) -> FloatArray:
     """Return how far rounding can take the constraints at states."""
-    farthest = int(np.argmax(np.max(np.abs(q), axis=0, initial=0.0)))
+    farthest = int(np.abs(q.T).argmax()) // len(q) if q.size else 0
     return plan.balance.errors.near(float(t[farthest]), q[:, farthest], plan.sizes)
 
 
@@ -284,23 +305,29 @@ def constraints_at(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArr
     return ConstraintsAt(value.T / rows, entries, explicit_rate.T / rows, kept, pattern, _normal(plan), rows)
 
 
+def _project_rows(plan: SceneProblem, t: FloatArray, y: FloatArray, nearest: TakesNearest | None) -> Projected:
+    q, u = plan.program.split(y.T)
+    taken = None if nearest is None else _taken(plan, t, y, nearest)
+    if taken is None:
+        return _project(plan, t, q, u, y if y.shape[1] == len(q) + len(u) else None)
+    found, done = taken
+    if not done.all():
+        rest = _project(plan, t[~done], q[:, ~done], u[:, ~done])
+        found.coordinates[:, ~done], found.speeds[:, ~done] = rest.coordinates, rest.speeds
+        found.doubtful[~done] = rest.doubtful
+    return found
+
+
 def _project(
-    plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray, nearest: Nearest | None = None
+    plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray, rows: FloatArray | None = None
 ) -> Projected:
-    sizes = plan.sizes[:, None]
-    kinematic_map, holding = plan.balance.kinematic_map, plan.balance.holding(list(plan.finding.kept))
-    q, speeds = kinematic_map.normalized(q.copy()), (u / sizes).T
-    taken = None if nearest is None else _taken(plan, t, q, u, nearest)
-    if taken is not None:
-        found, done = taken
-        if not done.all():
-            rest = _project(plan, t[~done], q[:, ~done], u[:, ~done])
-            found.coordinates[:, ~done], found.speeds[:, ~done] = rest.coordinates, rest.speeds
-            found.doubtful[~done] = rest.doubtful
-        return found
-    held = misses_of(plan, t, q, u)
+    kinematic_map = plan.balance.kinematic_map
+    q = q.copy() if rows is not None else kinematic_map.normalized(q.copy())
+    held = misses_of(plan, t, q, u, rows)
     if _are_exact(plan, held):
         return Projected(q, u.copy(), lambda: held, np.zeros(len(t), dtype=bool))
+    sizes, holding = plan.sizes[:, None], plan.balance.holding(list(plan.finding.kept))
+    speeds = (u / sizes).T
     now = constraints_at(plan, t, q, u)
     last = np.full(len(t), np.inf)
     active = np.ones(len(t), dtype=bool)
@@ -327,36 +354,39 @@ def _are_exact(plan: SceneProblem, held: FloatArray) -> bool:
 
 
 def _taken(
-    plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray, nearest: Nearest
-) -> tuple[Projected, NDArray[np.bool_]] | None:
+    plan: SceneProblem, t: FloatArray, y: FloatArray, nearest: TakesNearest
+) -> tuple[Projected, BoolArray] | None:
     """Return what machine code finds, and which of it meets all constraints; None where it finds nothing."""
-    own = np.ascontiguousarray(np.concatenate([q, u]).T)
-    rows = own.copy()
-    met = nearest(t, rows)
-    if met is None:
-        return None
     sizes = np.concatenate([plan.coordinate_sizes, plan.sizes / plan.scales.time])
-    misses = once(partial(misses_of, plan, t, q, u))
+    made = nearest(t, y, sizes)
+    if made is None:
+        return None
+    q, u = plan.program.split(y.T)
+    misses = once(partial(misses_of, plan, t, q, u, y))
     free, contacts = np.zeros(len(t), dtype=bool), plan.assembly.own_equations.contacts
-    has_more, moved = bool(contacts or plan.finding.redundant), np.max(np.abs(rows - own) / sizes)
+    has_more, met, moved = bool(contacts or plan.finding.redundant), made.met, float(made.moved.max())
     # A row in units of its largest entry misses no more than the sum of what its unknowns move by to meet it.
     meets = not has_more and len(sizes) * moved <= _EXACT
     if met.all() and (meets or ((contacts or moved <= _FAR) and _are_exact(plan, misses()))):
-        return Projected(q, u.copy(), misses, free), met
-    near, moving = (part.copy() for part in plan.program.split(rows.T))
+        return Projected(q.copy(), u.copy(), misses, free), met
+    near, moving = (part.copy() for part in plan.program.split(made.states.T))
     found = Projected(plan.balance.kinematic_map.normalized(near), moving, misses, free)
-    if has_more or not _stays(plan, t, rows, sizes, nearest):
-        left = misses_of(plan, t, found.coordinates, moving) * np.array([[1.0], [plan.scales.time]])
+    if has_more or not _stays(t, made, sizes, nearest):
+        rows = made.states if found.coordinates is near else None
+        left = misses_of(plan, t, found.coordinates, moving, rows) * np.array([[1.0], [plan.scales.time]])
         met = met & np.all(left <= tolerances.MET, axis=0)
     return found, met
 
 
-def _stays(plan: SceneProblem, t: FloatArray, rows: FloatArray, sizes: FloatArray, nearest: Nearest) -> bool:
-    """Return whether states move by next to nothing where they are taken onto the constraints again."""
-    again = rows.copy()
-    met = nearest(t, again)
-    most = 2 * len(sizes) * np.max(np.abs(again - rows) / sizes)
-    return met is not None and bool(met.all() and most <= tolerances.MET)
+def _stays(t: FloatArray, made: Nearest, sizes: FloatArray, nearest: TakesNearest) -> bool:
+    """Return whether states move by next to nothing where they are taken onto the constraints again.
+
+    What is left is of second order in how far they were taken: those that moved most are looked at.
+    """
+    most = np.argpartition(made.moved, -_LOOKED_AT)[-_LOOKED_AT:] if len(t) > _LOOKED_AT else slice(None)
+    again = nearest(t[most], made.states[most], sizes)
+    is_met = again is not None and made.met.all() and again.met.all()
+    return again is not None and bool(is_met and 2 * len(sizes) * again.moved.max() <= tolerances.MET)
 
 
 def _least_norm(jacobian: FloatArray) -> Callable[[FloatArray], FloatArray]:

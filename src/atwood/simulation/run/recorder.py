@@ -16,7 +16,7 @@ from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, made_of
 from atwood.simulation.problem.problem import SceneProblem
-from atwood.simulation.problem.projection import Misses, Nearest, misses_of, once, project_safely, project_states
+from atwood.simulation.problem.projection import Misses, TakesNearest, misses_of, once, project_rows, project_safely
 
 if TYPE_CHECKING:
     from atwood.integrators.time_stepping.session import Change
@@ -190,7 +190,7 @@ class Recorder:
     def __init__(self, plan: SceneProblem) -> None:
         self.plan = plan
         self.singular_crossings: list[SingularCrossing] = []
-        self.nearest: Nearest | None = None
+        self.nearest: TakesNearest | None = None
         self._jumps: list[FloatArray] = []
         self._changes: list[Callable[[], Sequence[Change]]] = []
         self._plan_at: Callable[[int], SceneProblem] | None = None
@@ -351,9 +351,12 @@ class Recorder:
         """Return what was recorded."""
         self.settle()
         blocks = self._samples[0]
-        q, u = (np.concatenate([getattr(one, name) for one in blocks], axis=1) for name in ("q", "u"))
-        misses = once(lambda: np.concatenate([one.misses() for one in blocks], axis=1))
-        time, shown = (np.concatenate([getattr(one, name) for one in blocks]) for name in ("time", "shown"))
+        last = blocks[-1]
+        time, q, u, shown, misses = last.time, last.q, last.u, last.shown, last.misses
+        if len(blocks) > 1:
+            q, u = (np.concatenate([getattr(one, name) for one in blocks], axis=1) for name in ("q", "u"))
+            misses = once(lambda: np.concatenate([one.misses() for one in blocks], axis=1))
+            time, shown = (np.concatenate([getattr(one, name) for one in blocks]) for name in ("time", "shown"))
         # A path may lead over a place behind the end, or behind an event.
         crossings = tuple(one for one in self.singular_crossings if one.path is None or one.time <= time[-1])
         starts = np.zeros(1, dtype=int)
@@ -365,19 +368,20 @@ class Recorder:
         return Stretch(self.plan, impact, after_time_event, time, q, u, shown, misses, *rest)
 
     def _finish(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_], waiting: Sequence[_States] = ()) -> None:
-        q, u = (part.copy() for part in self.plan.program.split(y.T))
-        q = self.plan.balance.kinematic_map.normalized(q)
-        if not self.plan.balance.constraints:
-            self._add(_Block(t, q, u, shown, partial(np.zeros, (2, len(t)))), waiting)
-            return
-        made = project_states(self.plan, t, q, u, self.nearest)
-        if not self.plan.is_projected:
-            self._add(_Block(t, q, u, shown, made.misses), waiting)
+        made = project_rows(self.plan, t, y, self.nearest) if self.plan.balance.constraints else None
+        if made is None or not self.plan.is_projected:
+            q, u = (part.copy() for part in self.plan.program.split(y.T))
+            q = self.plan.balance.kinematic_map.normalized(q)
+            misses = partial(np.zeros, (2, len(t))) if made is None else made.misses
+            self._add(_Block(t, q, u, shown, misses), waiting)
             return
         block = _Block(t, made.coordinates, made.speeds, shown, made.misses)
-        for i in np.flatnonzero(made.doubtful):
+        doubtful = np.flatnonzero(made.doubtful).tolist()
+        q, u = (part.copy() for part in self.plan.program.split(y.T)) if doubtful else (y.T, y.T)
+        for i in doubtful:
+            one = self.plan.balance.kinematic_map.normalized(q[:, i])
             try:
-                block.q[:, i], block.u[:, i] = project_safely(self.plan, float(t[i]), q[:, i], u[:, i])
+                block.q[:, i], block.u[:, i] = project_safely(self.plan, float(t[i]), one, u[:, i])
             except SolveError:
                 self._add(block.first(int(i)))
                 raise

@@ -399,8 +399,8 @@ class _Runner:
     def _strayed(self, y: FloatArray, ends: NDArray[np.intp]) -> int | None:
         """Return the first of some rows in which coordinates of an orientation need another size; None if none does."""
         plan = self.segment.plan
-        needs = plan.balance.kinematic_map.needs_normalization
-        return next((int(k) - 1 for k in ends if needs(plan.program.split(y[k - 1])[0])), None)
+        needs = plan.balance.kinematic_map.needs_normalization(plan.program.split(y[ends - 1].T)[0])
+        return int(ends[needs.argmax()]) - 1 if needs.any() else None
 
     def _all_jumps(self, session: Session) -> _Jumps | None:
         """Return the jumps since the last states were recorded."""
