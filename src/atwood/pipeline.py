@@ -28,6 +28,7 @@ from atwood.arguments import instance, number, one_of, optional, takes
 from atwood.clock import GRACE, Clock, TimeIsUp
 from atwood.errors import UnsupportedError, UsageError
 from atwood.forms.assembly import Assembly
+from atwood.forms.caches import without_collection
 from atwood.forms.other_values import Source
 from atwood.forms.reassembly import assembled, assembled_again
 from atwood.forms.residuals import check_level
@@ -113,7 +114,7 @@ def assemble(
     AtwoodError
         If the scene is not sound; the error names the part.
     """
-    with stage("flatten"):
+    with stage("flatten"), without_collection():
         flat, own = flatten(scene, name), scene.copy()
     return assemble_flat(flat, own, form=form, level=level, orientation=orientation)
 
@@ -125,7 +126,7 @@ def _to_run(scene: Model | Assembly, **given: str | None) -> Assembly:
     """Return an assembly, or assemble a scene to be run; the equations of one of the same structure are used again."""
     if isinstance(scene, Assembly):
         return assembly_of(scene, **given)
-    with stage("flatten"):
+    with stage("flatten"), without_collection():
         flat, own = flatten(scene, None), scene.copy()
     form, level, orientation = (given[key] or usual for key, usual in _USUAL.items())
     new = partial(assemble_flat, flat, own, form=form, level=level, orientation=orientation)

@@ -19,6 +19,7 @@ from atwood.lazy_dataclasses import replace
 from atwood.mechanics.kinematics.mechanism import Connector
 from atwood.mechanics.read import LineSigns, read_mechanism
 from atwood.model.local.flatten import FlatScene
+from atwood.model.local.kinds import OWN
 from atwood.stages import stage
 from atwood.topology.orientation_coordinates import Orientation
 
@@ -91,9 +92,6 @@ form, the oldest first."""
 _REMEMBERED, _LARGEST = 4, 100
 """So many are remembered, of scenes with no more parts: equations take memory."""
 
-_OWN = {"_parent", "_name", "_settings", "_token", "_declared"}
-"""What components keep of themselves. One that keeps more may have laws that depend on it."""
-
 
 def assembled_again(
     assembly: Callable[[], Assembly],
@@ -127,7 +125,7 @@ def _is_alike(flat: FlatScene, other: FlatScene) -> bool:
     if (flat.t_start, flat.t_end, flat.symbols) != (other.t_start, other.t_end, other.symbols):
         return False
     parts = (*flat.parts.values(), *other.parts.values())
-    return all(vars(part.component).keys() <= _OWN for part in parts)
+    return all(vars(part.component).keys() <= OWN for part in parts)
 
 
 def other_mode(

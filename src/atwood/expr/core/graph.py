@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import numbers
 from collections import defaultdict
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from atwood.clock import check_time
 from atwood.errors import AtwoodError
@@ -218,6 +219,27 @@ class Expression:
         return _describe(self, 3)
 
 
+class RenamedNode(NamedTuple):
+    """A node whose symbols have a name in common that can be another one.
+
+    Attributes
+    ----------
+    operation
+        What it does.
+    arguments
+        Places of its arguments, among nodes that are there and those before it in its record.
+    payload
+        As of a node; of a symbol what stands before and after the name.
+    is_parametric
+        Whether it depends on constants and parameters alone.
+    """
+
+    operation: str
+    arguments: tuple[int, ...]
+    payload: Any
+    is_parametric: bool
+
+
 class Graph:
     """The table of nodes that expressions live in.
 
@@ -321,6 +343,20 @@ class Graph:
                 continue
             arguments = tuple(nodes[place] for place in places)
             self._insert(_key(arguments, payload), operation, arguments, payload, is_parametric)
+
+    def renamed(self, foreign: Sequence[Expression], record: Sequence[RenamedNode], name: str) -> Sequence[Expression]:
+        """Return nodes that are there, and after them nodes of a record with another name, made where they are not."""
+        found, table = list(foreign), self._table
+        for operation, places, payload, is_parametric in record:
+            arguments = tuple([found[place] for place in places])
+            if operation == "symbol":
+                payload = payload[0] + name + payload[1]
+            key = arguments if payload is None else (arguments, payload)
+            node = table[operation].get(key)
+            if node is None:
+                node = self._insert(key, operation, arguments, payload, is_parametric)
+            found.append(node)
+        return found
 
     def _insert(
         self,

@@ -40,6 +40,7 @@ from atwood.model.local.joint_coordinates import (
     formulas_of,
     turns_read,
 )
+from atwood.model.local.kinds import Kinds
 from atwood.model.local.moving_mass import check_lagrangians, energies_in, find_varying
 from atwood.model.local.parts import (
     LocalConnector,
@@ -69,10 +70,15 @@ def localize(
     for one in (one for several in used.values() for one in several):
         counted.setdefault(one.joint, set()).add(one.coordinate)
     found: dict[str, LocalPart] = {}
+    kinds = Kinds(flat, modes, table, carried, {*used, *counted})
+
+    def read_laws(part: Part) -> LocalPart:
+        taken = [(one, found[one.joint]) for one in used.get(part.path, ())]
+        own = counted.get(part.path, ())
+        return _localize_part(part, flat, table, modes, line_signs, taken, own, carried or {})
+
     for path in sorted(flat.parts, key=lambda path: path in used):  # joints before what takes hold of them
-        taken = [(one, found[one.joint]) for one in used.get(path, ())]
-        part, own = flat.parts[path], counted.get(path, ())
-        found[path] = _localize_part(part, flat, table, modes, line_signs, taken, own, carried or {})
+        found[path] = kinds.read(flat.parts[path], read_laws)
     return {path: found[path] for path in flat.parts}
 
 
