@@ -175,7 +175,7 @@ class ExplicitSession(SteppingSession):
         problem, events, read = self._problem, self._problem.compiled_events, self._stepper.interpolation()
         if self._compiled is not None:
             self._compiled.begin(horizon, signs)
-        elif events is not None and self._notices and read is not None:
+        elif events is not None and read is not None:
             self._compiled = CompiledLocator(problem, events, read, horizon, signs)
         return self._compiled or super()._new_locator(horizon, signs)
 

@@ -40,6 +40,11 @@ JUMP: dict[str, Kind] = {
 `now` that of the event, which is later where only rounding made it late, `began` when the set did, `shortest` how long
 one lasts at least, `time` that of the scene, `stays` whether all may open."""
 
+_PLACES = {
+    piece: {name: (kind, place) for place, (name, kind) in enumerate(fields.items())}
+    for piece, fields in (("own", JUMP), ("sets", FIELDS))
+}
+
 EVENTS = ("unit", "code", "small", "placed")
 """Of each event: whose it is, what happens, what is zero but for errors, and whether it is that of a gap on places."""
 
@@ -128,47 +133,35 @@ class SetCode:
         self.built, self.routines = build_code([part], default_options([part])), _routines()
 
 
-class SetJumps(Jumps):
-    """The changes of sets of one session.
+class SetSolver:
+    """What becomes of gaps and slips at a moment, by the routine.
 
     Parameters
     ----------
     code
         What they are.
-    events, rates, given
-        The events at which they happen, the rates in between, and the addresses of functions that compute what depends
-        on parameters alone, of the rates and of the projection, of where that is kept, and of their scratch.
     pattern
         Which limits read which forces.
     units
         What is known of each gap and slip.
     count
         Number of rows.
-    places
-        Where states and directions of each are among the parameters; -1 where there is none.
-    stays
-        Whether a set in which all are open is one of them.
+    more
+        Lengths of further arrays in its memory.
     """
 
     def __init__(
         self,
         code: SetCode,
-        events: EventData,
-        rates: CompiledRates,
-        given: tuple[tuple[int, ...], tuple[int, ...], int],
         pattern: Sequence[tuple[int, int]],
         units: FloatArray,
         count: int,
-        places: FloatArray,
-        stays: bool,
+        more: Mapping[str, int] | None = None,
     ) -> None:
         own, size, number = code.coordinates + code.speeds, count, units.shape[1]
         self.set_code, self._size, self._units = code, own, units.copy()
         self._each = size + len(ENTRY)
-        self._stride = HEAD + 2 * own + 3 * number + MOST_IMPACTS * self._each
-        self._room = max(64, ROOM // self._stride)
         lengths = {
-            "own": len(JUMP),
             "sets": len(FIELDS),
             "derived": len(code.program.prologue),
             "room": code.built.scratch,
@@ -182,58 +175,28 @@ class SetJumps(Jumps):
             "pattern": 2 * len(pattern),
             "past": 2 * PAST,
             "struck": CAPACITY * self._each,
-            "table": len(EVENTS) * events.count,
-            "margins": events.count,
-            "states": 2 * number,
-            "near": own,
-            "before": own,
-            "values": len(code.program.parameters),
-            "places": 2 * number,
-            "log": self._stride * self._room,
+            **(more or {}),
         }
         ends = np.cumsum(list(lengths.values()))
-        memory = np.zeros(int(ends[-1]))
-        self._pieces = dict(zip(lengths, np.split(memory, ends[:-1]), strict=True))
-        self._keeps = memory, events, rates
+        self._memory = np.zeros(int(ends[-1]))
+        self._pieces = dict(zip(lengths, np.split(self._memory, ends[:-1]), strict=True))
+        self._at = {name: one.ctypes.data for name, one in self._pieces.items()}
         self._pieces["pattern"][:] = [one for some in zip(*pattern, strict=True) for one in some]
-        self._pieces["places"][:] = places.ravel()
         self._pieces["units"][:] = units.ravel()
-        self._put("sets", {"count": number, "size": size, "entries": len(pattern), "inside": 1.0})
-        self._put(
-            "own", {"events": events.count, "size": own, "stride": self._stride, "capacity": self._room, "stays": stays}
-        )
-        self._place(events, rates, given)
-        self._rates = RATES(rates.function), rates.data
-        self._resolve = _RESOLVE(code.routines.code.addresses["resolve"])
-        self.function, self.data = code.routines.code.addresses["jump"], self._pieces["own"].ctypes.data
-
-    def _place(
-        self, events: EventData, rates: CompiledRates, given: tuple[tuple[int, ...], tuple[int, ...], int]
-    ) -> None:
-        """Say where everything is."""
-        prologues, kept, scratch = given
-        code, at = self.set_code, {name: one.ctypes.data for name, one in self._pieces.items()}
         same = ("derived", "y", "out", "units", "rows", "matrix", "left", "shares", "pattern", "past")
-        self._put("sets", {name: at[name] for name in same} | {"scratch": at["room"], "log": at["struck"]})
+        self._put("sets", {name: self._at[name] for name in same})
+        self._put("sets", {"scratch": self._at["room"], "log": self._at["struck"]})
         self._put("sets", {"program": code.built.code.addresses["contacts"]})
         self._put("sets", {"coordinates": code.coordinates, "speeds": code.speeds})
-        named = ("sets", "table", "margins", "states", "near", "before", "values", "places", "log")
-        self._put("own", {name: at[name] for name in named} | {"shift": events.arrays[1].ctypes.data})
-        self._put("own", {"seen": events.memory.ctypes.data, "event_derived": events.arrays[0].ctypes.data})
-        self._put("own", dict(zip(("event_prologue", "event_scratch"), events.prologue, strict=True)))
-        self._put("own", {"rates": rates.function, "rates_data": rates.data})
-        self._put("own", {"project": rates.project, "project_data": rates.project_data, "scratch": scratch})
-        for name, prologue, place in zip(("kernel", "nearer"), prologues, kept, strict=True):
-            self._put("own", {f"{name}_prologue": prologue, f"{name}_derived": place})
+        self._put("sets", {"count": number, "size": size, "entries": len(pattern), "inside": 1.0})
+        self._resolve = _RESOLVE(code.routines.code.addresses["resolve"])
 
     def _put(self, piece: str, fields: Mapping[str, float]) -> None:
-        kinds, numbers = (JUMP if piece == "own" else FIELDS), self._pieces[piece]
-        places = {name: k for k, name in enumerate(kinds)}
+        numbers = self._pieces[piece]
+        integers = numbers.view(np.int64)
         for name, value in fields.items():
-            (numbers if kinds[name] is NUMBER else numbers.view(np.int64))[places[name]] = value
-
-    def _got(self, name: str) -> int:
-        return int(self._pieces["own"].view(np.int64)[list(JUMP).index(name)])
+            kind, place = _PLACES[piece][name]
+            (numbers if kind is NUMBER else integers)[place] = value
 
     @property
     def _own_units(self) -> FloatArray:
@@ -245,7 +208,6 @@ class SetJumps(Jumps):
         self, parameter_values: FloatArray, states: FloatArray, near: float, past: Sequence[tuple[float, float]]
     ) -> None:
         """Take other parameters, states of gaps and slips, what is small, and impacts that have been."""
-        self._pieces["values"][:] = parameter_values
         self._pieces["derived"][:] = self.set_code.built.derive("contacts", self.set_code.program, parameter_values)[0]
         units = self._own_units
         for name in ("small", "slow"):
@@ -254,16 +216,6 @@ class SetJumps(Jumps):
         known = list(past)[-PAST:]
         self._pieces["past"][: 2 * len(known)] = np.ravel(known)
         self._put("sets", {"known": len(known)})
-
-    def begin_again(self, table: FloatArray, scales: tuple[float, float, float, float]) -> None:
-        """Take the events of another run, from what was given on.
-
-        Scales are how long a set lasts at least, how long impacts may go on that are summed, as a rule and where
-        rounding tells in them, and the time of the scene.
-        """
-        self._pieces["table"][:] = table.ravel()
-        self._put("own", {"logged": 0, **dict(zip(("shortest", "ahead", "rough", "time"), scales, strict=True))})
-        self._told = 0
 
     def resolve(
         self, t: float, y: FloatArray, triggers: FloatArray, longest: tuple[float, float], is_start: bool
@@ -280,13 +232,101 @@ class SetJumps(Jumps):
         struck = pieces["struck"][: self._said("logged") * self._each].reshape(-1, self._each).copy()
         gaps = np.flatnonzero((units[UNITS["stopped"]] != 0.0) & (units[UNITS["slip"]] == 0.0))
         stopped = int(gaps[0]) if self._said("stops") and len(gaps) else -1
-        left = float(pieces["sets"][list(FIELDS).index("ahead")])
+        left = float(pieces["sets"][_PLACES["sets"]["ahead"][1]])
         states = units[UNITS["next"] : UNITS["next"] + 3].copy()
         made = SetJump(t, np.array([y, pieces["y"]]), states, stopped, left, struck)
         return made, units[UNITS["closed"]] != 0.0
 
     def _said(self, name: str) -> int:
-        return int(self._pieces["sets"].view(np.int64)[list(FIELDS).index(name)])
+        return int(self._pieces["sets"].view(np.int64)[_PLACES["sets"][name][1]])
+
+
+class SetJumps(SetSolver, Jumps):
+    """The changes of sets of one session.
+
+    Parameters
+    ----------
+    code, pattern, units, count
+        As of `SetSolver`.
+    events, rates, given
+        The events at which they happen, the rates in between, and the addresses of functions that compute what depends
+        on parameters alone, of the rates and of the projection, of where that is kept, and of their scratch.
+    places
+        Where states and directions of each are among the parameters; -1 where there is none.
+    stays
+        Whether a set in which all are open is one of them.
+    """
+
+    def __init__(
+        self,
+        code: SetCode,
+        pattern: Sequence[tuple[int, int]],
+        units: FloatArray,
+        count: int,
+        events: EventData,
+        rates: CompiledRates,
+        given: tuple[tuple[int, ...], tuple[int, ...], int],
+        places: FloatArray,
+        stays: bool,
+    ) -> None:
+        own, number = code.coordinates + code.speeds, units.shape[1]
+        self._stride = HEAD + 2 * own + 3 * number + MOST_IMPACTS * (count + len(ENTRY))
+        self._room = max(64, ROOM // self._stride)
+        more = {
+            "own": len(JUMP),
+            "table": len(EVENTS) * events.count,
+            "margins": events.count,
+            "states": 2 * number,
+            "near": own,
+            "before": own,
+            "values": len(code.program.parameters),
+            "places": 2 * number,
+            "log": self._stride * self._room,
+        }
+        super().__init__(code, pattern, units, count, more)
+        self._keeps = events, rates
+        self._pieces["places"][:] = places.ravel()
+        self._put(
+            "own", {"events": events.count, "size": own, "stride": self._stride, "capacity": self._room, "stays": stays}
+        )
+        self._place(events, rates, given)
+        self._rates = RATES(rates.function), rates.data
+        self.function, self.data = code.routines.code.addresses["jump"], self._at["own"]
+
+    def _place(
+        self, events: EventData, rates: CompiledRates, given: tuple[tuple[int, ...], tuple[int, ...], int]
+    ) -> None:
+        """Say where everything is."""
+        prologues, kept, scratch = given
+        at = self._at
+        named = ("sets", "table", "margins", "states", "near", "before", "values", "places", "log")
+        self._put("own", {name: at[name] for name in named} | {"shift": events.arrays[1].ctypes.data})
+        self._put("own", {"seen": events.memory.ctypes.data, "event_derived": events.arrays[0].ctypes.data})
+        self._put("own", dict(zip(("event_prologue", "event_scratch"), events.prologue, strict=True)))
+        self._put("own", {"rates": rates.function, "rates_data": rates.data})
+        self._put("own", {"project": rates.project, "project_data": rates.project_data, "scratch": scratch})
+        for name, prologue, place in zip(("kernel", "nearer"), prologues, kept, strict=True):
+            self._put("own", {f"{name}_prologue": prologue, f"{name}_derived": place})
+
+    def _got(self, name: str) -> int:
+        return int(self._pieces["own"].view(np.int64)[_PLACES["own"][name][1]])
+
+    def give(
+        self, parameter_values: FloatArray, states: FloatArray, near: float, past: Sequence[tuple[float, float]]
+    ) -> None:
+        """Take other parameters, states of gaps and slips, what is small, and impacts that have been."""
+        self._pieces["values"][:] = parameter_values
+        super().give(parameter_values, states, near, past)
+
+    def begin_again(self, table: FloatArray, scales: tuple[float, float, float, float]) -> None:
+        """Take the events of another run, from what was given on.
+
+        Scales are how long a set lasts at least, how long impacts may go on that are summed, as a rule and where
+        rounding tells in them, and the time of the scene.
+        """
+        self._pieces["table"][:] = table.ravel()
+        self._put("own", {"logged": 0, **dict(zip(("shortest", "ahead", "rough", "time"), scales, strict=True))})
+        self._told = 0
 
     def begin(self, t: float) -> None:
         """Learn when the present set begins."""

@@ -10,6 +10,8 @@ from tests.helpers.contact_scenes import rough_pendulum
 
 import atwood as aw
 from atwood import Scene, UsageError, simulate
+from atwood.integrators.event_location import EventLocator
+from atwood.simulation.contacts import changes, compiled
 from atwood_library import (
     BallContact,
     Damper,
@@ -117,6 +119,30 @@ def test_events_are_those_of_the_explicit_method(make: Callable[[], Scene], solv
     told = [[(one.part, one.law, one.kind) for one in each.events] for each in runs]
     assert told[0] == told[1]
     assert [one.time for one in runs[1].events] == pytest.approx([one.time for one in runs[0].events], abs=2e-6)
+
+
+@METHODS
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+def test_sets_are_found_by_the_routine_of_explicit_steps(
+    form: str, solver: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Python finds the set of the start alone, and no zero of a series."""
+    in_python, plain, found = [], changes.resolve, []
+
+    def counted(*given: object) -> changes.Changed:
+        in_python.append(given)
+        return plain(*given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(changes, "resolve", counted)
+    if solver == "taylor":
+        monkeypatch.setattr(EventLocator, "search", lambda *_: pytest.fail("an event is looked for in Python"))
+    for counts in (1, 6):
+        in_python.clear()
+        found.append(simulate(StickSlip(), solver=solver, form=form, t_end=2.0, rtol=1e-8).events)
+        assert len(in_python) == counts
+        monkeypatch.setattr(compiled, "resolved", lambda *_: None)
+    assert [(one.kind, one.law) for one in found[0]] == [(one.kind, one.law) for one in found[1]]
+    assert [one.time for one in found[0]] == pytest.approx([one.time for one in found[1]], abs=1e-12)
 
 
 @METHODS

@@ -15,7 +15,7 @@ from atwood.forms.constrained import contacts_program
 from atwood.forms.loose import is_loose, kept_touching, loose_equations
 from atwood.integrators import set_routines as sets
 from atwood.integrators.embedded.rates import OwnRates
-from atwood.integrators.set_jumps import EVENTS, SetCode, SetJump, SetJumps, SetLog
+from atwood.integrators.set_jumps import EVENTS, SetCode, SetJump, SetJumps, SetLog, SetSolver
 from atwood.integrators.set_routines import UNITS
 from atwood.integrators.time_stepping.session import Change
 from atwood.lazy_dataclasses import dataclass
@@ -186,21 +186,36 @@ def sets_of(
     if is_watched or is_loose(assembly) or not changes_in_steps(plan):
         return None
 
+    made = _code_of(plan, t, y)
+    if made is None:
+        return None
+    (data, code), before = made, len(assembly.mechanism.table.values)
+    places = np.array([[before + one[0], before + one[1] if len(one) > 1 else -1] for one in layout.places]).T
+    given, count = (rates.prologues, rates.places, rates.scratch), len(layout.contacts)
+    own, stays = (code, data.pattern, _units(layout, plan), count), _is_short(plan, t, y)
+    return SetJumps(*own, events, rates.rates, given, places, stays)
+
+
+def solver_of(plan: SceneProblem, t: float, y: FloatArray) -> SetSolver | None:
+    """Return what finds sets where steps stop at each event; None where these are left to Python."""
+    made = _code_of(plan, t, y) if changes_in_steps(plan) else None
+    if made is None:
+        return None
+    (data, code), layout = made, layout_of(plan.assembly)
+    return SetSolver(code, data.pattern, _units(layout, plan), len(layout.contacts))
+
+
+def _code_of(plan: SceneProblem, t: float, y: FloatArray) -> tuple[SetData, SetCode] | None:
+    """Return the machine code of sets; None where there is none."""
+    assembly = plan.assembly
+
     def make() -> tuple[SetData, SetCode] | None:
         found = None if why_in_python(assembly) else set_data(plan, t, y)
         if found is None or any(node.operation == "external" for node in found.program.nodes):
             return None
         return found, SetCode(found.program)
 
-    made = assembly.shared.get(_CODE, make, assembly.form, plan.finding.kept, light_speeds(plan, t, y))
-    if made is None:
-        return None
-    data, code = made
-    before = len(assembly.mechanism.table.values)
-    places = np.array([[before + one[0], before + one[1] if len(one) > 1 else -1] for one in layout.places]).T
-    given, count = (rates.prologues, rates.places, rates.scratch), len(layout.contacts)
-    stays = _is_short(plan, t, y)
-    return SetJumps(code, events, rates.rates, given, data.pattern, data.units, count, places, stays)
+    return assembly.shared.get(_CODE, make, assembly.form, plan.finding.kept, light_speeds(plan, t, y))
 
 
 def fill_sets(
@@ -235,7 +250,7 @@ def _states(assembly: Assembly) -> FloatArray:
     return np.array([[state, *way, *[0.0] * (2 - len(way))] for state, way in found]).T
 
 
-def _give(jumps: SetJumps, plan: SceneProblem, relative: float, impacts: Sequence[tuple[float, str]]) -> None:
+def _give(jumps: SetSolver, plan: SceneProblem, relative: float, impacts: Sequence[tuple[float, str]]) -> None:
     """Give them parameters and states, and times and parts of the impacts before."""
     assembly = plan.assembly
     states, parts = assembly.kept.get(_STATES, lambda: _states(assembly)), _parts(layout_of(assembly))
@@ -244,7 +259,7 @@ def _give(jumps: SetJumps, plan: SceneProblem, relative: float, impacts: Sequenc
 
 
 def resolved(
-    jumps: SetJumps,
+    jumps: SetSolver,
     plan: SceneProblem,
     state: tuple[float, FloatArray, FloatArray],
     relative: float,
@@ -253,7 +268,7 @@ def resolved(
     is_start: bool,
     told: float,
 ) -> Changed | None:
-    """Return what `resolve` in `changes` does, by the routine of a session; None where that leaves it to Python."""
+    """Return what `resolve` in `changes` does, by the routine; None where that leaves it to Python."""
     assembly, layout, (t, q, u) = plan.assembly, layout_of(plan.assembly), state
     _give(jumps, plan, relative, impacts)
     happened = {(one.part, one.law): float(HAPPENED.get(one.target, 0)) for one in triggers}

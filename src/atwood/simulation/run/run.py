@@ -13,7 +13,7 @@ from atwood.clock import GRACE, Clock, TimeIsUp
 from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key, Shared
-from atwood.forms.loose import has_touched, is_loose
+from atwood.forms.loose import has_touched, is_loose, kept_touching
 from atwood.integrators.protocol import Statistics
 from atwood.lazy_dataclasses import replace
 from atwood.mechanics.outputs.event_functions import CONTACT, UPDATE
@@ -456,11 +456,12 @@ class Walk:
         relative, one_by_one = self.options.relative_tolerance, self.options.impacts == "one_by_one"
 
         def find() -> Changed:
-            jumps, found = None if one_by_one else self._kept.sets(plan), None
+            whole, found = plan.in_piece(kept_touching(plan.assembly)), None
+            jumps = None if one_by_one else self._kept.sets(whole, state, None if is_start else self.choice.method)
             if jumps is not None:
                 from atwood.simulation.contacts.compiled import resolved
 
-                found = resolved(jumps, plan, state, relative, triggers, self._impacts, is_start, self.t)
+                found = resolved(jumps, whole, state, relative, triggers, self._impacts, is_start, self.t)
             given = self.start.length, plan.scales, relative, triggers, one_by_one, self._impacts, is_start, self.t
             return found or resolve(self.assembly, state, *given)
 

@@ -47,7 +47,7 @@ from atwood.simulation.run.choice import solved_loops
 if TYPE_CHECKING:
     from atwood.forms.loops.closed_form import ClosedForm
     from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
-    from atwood.integrators.set_jumps import SetJumps
+    from atwood.integrators.set_jumps import SetSolver
     from atwood.integrators.symplectic.stepper import Hamiltonian
     from atwood.integrators.taylor.stepper import TaylorProblem
     from atwood.simulation.problem.closed_loops import Solved
@@ -297,6 +297,7 @@ class KeptSession:
 
     def __init__(self, assembly: Assembly | None = None) -> None:
         self._assembly = assembly
+        self._solvers: list[tuple[tuple[object, ...], SetSolver]] = []
         self.kept: list[Opened] = (None if assembly is None else assembly.kept.take(_SESSIONS)) or []
 
     def hand_back(self) -> None:
@@ -318,18 +319,32 @@ class KeptSession:
         found = next((one.fill for one in self.kept if one.session is session), None)
         return found if isinstance(found, Filling) else None
 
-    def sets(self, plan: SceneProblem) -> SetJumps | None:
-        """Return the changes of sets of a session that is kept for a plan; None where there are none."""
-        own = plan.program, plan.scales, plan.sizes, plan.finding
+    def sets(
+        self, plan: SceneProblem, state: tuple[float, FloatArray, FloatArray], method: Method | None
+    ) -> SetSolver | None:
+        """Return what finds sets for a plan: the changes of its session, or where steps make none, a routine alone.
+
+        None where there is none, and where nothing is opened for what begins: there is no method yet.
+        """
+        own = plan.assembly.shared, plan.program, plan.scales, plan.sizes, plan.finding
         for one in self.kept:
             jumps = one.fill.problem.jumps if isinstance(one.fill, Filling) else None
             _, shared, _, *objects = one.objects
-            if jumps is not None and shared is plan.assembly.shared and all(map(is_, objects, own)):
+            if jumps is not None and all(map(is_, (shared, *objects), own)):
                 from atwood.integrators.set_jumps import SetJumps
 
                 if isinstance(jumps, SetJumps):
                     return jumps
-        return None
+        if method is None or method.tableau is not None or not self.jumps(plan.assembly):
+            return None
+        known = next((found for objects, found in self._solvers if all(map(is_, objects, own))), None)
+        if known is None:
+            from atwood.simulation.contacts.compiled import solver_of
+
+            known = solver_of(plan, state[0], np.concatenate(state[1:]))
+            if known is not None:
+                self._solvers.append((own, known))
+        return known
 
     def begin_again(
         self, request: SolverRequest, method: Method, t: float, y: FloatArray, on_stiff: OnStiff | None, *more: object
