@@ -114,6 +114,7 @@ def _routines() -> Built:
     return build_code([], CodeOptions(level=2), exports=("jump", "resolve"), routines=source)
 
 
+_PROLOGUE = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)
 _RESOLVE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, ctypes.c_int64, ctypes.c_int64)
 
 
@@ -163,6 +164,7 @@ class SetSolver:
         self._each = size + len(ENTRY)
         lengths = {
             "sets": len(FIELDS),
+            "values": len(code.program.parameters),
             "derived": len(code.program.prologue),
             "room": code.built.scratch,
             "y": own,
@@ -189,6 +191,7 @@ class SetSolver:
         self._put("sets", {"program": code.built.code.addresses["contacts"]})
         self._put("sets", {"coordinates": code.coordinates, "speeds": code.speeds})
         self._put("sets", {"count": number, "size": size, "entries": len(pattern), "inside": 1.0})
+        self._derive = _PROLOGUE(code.built.code.addresses["contacts_prologue"])
         self._resolve = _RESOLVE(code.routines.code.addresses["resolve"])
 
     def _put(self, piece: str, fields: Mapping[str, float]) -> None:
@@ -208,7 +211,8 @@ class SetSolver:
         self, parameter_values: FloatArray, states: FloatArray, near: float, past: Sequence[tuple[float, float]]
     ) -> None:
         """Take other parameters, states of gaps and slips, what is small, and impacts that have been."""
-        self._pieces["derived"][:] = self.set_code.built.derive("contacts", self.set_code.program, parameter_values)[0]
+        self._pieces["values"][:] = parameter_values
+        self._derive(*(self._at[name] for name in ("values", "derived", "room")))
         units = self._own_units
         for name in ("small", "slow"):
             units[UNITS[name]] = near * self._units[UNITS[name]]
@@ -279,7 +283,6 @@ class SetJumps(SetSolver, Jumps):
             "states": 2 * number,
             "near": own,
             "before": own,
-            "values": len(code.program.parameters),
             "places": 2 * number,
             "log": self._stride * self._room,
         }
@@ -310,13 +313,6 @@ class SetJumps(SetSolver, Jumps):
 
     def _got(self, name: str) -> int:
         return int(self._pieces["own"].view(np.int64)[_PLACES["own"][name][1]])
-
-    def give(
-        self, parameter_values: FloatArray, states: FloatArray, near: float, past: Sequence[tuple[float, float]]
-    ) -> None:
-        """Take other parameters, states of gaps and slips, what is small, and impacts that have been."""
-        self._pieces["values"][:] = parameter_values
-        super().give(parameter_values, states, near, past)
 
     def begin_again(self, table: FloatArray, scales: tuple[float, float, float, float]) -> None:
         """Take the events of another run, from what was given on.

@@ -94,10 +94,11 @@ def _interpolate(pair: Tableau) -> Routine:
     """Write values and rates at a time within the last step."""
     arguments = {"time": NUMBER, "y_out": ADDRESS, "yp_out": ADDRESS}
     r, m, (time, y_out, yp_out) = open_routine(pair, "interpolate", arguments, exported=True)
-    with r.when(time == m.t):
-        r.copy(y_out, m.row("y"), m.size)
-        r.copy(yp_out, m.row("end slope"), m.size)
-        r.give(0)
+    for end, values, rates in ((m.t, "y", "end slope"), (m.t_old, "y_old", 0)):
+        with r.when(time == end):
+            r.copy(y_out, m.row(values), m.size)
+            r.copy(yp_out, m.row(rates), m.size)
+            r.give(0)
     with r.when(r.call("densify", m.session) != 0):
         r.give(3)
     r.call("polynomial", m.session, (time - m.t_old) / m.h)

@@ -18,7 +18,7 @@ from atwood.mechanics.dynamics.equations import ContactRow
 from atwood.mechanics.outputs.event_functions import CLOSES
 from atwood.model.values.units import ALONG
 from atwood.simulation.contacts.changes import NEAR, longest_left, told_impact
-from atwood.simulation.events.modes import LAST, EventProbe, ToldLater
+from atwood.simulation.events.modes import LAST, EventProbe, EventRecord, ToldLater
 from atwood.simulation.problem.explicit_scene import impact_code, values_on_constraints
 from atwood.simulation.problem.problem import SceneProblem
 
@@ -78,15 +78,18 @@ def fill_bounces(
 
 def noted_bounces(log: JumpLog, plan: SceneProblem, probe: EventProbe) -> ToldLater:
     """Return what is told of impacts, and when which parts had the last of them."""
-    units = {one.row.key[:2]: one.law.options.unit for one in _gaps(plan)}
     watched = [(one.part, one.law) for one in probe.event_functions]
-    last = log.entries[-LAST:, :2].tolist()
-    return ToldLater(
-        lambda: [
+
+    def told() -> list[EventRecord]:
+        units = {one.row.key[:2]: one.law.options.unit for one in _gaps(plan)}
+        return [
             told_impact(
                 one.time, watched[one.event], units[watched[one.event]], (one.impulse,), (one.before, one.after)
             )
             for one in log.jumps()
-        ],
-        [(time, watched[int(event)][0]) for time, event in last],
-    )
+        ]
+
+    def strikes() -> list[tuple[float, str]]:
+        return [(time, watched[int(event)][0]) for time, event in log.entries[-LAST:, :2].tolist()]
+
+    return ToldLater(told, strikes)

@@ -294,10 +294,10 @@ def resolved(
 
 def noted_sets(log: SetLog, assembly: Assembly, changes: Callable[[], Sequence[Change]]) -> ToldLater:
     """Return what is told of changes, with the parts of the impacts among them."""
-    parts = [one.row.key[0] for one in layout_of(assembly).first]
+    first = layout_of(assembly).first
     return ToldLater(
         lambda: [event for one in changes() for event in one.told],
-        [(time, parts[gap]) for time, gap in log.strikes()],
+        lambda: [(time, first[gap].row.key[0]) for time, gap in log.strikes()],
     )
 
 

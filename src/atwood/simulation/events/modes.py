@@ -134,12 +134,12 @@ class ToldLater:
     ----------
     make
         Tells of them, in order.
-    impacts
-        Times and parts of the impacts among them, of many the last.
+    strikes
+        Gives times and parts of the impacts among them, of many the last.
     """
 
     make: Callable[[], Sequence[EventRecord]]
-    impacts: Sequence[tuple[float, str]]
+    strikes: Callable[[], Sequence[tuple[float, str]]]
 
     @cached_property
     def events(self) -> Sequence[EventRecord]:

@@ -211,7 +211,8 @@ class Walk:
             recorder, outcome = self._segment()
             self.t, self._handed = outcome.t, outcome.handed
             self.events += outcome.noted
-            self._remember(outcome.noted)
+            if outcome.t < self.options.t_end or outcome.event is not None:
+                self._remember(outcome.noted)
             is_short = outcome.t - before < shortest_mode(recorder.plan, self.options, self.start.time)
             chatter = chatter + 1 if is_short else 0
             if outcome.event is None:
@@ -271,7 +272,7 @@ class Walk:
         ahead = self.samples.until(t, limit)
         if limit < options.t_end or (t < limit and self.sampler.due_at(limit)):  # the state just after it is shown
             ahead = ahead.without_last_shown()
-        coming = self._moments(schedule)
+        coming = None if contacts else self._moments(schedule)
         stretch = self.plan, self.probe, options, self.choice, ahead, self.show, self.statistics, self._kept
         segment = Segment(*stretch, coming)
         recorder = Recorder(self.plan)
@@ -472,7 +473,7 @@ class Walk:
         """Remember the impacts among some events."""
         for one in events:
             if isinstance(one, ToldLater):
-                self._impacts += one.impacts
+                self._impacts += one.strikes()
             elif one.kind == "impact":
                 self._impacts.append((one.time, one.part))
         del self._impacts[:-LAST]
