@@ -15,6 +15,7 @@ import numpy as np
 
 from atwood.arrays import BoolArray, FloatArray
 from atwood.forms.caches import Key
+from atwood.forms.loose import has_touched
 from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.matrices import is_best_full
 from atwood.numerics.rank import trusted_sizes
@@ -363,8 +364,8 @@ def _taken(
         return None
     q, u = plan.program.split(y.T)
     misses = once(partial(misses_of, plan, t, q, u, y))
-    free, contacts = np.zeros(len(t), dtype=bool), plan.assembly.own_equations.contacts
-    has_more, met, moved = bool(contacts or plan.finding.redundant), made.met, float(made.moved.max())
+    free, contacts = np.zeros(len(t), dtype=bool), has_touched(plan.assembly)
+    has_more, met, moved = contacts or bool(plan.finding.redundant), made.met, float(made.moved.max())
     # A row in units of its largest entry misses no more than the sum of what its unknowns move by to meet it.
     meets = not has_more and len(sizes) * moved <= _EXACT
     if met.all() and (meets or ((contacts or moved <= _FAR) and _are_exact(plan, misses()))):
