@@ -453,10 +453,13 @@ class Walk:
     ) -> Changed:
         """Return what becomes of gaps and slips now, by the routine of the steps if there is one; kept at a start."""
         from atwood.simulation.contacts.changes import resolve
+        from atwood.simulation.contacts.static_limits import check_static_limits
 
         relative, one_by_one = self.options.relative_tolerance, self.options.impacts == "one_by_one"
 
         def find() -> Changed:
+            if is_start:
+                check_static_limits(self.assembly, state, self.start.length)
             whole, found = plan.in_piece(kept_touching(plan.assembly)), None
             jumps = None if one_by_one else self._kept.sets(whole, state, None if is_start else self.choice.method)
             if jumps is not None:
