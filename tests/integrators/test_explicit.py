@@ -480,8 +480,8 @@ def test_sessions_with_compiled_rates_share_nothing() -> None:
 
 
 @pytest.mark.parametrize("name", ["four-bar", "chain"])
-def test_code_that_took_less_to_make_is_left_at_any_step(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Machine code of LLVM's quickest level and of a higher one give the same bits, after any step."""
+def test_tapes_are_left_at_any_step(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tapes and machine code give the same bits, after any step."""
     monkeypatch.setenv("ATWOOD_CACHE", "0")
     assembly = assemble(SCENES[name](), form="dae")
     start = find_start(assembly)
@@ -490,18 +490,19 @@ def test_code_that_took_less_to_make_is_left_at_any_step(name: str, monkeypatch:
     made = own_rates_on_constraints(plan, 0.0, y)
     assert made is not None
     code, _ = made
-    quick, better = code._built, code._better
+    tiers = code.tiers
+    quick, better = tiers.now, tiers._better
     assert better is not None
     best, values = better(), values_on_constraints(plan)
 
     def ended(before: float) -> list[Any]:
-        code._built, code._better, code._left = quick, lambda: best, math.inf
+        tiers.now, tiers._better, tiers._left = quick, lambda: best, math.inf
         problem = ExplicitProblem(len(y), pendulum, compiled=code.bind(values))
         stepper = CompiledStepper(problem, tight(1e-8), TABLEAU)
         assert stepper.start(0.0, y)
         function = stepper._count("function")
         for step in range(55):
-            code._left = math.inf if step < before else 0.0
+            tiers._left = math.inf if step < before else 0.0
             stepper.run(math.inf, 1)
         assert (stepper._count("function") == function) == (before == math.inf)
         return [stepper.state()[0], *stepper.state()[1]]
@@ -538,7 +539,7 @@ def test_code_that_is_replaced_is_called_no_more(monkeypatch: pytest.MonkeyPatch
     assert made is not None
     code, before = made[0], made[0].open()
     code.fill(before, values_on_constraints(plan))
-    quick = weakref.ref(code._built.code)
+    quick = weakref.ref(code.tiers.now.code)
     code.at_its_best()
     del made
     gc.collect()
@@ -554,7 +555,7 @@ def test_code_that_is_replaced_is_called_no_more(monkeypatch: pytest.MonkeyPatch
     gc.collect()
     assert quick() is None
     after = code.open()
-    assert set(after.prologues) <= set(code._built.code.addresses.values())
+    assert set(after.prologues) <= set(code.tiers.now.code.addresses.values())
     code.fill(after, values_on_constraints(plan))
 
 

@@ -11,7 +11,7 @@ import pytest
 from llvmlite import binding
 
 from atwood import simulate, sweep
-from atwood.codegen.llvm import build, engine, own
+from atwood.codegen.llvm import build, engine, own, tiers
 from atwood.codegen.llvm.engine import lane_count
 from atwood_library.scenes import SCENES, Chain
 
@@ -90,15 +90,20 @@ def test_nothing_is_fused(monkeypatch: pytest.MonkeyPatch) -> None:
         written.append((text, level, has_variables))
         return engine.compile_text(text, level, has_variables)
 
-    monkeypatch.setattr(build, "compile_text", compile_text)
+    for module in (build, tiers):
+        monkeypatch.setattr(module, "compile_text", compile_text)
+    tiers._code_of_tapes.cache_clear()
     monkeypatch.setenv("ATWOOD_CACHE", "0")
     monkeypatch.setattr(own, "compiled", {})  # what is in use stays
     functions = own.own_functions.__wrapped__()
+    tiers._evaluator.__wrapped__()
+    simulate(SCENES["four-bar"](), form="dae", t_end=0.01)
     simulate(Chain(links=7), solver="taylor", t_end=0.01)
     simulate(SCENES["four-bar"](), solver="ida", t_end=0.01)
     sweep(SCENES["double-pendulum"](), {"gravity": [*range(5, 13)]}, t_end=0.01, solver="explicit", threads=1)
     assert any(f"@own_sin_cos_{lane_count()}" in text for text, _, _ in written)
     assert functions.addresses
+    assert sum("@evaluate(" in text for text, _, _ in written) > 1
     assert len(written) > 2
     binding.initialize_all_targets()
     binding.initialize_all_asmprinters()

@@ -8,6 +8,7 @@ is left: the run then stands at the end of the last stretch that came out well.
 from __future__ import annotations
 
 import ctypes
+import time
 from collections.abc import Callable
 from ctypes import c_int, c_void_p
 from typing import Any
@@ -107,6 +108,8 @@ class Moments:
         What happens.
     start
         Its first state.
+    ran
+        Told for how long, in seconds, steps have been taken.
 
     Attributes
     ----------
@@ -116,7 +119,10 @@ class Moments:
         Discrete states from each moment on.
     """
 
-    def __init__(self, places: BatchPlaces, horizon: int, changes: Changes, start: FloatArray) -> None:
+    def __init__(
+        self, places: BatchPlaces, horizon: int, changes: Changes, start: FloatArray, ran: Callable[[float], None]
+    ) -> None:
+        self._ran = ran
         rows, count, size = len(changes.samples), len(changes.times), len(start)
         self.changes, self._places = changes, places
         self.values, self.held = np.empty((rows, size)), np.empty((count, changes.held[1]))
@@ -165,7 +171,9 @@ class Moments:
         job[_PLACES["pause"]] = self.now + most
         while True:
             job[_PLACES["budget"]] = _BUDGET
+            began = time.perf_counter()
             code = self._function(job.ctypes.data)
+            self._ran(time.perf_counter() - began)
             if code == ASKS:
                 at = self.now
                 if not ask(at, self.values[self.changes.first[at]], self.changes.parameters):

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from atwood.arrays import FloatArray
-from atwood.codegen.llvm.build import Built, RoutineSource, build_code, default_options
+from atwood.codegen.llvm.build import RoutineSource
 from atwood.codegen.llvm.module import Part
+from atwood.codegen.llvm.tiers import Tiers
 from atwood.codegen.routines import ADDRESS, NUMBER, Routine, call_kernel, place_of
 from atwood.expr.core.program import Program
 from atwood.integrators.protocol import StepGuard
@@ -29,22 +30,23 @@ class GuardCode:
     ----------
     program
         See `compile_guard`.
-    built
+    tiers
         The code.
     """
 
-    def __init__(self, program: Program, built: Built) -> None:
-        self._program, self._built = program, built
+    def __init__(self, program: Program, tiers: Tiers) -> None:
+        self._program, self._tiers = program, tiers
 
     def bind(self, parameter_values: ArrayLike, reach: float, shortest: float) -> StepGuard:
         """Return the guard of one session."""
-        address = self._built.code.addresses["guard"]
-        derived, scratch = self._built.derive("kernel", self._program, parameter_values)
+        built = self._tiers.spend(0.0)
+        address = built.code.addresses["guard"]
+        derived, scratch = built.derive("kernel", self._program, parameter_values)
         data = np.zeros(4)
         data[:2].view(np.uint64)[:] = derived.ctypes.data, scratch.ctypes.data
         data[2:] = reach, shortest
         call, place = _GUARD(address), data.ctypes.data
-        keep = self._built, derived, scratch, data
+        keep = built, derived, scratch, data
 
         def passes(
             t0: float, y0: FloatArray, p0: FloatArray, t1: float, y1: FloatArray, p1: FloatArray, _: object = keep
@@ -58,9 +60,8 @@ class GuardCode:
 
 def compile_guard(program: Program) -> GuardCode:
     """Compile a program that judges steps."""
-    part = Part("kernel", program)
     routines = RoutineSource("integrators.step_guard")
-    return GuardCode(program, build_code([part], default_options([part]), exports=["guard"], routines=routines))
+    return GuardCode(program, Tiers([Part("kernel", program)], ["guard"], routines))
 
 
 def write_routines(kernel: str = "kernel") -> list[Routine]:

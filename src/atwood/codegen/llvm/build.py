@@ -35,7 +35,7 @@ from atwood.codegen.routines import own_name
 from atwood.errors import KernelEvaluationError, UnsupportedError
 from atwood.expr.core.operations import ExternalFunction
 from atwood.expr.core.program import Program
-from atwood.lazy_dataclasses import dataclass, replace
+from atwood.lazy_dataclasses import dataclass
 from atwood.stages import stage
 
 if TYPE_CHECKING:
@@ -90,9 +90,6 @@ Where loops leave no more lines than these, the level is at least one.
 
 _BRIEF = 500
 """The same for programs that are run for short stretches, between which far more is done."""
-
-_HARDER = 5e-5
-"""Seconds that LLVM takes longer for a node above its quickest level."""
 
 
 class Failures(threading.local):
@@ -182,40 +179,6 @@ def build_code(
         return within_time(lambda: build_now(parts, options, exports, routines, cached))
 
 
-@dataclass(frozen=True)
-class Tiers:
-    """Programs as machine code that is made quickly, and as what is made of them once they have run for long.
-
-    Attributes
-    ----------
-    quick
-        The code to begin with.
-    better
-        Makes code of the same values, to the bit, with the same arrays; None where the quick one is the best.
-    cost
-        How long that takes, about, s.
-    """
-
-    quick: Built
-    better: Callable[[], Built] | None
-    cost: float
-
-
-def build_tiers(parts: Sequence[Part], is_brief: bool, exports: Sequence[str], routines: RoutineSource) -> Tiers:
-    """Compile programs of some size quickly, unless the cache has what is made of them where they run for long."""
-    options, size = default_options(parts, is_brief), sum(part.program.size for part in parts)
-    best = functools.partial(build_code, parts, options, exports=exports, routines=routines)
-    if size <= _BRIEF or not options.level or _is_cached(parts, options, routines):
-        return Tiers(best(), None, 0.0)
-    quick = build_code(parts, replace(options, level=0), exports=exports, routines=routines)
-    return Tiers(quick, best, _HARDER * size)
-
-
-def _is_cached(parts: Sequence[Part], options: CodeOptions, routines: RoutineSource) -> bool:
-    store = default_cache()
-    return store is not None and store.has(_key(parts, options, routines))
-
-
 def build_now(
     parts: Sequence[Part],
     options: CodeOptions,
@@ -227,7 +190,7 @@ def build_now(
     names = [*exports, *(name for part in parts for name in (part.name, f"{part.name}_prologue"))]
     has_externals = any(node.operation == "external" for part in parts for node in part.program.nodes)
     store = default_cache() if cached and not has_externals else None
-    key = _key(parts, options, routines) if store else ""
+    key = key_of(parts, options, routines) if store else ""
     if store is not None:
         found = _from_cache(store, key, names)
         if found is not None:
@@ -278,7 +241,8 @@ def _from_cache(store: Cache, key: str, names: Sequence[str]) -> Built | None:
         return None
 
 
-def _key(parts: Sequence[Part], options: CodeOptions, routines: RoutineSource | None) -> str:
+def key_of(parts: Sequence[Part], options: CodeOptions, routines: RoutineSource | None) -> str:
+    """Return the name of machine code in the cache."""
     written = routines.key if routines is not None else ()
     programs = [(part.name, part.program.digest, part.positions, part.lanes, part.packed) for part in parts]
     return make_key([_GENERATOR, hash_of_generators(), programs, options, written, target_description()])

@@ -7,27 +7,25 @@ from __future__ import annotations
 
 import ctypes
 from ctypes import c_int64, c_void_p
-from itertools import accumulate
+from time import perf_counter
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from atwood.arrays import FloatArray, address_of
 from atwood.clock import check_time
-from atwood.codegen.llvm.build import Built, RoutineSource, build_code, default_options
+from atwood.codegen.llvm.build import RoutineSource
 from atwood.codegen.llvm.module import Part
-from atwood.codegen.routines import ADDRESS, INTEGER, Routine, addresses
+from atwood.codegen.llvm.tiers import Tiers
+from atwood.codegen.routines import ADDRESS, INTEGER, Kind, Record, Routine
 from atwood.expr.core.program import Program
 
-_COLUMNS = ctypes.CFUNCTYPE(None, *[c_void_p] * 5, c_int64)
+_COLUMNS = ctypes.CFUNCTYPE(None, c_void_p)
 
 
 def compile_columns(program: Program) -> ColumnProgram:
     """Compile a program for many states at once."""
-    inputs = tuple(len(group.symbols) for group in program.inputs)
-    outputs = tuple(len(group.expressions) for group in program.outputs)
-    part, routines = Part("kernel", program), RoutineSource("codegen.llvm.columns", (), (inputs, outputs))
-    return ColumnProgram(program, build_code([part], default_options([part]), exports=["columns"], routines=routines))
+    return ColumnProgram(program, Tiers([Part("kernel", program)], ["columns"], RoutineSource("codegen.llvm.columns")))
 
 
 class ColumnProgram:
@@ -35,19 +33,18 @@ class ColumnProgram:
 
     Parameters
     ----------
-    program, built
+    program, tiers
         What it computes, and its code.
     """
 
-    def __init__(self, program: Program, built: Built) -> None:
-        self.program, self.built = program, built
-        self.call = _COLUMNS(built.code.addresses["columns"])
+    def __init__(self, program: Program, tiers: Tiers) -> None:
+        self.program, self.tiers = program, tiers
         self.inputs = [len(group.symbols) for group in program.inputs]
         self.outputs = [len(group.expressions) for group in program.outputs]
 
     def bind(self, parameter_values: ArrayLike) -> ColumnKernel:
         """Compute once what depends on parameters alone."""
-        derived, _ = self.built.derive("kernel", self.program, parameter_values)
+        derived, _ = self.tiers.now.derive("kernel", self.program, parameter_values)
         return ColumnKernel(self, derived)
 
 
@@ -71,10 +68,16 @@ class ColumnKernel:
         code, states = self.code, max(one.shape[1] for one in groups)
         given = [_full(one, (size, states)) for one, size in zip(groups, code.inputs, strict=True)]
         found = [np.empty((size, states)) for size in code.outputs]
-        room, scratch = np.empty(sum(code.inputs) + sum(code.outputs)), np.empty(code.built.scratch)
-        lists = [(c_void_p * len(arrays))(*map(address_of, arrays)) for arrays in (given, found)]
-        work = (self._derived, scratch, room)
-        code.call(*lists, *map(address_of, work), states)
+        built, began = code.tiers.now, perf_counter()
+        room, scratch = np.empty(sum(code.inputs) + sum(code.outputs)), np.empty(built.scratch)
+        groups_of = (given, code.inputs), (found, code.outputs)
+        lists = [np.array([address_of(one) for one in arrays], dtype=np.int64) for arrays, _ in groups_of]
+        counts = [np.array(sizes, dtype=np.int64) for _, sizes in groups_of]
+        begins = 8 * np.cumsum([0, *code.inputs, *code.outputs])[:-1] + room.ctypes.data
+        data = *lists, *counts, begins, begins[len(given) :], self._derived, scratch
+        job = (c_int64 * len(_FIELDS))(*map(address_of, data), len(given), len(found), states)
+        _COLUMNS(built.code.addresses["columns"])(ctypes.addressof(job))
+        code.tiers.spend(perf_counter() - began)
         return tuple(found)
 
 
@@ -82,24 +85,24 @@ def _full(values: FloatArray, shape: tuple[int, int]) -> FloatArray:
     return np.ascontiguousarray(values if values.shape == shape else np.broadcast_to(values, shape))
 
 
-def write_routines(inputs: tuple[int, ...], outputs: tuple[int, ...]) -> list[Routine]:
+_LISTS = ("inputs", "outputs", "input_sizes", "output_sizes", "gathered", "computed", "derived", "scratch")
+_COUNTS = ("taken", "given", "states")
+_FIELDS: dict[str, Kind] = {**dict.fromkeys(_LISTS, ADDRESS), **dict.fromkeys(_COUNTS, INTEGER)}
+
+
+def write_routines() -> list[Routine]:
     """Write the loop over the states: each is gathered, worked on, and scattered."""
-    arguments = dict.fromkeys(("inputs", "outputs", "derived", "scratch", "room"), ADDRESS) | {"states": INTEGER}
-    r = Routine("columns", arguments, None, exported=True)
-    given, found, derived, scratch, room, states = r.arguments
-    sizes, begins = (*inputs, *outputs), [0, *accumulate((*inputs, *outputs))]
-    places = [room.at(begin) for begin in begins[:-1]]
-    arrays = [given.read(k, ADDRESS) for k in range(len(inputs))] + [
-        found.read(k, ADDRESS) for k in range(len(outputs))
-    ]
-    groups, middle = list(zip(arrays, places, sizes, strict=True)), len(inputs)
-    lists = [addresses(r, places[:middle]), addresses(r, places[middle:])]
+    r = Routine("columns", {"job": ADDRESS}, None, exported=True)
+    m = Record(r.arguments[0], _FIELDS)
+    states = m.states
     with r.count(states) as state:
-        for array, place, size in groups[:middle]:
-            with r.count(size) as i:
+        with r.count(m.taken) as k:
+            array, place = m.inputs.read(k, ADDRESS), m.gathered.read(k, ADDRESS)
+            with r.count(m.input_sizes.read(k, INTEGER)) as i:
                 place[i] = array[i * states + state]
-        r.call("kernel", lists[0], derived, scratch, lists[1])
-        for array, place, size in groups[middle:]:
-            with r.count(size) as i:
+        r.call("kernel", m.gathered, m.derived, m.scratch, m.computed)
+        with r.count(m.given) as k:
+            array, place = m.outputs.read(k, ADDRESS), m.computed.read(k, ADDRESS)
+            with r.count(m.output_sizes.read(k, INTEGER)) as i:
                 array[i * states + state] = place[i]
     return [r]

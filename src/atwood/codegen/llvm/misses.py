@@ -6,17 +6,18 @@ import ctypes
 from collections.abc import Callable, Sequence
 from ctypes import c_int64, c_void_p
 from functools import partial
-from itertools import accumulate
 from math import nan
+from time import perf_counter
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from atwood.arrays import FloatArray, IndexArray, address_of
 from atwood.clock import check_time
-from atwood.codegen.llvm.build import Built, RoutineSource, build_code, default_options
+from atwood.codegen.llvm.build import RoutineSource
 from atwood.codegen.llvm.module import Part
-from atwood.codegen.routines import ADDRESS, INTEGER, Record, Routine, addresses
+from atwood.codegen.llvm.tiers import Tiers
+from atwood.codegen.routines import ADDRESS, INTEGER, Kind, Record, Routine, addresses
 from atwood.expr.core.program import Program
 
 _MISSES = ctypes.CFUNCTYPE(None, c_void_p, c_int64)
@@ -33,24 +34,22 @@ def compile_misses(program: Program, places: Sequence[tuple[int, int]]) -> MissP
     places
         Row and column of each entry.
     """
-    part = Part("kernel", program)
-    shape = len(program.inputs[1].symbols), len(program.inputs[2].symbols), len(program.outputs[0].expressions)
-    routines = RoutineSource("codegen.llvm.misses", (), (*shape, len(places)))
-    built = build_code([part], default_options([part]), exports=["misses"], routines=routines)
-    return MissProgram(program, built, np.array(places, dtype=np.int64).reshape(-1, 2).T.copy())
+    tiers = Tiers([Part("kernel", program)], ["misses"], RoutineSource("codegen.llvm.misses"))
+    return MissProgram(program, tiers, np.array(places, dtype=np.int64).reshape(-1, 2).T.copy())
 
 
 class MissProgram:
     """By how much states miss conditions, for any parameter values; see `compile_misses`."""
 
-    def __init__(self, program: Program, built: Built, places: IndexArray) -> None:
-        self.program, self._built, self._places = program, built, places
-        self._call = _MISSES(built.code.addresses["misses"])
+    def __init__(self, program: Program, tiers: Tiers, places: IndexArray) -> None:
+        self.program, self._tiers, self._places = program, tiers, places
+        _, q, u = (len(group.symbols) for group in program.inputs)
+        self._sizes = q, u, len(program.outputs[0].expressions)
         self._room = 2 * len(program.outputs[0].expressions) + sum(len(one.expressions) for one in program.outputs)
 
     def bind(self, parameter_values: ArrayLike) -> Callable[..., FloatArray]:
         """Compute once what depends on parameters alone; return what is called with the rest."""
-        return partial(self._misses, self._built.derive("kernel", self.program, parameter_values)[0])
+        return partial(self._misses, self._tiers.now.derive("kernel", self.program, parameter_values)[0])
 
     def _misses(
         self, derived: FloatArray, t: FloatArray, y: FloatArray, sizes: FloatArray, least: FloatArray
@@ -61,28 +60,35 @@ class MissProgram:
         larger. What is not finite is missed by nan.
         """
         check_time()
-        room, found = np.empty(self._room + self._built.scratch), np.empty((2, len(t)))
+        built, began = self._tiers.now, perf_counter()
+        room, found = np.empty(self._room + built.scratch), np.empty((2, len(t)))
         y, t, least = (np.ascontiguousarray(one) for one in (y, t, least))
         arrays = t, y, sizes, least, derived, room, self._places, found
-        self._call((c_void_p * len(arrays))(*map(address_of, arrays)), len(t))
+        data = (c_int64 * len(_FIELDS))(*map(address_of, arrays), *self._sizes, self._places.shape[1])
+        _MISSES(built.code.addresses["misses"])(ctypes.addressof(data), len(t))
+        self._tiers.spend(perf_counter() - began)
         return found
 
 
-_FIELDS = ("t", "y", "sizes", "least", "derived", "room", "places", "found")
+_ARRAYS = ("t", "y", "sizes", "least", "derived", "room", "places", "found")
+_COUNTS = ("coordinates", "speeds", "conditions", "entries")
+_FIELDS: dict[str, Kind] = {**dict.fromkeys(_ARRAYS, ADDRESS), **dict.fromkeys(_COUNTS, INTEGER)}
 
 
-def write_routines(coordinates: int, speeds: int, conditions: int, entries: int) -> list[Routine]:
+def write_routines() -> list[Routine]:
     """Write the loop over the states."""
     r = Routine("misses", {"data": ADDRESS, "states": INTEGER}, None, exported=True)
     data, states = r.arguments
-    m = Record(data, dict.fromkeys(_FIELDS, ADDRESS))
-    begins = [0, *accumulate((conditions, conditions, conditions, entries, conditions))]
-    units, rates, values, slopes, drifts, scratch = (m.room.at(one) for one in begins)
+    m = Record(data, _FIELDS)
+    conditions, entries = m.conditions, m.entries
+    units, rates, values, slopes = (m.room.at(conditions * k) for k in range(4))
+    drifts = slopes.at(entries)
+    scratch = drifts.at(conditions)
     outputs = addresses(r, [values, slopes, drifts])
     worst, total = (r.variable(0.0), r.variable(0.0)), r.variable(0.0)
     with r.count(states) as state:
-        y = m.y.at(state * (coordinates + speeds))
-        u = y.at(coordinates)
+        y = m.y.at(state * (m.coordinates + m.speeds))
+        u = y.at(m.coordinates)
         r.call("kernel", addresses(r, [m.t.at(state), y, u]), m.derived, scratch, outputs)
         r.clear(units, values)
         for one in (*worst, total):

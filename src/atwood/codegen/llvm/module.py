@@ -385,6 +385,18 @@ def _write_prologue(name: str) -> str:
 }}"""
 
 
+def stub_text(names: Sequence[str]) -> str:
+    """Return the functions of programs that are tapes: the evaluator is called with ``tape.name``."""
+    lines = ["declare i32 @evaluate(ptr, ptr, ptr, ptr, ptr)"]
+    for name in names:
+        for one in (name, f"{name}_values"):
+            lines.append(f"@tape.{one} = external global i8")
+            lines.append(f"define i32 @{one}({_ARGUMENTS}) #0 {{")
+            lines.append(f"  %code = call i32 @evaluate(ptr @tape.{one}, {_PASSED})\n  ret i32 %code\n}}")
+        lines.append(_write_prologue(name))
+    return "\n".join(lines)
+
+
 def _declarations(needs: Needs, runs: int) -> list[str]:
     """Return the declarations of what the module calls."""
     lines = [f"declare double @llvm.{name}.f64(double)" for name in INTRINSICS.values()]

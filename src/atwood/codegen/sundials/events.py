@@ -10,14 +10,26 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from ctypes import Array, c_double, c_int, c_void_p
+from ctypes import Array, c_double, c_int, c_int64, c_void_p
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from atwood.codegen.llvm.build import Built, RoutineSource, build_code, default_options
+from atwood.codegen.llvm.build import RoutineSource
 from atwood.codegen.llvm.module import Part
-from atwood.codegen.routines import ADDRESS, BOOLEAN, NUMBER, Record, Routine, Value, call_kernel, place_of
+from atwood.codegen.llvm.tiers import Tiers
+from atwood.codegen.routines import (
+    ADDRESS,
+    BOOLEAN,
+    INTEGER,
+    NUMBER,
+    Kind,
+    Record,
+    Routine,
+    Value,
+    call_kernel,
+    place_of,
+)
 from atwood.codegen.sundials.layout import SundialsLayout, sundials_layout
 from atwood.codegen.sundials.residuals import array_of
 from atwood.codegen.tangents import SECANT, STEEP
@@ -55,6 +67,9 @@ class EventData:
         What depends on parameters alone, and what is added to each value.
     prologue
         Addresses of the function that computes the former, and of its scratch.
+    faster
+        Told for how long, in seconds, steps have been taken, or 0 at a start, it returns the address of what is faster
+        in the place of `explicit`, as soon as that pays; None before. It is None where there is nothing faster.
     keep
         Whatever must live as long as the addresses are used.
     """
@@ -67,6 +82,7 @@ class EventData:
     memory: NDArray[np.float64]
     arrays: tuple[NDArray[np.float64], NDArray[np.float64]]
     prologue: tuple[int, int]
+    faster: Callable[[float], int | None] | None
     keep: object
 
     def restart(self, t: float) -> None:
@@ -111,35 +127,47 @@ class EventCode:
     ----------
     program
         Program of (t, q, u, shift) with one output group.
-    built
+    tiers
         The code.
-    has_ida
-        Whether the function for IDA is there.
     """
 
-    def __init__(self, program: Program, built: Built, has_ida: bool) -> None:
-        self.program, self._built = program, built
-        addresses = built.code.addresses
-        self._plain, self._explicit = addresses["events"], addresses["look"]
-        self._ida = addresses["ida_events"] if has_ida else 0
+    def __init__(self, program: Program, tiers: Tiers) -> None:
+        self.program, self._tiers = program, tiers
 
     def bind(self, parameter_values: ArrayLike, shifts: ArrayLike) -> EventData:
         """Return the functions for one session."""
-        shift = np.array(shifts, dtype=np.float64)
-        derived, scratch = self._built.derive("kernel", self.program, parameter_values)
-        memory = np.zeros(3 + 3 * len(shift))
+        shift, tiers, built = np.array(shifts, dtype=np.float64), self._tiers, self._tiers.now
+        derived, scratch = built.derive("kernel", self.program, parameter_values)
+        coordinates, speeds = (len(self.program.inputs[k].symbols) for k in (1, 2))
+        counts = coordinates, coordinates + speeds, len(shift)
+        memory = np.zeros(3 + 3 * len(shift) + coordinates + speeds)
         arrays: tuple[NDArray[np.float64], ...] = (derived, scratch, shift, memory)
-        data = (c_void_p * 4)(*(array.ctypes.data for array in arrays))
-        functions = self._plain, self._explicit, self._ida
-        place, own = ctypes.addressof(data), (derived, shift)
-        prologue = self._built.code.addresses["kernel_prologue"], scratch.ctypes.data
-        return EventData(*functions, place, len(shift), memory, own, prologue, (self._built, scratch, data))
+        data = (c_int64 * 7)(*(array.ctypes.data for array in arrays), *counts)
+        plain, explicit, ida = (built.code.addresses.get(name, 0) for name in ("events", "look", "ida_events"))
+        prologue = built.code.addresses["kernel_prologue"], scratch.ctypes.data
+
+        def faster(seconds: float) -> int | None:
+            now = tiers.spend(seconds)
+            return None if now is built else now.code.addresses["look"]
+
+        return EventData(
+            plain,
+            explicit,
+            ida,
+            ctypes.addressof(data),
+            len(shift),
+            memory,
+            (derived, shift),
+            prologue,
+            faster if tiers.has_better else None,
+            (built, scratch, data),
+        )
 
     def fill(self, data: EventData, parameter_values: ArrayLike, shifts: ArrayLike) -> None:
         """Give the functions of a session other parameters and shifts; arguments as of `bind`."""
         derived, shift = data.arrays
         shift[:] = shifts
-        derived[:], _ = self._built.derive("kernel", self.program, parameter_values)
+        derived[:], _ = self._tiers.now.derive("kernel", self.program, parameter_values)
 
 
 def compile_events(program: Program, for_ida: bool, is_brief: bool = False) -> EventCode:
@@ -147,41 +175,44 @@ def compile_events(program: Program, for_ida: bool, is_brief: bool = False) -> E
     groups = [len(group.symbols) for group in program.inputs]
     if len(groups) != 4 or groups[0] != 1 or [groups[3]] != [len(program.results)]:
         raise UsageError(f"needs the input groups t, q, u and shift, not groups of {groups}", where=program.name)
-    part = Part("kernel", program)
     layout = sundials_layout() if for_ida else None
     exports = ["events", "look", *(["ida_events"] if for_ida else [])]
     files = ("codegen/sundials/residuals.py", "codegen/tangents.py")
-    routines = RoutineSource("codegen.sundials.events", files, (groups[1], groups[2], groups[3], layout))
-    options = default_options([part], is_brief)
-    return EventCode(program, build_code([part], options, exports=exports, routines=routines), for_ida)
+    routines = RoutineSource("codegen.sundials.events", files, (layout,))
+    return EventCode(program, Tiers([Part("kernel", program)], exports, routines, is_brief, is_quick=not for_ida))
 
 
-def write_routines(coordinates: int, speeds: int, count: int, layout: SundialsLayout | None) -> list[Routine]:
+def write_routines(layout: SundialsLayout | None) -> list[Routine]:
     """Write the values of events, what compares them with those at the last point, and the function that IDA calls."""
-    written = [_values(coordinates), _look(coordinates + speeds, count)]
-    return [*written, _ida_events(layout, count)] if layout is not None else written
+    written = [_values(), _look()]
+    return [*written, _ida_events(layout)] if layout is not None else written
 
 
-def _values(coordinates: int) -> Routine:
+_DATA: dict[str, Kind] = dict.fromkeys(("derived", "scratch", "shift", "memory"), ADDRESS)
+_DATA |= dict.fromkeys(("coordinates", "size", "count"), INTEGER)
+
+
+def _values() -> Routine:
     r = Routine("events", _ARGUMENTS, exported=True)
     t, y, _, values, data = r.arguments
-    derived, scratch, shift = (data.read(k, ADDRESS) for k in range(3))
-    inputs = [place_of(r, t), y, y.at(coordinates), shift]
-    r.give(call_kernel(r, "kernel", inputs, derived, scratch, [values]))
+    m = Record(data, _DATA)
+    inputs = [place_of(r, t), y, y.at(m.coordinates), m.shift]
+    r.give(call_kernel(r, "kernel", inputs, m.derived, m.scratch, [values]))
     return r
 
 
-def _look(size: int, count: int) -> Routine:
+def _look() -> Routine:
     """Remember the last point, and compare signs and tangents; -2 where zero may be passed.
 
     The memory: the time of the last point, the length over which slopes are taken, whether it has said so, and then
-    values and slopes at the last point, and room for another row of values.
+    values and slopes at the last point, and room for another row of values and for a state.
     """
     r = Routine("look", _ARGUMENTS, exported=True)
     t, y, yp, values, data = r.arguments
-    code = r.call("events", t, y, yp, values, data)
-    memory, shifted = data.read(3, ADDRESS), r.array(size)
-    lasts, slopes, others = (memory.at(3 + k * count) for k in range(3))
+    code, m = r.call("events", t, y, yp, values, data), Record(data, _DATA)
+    memory, count = m.memory, m.count
+    lasts = memory.at(3)
+    slopes, others, shifted = (lasts.at(count * k) for k in (1, 2, 3))
     own = Record(memory, dict.fromkeys(("last", "length", "said"), NUMBER))
     width = t - own.last
     with r.when((width <= 0.0) | (code != 0)):
@@ -189,7 +220,7 @@ def _look(size: int, count: int) -> Routine:
     length = r.most(width, own.length * 0.5)
     own.length, own.last = length, t
     past = length * SECANT
-    with r.count(size) as i:
+    with r.count(m.size) as i:
         shifted[i] = y[i] - yp[i] * past
     has_slopes = r.call("events", t - past, shifted, yp, others, data) == 0
     found = r.variable(0, BOOLEAN)
@@ -215,13 +246,14 @@ def _may_pass_zero(r: Routine, width: Value, first: tuple[Value, Value], last: t
     return ~((a > 0.0) & (b > 0.0)) | turns | steep
 
 
-def _ida_events(layout: SundialsLayout, count: int) -> Routine:
+def _ida_events(layout: SundialsLayout) -> Routine:
     """Write the function that IDA calls, to which nothing ever is zero."""
     r = Routine("ida_events", _ARGUMENTS, exported=True)
     t, *vectors, values, user = r.arguments
     y, yp = (array_of(one, layout.vector_data) for one in vectors)
-    code = r.call("look", t, y, yp, values, user.read(EVENTS_PLACE, ADDRESS))
-    with r.count(count) as k:
+    data = user.read(EVENTS_PLACE, ADDRESS)
+    code = r.call("look", t, y, yp, values, data)
+    with r.count(Record(data, _DATA).count) as k:
         values[k] = 1.0
     r.give(code)
     return r

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import ctypes
-import threading
 from collections.abc import Callable
-from contextlib import suppress
 from ctypes import c_void_p
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from atwood.arrays import FloatArray
-from atwood.clock import TimeIsUp
-from atwood.codegen.llvm.build import Built, RoutineSource, build_tiers
+from atwood.codegen.llvm.build import Built, RoutineSource
 from atwood.codegen.llvm.module import Part
-from atwood.codegen.routines import ADDRESS, CODE, NUMBER, Routine, call_kernel, place_of
+from atwood.codegen.llvm.tiers import Tiers
+from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Routine, Value, call_kernel, place_of
 from atwood.errors import UnsupportedError
 from atwood.expr.core.program import Program
 from atwood.integrators.protocol import MET, STEPS, CompiledRates
@@ -23,53 +21,62 @@ from atwood.lazy_dataclasses import dataclass
 
 _PROLOGUE = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)
 
-_STARTS = 10
-"""What was started so often will be started again."""
 
-
-def rates_source(coordinates: int, speeds: int, given: bool, projects: bool = False) -> RoutineSource:
-    """Return what writes ``rates``, and ``project`` where there are constraints."""
+def rates_source(coordinates: int | None, speeds: int | None, given: bool, projects: bool = False) -> RoutineSource:
+    """Return what writes ``rates``, and ``project`` where there are constraints; without numbers these are data."""
     files = ("integrators/protocol.py",)
     return RoutineSource("integrators.embedded.rates", files, (coordinates, speeds, given, projects))
 
 
-def write_routines(coordinates: int, speeds: int, given: bool, projects: bool) -> list[Routine]:
+def write_routines(coordinates: int | None, speeds: int | None, given: bool, projects: bool) -> list[Routine]:
     """Write the routines; see `rates_source`."""
     written = [_rates(coordinates, speeds, given)]
     return [*written, _project(coordinates, speeds)] if projects else written
 
 
-def _rates(coordinates: int, speeds: int, given: bool) -> Routine:
-    """Write ``(q', u')`` from ``(q, u)``; the data: derived values and scratch."""
+_HEAD = 7
+"""The data of a session begin with: the pointers to derived values and scratch of both functions, that to room for the
+results of a projection, and the numbers of coordinates and of speeds."""
+
+
+def _rates(coordinates: int | None, speeds: int | None, given: bool) -> Routine:
+    """Write ``(q', u')`` from ``(q, u)``."""
     arguments = {"t": NUMBER, "y": ADDRESS, "yp": ADDRESS, "data": ADDRESS}
     r = Routine("rates", arguments, exported=True)
     t, y, yp, data = r.arguments
-    u, accelerations = y.at(coordinates), yp.at(coordinates)
+    first, last = _counts(data, 5, coordinates, speeds)
+    u, accelerations = y.at(first), yp.at(first)
     if not given:
-        r.copy(yp, u, speeds)
+        r.copy(yp, u, last)
     outputs = [yp, accelerations] if given else [accelerations]
     derived, scratch = (data.read(k, ADDRESS) for k in range(2))
     r.give(call_kernel(r, "kernel", [place_of(r, t), y, u], derived, scratch, outputs))
     return r
 
 
-def _project(coordinates: int, speeds: int) -> Routine:
+def _counts(data: Value, place: int, *known: int | None) -> tuple[Value | int, ...]:
+    return tuple(data.read(place + k, INTEGER) if one is None else one for k, one in enumerate(known))
+
+
+def _project(coordinates: int | None, speeds: int | None) -> Routine:
     """Take steps of Newton's method until one moves nothing; 1 where none does.
 
-    The data: derived values, scratch, and room for the results of a step.
+    The data begin with the derived values of this function.
     """
     r = Routine("project", {"t": NUMBER, "y": ADDRESS, "data": ADDRESS}, exported=True)
     t, y, data = r.arguments
     derived, scratch, room = (data.read(k, ADDRESS) for k in range(3))
-    moved = room.at(coordinates + speeds)
+    first, last = _counts(data, 3, coordinates, speeds)
+    total = first + last
+    moved = room.at(total)
     time = place_of(r, t)
     with r.count(STEPS):
-        inputs, outputs = [time, y, y.at(coordinates)], [room, room.at(coordinates), moved]
+        inputs, outputs = [time, y, y.at(first)], [room, room.at(first), moved]
         with r.when(call_kernel(r, "nearer", inputs, derived, scratch, outputs) != 0):
             r.give(1)
-        r.copy(y, room, coordinates + speeds)
+        r.copy(y, room, total)
         largest = r.variable(0.0)
-        with r.count(speeds) as i:
+        with r.count(last) as i:
             largest.now = r.most(r.size(moved[i]), largest.now)
         with r.when(largest.now <= MET):
             r.give(0)
@@ -105,11 +112,9 @@ class CompiledAccelerations:
         _, q, u = (len(group.symbols) for group in program.inputs)
         given, projects = len(program.outputs) == 2, projection is not None
         self._room = q + 2 * u if projects else 0
-        routines = rates_source(q, u, given, projects)
         exports = ["rates", "project"] if projects else ["rates"]
-        tiers = build_tiers(parts, is_brief, exports, routines)
-        self._built, self._better, self._cost = tiers.quick, tiers.better, tiers.cost
-        self._left, self._lock = self._cost, threading.Lock()
+        routines, of_tapes = (rates_source(n, m, given, projects) for n, m in ((q, u), (None, None)))
+        self.tiers, self._counts = Tiers(parts, exports, routines, is_brief, of_tapes), (q, u)
 
     def bind(self, parameter_values: ArrayLike, projects: bool = True) -> Callable[[], CompiledRates]:
         """Return what gives each session functions of its own, with these parameters."""
@@ -123,30 +128,28 @@ class CompiledAccelerations:
 
     def open(self, projects: bool = True) -> OwnRates:
         """Return rates of a session whose parameters can be changed between its runs."""
-        # The pointers to derived values, scratch and room of each function; then scratch, room and the derived values.
-        head, counts = 5 if self._room else 2, [len(one.prologue) for one in self._programs.values()]
-        room = head + self._built.scratch
+        counts = [len(one.prologue) for one in self._programs.values()]
+        built = self.tiers.now
+        room = _HEAD + built.scratch
         own = np.empty(room + self._room + sum(counts))
         data, places, end = own.ctypes.data, [], room + self._room
         for count in counts:
             places.append(data + 8 * end)
             end += count
-        scratch = data + 8 * head
-        pointers = [place for one in places for place in (one, scratch)]
-        own[:head].view(np.uint64)[:] = [*pointers, data + 8 * room][:head]
-        built = self._built
+        scratch = data + 8 * _HEAD
+        pointers = [place for one in (places[0], places[-1]) for place in (one, scratch)]
+        own[:_HEAD].view(np.uint64)[:] = [*pointers, data + 8 * room, *self._counts]
         rates = self._at(data, (built, own), projects)
         prologues = tuple(built.code.addresses[f"{name}_prologue"] for name in self._programs)
         return OwnRates(rates, prologues, places[0], scratch, tuple(places))
 
     def _at(self, data: int, kept: tuple[Built, FloatArray], projects: bool) -> CompiledRates:
         """Return the present code with the data of a session; it keeps the code whose prologues fill that."""
-        built, quick = self._built, self._better is not None
+        built, quick = self.tiers.now, self.tiers.has_better
         project = built.code.addresses["project"] if projects and self._room else 0
 
         def faster(seconds: float) -> CompiledRates | None:
-            self._spend(seconds)
-            return None if self._built is built else self._at(data, kept, projects)
+            return None if self.tiers.spend(seconds) is built else self._at(data, kept, projects)
 
         return CompiledRates(
             built.code.addresses["rates"],
@@ -157,19 +160,9 @@ class CompiledAccelerations:
             faster if quick else None,
         )
 
-    def _spend(self, seconds: float) -> None:
-        """Take note of steps or a start; compile what is faster once it has run for as long as that takes, or often."""
-        self._left -= seconds or self._cost / _STARTS
-        if self._left <= 0.0:
-            with suppress(TimeIsUp):
-                self.at_its_best()
-
     def at_its_best(self) -> CompiledAccelerations:
         """Return this with the code that suits many runs, or a long one."""
-        with self._lock:
-            better, self._better = self._better, None
-            if better is not None:
-                self._built = better()
+        self.tiers.at_its_best()
         return self
 
     def fill(self, own: OwnRates, parameter_values: ArrayLike) -> None:

@@ -121,6 +121,7 @@ class CompiledStepper(NativeStepper):
         self._callbacks: list[object] = []
         self.interrupted = False
         self._restart: Callable[[float], None] | None = None
+        self._faster_events: Callable[[float], int | None] | None = None
         guard = problem.guard
         self._calls_python = problem.compiled is None or (guard is not None and not guard.function)
         rates = self._in_python(problem) if problem.compiled is None else problem.compiled()
@@ -150,7 +151,7 @@ class CompiledStepper(NativeStepper):
 
     def _go_on(self, last: int, function: str, *arguments: int) -> int | None:
         """Take steps, and see whether the next ones are to be taken by faster code."""
-        if self._rates.faster is None:
+        if self._rates.faster is None and self._faster_events is None:
             return super()._go_on(last, function, *arguments)
         began = time.perf_counter()
         code = super()._go_on(last, function, *arguments)
@@ -163,6 +164,10 @@ class CompiledStepper(NativeStepper):
         if better is not None:
             self._rates, self._keep = better, (self._keep, better.keep)
             self._set(function=better.function, project=better.project)
+        events = None if self._faster_events is None else self._faster_events(seconds)
+        if events is not None:
+            self._faster_events = None
+            self._set(events=events)
 
     def batch_places(self) -> BatchPlaces:
         """Return the addresses with which many runs can be made in one call."""
@@ -173,12 +178,12 @@ class CompiledStepper(NativeStepper):
         from atwood.integrators.moments import Moments
 
         horizon = self._session + 8 * self._places["horizon"]
-        return Moments(self.batch_places(), horizon, changes, self._ends[0])
+        return Moments(self.batch_places(), horizon, changes, self._ends[0], self._change_over)
 
     def watch(self, events: EventData) -> bool:
         """Come back with `Outcome.NOTICED` after a step in which an event may have happened."""
         self._events, self._signs = np.zeros((2, events.count))
-        self._keep, self._restart = (self._keep, events), events.restart
+        self._keep, self._restart, self._faster_events = (self._keep, events), events.restart, events.faster
         values, signs = (array.ctypes.data for array in (self._events, self._signs))
         self._set(events=events.explicit, events_data=events.address, values=values, signs=signs)
         self._set(event_count=events.count)

@@ -1,0 +1,370 @@
+"""Programs as tapes: lists of operations that one evaluator, compiled once a machine, runs without machine code.
+
+A tape does what the machine code of a program does: the same operations, in an order in which neighbours of one kind
+stand together, so that all values have the same bits.  It takes some thirtieth of the time to make, and two to four
+times as long to run.
+
+A tape is an array of doubles: the number of constants, these, and behind them words of 32 bits.  Values lie in the
+scratch array, each in a place of its own: constants, what is given, and what is computed, in the order of the words.
+Each group of words begins with a code and a count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import chain
+from math import nan
+
+import numpy as np
+
+from atwood.arrays import FloatArray
+from atwood.codegen.llvm.layout import LARGEST_UNROLLED, Body, MatrixKey, matrix_key, places_of
+from atwood.codegen.llvm.linear_systems import write_elimination
+from atwood.codegen.llvm.text import OWN_FUNCTIONS
+from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Routine, Value, Variable
+from atwood.errors import UnsupportedError
+from atwood.expr.core.analysis import live
+from atwood.expr.core.graph import Expression
+from atwood.lazy_dataclasses import dataclass
+
+_TWO = ("mul", "add", "sub", "div", "minimum", "maximum", "less", "less_equal", "logical_and", "logical_or")
+_ONE = ("neg", "sqrt", "absolute", "floor", "sign", "logical_not")
+_OTHERS = ("copy", "store", "end", "sin_cos", "call1", "call2", "select", "small", "factorise", "substitute")
+_CODES = {one: k for k, one in enumerate((*_TWO[:3], *_OTHERS, *_TWO[3:], *_ONE))}
+_PARTNERS = {"sin": "cos", "cos": "sin"}
+
+
+@dataclass(frozen=True, eq=False)
+class Tape:
+    """A body as what the evaluator reads.
+
+    Attributes
+    ----------
+    words
+        The tape.
+    scratch
+        The length of the scratch array that it needs, which is at least that of the machine code.
+    """
+
+    words: FloatArray
+    scratch: int
+
+
+def write_tape(body: Body, functions: Callable[[str], int]) -> Tape:
+    """Return a body as a tape; a function tells where the elementary ones are, by their names as operations.
+
+    Raises
+    ------
+    UnsupportedError
+        If it calls functions in Python.
+    """
+    return _Writer(body, functions).tape()
+
+
+class _Writer:
+    """What has been written of a tape."""
+
+    def __init__(self, body: Body, functions: Callable[[str], int]) -> None:
+        self.body, self.functions = body, functions
+        self.known = places_of(body)
+        nodes = live([node for node, _, _ in body.results])
+        self.constants = [node.payload for node in nodes if node.is_constant]
+        self.places = {node.index: k for k, node in enumerate(one for one in nodes if one.is_constant)}
+        self.words: list[int] = []
+        self.regions: dict[MatrixKey, int] = {}
+        self.tables: dict[str, int] = {}
+        self.nodes = self._needed(nodes)
+
+    def _needed(self, nodes: Sequence[Expression]) -> list[Expression]:
+        """Return what is computed, arguments before users."""
+        known, wanted = self.known, {node.index for node, _, _ in self.body.results}
+        found = []
+        for node in reversed(nodes):
+            if node.index in wanted and node.index not in known and node.arguments:
+                wanted.update([one.index for one in node.arguments])
+                found.append(node)
+        return found[::-1]
+
+    def tape(self) -> Tape:
+        """Return the whole tape."""
+        groups = self._groups()
+        for kind in sorted({kind for kind, _ in groups} & {*OWN_FUNCTIONS, "sin_cos"}):
+            self.tables[kind] = len(self.constants)
+            self.constants.append(float(np.array(self.functions(kind), dtype=np.uint64).view(np.float64)))
+        self.end = len(self.constants)
+        for pointer, given in self.body.given:
+            number = 0 if pointer == "derived" else 1 + int(pointer.removeprefix("in"))
+            self.words += [_CODES["copy"], len(given), number]
+            self._place(given)
+        for kind, several in groups:
+            self._write(kind, several)
+        self._write_results()
+        padding = [0] * (1 + len(self.words) % 2)
+        words = np.array([*self.words, _CODES["end"], *padding], dtype=np.int32)
+        head = np.array([len(self.constants)], dtype=np.int64).view(np.float64)
+        return Tape(np.concatenate([head, self.constants, words.view(np.float64)]), self.end)
+
+    def _groups(self) -> list[tuple[str, list[Expression]]]:
+        """Return operations of one kind together, behind those whose values they read."""
+        levels: dict[int, int] = {}
+        groups: dict[tuple[int, str], list[Expression]] = {}
+        waves = {(one.operation, one.arguments[0].index) for one in self.nodes if one.operation in _PARTNERS}
+        for node in self.nodes:
+            kind, arguments = node.operation, node.arguments
+            level = 1 + max([levels.get(one.index, 0) for one in arguments])
+            levels[node.index] = level
+            if kind in _PARTNERS and (_PARTNERS[kind], arguments[0].index) in waves:
+                if kind == "cos":
+                    continue
+                kind = "sin_cos"
+            groups.setdefault((level, kind), []).append(node)
+        self.cosines = {one.arguments[0].index: one for one in self.nodes if one.operation == "cos"}
+        return [(kind, several) for (_, kind), several in sorted(groups.items(), key=lambda one: one[0])]
+
+    def _place(self, nodes: Sequence[Expression]) -> None:
+        """Give values the next places."""
+        self.places.update((node.index, self.end + k) for k, node in enumerate(nodes))
+        self.end += len(nodes)
+
+    def _arguments(self, nodes: Sequence[Expression]) -> list[int]:
+        places = self.places
+        return [places[one.index] for node in nodes for one in node.arguments]
+
+    def _write(self, kind: str, nodes: Sequence[Expression]) -> None:
+        """Write operations of one kind."""
+        if kind == "component":
+            self.places.update((one.index, self.places[one.arguments[0].index] + one.payload) for one in nodes)
+        elif kind == "solve":
+            for one in nodes:
+                self._solve(one)
+        elif kind == "sin_cos":
+            self.words += [_CODES[kind], len(nodes), self.tables[kind], *self._arguments(nodes)]
+            pairs = [(one, self.cosines[one.arguments[0].index]) for one in nodes]
+            self._place(list(chain.from_iterable(pairs)))
+        elif kind in OWN_FUNCTIONS:
+            self.words += [_CODES[f"call{OWN_FUNCTIONS[kind]}"], len(nodes), self.tables[kind]]
+            self.words += self._arguments(nodes)
+            self._place(nodes)
+        elif kind in _CODES:
+            self.words += [_CODES[kind], len(nodes), *self._arguments(nodes)]
+            self._place(nodes)
+        else:
+            raise UnsupportedError(f"there is no tape for the operation {kind} in {nodes[0]!r}")
+
+    def _solve(self, node: Expression) -> None:
+        """Write a linear system; its unknowns lie side by side."""
+        size, key = node.payload, matrix_key(node)
+        entries = [self.places[one.index] for one in node.arguments]
+        if size <= LARGEST_UNROLLED:
+            self.words += [_CODES["small"], size, *entries]
+            self.places[node.index] = self.end + size * size
+            self.end += size * (size + 1)
+            return
+        if key not in self.regions:
+            self.words += [_CODES["factorise"], size, *entries[: size * size]]
+            self.regions[key] = self.end
+            self.end += size * (size + 1)
+        self.words += [_CODES["substitute"], size, self.regions[key], *entries[size * size :]]
+        self.places[node.index] = self.end
+        self.end += size
+
+    def _write_results(self) -> None:
+        groups: dict[str, list[int]] = {}
+        for node, pointer, position in self.body.results:
+            groups.setdefault(pointer, []).extend((self.places[node.index], position))
+        for pointer, pairs in groups.items():
+            self.words += [_CODES["store"], len(pairs) // 2, int(pointer.removeprefix("out")), *pairs]
+
+
+def write_routines() -> list[Routine]:
+    """Write the evaluator; it takes a tape, and then what a program's function takes, and returns what that does."""
+    r = Routine("evaluate", dict.fromkeys(("tape", "inputs", "derived", "scratch", "outputs"), ADDRESS), exported=True)
+    return [*write_elimination(), _write_small(), _Evaluator(r).written()]
+
+
+class _Evaluator:
+    """The routine while it is written: where the next words and the next values are."""
+
+    def __init__(self, r: Routine) -> None:
+        self.r = r
+        self.tape, self.inputs, self.derived, self.values, self.outputs = r.arguments
+
+    def written(self) -> Routine:
+        """Write the loop over groups of words."""
+        r, count = self.r, self.tape.read(0, INTEGER)
+        r.copy(self.values, self.tape.at(1), count)
+        self.word: Variable = r.variable(self.tape.at(count + 1), ADDRESS)
+        self.next: Variable = r.variable(self.values.at(count), ADDRESS)
+        total = r.variable(0.0)
+        written = {"copy": self._copy, "sin_cos": self._waves, "select": self._select} | {
+            "small": self._small,
+            "factorise": self._factorise,
+            "substitute": self._substitute,
+        }
+        with r.forever() as loop:
+            now = self.word.now
+            code, count = (now.read(k, CODE).integer() for k in range(2))
+            words = now.at(2, CODE)
+            for kind, number in _CODES.items():
+                with r.when(code == number):
+                    if kind == "end":
+                        r.give((total.now - total.now != 0.0).code())
+                    elif kind == "store":
+                        self._store(words, count, total)
+                    elif kind in written:
+                        written[kind](words, count)
+                    elif kind in ("call1", "call2"):
+                        self._call(words, count, int(kind[-1]))
+                    else:
+                        self._each(words, count, kind)
+                    r.repeat(loop)
+            r.give(1)
+        return r
+
+    def _value(self, words: Value, k: Value | int) -> Value:
+        """Return a value whose place is a word."""
+        return self.values[words.read(k, CODE).integer()]
+
+    def _go_on(self, words: Value, read: Value | int, made: Value | int) -> None:
+        """Go on behind words that have been read, and values that have been made."""
+        self.word.now = words.at(read, CODE)
+        self.next.now = self.next.now.at(made)
+
+    def _each(self, words: Value, count: Value, kind: str) -> None:
+        r, place, taken = self.r, self.next.now, 2 if kind in _TWO else 1
+        with r.count(count) as k:
+            place[k] = _computed(r, kind, *(self._value(words, k * taken + i) for i in range(taken)))
+        self._go_on(words, count * taken, count)
+
+    def _copy(self, words: Value, count: Value) -> None:
+        r, number = self.r, words.read(0, CODE).integer()
+        table = self.inputs
+        with r.when(number == 0):
+            r.copy(self.next.now, self.derived, count)
+        with r.otherwise():
+            r.copy(self.next.now, table.read(number - 1, ADDRESS), count)
+        self._go_on(words, 1, count)
+
+    def _store(self, words: Value, count: Value, total: Variable) -> None:
+        r, target = self.r, self.outputs.read(words.read(0, CODE).integer(), ADDRESS)
+        with r.count(count) as k:
+            value = self._value(words, 2 * k + 1)
+            target[words.read(2 * k + 2, CODE).integer()] = value
+            total.now = total.now + value
+        self._go_on(words, 2 * count + 1, 0)
+
+    def _function(self, words: Value) -> Value:
+        return self.tape.read(words.read(0, CODE).integer() + 1, ADDRESS)
+
+    def _waves(self, words: Value, count: Value) -> None:
+        r, place, function = self.r, self.next.now, self._function(words)
+        with r.count(count) as k:
+            sine = place.at(2 * k)
+            r.call(function, self._value(words, k + 1), sine, sine.at(1), result=None)
+        self._go_on(words, count + 1, 2 * count)
+
+    def _call(self, words: Value, count: Value, taken: int) -> None:
+        r, place, function = self.r, self.next.now, self._function(words)
+        with r.count(count) as k:
+            given = [self._value(words, k * taken + i + 1) for i in range(taken)]
+            place[k] = r.call(function, *given, result=NUMBER)
+        self._go_on(words, count * taken + 1, count)
+
+    def _select(self, words: Value, count: Value) -> None:
+        r, place = self.r, self.next.now
+        with r.count(count) as k:
+            condition, a, b = (self._value(words, 3 * k + i) for i in range(3))
+            place[k] = r.choose(condition != 0.0, a, b)
+        self._go_on(words, 3 * count, count)
+
+    def _gather(self, words: Value, count: Value) -> None:
+        """Bring so many values together at the next places."""
+        place = self.next.now
+        with self.r.count(count) as k:
+            place[k] = self._value(words, k)
+        self._go_on(words, count, count)
+
+    def _small(self, words: Value, size: Value) -> None:
+        matrix = self.next.now
+        self._gather(words, size * (size + 1))
+        self.r.call("small", size, matrix, matrix.at(size * size), result=None)
+
+    def _factorise(self, words: Value, size: Value) -> None:
+        matrix = self.next.now
+        self._gather(words, size * size)
+        self.r.call("factorise", size, matrix, matrix.at(size * size), result=None)
+        self.next.now = self.next.now.at(size)
+
+    def _substitute(self, words: Value, size: Value) -> None:
+        side, matrix = self.next.now, self.values.at(words.read(0, CODE).integer())
+        self._gather(words.at(1, CODE), size)
+        self.r.call("substitute", size, matrix, matrix.at(size * size), side, result=None)
+
+
+def _computed(r: Routine, kind: str, a: Value, b: Value | None = None) -> Value:
+    """Return what an operation of one or two values gives; see `atwood.codegen.llvm.text`."""
+    if b is None:
+        match kind:
+            case "neg":
+                return r.flip(r.high(r.value(-0.0, NUMBER)) >> 31, a)
+            case "sqrt":
+                return r.sqrt(a)
+            case "absolute":
+                return r.size(a)
+            case "floor":
+                return r.floor(a)
+            case "logical_not":
+                return r.choose(a != 0.0, 0.0, 1.0)
+        return r.choose(a > 0.0, r.value(1.0, NUMBER), r.choose(a < 0.0, r.value(-1.0, NUMBER), a * 0.0))
+    match kind:
+        case "add":
+            return a + b
+        case "sub":
+            return a - b
+        case "mul":
+            return a * b
+        case "div":
+            return a / b
+        case "minimum":
+            return r.choose(a <= b, a, b)
+        case "maximum":
+            return r.choose(a >= b, a, b)
+        case "less":
+            condition = a < b
+        case "less_equal":
+            condition = a <= b
+        case "logical_and":
+            condition = (a != 0.0) & (b != 0.0)
+        case _:
+            condition = (a != 0.0) | (b != 0.0)
+    return r.choose(condition, 1.0, 0.0)
+
+
+def _write_small(name: str = "small") -> Routine:
+    """Write the elimination of few unknowns with one right-hand side, as `Solver` does it in registers."""
+    r = Routine(name, {"n": INTEGER, "a": ADDRESS, "x": ADDRESS}, None)
+    n, a, x = r.arguments
+    with r.count(n) as k:
+        row = a.at(k * n)
+        with r.count(n, k + 1) as i:
+            other = a.at(i * n)
+            with r.when(r.size(other[k]) > r.size(row[k])):
+                with r.count(n, k) as j:
+                    row[j], other[j] = other[j], row[j]
+                x[k], x[i] = x[i], x[k]
+        head = row[k]
+        row[k] = r.choose(head == 0.0, nan, head)
+        with r.count(n, k + 1) as i:
+            below = a.at(i * n)
+            factor = below[k] / row[k]
+            with r.count(n, k + 1) as j:
+                below[j] = below[j] - factor * row[j]
+            x[i] = x[i] - factor * x[k]
+    with r.count(n) as turn:
+        i = n - 1 - turn
+        row, total = a.at(i * n), r.variable(x[i])
+        with r.count(n, i + 1) as j:
+            total.now = total.now - row[j] * x[j]
+        x[i] = total.now / row[i]
+    r.give()
+    return r

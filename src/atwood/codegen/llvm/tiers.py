@@ -1,0 +1,154 @@
+"""Programs that run at once, by tapes, and by machine code once they have run for long.
+
+A module of tapes has the functions of one of machine code, with the same arrays and bits.  Its own code is that of its
+routines, and calls of the evaluator (`atwood.codegen.llvm.tape`): it is the same for all programs.
+"""
+
+from __future__ import annotations
+
+import functools
+import threading
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+
+from atwood.clock import TimeIsUp, within_time
+from atwood.codegen.cache import default_cache, make_key
+from atwood.codegen.llvm.build import (
+    Built,
+    RoutineSource,
+    build_code,
+    build_now,
+    default_options,
+    hash_of_generators,
+    key_of,
+    once,
+)
+from atwood.codegen.llvm.engine import compile_text, load_code, target_description
+from atwood.codegen.llvm.layout import main_body, prologue_body
+from atwood.codegen.llvm.module import CodeOptions, Part, stub_text, write_module
+from atwood.codegen.llvm.own import address_of
+from atwood.codegen.llvm.tape import Tape, write_tape
+from atwood.errors import UnsupportedError
+from atwood.stages import stage
+
+_COST = (1.5e-5, 4e-5)
+"""Seconds that it takes to make machine code, for each node, at LLVM's quickest level and above."""
+
+_LEAST = 0.01
+"""Seconds that it takes at least."""
+
+_STARTS = 10
+"""What was started so often will be started again."""
+
+
+class Tiers:
+    """Programs as tapes, and as machine code once they have run for as long as that takes to make, or were begun often.
+
+    Parameters
+    ----------
+    parts, exports, routines
+        See `build_code`.
+    is_brief
+        Whether they are run for short stretches at a time.
+    of_tapes
+        Routines that do the same whatever the shape of the programs, if others do it for one shape.
+    is_quick
+        Whether tapes are to do at first; what calls functions in Python has none.
+
+    Attributes
+    ----------
+    now
+        The present code. All that is made has the same arrays, and gives the same values to the bit.
+    """
+
+    def __init__(
+        self,
+        parts: Sequence[Part],
+        exports: Sequence[str],
+        routines: RoutineSource,
+        is_brief: bool = False,
+        of_tapes: RoutineSource | None = None,
+        is_quick: bool = True,
+    ) -> None:
+        options, size = default_options(parts, is_brief), sum(part.program.size for part in parts)
+        best = functools.partial(build_code, parts, options, exports=exports, routines=routines)
+        store, self._lock = default_cache(), threading.Lock()
+        is_quick &= store is None or not within_time(lambda: store.has(key_of(parts, options, routines)))
+        self._better: Callable[[], Built] | None = best if is_quick else None
+        self._cost = self._left = _LEAST + _COST[options.level > 0] * size
+        try:
+            self.now = build_tapes(parts, exports, of_tapes or routines) if is_quick else best()
+        except UnsupportedError:
+            self.now, self._better = best(), None
+
+    @property
+    def has_better(self) -> bool:
+        """Whether there is code that runs faster."""
+        return self._better is not None
+
+    def spend(self, seconds: float) -> Built:
+        """Take note that it ran for so long, or, with 0, that it begins; return what is best to go on with."""
+        if self._better is not None:
+            self._left -= seconds or self._cost / _STARTS
+            if self._left <= 0.0:
+                with suppress(TimeIsUp):
+                    self.at_its_best()
+        return self.now
+
+    def at_its_best(self) -> Built:
+        """Return the code that suits many runs, or a long one."""
+        with self._lock:
+            better, self._better = self._better, None
+            if better is not None and (built := better()).scratch <= self.now.scratch:
+                self.now = built
+        return self.now
+
+
+def build_tapes(parts: Sequence[Part], exports: Sequence[str] = (), routines: RoutineSource | None = None) -> Built:
+    """Return programs as tapes, as `build_code` returns them as machine code.
+
+    Raises
+    ------
+    UnsupportedError
+        If a program calls functions in Python.
+    """
+    with stage("code"):
+        return within_time(lambda: _build_tapes(parts, exports, routines))
+
+
+def _build_tapes(parts: Sequence[Part], exports: Sequence[str], routines: RoutineSource | None) -> Built:
+    tapes: dict[str, Tape] = {}
+    for part in parts:
+        tapes[part.name] = write_tape(main_body(part.program, part.positions), address_of)
+        tapes[f"{part.name}_values"] = write_tape(prologue_body(part.program), address_of)
+    names = [*exports, *(name for part in parts for name in (part.name, f"{part.name}_prologue"))]
+    evaluator = _evaluator()
+    addresses = {f"tape.{name}": one.words.ctypes.data for name, one in tapes.items()}
+    addresses["evaluate"] = evaluator.code.addresses["evaluate"]
+    code = _code_of_tapes(tuple(part.name for part in parts), routines)
+    loaded = load_code(code, names, addresses, (evaluator, *tapes.values()))
+    return Built(loaded, max(one.scratch for one in tapes.values()), False, None)
+
+
+@once
+def _evaluator() -> Built:
+    return build_now([], CodeOptions(level=2), ["evaluate"], RoutineSource("codegen.llvm.tape"), True)
+
+
+@functools.lru_cache(maxsize=64)
+def _code_of_tapes(names: tuple[str, ...], routines: RoutineSource | None) -> bytes:
+    """Return the object code of a module of tapes, which knows of its programs by their names alone."""
+    written = routines.key if routines is not None else ()
+    key, store = make_key(["tapes", hash_of_generators(), names, written, target_description()]), default_cache()
+    found = store.read(key) if store is not None else None
+    if found is not None:
+        return found
+    text = "\n".join([write_module([], CodeOptions()).text, stub_text(names)])
+    if routines is not None:
+        from atwood.codegen.llvm.printer import print_routines
+
+        text = f"{text}\n{print_routines(routines.write())}"
+    code = compile_text(text, 1, has_variables=True)
+    if store is not None:
+        store.write(key, code)
+    return code
