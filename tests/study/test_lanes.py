@@ -7,11 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from atwood import assemble, sweep
+from atwood import Component, Point, Scalar, Scene, assemble, connector, event, parameter, sweep
 from atwood.forms.assembly import Assembly
-from atwood.study.sweeps import motions
+from atwood.integrators.batch import NOTICED
+from atwood.integrators.lanes import LaneBatch
+from atwood.study.sweeps import motions, waves
 from atwood.study.sweeps.result import Sweep
-from atwood_library.scenes import SCENES
+from atwood_library.scenes import SCENES, DoublePendulum
+
+from .test_sweep_events import ball
 
 RUNS = 19
 
@@ -25,7 +29,8 @@ VARIED = {
 
 def made(assembly: Assembly, width: int, monkeypatch: pytest.MonkeyPatch, vary: Any, **more: Any) -> Sweep:
     """Make a sweep in one thread, with so many runs side by side; 1 is one after another."""
-    monkeypatch.setattr(motions, "lane_count", lambda: width if width > 1 else 10**9)
+    for module in (motions, waves):
+        monkeypatch.setattr(module, "lane_count", lambda: width if width > 1 else 10**9)
     given: dict[str, Any] = {"t_end": 1.0, "outputs": 12, "threads": 1, "combine": "list", "solver": "taylor", **more}
     return sweep(assembly, vary, **given)
 
@@ -111,3 +116,60 @@ def test_fewer_runs_than_lanes_and_what_judges_steps_go_one_after_another(monkey
         found = made(assembly, 8, monkeypatch, {"gravity": np.linspace(5.0, 15.0, count)})
         assert found.statistics.batched == count
         assert opened.pop() == lanes
+
+
+class Wall(Component):
+    """The run ends where a point passes it."""
+
+    place: float = parameter(1.0, unit="m", doc="Where it stands.")
+    point: Point = connector(Point, "What may pass it.")
+
+    @event(direction=1, unit="m", target="stop", message="it is past the wall")
+    def passes(self) -> Scalar:
+        """Return how far the point is behind it."""
+        return self.point.position.x - self.place
+
+
+def before_a_wall(place: float) -> Scene:
+    scene = DoublePendulum()
+    wall = scene.add("wall", Wall(place=place))
+    scene.connect(scene["bob2"].point, wall.point)
+    scene.start["rod2.angle"] = 0.0
+    return scene
+
+
+WATCHED: dict[str, tuple[Any, dict[str, Any]]] = {
+    "never met": (lambda: before_a_wall(50.0), {"start": {"rod1.angle": (-2.5, 2.5)}}),
+    "met by some": (lambda: before_a_wall(1.3), {"start": {"rod1.angle": (-1.5, 0.3)}, "outputs": 40}),
+    "again and again": (ball, {"start": {"ball.position.z": (0.01, 1.0)}}),
+    "ends alone": (ball, {"start": {"ball.velocity.z": (-2.0, 9.0)}, "outputs": None}),
+}
+
+
+@pytest.mark.parametrize("name", WATCHED)
+def test_runs_that_are_watched_leave_their_lanes_where_something_happens(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, more = WATCHED[name]
+    (path, (low, high)), *_ = more["start"].items()
+    assembly, given = assemble(scene()), {"t_end": 2.0, "solver": "explicit", **more}
+    given["start"] = {path: np.random.default_rng(4).uniform(low, high, 4 * RUNS)}
+    codes: list[int] = []
+    kept = LaneBatch.advance
+
+    def noted(self: LaneBatch) -> bool:
+        is_done = kept(self)
+        codes.extend(self.codes.tolist() if is_done else ())
+        return is_done
+
+    monkeypatch.setattr(LaneBatch, "advance", noted)
+    alone = made(assembly, 1, monkeypatch, None, **given)
+    assert not codes
+    assert not alone.failed
+    for width in (2, 8):
+        wide = made(assembly, width, monkeypatch, None, **given)
+        assert wide.statistics.batched == alone.statistics.batched == 4 * RUNS
+        assert np.array_equal(numbers(wide), numbers(alone))
+        assert (wide.status, wide.messages) == (alone.status, alone.messages)
+        assert np.array_equal(wide.end_time, alone.end_time)
+    assert set(codes) == ({0} if name == "never met" else {0, NOTICED})

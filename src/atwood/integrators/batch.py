@@ -22,8 +22,9 @@ from atwood.codegen.llvm.module import CodeOptions
 from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Kind, Record, Routine, Value, Variable
 from atwood.lazy_dataclasses import dataclass
 
-ENDS = {0: "reached", 1: "step limit", 2: "too small", 3: "no value between", 4: "no rates"}
-"""How a run can end."""
+NOTICED = 5
+ENDS = {0: "reached", 1: "step limit", 2: "too small", 3: "no value between", 4: "no rates", NOTICED: "noticed"}
+"""How a run can end; `NOTICED` after a step in which an event may have happened, with its state to go on from alone."""
 
 _FIRST_BUDGET, _MOMENT = 2_000, 0.03
 """Steps of the first call, and for about how long a call should last, in seconds, so that Ctrl-C is heard."""
@@ -172,7 +173,7 @@ class Job:
         elif not is_done and taken < 0.5 * _MOMENT:
             self._allowed *= 2
         if is_done:  # what a run that ended early did not reach may have been half written
-            self.values[self.codes != 0] = np.nan
+            self.values[(self.codes != 0) & (self.codes != NOTICED)] = np.nan
         return is_done
 
 

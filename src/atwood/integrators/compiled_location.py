@@ -140,6 +140,10 @@ class CompiledLocator(EventLocator):
         """Whether nothing is known yet of the first step after a restart."""
         return bool(self._integers[_PLACES["settling"]])
 
+    def settle(self) -> None:
+        """Know that nothing happened in the first step after the last start."""
+        self._set(settling=0)
+
     def restart(self, state: State) -> None:
         """Take the signs from a new start of the solution."""
         given, self._given = self._given, ()

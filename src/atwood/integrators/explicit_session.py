@@ -21,6 +21,7 @@ from atwood.integrators.jumps import JumpLog
 from atwood.integrators.protocol import (
     Budget,
     ExplicitProblem,
+    Handed,
     Nearest,
     SolverOptions,
     State,
@@ -169,6 +170,22 @@ class ExplicitSession(SteppingSession):
         self._stepper.renew(horizon, absolute)
         self._begin_count(horizon, budget, signs)
         self._begin(t, y, on_stiff, end)
+
+    def take_over(self, handed: Handed) -> None:
+        """Go on behind a step that was taken side by side with those of other runs, in which an event may be.
+
+        It has just begun again where they did.
+        """
+        events, began = self._problem.compiled_events, self._here[0]
+        assert events is not None
+        assert self._compiled is not None
+        self._stepper.take_over(handed)
+        events.take_over(*handed.looked)
+        self._searched = self._stepper.begin_of_step()
+        if self._searched > began:
+            self._compiled.settle()
+        self._newest = self._stepper.state()
+        self._reached = min(self._newest[0], self._end)
 
     def _new_locator(self, horizon: float, signs: tuple[int, ...] | None) -> EventLocator | None:
         """Return what finds events in a new run: routines where events and what is between two steps are compiled."""

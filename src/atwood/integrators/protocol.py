@@ -566,3 +566,22 @@ def _check_watch(problem: ImplicitProblem | ExplicitProblem) -> None:
         raise UsageError(f"{problem.event_count} events need as many directions")
     if not set(problem.event_directions) <= {-1, 0, 1}:
         raise UsageError("an event direction is -1, 0 or +1")
+
+
+@dataclass(frozen=True, eq=False)
+class Handed:
+    """What a run is handed over with that was watched in a lane, after a step in which it may have met an event.
+
+    Attributes
+    ----------
+    rows
+        The table of arrays, one row each.
+    fields
+        Fields of the session by name.
+    looked
+        Time, length and signs of the last look, and values and slopes of each event there.
+    """
+
+    rows: FloatArray
+    fields: dict[str, float]
+    looked: tuple[float, float, FloatArray, FloatArray]

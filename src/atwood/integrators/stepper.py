@@ -21,7 +21,7 @@ from atwood.codegen.llvm.build import Built, RoutineSource, build_code
 from atwood.codegen.llvm.module import CodeOptions
 from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Kind, Lanes, Operand, Record, Routine, Value
 from atwood.errors import KernelEvaluationError, UsageError
-from atwood.integrators.protocol import Nearest, State, StepMonitor
+from atwood.integrators.protocol import Handed, Nearest, State, StepMonitor
 from atwood.lazy_dataclasses import dataclass, names_of
 
 if TYPE_CHECKING:
@@ -133,6 +133,10 @@ class Stepper(ABC):
     def expect(self, signs: FloatArray) -> None:
         """Learn which sign each event has; where it is zero, every step is noticed."""
         return
+
+    def take_over(self, handed: Handed) -> None:
+        """Stand behind a step that was taken side by side with those of other runs."""
+        raise UsageError("only embedded pairs are watched side by side")
 
     def begin_of_step(self) -> float:
         """Return the time at the begin of the last step."""

@@ -90,6 +90,11 @@ class EventData:
         self.memory[:] = 0.0
         self.memory[0] = t
 
+    def take_over(self, last: float, length: float, values: NDArray[np.float64], slopes: NDArray[np.float64]) -> None:
+        """Know what was seen at the last point: its time, the length over which slopes are taken, values and slopes."""
+        self.memory[:3] = last, length, 0.0
+        self.memory[3 : 3 + 2 * self.count] = np.concatenate([values, slopes])
+
     def has_noticed(self) -> bool:
         """Return, once, whether a value may have passed zero."""
         said = self.memory[2] != 0.0
@@ -228,7 +233,7 @@ def _look() -> Routine:
         first, first_slope, value = lasts[k], slopes[k], values[k]
         slope = r.choose(has_slopes, (value - others[k]) / past, 0.0)
         lasts[k], slopes[k] = value, slope
-        found.now = found.now | _may_pass_zero(r, width, (first, first_slope), (value, slope))
+        found.now = found.now | may_pass_zero(r, width, (first, first_slope), (value, slope))
     with r.when(found.now & (width > 0.0)):
         own.said = 1.0
         r.give(-2)
@@ -236,7 +241,7 @@ def _look() -> Routine:
     return r
 
 
-def _may_pass_zero(r: Routine, width: Value, first: tuple[Value, Value], last: tuple[Value, Value]) -> Value:
+def may_pass_zero(r: Routine, width: Value, first: tuple[Value, Value], last: tuple[Value, Value]) -> Value:
     """Tell whether signs differ, or tangents at both ends leave room for a dip between them."""
     sign = r.choose(last[0] < 0.0, -1.0, 1.0)
     a, b, signed = first[0] * sign, last[0] * sign, width * sign

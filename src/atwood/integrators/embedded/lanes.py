@@ -13,6 +13,7 @@ from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Routine, Value, addresses, place_of, places_of
 from atwood.expr.core.program import Program
 from atwood.integrators.embedded.dense_output import write_terms
+from atwood.integrators.embedded.looks import EventsOfMany, look_places, places_in_session, room_for, write_look
 from atwood.integrators.embedded.stepper import MANY_FIELDS, open_routine
 from atwood.integrators.embedded.steps import (
     GROWTH,
@@ -67,7 +68,8 @@ def write_routines(pair: Tableau, runs: int) -> list[Routine]:
     """Write the routines of sessions of so many runs; ``batch`` is called from outside."""
     memory = partial(Memory, MANY_FIELDS, pair.rows, runs=runs)
     own = [write(pair, runs) for write in (_evaluate, _begin, _step, _stability, _read)]
-    return [*write_batch(runs, memory, "absolute"), *own, *write_inner(pair, runs)]
+    batch = write_batch(runs, memory, "absolute", looks=True)
+    return [*batch, *own, *write_look(pair, runs), *write_inner(pair, runs)]
 
 
 def _evaluate(pair: Tableau, runs: int) -> Routine:
@@ -190,8 +192,9 @@ def _read(pair: Tableau, runs: int) -> Routine:
 
 
 _FILES = (
-    *(f"integrators/embedded/{name}.py" for name in ("dense_output", "steps", "stepper", "tableau")),
+    *(f"integrators/embedded/{name}.py" for name in ("dense_output", "looks", "steps", "stepper", "tableau")),
     *(f"integrators/{name}.py" for name in ("lanes", "stepper")),
+    *(f"codegen/{name}.py" for name in ("sundials/events", "tangents")),
 )
 
 
@@ -201,14 +204,18 @@ def _code(pair: Tableau, runs: int) -> Built:
     return build_code([], CodeOptions(level=2), exports=["batch"], routines=routines)
 
 
-def open_lanes(rates: RatesOfMany, values: FloatArray, options: SolverOptions, pair: Tableau) -> LanePlaces:
+def open_lanes(
+    rates: RatesOfMany, values: FloatArray, events: EventsOfMany | None, options: SolverOptions, pair: Tableau
+) -> LanePlaces:
     """Return a session of runs side by side with these parameters, as far as a run has none of its own."""
     runs, program = rates.runs, rates.program
     _, q, u = (len(group.symbols) for group in program.inputs)
     padded = -(-(q + u) // WIDTH) * WIDTH * runs
     fields = in_lanes(MANY_FIELDS, runs)
     places, begin = places_of(fields), pair.rows["all"] * padded
-    memory = np.zeros(begin + sum(1 if kind in (ADDRESS, INTEGER) else runs for kind in fields.values()))
+    count = 0 if events is None else len(events.program.results)
+    looks = begin + sum(1 if kind in (ADDRESS, INTEGER) else runs for kind in fields.values())
+    memory = np.zeros(looks + room_for(count, runs))
     derived, scratch = np.zeros(len(program.prologue) * runs), np.zeros(rates.built.scratch)
     rows = memory[:begin].reshape(-1, padded)
     rows[pair.rows["absolute"]] = 1.0
@@ -216,6 +223,12 @@ def open_lanes(rates: RatesOfMany, values: FloatArray, options: SolverOptions, p
     whole = {"arrays": memory.ctypes.data, "function": code["kernel"], "derived": derived.ctypes.data}
     whole |= {"scratch": scratch.ctypes.data, "size": q + u, "padded": padded, "coordinates": q * runs}
     whole |= {"speeds": u * runs, "given": len(program.outputs) - 1}
+    watch = None
+    if events is not None:
+        handed = places_in_session(pair, q + u, padded, begin, places, looks, count, runs)
+        watch = look_places(events, memory, looks, handed, runs)
+        whole |= {"looks_at": memory.ctypes.data + 8 * looks, "events_derived": watch.derived}
+        whole |= {"events_scratch": watch.scratch, "events": watch.kernel, "event_count": count}
     for name, value in whole.items():
         memory.view(np.int64)[begin + places[name]] = value
     numbers = {"relative": options.relative_tolerance, "longest": options.max_step or inf, "horizon": options.horizon}
@@ -237,4 +250,5 @@ def open_lanes(rates: RatesOfMany, values: FloatArray, options: SolverOptions, p
         tolerance_factor=1.0,
         clear=clear,
         keep=(rates, memory, derived, scratch),
+        looks=watch,
     )

@@ -28,6 +28,7 @@ from atwood.integrators.protocol import (
     RATES,
     CompiledRates,
     ExplicitProblem,
+    Handed,
     Nearest,
     SolverOptions,
     StepMonitor,
@@ -76,7 +77,7 @@ MANY_FIELDS: dict[str, Kind] = {
     **dict.fromkeys(("edgy", "calm"), NUMBER),
     **LANE_FIELDS,
     "shortened": NUMBER,
-    **dict.fromkeys(("derived", "scratch"), ADDRESS),
+    **dict.fromkeys(("derived", "scratch", "looks_at", "events_derived", "events_scratch"), ADDRESS),
     **dict.fromkeys(("arrived", "coordinates", "speeds", "given"), INTEGER),
 }
 """The fields of runs side by side: which of them have arrived at the end of a step, and what their rates are."""
@@ -259,6 +260,12 @@ class CompiledStepper(NativeStepper):
             self._arrays[self._rows["absolute"], : self._size] = np.maximum(absolute, np.finfo(float).tiny)
         self._set(**dict.fromkeys(names_of(Counts), 0), horizon=horizon, longest=self._options.max_step or inf)
         self._set(watch=0, seen=0)
+
+    def take_over(self, handed: Handed) -> None:
+        """Stand behind a step that was taken side by side with those of other runs."""
+        self._arrays[:, : self._size] = handed.rows
+        names = {"taken": "steps", "edges": "stiff"}
+        self._set(is_dense=0, **{names.get(name, name): value for name, value in handed.fields.items()})
 
     def begin_of_step(self) -> float:
         """Return the time at the begin of the last step."""

@@ -13,6 +13,7 @@ from atwood.lazy_dataclasses import dataclass
 if TYPE_CHECKING:
     from atwood.integrators.batch import BatchPlaces
     from atwood.integrators.embedded.lanes import RatesOfMany
+    from atwood.integrators.embedded.looks import EventsOfMany
     from atwood.integrators.embedded.tableau import Tableau
     from atwood.integrators.explicit_session import ExplicitSession, OnStiff
     from atwood.integrators.lanes import LanePlaces
@@ -45,7 +46,7 @@ class Task:
     explicit
         The equations ``y' = f(t, y)``, with what is watched.
     many
-        Their rates for so many runs side by side, and the values of the parameters.
+        Their rates for so many runs side by side, the values of the parameters, and what is watched, if anything is.
     series, hamiltonian
         Their Taylor recurrences, and Hamilton's equations.
     implicit
@@ -65,7 +66,7 @@ class Task:
     on_stiff: OnStiff | None = None
     explicit: ExplicitProblem | None = None
     series: Callable[[], TaylorProblem] | None = None
-    many: Callable[[int], tuple[RatesOfMany, FloatArray]] | None = None
+    many: Callable[[int], tuple[RatesOfMany, FloatArray, EventsOfMany | None]] | None = None
     hamiltonian: Callable[[], Hamiltonian] | None = None
     implicit: Callable[[bool], ImplicitProblem] | None = None
     impulsive: ImpulsiveProblem | None = None

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +15,13 @@ from atwood.expr import Program
 from atwood.forms.assembly import Assembly
 from atwood.forms.other_values import decisions_of
 from atwood.forms.sides import has_sides
+from atwood.integrators.embedded.looks import handed
 from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
+from atwood.integrators.embedded.tableau import Tableau
+from atwood.integrators.event_location import NOISE, ROUNDING
 from atwood.integrators.explicit_session import ExplicitSession
-from atwood.integrators.protocol import Budget, Statistics, Status, StepResult
+from atwood.integrators.lanes import LanePlaces, Watched
+from atwood.integrators.protocol import Budget, Handed, Statistics, Status, StepResult
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.outputs.event_functions import EventFunction
 from atwood.simulation.dynamics.orientation_coordinates import COORDINATE_SWITCH
@@ -25,8 +30,11 @@ from atwood.simulation.events.modes import MARGIN, EventProbe, EventRecord, marg
 from atwood.simulation.problem.explicit_scene import own_rates
 from atwood.simulation.problem.preparation import make_problem
 from atwood.simulation.run.choice import choose
-from atwood.study.sweeps.motions import Motion, task_of
+from atwood.study.sweeps.motions import Motion, lanes_for, task_of
 from atwood.study.sweeps.runs import SweepRequest
+
+_CLEAR = 4.0
+"""The sign of an event at the start is beyond doubt from so many times its rounding on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +55,10 @@ class SweepMode:
         The compiled events with theirs, and their program of (t, q, u, shift); None where nothing is watched.
     columns
         Where the parameters of this mode stand among those of the sweep.
+    pair
+        The method.
+    lanes
+        Opens a session that takes runs side by side; None where there is none for this mode.
     """
 
     motion: Motion
@@ -58,6 +70,8 @@ class SweepMode:
     event_data: EventData | None
     program: Program | None
     columns: NDArray[np.intp]
+    pair: Tableau
+    lanes: Callable[[], LanePlaces | None]
 
     @property
     def assembly(self) -> Assembly:
@@ -83,7 +97,7 @@ class SweepMode:
             and not (other.constraints or own.constraints or own.orientation_coordinates)
         )
 
-    def shifts(
+    def signs(
         self,
         t: FloatArray,
         q: FloatArray,
@@ -92,25 +106,39 @@ class SweepMode:
         lengths: FloatArray,
         time: FloatArray,
         tolerance: float,
-    ) -> tuple[FloatArray, NDArray[np.bool_]]:
-        """Return what is added to events that start at zero, one row each, and which runs can go on from there.
+    ) -> tuple[Watched, NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return what is known of events at the start, and which runs can go on from there, alone and side by side.
 
-        The rule is that of `atwood.simulation.events.modes.EventProbe`; a run in which a one-sided bound does not hold
-        at once is made by itself.
+        What is added to events that start at zero is that of `atwood.simulation.events.modes.EventProbe`; a run in
+        which a one-sided bound does not hold at once is made by itself. Side by side with others goes what has signs
+        beyond rounding: see `atwood.integrators.event_location`.
         """
         runs, count = len(t), len(self.functions)
         if self.program is None:
-            return np.zeros((runs, 0)), np.ones(runs, dtype=bool)
+            nothing = np.zeros((runs, 0))
+            return Watched(nothing, nothing), *np.ones((2, runs), dtype=bool)
         bound = self.assembly.parameter_values if values is None else values.T
         kernel = self.assembly.compiled(self.program, vectorized=True).bind(bound)
-        found = np.broadcast_to(kernel(t[None, :], q.T, u.T, np.zeros((count, runs)))[0], (count, runs)).T
+
+        def values_at(y: FloatArray) -> FloatArray:
+            q, u = np.split(y, [self.coordinates], axis=1)
+            return np.broadcast_to(kernel(t[None, :], q.T, u.T, np.zeros((count, runs)))[0], (count, runs)).T
+
+        y = np.concatenate([q, u], axis=1)
+        found = values_at(y)
         mass = total_masses(self.assembly, values)
         small = np.empty((runs, count))
         for k, one in enumerate(self.functions):
             small[:, k] = MARGIN * tolerance * size_of(one.unit, lengths, time, mass)
         happened, shifts = margins_at_start(self.functions, found, small)
         known = np.all(np.isfinite(found), axis=1) & np.all(found + shifts != 0.0, axis=1)
-        return shifts, known & ~np.any(happened, axis=1)
+        usable = known & ~np.any(happened, axis=1)
+        noise = np.zeros_like(found)
+        for turn in (np.cos, np.sin):
+            moved = values_at(y + ROUNDING * np.abs(y) * turn(1.0 + 2.4 * np.arange(y.shape[1])))
+            noise = np.maximum(noise, NOISE * np.abs(moved - found))
+        clear = usable & np.all(np.abs(found + shifts) > _CLEAR * noise, axis=1)
+        return Watched(shifts, np.sign(found + shifts)), usable, clear
 
     def run(
         self,
@@ -122,20 +150,31 @@ class SweepMode:
         budget: Budget,
         times: FloatArray,
         end: float,
+        handed: Handed | None = None,
     ) -> tuple[FloatArray, StepResult, Statistics]:
-        """Take a run from a state through output times, as far as no event stops it."""
+        """Take a run from a state through output times, as far as no event stops it.
+
+        It may have gone a part of the way side by side with others, and then goes on where it is `handed` over.
+        """
         if values is not None:
             self.rates.fill(self.own_rates, values)
         if self.events is not None and self.event_data is not None:
             given = self.assembly.parameter_values if values is None else values
             self.events.fill(self.event_data, given, shift)
         self.session.begin_again(t, y, end - t, budget, None, end, absolute)
+        if handed is not None:
+            self.session.take_over(handed)
         found, _, result = self.session.sample(times)
         if result.status is Status.EVENT and self.event_data is not None:
             watched = self.event_data.function()
             result = without_margin(lambda t, y: watched(t, y, y), shift, result, t)
             found = found[: np.searchsorted(times[: len(found)], result.t, side="right")]
         return found, result, self.session.statistics
+
+    def handed(self, numbers: FloatArray) -> Handed:
+        """Return what a run is handed over with that was watched side by side with others."""
+        size = self.coordinates + len(self.assembly.reduced.speeds)
+        return handed(self.pair, size, len(self.functions), numbers)
 
     def event(self, result: StepResult) -> EventFunction | None:
         """Return which event a run goes on from: the first that happened and leads somewhere."""
@@ -181,9 +220,10 @@ def find_mode(
     if found is None or (functions and data is None):
         return None, "it calls functions in Python"
     motion = Motion(assembly)
-    task = task_of(motion, chosen, options, assembly.parameter_values, found[1], functions, data)
+    program = probe.program() if functions else None
+    task = task_of(motion, chosen, options, assembly.parameter_values, found[1], functions, data, program)
     session = chosen.open(replace(task, t=t, y=np.concatenate([q, u])))
     assert isinstance(session, ExplicitSession)
     code = None if data is None else probe.code(for_ida=False)
-    program = probe.program() if functions else None
-    return SweepMode(motion, functions, session, *found, code, data, program, columns), ""
+    lanes = cache(lambda: lanes_for(chosen, task))
+    return SweepMode(motion, functions, session, *found, code, data, program, columns, chosen.tableau, lanes), ""

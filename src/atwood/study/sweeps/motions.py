@@ -16,9 +16,11 @@ from atwood.arrays import FloatArray
 from atwood.codegen.llvm.engine import lane_count
 from atwood.codegen.sundials.events import EventData
 from atwood.errors import AtwoodError, UnsupportedError
+from atwood.expr import Program
 from atwood.forms.accelerations import AccelerationProgram, accelerations_of
 from atwood.forms.assembly import Assembly
 from atwood.integrators.batch import BatchPlaces
+from atwood.integrators.embedded.looks import events_of_many
 from atwood.integrators.embedded.rates import OwnRates
 from atwood.integrators.lanes import LanePlaces
 from atwood.integrators.methods import AUTO, Method, Task
@@ -216,12 +218,17 @@ def open_lanes(
 
     That is where a method or an operation of the scene has no code in lanes, and where something judges each step.
     """
-    lanes = lane_count()
-    if method.lanes is None or count < lanes:
+    if method.lanes is None or count < lane_count():
         return None
-    task = task_of(motion, method, options, values, compiled_rates(motion.assembly, motion.program).open())
+    own = compiled_rates(motion.assembly, motion.program).open()
+    return lanes_for(method, task_of(motion, method, options, values, own))
+
+
+def lanes_for(method: Method, task: Task) -> LanePlaces | None:
+    """Open a session for a task that takes runs side by side; None where there is none for it."""
+    assert method.lanes is not None
     try:
-        return None if task.problem.guard is not None else method.lanes(task, lanes)
+        return None if task.problem.guard is not None else method.lanes(task, lane_count())
     except UnsupportedError:
         return None
 
@@ -234,6 +241,7 @@ def task_of(
     own: OwnRates,
     functions: Sequence[EventFunction] = (),
     data: EventData | None = None,
+    watched: Program | None = None,
 ) -> Task:
     """Return what a session is opened for that makes one run of a sweep after another."""
     assembly, begin = motion.assembly, motion.assembly.flat.t_start
@@ -254,7 +262,11 @@ def task_of(
         start,
         end=options.t_end,
         explicit=problem,
-        many=lambda runs: (compiled_rates_of_many(assembly, motion.program, runs), values),
+        many=lambda runs: (
+            compiled_rates_of_many(assembly, motion.program, runs),
+            values,
+            None if watched is None else events_of_many(watched, runs),
+        ),
         series=series,
     )
 

@@ -14,10 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
+from atwood.codegen.llvm.engine import lane_count
 from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
+from atwood.integrators.batch import NOTICED
+from atwood.integrators.lanes import LaneBatch, Watched
 from atwood.integrators.methods import AUTO
-from atwood.integrators.protocol import Budget, Status
+from atwood.integrators.protocol import Budget, Handed, Status
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.outputs.event_functions import UPDATE, EventFunction
 from atwood.simulation.dynamics.orientation_coordinates import COORDINATE_SWITCH
@@ -31,6 +34,9 @@ from atwood.study.sweeps.runs import Records, SweepRequest
 
 _CHATTER = 20
 """A run with so many stretches in a row that hardly last is left to be made, and judged, by itself."""
+
+_SECOND = 2.0
+"""A run that is noticed in its second step is taken from its start again: its search goes on from that of the first."""
 
 _SHORT = 1e-9
 """A stretch of a smaller share of the run hardly lasts."""
@@ -74,6 +80,17 @@ class _Samples:
     y: FloatArray
 
 
+@dataclass(frozen=True, eq=False)
+class _Ready:
+    """What runs of one mode begin with, one row each: see `_Piece.advance`."""
+
+    t: FloatArray
+    y: FloatArray
+    values: FloatArray | None
+    watched: Watched
+    absolute: FloatArray
+
+
 class Waves:
     """Pieces of a sweep over a scene with events.
 
@@ -97,7 +114,7 @@ class Waves:
         states = [
             _State(run, row, begin, np.concatenate([q[row], u[row]]), first) for row, run in enumerate(runs.tolist())
         ]
-        piece = _Piece(self, lengths, parameters)
+        piece = _Piece(self, lengths, parameters, stop)
         while states:
             if stop.is_set():
                 return 0
@@ -113,12 +130,19 @@ class Waves:
     def mode(self, modes: tuple[tuple[str, str], ...], state: _State, piece: _Piece) -> SweepMode | None:
         """Return a mode with this thread's session; None where runs that come there are made by themselves."""
         if not hasattr(self._own, "modes"):
-            self._own.modes = {}
+            self._own.modes, self._own.kept = {}, {}
         known: dict[tuple[tuple[str, str], ...], SweepMode | None] = self._own.modes
         if modes not in known:
             n = len(self.request.assembly.other_mode(dict(modes), {}).reduced.coordinates)
             at = state.t, state.y[:n], state.y[n:], float(piece.lengths[state.row])
             known[modes] = find_mode(self.request, dict(modes), at, self.rows.varies)[0]
+        return known[modes]
+
+    def keeps_state(self, mode: SweepMode, modes: tuple[tuple[str, str], ...]) -> bool:
+        """Return whether a run can go on from a mode in others as it stands."""
+        known: dict[tuple[tuple[str, str], ...], bool] = self._own.kept.setdefault(mode, {})
+        if modes not in known:
+            known[modes] = mode.keeps_state(modes)
         return known[modes]
 
     def own(self, run: int, modes: tuple[tuple[str, str], ...]) -> Assembly:
@@ -129,8 +153,9 @@ class Waves:
 class _Piece:
     """Runs that are made together."""
 
-    def __init__(self, waves: Waves, lengths: FloatArray, parameters: FloatArray | None) -> None:
+    def __init__(self, waves: Waves, lengths: FloatArray, parameters: FloatArray | None, stop: threading.Event) -> None:
         self.waves, self.request, self.lengths, self.parameters = waves, waves.request, lengths, parameters
+        self.stop = stop
         self.samples: dict[tuple[tuple[str, str], ...], list[_Samples]] = {}
         self.ended: dict[int, tuple[_State, str]] = {}
         self.seconds = 0.0
@@ -144,24 +169,77 @@ class _Piece:
         options = self.request.options
         *_, time, absolute, usable = make_ready(mode.motion, t, q, u, values, lengths, options)
         with np.errstate(all="ignore"):
-            shifts, watched = mode.shifts(t, q, u, values, lengths, time, options.relative_tolerance)
+            watched, known, clear = mode.signs(t, q, u, values, lengths, time, options.relative_tolerance)
+        ready = _Ready(t, y, values, watched, absolute)
+        chosen = np.flatnonzero(usable & known)
+        left = self._side_by_side(mode, states, ready, chosen[clear[chosen]])
         going: list[tuple[_State, EventFunction]] = []
-        for k in np.flatnonzero(usable & watched).tolist():
-            event = self._stretch(mode, states[k], None if values is None else values[k], shifts[k], absolute[k])
+        for k in chosen.tolist():
+            handed = left.get(k)
+            if k in left and handed is None:
+                continue
+            event = self._stretch(mode, states[k], ready, k, handed)
             if event is not None:
                 going.append((states[k], event))
         return [one for one, event in going if self._enter(mode, one, event)]
 
+    def _side_by_side(
+        self, mode: SweepMode, states: Sequence[_State], ready: _Ready, chosen: NDArray[np.intp]
+    ) -> dict[int, Handed | None]:
+        """Take runs side by side as far as no event is noticed; return with what those go on that met one.
+
+        None stands for what has come to its end, or is to be made by itself.
+        """
+        options, times, width = self.request.options, self.request.times, lane_count()
+        chosen = chosen[[states[k].shown < len(times) for k in chosen.tolist()]] if len(chosen) else chosen
+        wide = mode.lanes() if len(chosen) >= width and options.max_steps is None else None
+        if wide is None:
+            return {}
+        shown = np.array([states[k].shown for k in chosen.tolist()])
+        batch = LaneBatch(
+            wide,
+            ready.t[chosen],
+            times,
+            ready.y[chosen],
+            ready.absolute[chosen],
+            parameters=None if ready.values is None else ready.values[chosen],
+            horizons=options.t_end - ready.t[chosen],
+            firsts=shown,
+            watched=Watched(ready.watched.shifts[chosen], ready.watched.signs[chosen]),
+        )
+        while not batch.advance():
+            if self.stop.is_set():
+                return dict.fromkeys(chosen.tolist())
+        self.seconds += batch.seconds
+        found: dict[int, Handed | None] = {}
+        for row, k in enumerate(chosen.tolist()):
+            state, code = states[k], int(batch.codes[row])
+            handed = mode.handed(batch.left[row]) if code == NOTICED else None
+            if handed is not None and handed.fields["taken"] == _SECOND:
+                continue
+            found[k] = handed
+            past = len(times) if handed is None else np.searchsorted(times, handed.fields["t_old"], side="right")
+            y = batch.values[row, state.shown : past]
+            if handed is None:
+                may_change = options.solver == AUTO and batch.stiff[row] > 0  # its solver
+                if code != 0 or may_change or not np.all(np.isfinite(y)):
+                    continue
+                state.steps += int(batch.steps[row])
+                self.ended[state.run] = state, "finished"
+            self._take(state, times[state.shown : past], y)
+        return found
+
     def _stretch(
-        self, mode: SweepMode, state: _State, values: FloatArray | None, shift: FloatArray, absolute: FloatArray
+        self, mode: SweepMode, state: _State, ready: _Ready, k: int, handed: Handed | None
     ) -> EventFunction | None:
         """Take one run to its next event; return it where another mode follows. What ends a run is noted."""
-        request = self.request
+        request, values = self.request, None if ready.values is None else ready.values[k]
+        shift, absolute = ready.watched.shifts[k], ready.absolute[k]
         most, end = request.options.max_steps, request.options.t_end
         budget = Budget(max_steps=None if most is None else max(0, most - state.steps))
         before, left = state.t, request.times[state.shown :]
         try:
-            y, result, cost = mode.run(state.t, state.y, values, shift, absolute, budget, left, end)
+            y, result, cost = mode.run(state.t, state.y, values, shift, absolute, budget, left, end, handed)
         except AtwoodError:  # said by the run by itself
             return None
         if mode.session.seems_stiff and request.options.solver == AUTO:  # it may change its solver
@@ -200,7 +278,7 @@ class _Piece:
         modes = tuple(sorted({**dict(state.modes), event.part: event.target}.items()))
         if state.t >= self.request.options.t_end:  # the run by itself says how it ends
             return False
-        if not (mode.keeps_state(modes) and not event.impact):
+        if event.impact or not self.waves.keeps_state(mode, modes):
             before = self.waves.own(state.run, state.modes)
             n, length = mode.coordinates, float(self.lengths[state.row])
             at = state.t, state.y[:n], state.y[n:]
