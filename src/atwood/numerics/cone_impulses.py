@@ -11,6 +11,7 @@ plane a body has three speeds and a contact one direction of slip, in space six 
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -28,7 +29,7 @@ _SWEEPS, _EACH = 5, 2000
 _LEAST, _WORK, _TURNS = 200_000, 2_000_000, 50
 """Contacts that are solved at least, unless nothing is missing, and at most, or so many looks."""
 
-_SWEEP = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, ctypes.c_int64, ctypes.c_double, *[ctypes.c_void_p] * 4)
+_ROUTINE = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, ctypes.c_int64, ctypes.c_double, *[ctypes.c_void_p] * 5)
 
 _FEW, _TRIES, _HALVED = 24, 20, 6
 """Of so many contacts at most Newton's method is tried, with so many steps, each halved so often at most."""
@@ -86,15 +87,6 @@ def _projected(p: FloatArray, friction: float) -> FloatArray:
     return np.concatenate([normal[None], p[1:] * np.where(size > most, most / or_one(size), 1.0)])
 
 
-def missing(touches: Touches, v: FloatArray, p: FloatArray, least: FloatArray, compliance: FloatArray) -> float:
-    """Return by which speed the laws are missed, in quadratic mean over the contacts."""
-    rates = touches.rates(v)
-    rates[0] -= least
-    each = compliance[[0] + [1] * (len(p) - 1)]
-    misses = (p - _projected(p - rates / each, touches.friction)) * each
-    return float(np.sqrt(np.mean(np.sum(misses**2, axis=0))))
-
-
 def impulses(
     touches: Touches, free: FloatArray, least: FloatArray, guess: FloatArray, small: float, large: float
 ) -> tuple[FloatArray, FloatArray, float]:
@@ -115,34 +107,35 @@ def impulses(
     """
     moves = touches.moves
     compliance = touches.compliance(moves)
-    p = _projected(guess, touches.friction)
-    v = _moved(touches, moves, free, p)
-    missed = missing(touches, v, p, least, compliance)
     nothing = _ROUNDED * float(np.max(np.abs(free)))
-    own, (_, count, rows, speeds) = np.ascontiguousarray(p.T), touches.slopes.shape
+    own, (_, count, rows, speeds) = _projected(guess, touches.friction).T.copy(), touches.slopes.shape
     both = [np.moveaxis(one, 0, 1).reshape(count, -1) for one in (touches.slopes, moves)]
     table = np.concatenate([np.stack([least, *compliance], axis=1), *both], axis=1)
     index = np.ascontiguousarray(speeds * touches.bodies.T, dtype=np.int64)
-    sweep = _SWEEP(_code().code.addresses[f"sweeps_{rows}"])
-    done, look, sweeps = 0, 0, max(_SWEEPS, _EACH // count)
+    sweep, look = (_ROUTINE(_code().code.addresses[f"{name}_{rows}"]) for name in ("sweeps", "look"))
+    v, squares = np.empty_like(free), np.empty(1)
+
+    def missed_by(p: FloatArray) -> float:
+        """Return by which speed the laws are missed, in quadratic mean over the contacts; v are the speeds then."""
+        v[:] = free
+        look(count, 1, touches.friction, *(one.ctypes.data for one in (index, table, v, p, squares)))
+        return float(np.sqrt(squares[0] / count))
+
+    missed = missed_by(own)
+    done, looks, sweeps = 0, 0, max(_SWEEPS, _EACH // count)
     most = max(_WORK, 2 * _TURNS * sweeps * count)
     while missed > nothing and not (missed <= small and done >= _LEAST):
-        sweep(count, sweeps, touches.friction, *(one.ctypes.data for one in (index, table, v, own)))
-        v = _moved(touches, moves, free, own.T)
-        missed, done = missing(touches, v, own.T, least, compliance), done + 2 * sweeps * count
-        look += 1
-        if missed > nothing and count <= _FEW and look & (look - 1) == 0:  # ever more seldom
+        sweep(count, sweeps, touches.friction, *(one.ctypes.data for one in (index, table, v, own, squares)))
+        missed, done, looks = missed_by(own), done + 2 * sweeps * count, looks + 1
+        if missed > nothing and count <= _FEW and looks & (looks - 1) == 0:  # ever more seldom
             wanted = touches.rates(free)
             wanted[0] -= least
-            nearer = _nearer(touches, moves, wanted, own.T, compliance)
-            there = _moved(touches, moves, free, nearer)
-            found = missing(touches, there, nearer, least, compliance)
-            if found < missed:
-                own[:], v, missed = nearer.T, there, found
-        p = own.T
+            nearer = _nearer(touches, moves, wanted, own.T, compliance).T.copy()
+            found = missed_by(nearer)
+            own, missed = (nearer, found) if found < missed else (own, missed_by(own))
         if done >= most * (1 if missed <= large else 10):
             break
-    return v, p, missed
+    return v, own.T, missed
 
 
 def _nearer(touches: Touches, moves: FloatArray, free: FloatArray, p: FloatArray, compliance: FloatArray) -> FloatArray:
@@ -192,73 +185,82 @@ def _nearer(touches: Touches, moves: FloatArray, free: FloatArray, p: FloatArray
     return projected
 
 
-def _moved(touches: Touches, moves: FloatArray, free: FloatArray, p: FloatArray) -> FloatArray:
-    """Return the speeds that impulses make of others."""
-    pushed, found = np.einsum("scrk,rc->sck", moves, p), np.array(free)
-    for bodies, by in zip(touches.bodies, pushed, strict=True):
-        for column, each in zip(found.T, by.T, strict=True):
-            column += np.bincount(bodies, each, len(free))
-    return found
-
-
 @once
 def _code() -> Built:
-    """Return the code of the sweeps."""
-    names = [f"sweeps_{rows}" for rows, _ in _SHAPES]
+    """Return the code of the sweeps, and of the looks at what they leave."""
+    names = [f"{name}_{rows}" for name in ("sweeps", "look") for rows, _ in _SHAPES]
     return build_code([], CodeOptions(level=2), exports=names, routines=RoutineSource("numerics.cone_impulses"))
 
 
 def write_routines() -> list[Routine]:
-    """Write the sweeps, in a plane and in space."""
-    return [routine for shape in _SHAPES for routine in _sweeps(*shape)]
+    """Write the sweeps and the looks, in a plane and in space."""
+    return [routine for shape in _SHAPES for routine in (*_sweeps(*shape), *_look(*shape))]
+
+
+_OF_CONTACTS = {
+    "friction": NUMBER,
+    "index": ADDRESS,
+    "table": ADDRESS,
+    "v": ADDRESS,
+    "p": ADDRESS,
+    "squares": ADDRESS,
+}
+
+
+class _Contact:
+    """One contact within a routine: its least rate of opening, its compliances, impulses, and speeds of its bodies."""
+
+    def __init__(self, routine: Routine, rows: int, speeds: int) -> None:
+        i, self.friction, index, table, v, p, self.squares = routine.arguments
+        self.rows, self.speeds, self.routine = rows, speeds, routine
+        self.row = table.at(i * (3 + 4 * rows * speeds))
+        self.least, self.gives, self.yields = (self.row[k] for k in range(3))
+        bodies, self.p = [v.at(index.read(i * 2 + k, INTEGER)) for k in (0, 1)], p.at(i * rows)
+        self._entries = [(bodies[s], s * rows * speeds, k) for s in (0, 1) for k in range(speeds)]
+
+    def _turns(self, r: int, k: int) -> bool:
+        return self.rows > 2 or r > 0 or k < 2  # the normals of discs go through their centres
+
+    def rate(self, r: int) -> Value:
+        """Return how fast it opens, or slips."""
+        terms = [(3 + at + r * self.speeds + k, v[k]) for v, at, k in self._entries if self._turns(r, k)]
+        first, *rest = (self.row[place] * speed for place, speed in terms)
+        return sum(rest, first)
+
+    def push(self, by: Mapping[int, Value]) -> None:
+        """Change the speeds of its bodies by impulses."""
+        for body, at, k in self._entries:
+            first = 3 + 2 * self.rows * self.speeds + at + k
+            moves = (self.row[first + r * self.speeds] * x for r, x in by.items() if self._turns(r, k))
+            body[k] = sum(moves, body[k])
+
+    def within(self, slips: list[Value], normal: Value) -> list[Value]:
+        """Return impulses of friction, shortened to what a normal one allows."""
+        most, choose = self.friction * normal, self.routine.choose
+        if self.rows == 2:
+            return [choose(slips[0] > most, most, choose(slips[0] < 0.0 - most, 0.0 - most, slips[0]))]
+        size = self.routine.sqrt(sum((x * x for x in slips[1:]), slips[0] * slips[0]))
+        share = choose(size > most, most / choose(size > 0.0, size, 1.0), 1.0)
+        return [slip * share for slip in slips]
 
 
 def _sweeps(rows: int, speeds: int) -> list[Routine]:
-    of_contact = {"i": INTEGER, "friction": NUMBER, "index": ADDRESS, "table": ADDRESS, "v": ADDRESS, "p": ADDRESS}
-    one = Routine(f"contact_{rows}", of_contact)
-    i, friction, index, table, v, p = one.arguments
-    row = table.at(i * (3 + 4 * rows * speeds))
-    least, gives, yields = (row[k] for k in range(3))
-    bodies, own = [v.at(index.read(i * 2 + k, INTEGER)) for k in (0, 1)], p.at(i * rows)
-    entries = [(bodies[s], s * rows * speeds, k) for s in (0, 1) for k in range(speeds)]
-
-    def rate(r: int) -> Value:
-        first, *rest = (row[3 + start + r * speeds + k] * body[k] for body, start, k in entries if turns(r, k))
-        return sum(rest, first)
-
-    def turns(r: int, k: int) -> bool:
-        return rows > 2 or r > 0 or k < 2  # the normals of discs go through their centres
-
-    def push(by: dict[int, Value]) -> None:
-        for body, start, k in entries:
-            moves = (row[3 + 2 * rows * speeds + start + r * speeds + k] * x for r, x in by.items() if turns(r, k))
-            body[k] = sum(moves, body[k])
-
-    old, before = own[0], [own[r] for r in range(1, rows)]
-    normal = old - (rate(0) - least) / gives
+    one = Routine(f"contact_{rows}", {"i": INTEGER, **_OF_CONTACTS})
+    at = _Contact(one, rows, speeds)
+    old, before = at.p[0], [at.p[r] for r in range(1, rows)]
+    normal = old - (at.rate(0) - at.least) / at.gives
     normal = one.choose(normal > 0.0, normal, 0.0)
     pushed = {0: normal - old}
     if rows > 2:
-        push(pushed)
-    slips = [one_before - rate(r) / yields for r, one_before in enumerate(before, 1)]
-    most = friction * normal
-    if rows > 2:
-        size = one.sqrt(sum((x * x for x in slips[1:]), slips[0] * slips[0]))
-        share = one.choose(size > most, most / one.choose(size > 0.0, size, 1.0), 1.0)
-        slips = [slip * share for slip in slips]
-    else:
-        slips = [one.choose(slips[0] > most, most, one.choose(slips[0] < 0.0 - most, 0.0 - most, slips[0]))]
+        at.push(pushed)
+    slips = at.within([one_before - at.rate(r) / at.yields for r, one_before in enumerate(before, 1)], normal)
     rubbed = {r: slip - was for r, (slip, was) in enumerate(zip(slips, before, strict=True), 1)}
-    push(rubbed if rows > 2 else pushed | rubbed)
-    own[0] = normal
+    at.push(rubbed if rows > 2 else pushed | rubbed)
+    at.p[0] = normal
     for r, slip in enumerate(slips, 1):
-        own[r] = slip
+        at.p[r] = slip
     one.give(0)
-    every = Routine(
-        f"sweeps_{rows}",
-        {"count": INTEGER, "sweeps": INTEGER, **{key: of_contact[key] for key in [*of_contact][1:]}},
-        exported=True,
-    )
+    every = Routine(f"sweeps_{rows}", {"count": INTEGER, "sweeps": INTEGER, **_OF_CONTACTS}, exported=True)
     count, sweeps, *rest = every.arguments
     with every.count(sweeps):
         with every.count(count) as i:
@@ -267,3 +269,27 @@ def _sweeps(rows: int, speeds: int) -> list[Routine]:
             every.call(one, count - 1 - i, *rest)
     every.give(0)
     return [one, every]
+
+
+def _look(rows: int, speeds: int) -> list[Routine]:
+    """Write what pushes bodies by all impulses, and then sums the squares of what is missed."""
+    pushed = Routine(f"pushed_{rows}", {"i": INTEGER, **_OF_CONTACTS})
+    at = _Contact(pushed, rows, speeds)
+    at.push({r: at.p[r] for r in range(rows)})
+    pushed.give(0)
+    missed = Routine(f"missed_{rows}", {"i": INTEGER, **_OF_CONTACTS})
+    at = _Contact(missed, rows, speeds)
+    normal = at.p[0] - (at.rate(0) - at.least) / at.gives
+    normal = missed.choose(normal > 0.0, normal, 0.0)
+    slips = at.within([at.p[r] - at.rate(r) / at.yields for r in range(1, rows)], normal)
+    misses = [(at.p[0] - normal) * at.gives, *((at.p[r] - slip) * at.yields for r, slip in enumerate(slips, 1))]
+    at.squares[0] = sum((x * x for x in misses), at.squares[0])
+    missed.give(0)
+    every = Routine(f"look_{rows}", {"count": INTEGER, "sweeps": INTEGER, **_OF_CONTACTS}, exported=True)
+    count, _, *rest = every.arguments
+    rest[-1][0] = 0.0
+    for one in (pushed, missed):
+        with every.count(count) as i:
+            every.call(one, i, *rest)
+    every.give(0)
+    return [pushed, missed, every]

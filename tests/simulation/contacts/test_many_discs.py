@@ -154,6 +154,27 @@ def test_impulses_meet_the_laws() -> None:
     assert np.all((p[1] * rates[1] <= 1e-12) & (np.abs(p[0] * rates[0]) < 1e-11))
 
 
+@pytest.mark.parametrize(("rows", "speeds"), [(2, 3), (3, 6)])
+def test_what_is_missed_is_what_the_laws_say(rows: int, speeds: int) -> None:
+    """Many contacts in any direction, left before they are solved to rounding."""
+    chance = np.random.default_rng(rows)
+    slopes = chance.normal(size=(2, 600, rows, speeds))
+    if rows == 2:
+        slopes[:, :, 0, 2] = 0.0  # normals of discs go through their centres
+    bodies = np.array([chance.permutation(600) % 150, chance.permutation(600) % 150])
+    inverse = np.array([*(np.eye(speeds) for _ in range(150)), np.zeros((speeds, speeds))])
+    touches, least = Touches(bodies, slopes, inverse, 0.4), chance.uniform(size=600)
+    v, p, missed = impulses(touches, chance.normal(size=(151, speeds)), least, np.zeros((rows, 600)), 1e9, 1e9)
+    rates, own = touches.rates(v), touches.compliance(touches.moves)
+    each = own[[0] + [1] * (rows - 1)]
+    ahead = p - (rates - np.array([least, *(rows - 1) * [np.zeros(600)]])) / each
+    normal, size = np.maximum(ahead[0], 0.0), np.linalg.norm(ahead[1:], axis=0)
+    allowed = np.array([normal, *(ahead[1:] * np.minimum(1.0, 0.4 * normal / size))])
+    expected = np.sqrt(np.mean(np.sum(((p - allowed) * each) ** 2, axis=0)))
+    assert missed > 1e-9
+    np.testing.assert_allclose(missed, expected, rtol=1e-6)
+
+
 def test_what_a_group_cannot_be_is_named() -> None:
     scene = group([place(0.0, 0.1), place(0.0, 0.25)])
     with pytest.raises(aw.StartError, match=r"c: disc\[0\] starts inside disc\[1\], by 0\.05 m"):
