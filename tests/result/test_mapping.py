@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from atwood import ResultError, Scene, load_result, simulate
+from atwood.result.segment_quantities import SegmentQuantities, quantities_of, values_along
 from atwood.result.trajectories import Trajectories
 from atwood_library import Ground, PointMass, Rod
-from atwood_library.scenes import DoublePendulum
+from atwood_library.scenes import BouncingBall, DoublePendulum, StickSlip
 
 
 @pytest.fixture(scope="module")
@@ -107,3 +108,18 @@ def test_a_part_with_the_name_of_a_method_is_reached_by_its_path():
     result = simulate(scene, outputs=3)
     assert np.array_equal(result.group("items")["angle"], result["items.angle"])
     assert callable(result.parts.items)
+
+
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+@pytest.mark.parametrize("scene", [BouncingBall, StickSlip])
+def test_segments_that_are_alike_are_read_as_one_and_give_what_each_gives(scene: type[Scene], form: str) -> None:
+    result = simulate(scene(), form=form, t_end=8.0, outputs=41)
+    segments = result.run.segments
+    readings = quantities_of(segments)
+    assert len(segments) > 8
+    assert len(readings) <= len(segments) // 2
+    numbers = sorted(number for one in readings for number in one.parts)
+    assert numbers == list(range(len(segments)))
+    paths = tuple(result.paths)
+    alone = [SegmentQuantities({number: one}).values(paths) for number, one in enumerate(segments)]
+    np.testing.assert_allclose(values_along(readings, paths), np.concatenate(alone, axis=1), rtol=1e-12, atol=1e-12)

@@ -28,7 +28,7 @@ from atwood.integrators.methods import AUTO, METHODS
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.result.energy import EnergyLedger, accounts, energy_near
 from atwood.result.result import Result
-from atwood.result.segment_quantities import SegmentQuantities
+from atwood.result.segment_quantities import quantities_of
 from atwood.result.work import find_ledger, ledger_of_samples
 from atwood.simulation.events.sampling import refuse_updates
 from atwood.simulation.problem.options import RunOptions
@@ -347,7 +347,7 @@ def needed_error(run: Run, doubt: float) -> float:
     every = np.ones(sum(len(one.time) for one in run.segments), dtype=bool)
     with np.errstate(all="ignore"):
         try:
-            pieces = accounts([SegmentQuantities(one) for one in run.segments])
+            pieces = accounts(quantities_of(run.segments))
             worth = max(energy_near(one, _NEAR) for one in run.segments) / _NEAR
             found = _beyond(ledger_of_samples(pieces, every)) / worth
             if found > doubt and any(one.power is not None for one in pieces):

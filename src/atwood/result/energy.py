@@ -15,7 +15,7 @@ from atwood.errors import UsageError
 from atwood.expr import Program, depends_on, substitute
 from atwood.forms.caches import Key
 from atwood.forms.quantities import energy_program, known_program
-from atwood.lazy_dataclasses import dataclass, replace
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Constraint, Equations
 from atwood.mechanics.outputs.part_power import MovingMass, applied_power, moving_masses, switched_energy
 from atwood.result.segment_quantities import SegmentQuantities, state_values
@@ -271,16 +271,16 @@ def accounts(readings: Sequence[SegmentQuantities]) -> list[Piece]:
     """Return the samples of all segments that a ledger is made of."""
     found: dict[int, Piece] = {}
     powers = powers_into(readings)
-    for numbers, joined in _together(readings):
+    for one in readings:
+        joined = one.segment
         assembly, state = joined.assembly, (joined.time, joined.coordinates, joined.speeds)
         mechanism, equations = assembly.mechanism, assembly.own_equations
         switching = known_program(assembly, _SWITCHED, lambda: [switched_energy(mechanism, equations)])  # noqa: B023
         energies = state_values(assembly, energy_program(assembly), *state)
         switched = None if switching.results[0].is_zero else state_values(assembly, switching, *state)[0]
-        motions, rounding, end = _motions(joined), _rounding(joined), 0
-        for number in numbers:
-            segment = readings[number].segment
-            own = slice(end, end := end + len(segment.time))
+        motions, rounding = _motions(joined), _rounding(joined)
+        for number, segment in one.parts.items():
+            own = one.places[number]
             found[number] = Piece(
                 time=segment.time,
                 kinetic=energies[0, own],
@@ -294,25 +294,7 @@ def accounts(readings: Sequence[SegmentQuantities]) -> list[Piece]:
                 is_switched=segment.after_time_event,
                 is_rest=segment.rests,
             )
-    return [found[number] for number in range(len(readings))]
-
-
-def _together(readings: Sequence[SegmentQuantities]) -> Iterator[tuple[list[int], SegmentRecord]]:
-    """Give the numbers of segments with the same equations and parameters, and a record of all their samples.
-
-    Runs with contacts have thousands of short ones.
-    """
-    alike: dict[tuple[int, bytes, bytes, float], list[int]] = {}
-    for number, one in enumerate(readings):
-        plan = one.segment.plan
-        about = id(plan.assembly), plan.coordinate_sizes.tobytes(), plan.sizes.tobytes(), plan.scales.time
-        alike.setdefault(about, []).append(number)
-    for numbers in alike.values():
-        segments = [readings[number].segment for number in numbers]
-        times = np.concatenate([one.time for one in segments])
-        places = np.concatenate([one.coordinates for one in segments], axis=1)
-        speeds = np.concatenate([one.speeds for one in segments], axis=1)
-        yield numbers, replace(segments[0], time=times, coordinates=places, speeds=speeds)
+    return [found[number] for number in range(len(found))]
 
 
 def _motions(segment: SegmentRecord) -> tuple[Motion, ...]:
@@ -334,19 +316,18 @@ def _motions(segment: SegmentRecord) -> tuple[Motion, ...]:
 
 def powers_into(readings: Sequence[SegmentQuantities]) -> list[FloatArray | None]:
     """Return the power that is put into the scene at each sample of each segment; None where nothing can."""
-    found: list[FloatArray | None] = [None] * len(readings)
-    for numbers, joined in _together(readings):
-        assembly, end = joined.assembly, 0
+    found: dict[int, FloatArray | None] = {}
+    for one in readings:
+        joined, total = one.segment, None
+        assembly = joined.assembly
         mechanism, equations = assembly.mechanism, assembly.own_equations
         program = known_program(assembly, POWER, lambda: [applied_power(mechanism, equations)])  # noqa: B023
-        moving = any(_moves_by_itself(assembly.maximal, one) for one in assembly.maximal.constraints)
-        if program.results[0].is_zero and not moving:
-            continue
-        total: FloatArray = state_values(assembly, program, joined.time, joined.coordinates, joined.speeds)[0]
-        for number in numbers:
-            own = total[end : (end := end + len(readings[number].segment.time))]
-            found[number] = own + readings[number].reactions[1] if moving else own
-    return found
+        moving = any(_moves_by_itself(assembly.maximal, each) for each in assembly.maximal.constraints)
+        if moving or not program.results[0].is_zero:
+            total = state_values(assembly, program, joined.time, joined.coordinates, joined.speeds)[0]
+            total = total + one.reactions[1] if moving else total
+        found.update({number: None if total is None else total[place] for number, place in one.places.items()})
+    return [found[number] for number in range(len(found))]
 
 
 def _moves_by_itself(equations: Equations, constraint: Constraint) -> bool:

@@ -98,6 +98,9 @@ class _Sums:
         others = [(name, part, "") for part in parts for name in names]
         self._found: dict[tuple[str, str, str], list[FloatArray]]
         self._found = {key: [] for key in (*(("work", *end) for end in ends), *others)}
+        self._of: dict[str, list[tuple[str, str, str]]] = {}
+        for key in self._found:
+            self._of.setdefault(key[1], []).append(key)
         self._carried: dict[tuple[str, str, str], float] = {}
 
     def jump(self, done: _Done) -> None:
@@ -115,7 +118,7 @@ class _Sums:
     def part(self, path: str, energies: FloatArray, shown: NDArray[np.bool_], is_unique: bool) -> PartEnergy:
         """Return the energy of a part at the output times, from its energies at all samples."""
         own = {
-            (field, name): np.concatenate(x)[shown] for (field, part, name), x in self._found.items() if part == path
+            (field, name): np.concatenate(self._found[field, path, name])[shown] for field, _, name in self._of[path]
         }
         work = {name: values for (field, name), values in own.items() if field == "work"}
         supplied, dissipated, constraints, impacts = (values for (field, _), values in own.items() if field != "work")

@@ -21,7 +21,7 @@ from atwood.forms.quantities import find_observables
 from atwood.integrators.protocol import Statistics
 from atwood.model.declare.connectors import PATHS, Quantity
 from atwood.result.energy import ConservedLedger, EnergyLedger, accounts
-from atwood.result.segment_quantities import SegmentQuantities
+from atwood.result.segment_quantities import SegmentQuantities, quantities_of, values_along
 from atwood.result.trajectories import Trajectories
 from atwood.result.turns import TurnCounter
 from atwood.result.work import find_ledger
@@ -295,8 +295,7 @@ class Result(Trajectories):
             return
         turning = self._turns.needed(missing)
         needed = tuple(dict.fromkeys((*missing, *turning)))
-        pieces = np.concatenate([reading.values(needed) for reading in self._readings], axis=1)
-        raw = dict(zip(needed, pieces, strict=True))
+        raw = dict(zip(needed, values_along(self._readings, needed), strict=True))
         for path in missing:
             counts = self.assembly.observables[path].periodic
             self._cache[path] = self._turns.counted(path, raw, self._all_time) if counts else raw[path]
@@ -306,8 +305,8 @@ class Result(Trajectories):
         return TurnCounter(self.run)
 
     @cached_property
-    def _readings(self) -> tuple[SegmentQuantities, ...]:
-        return tuple(SegmentQuantities(segment) for segment in self._segments)
+    def _readings(self) -> list[SegmentQuantities]:
+        return quantities_of(self._segments)
 
     # -- how good it is -------------------------------------------------------------------------------------------
 

@@ -1,9 +1,14 @@
-"""What follows from the samples of one segment of a run: accelerations, reactions, and quantities by path."""
+"""What follows from the samples of a run: accelerations, reactions, and quantities by path.
+
+Runs with contacts have thousands of short segments. Those with the same equations and parameters are worked out as one.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
+from itertools import accumulate, pairwise
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +17,7 @@ from atwood.expr import Expression, Program, Scalar, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.quantities import find_observables, observer, state_program
+from atwood.lazy_dataclasses import replace
 from atwood.simulation.dynamics.reactions import ReactionSolver
 from atwood.simulation.run.recorder import SegmentRecord
 
@@ -61,16 +67,27 @@ def shown_values(segment: SegmentRecord, name: str, quantities: Iterable[Scalar]
 
 
 class SegmentQuantities:
-    """The quantities of one segment of a run, computed when they are asked for.
+    """The quantities of segments of a run with the same equations and parameters, computed when they are asked for.
 
     Parameters
     ----------
+    parts
+        The segments by their numbers in the run.
+
+    Attributes
+    ----------
     segment
-        The segment.
+        A record of all their samples.
+    places
+        Which of these are those of each segment.
     """
 
-    def __init__(self, segment: SegmentRecord) -> None:
-        self.segment = segment
+    def __init__(self, parts: Mapping[int, SegmentRecord]) -> None:
+        self.parts = parts
+        first, *others = parts.values()
+        self.segment = first if not others else _joined([first, *others])
+        ends = accumulate((len(one.time) for one in parts.values()), initial=0)
+        self.places = dict(zip(parts, (slice(*ends) for ends in pairwise(ends)), strict=True))
 
     def values(self, paths: tuple[str, ...]) -> FloatArray:
         """Return quantities by path, shape (paths, samples)."""
@@ -111,3 +128,30 @@ class SegmentQuantities:
             )
             power[~clear] = np.interp(t[~clear], t[clear], power[clear])
         return values, power
+
+
+def _joined(segments: Sequence[SegmentRecord]) -> SegmentRecord:
+    """Return a record of the samples of all of some segments."""
+    times = np.concatenate([one.time for one in segments])
+    places, speeds = (np.concatenate([getattr(one, x) for one in segments], axis=1) for x in ("coordinates", "speeds"))
+    shown = np.concatenate([one.shown for one in segments])
+    return replace(segments[0], time=times, coordinates=places, speeds=speeds, shown=shown)
+
+
+def quantities_of(segments: Iterable[SegmentRecord]) -> list[SegmentQuantities]:
+    """Return the quantities of all segments of a run, of those that are alike together."""
+    alike: dict[tuple[Any, ...], dict[int, SegmentRecord]] = {}
+    for number, one in enumerate(segments):
+        plan, alone = one.plan, number if one.singular_crossings else -1
+        sizes = plan.coordinate_sizes.tobytes(), plan.sizes.tobytes(), plan.scales.time
+        alike.setdefault((alone, id(plan.assembly), plan.finding, *sizes), {})[number] = one
+    return [SegmentQuantities(parts) for parts in alike.values()]
+
+
+def values_along(readings: Sequence[SegmentQuantities], paths: tuple[str, ...]) -> FloatArray:
+    """Return quantities by path at all samples of a run in their order, shape (paths, samples)."""
+    pieces = {}
+    for one in readings:
+        values = one.values(paths)
+        pieces.update({number: values[:, place] for number, place in one.places.items()})
+    return np.concatenate([pieces[number] for number in range(len(pieces))], axis=1)

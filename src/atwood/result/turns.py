@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
-from atwood.result.segment_quantities import SegmentQuantities
+from atwood.result.segment_quantities import quantities_of, values_along
 from atwood.simulation.run.recorder import SegmentRecord
 from atwood.simulation.run.run_record import Run, run_again
 
@@ -129,7 +129,7 @@ def _parts_of(rates: FloatArray, span: float) -> int:
 
 
 def _read(segments: Sequence[SegmentRecord], paths: tuple[str, ...]) -> tuple[FloatArray, dict[str, FloatArray]]:
-    pieces = np.concatenate([SegmentQuantities(segment).values(paths) for segment in segments], axis=1)
+    pieces = values_along(quantities_of(segments), paths)
     return np.concatenate([segment.time for segment in segments]), dict(zip(paths, pieces, strict=True))
 
 

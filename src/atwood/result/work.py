@@ -14,7 +14,7 @@ from atwood.clock import Clock, TimeIsUp, check_time
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import scipy
 from atwood.result.energy import EnergyLedger, Piece, make_ledger, powers_into
-from atwood.result.segment_quantities import SegmentQuantities
+from atwood.result.segment_quantities import quantities_of
 from atwood.simulation.run.recorder import SegmentRecord
 from atwood.simulation.run.run_record import Run, run_again, times_of_steps
 
@@ -142,7 +142,7 @@ def _work_in_steps(run: Run, pieces: Sequence[Piece], count: int) -> tuple[list[
     if found is None:
         return None
     work, unsure, swing = [], 0.0, 0.0
-    powers = powers_into([SegmentQuantities(one.segment) for one in found])
+    powers = powers_into(quantities_of(one.segment for one in found))
     for one, piece, power in zip(found, pieces, powers, strict=True):
         rows = np.zeros((len(one.grid) - 1, count)) if power is None else power[one.places].reshape(-1, count)
         done, error = integral_in_steps(one.grid, rows)
