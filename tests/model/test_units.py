@@ -122,3 +122,11 @@ def test_units_that_cannot_be_read(text):
 def test_raised_digits_and_electric_units(written: str, plain: str) -> None:
     one, other = parse_unit(written), parse_unit(plain)
     assert (one.factor, one.exponents) == (other.factor, other.exponents)
+
+
+@pytest.mark.parametrize(("unit", "asked"), [("1", "without a unit"), ("m", "in m")])
+@pytest.mark.parametrize("text", ["four", "4 kg"])
+def test_a_number_is_asked_for_in_a_sentence(unit, asked, text):
+    with pytest.raises(ParameterError) as caught:
+        parse_quantity(text, parse_unit(unit), "part.corners")
+    assert caught.value.advice.endswith(f" {asked}.")

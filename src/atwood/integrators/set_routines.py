@@ -40,7 +40,8 @@ FIELDS: dict[str, Kind] = {
 """The memory of sets. `finite` is 0 where limits are of impulses, which finite forces do not have; `blur` and `pace`
 are multiples of what is small and slow; `inside` is how deep a gap may be, in multiples of what is small; `ahead` is
 how long impacts may still go on that are summed, and then how long they do, `rough` how long where rounding tells the
-length of their intervals, `lasted` how long these have gone on; `shared` is 1 where forces of a set that was found are
+length of their intervals, `lasted` how long these have gone on; `stops` is 1 where these come to an end and may still
+wait for one more, 2 where they come to an end; `shared` is 1 where forces of a set that was found are
 not determined, as rows repeat each other, or where another share might let rest what begins to slip, and `repeats`
 where those solved for last are not."""
 
@@ -104,6 +105,9 @@ EVEN = 4.0
 
 STEADY, LATER = 1.5, 0.001
 """Where factors differ by more than the first from their mean, a series is summed later: at this share of its rest."""
+
+WAITS = 0.1
+"""Of how long impacts may still go on that are summed: so long may those that wait for one more."""
 
 FLATTENS = 0.9
 """Where the newest interval shrinks by less than this share of what all do on average, rounding tells its length."""
@@ -753,13 +757,17 @@ def _is_still(r: Routine, m: Sets, k: Value, size: Value) -> Value:
 
 
 def _stop() -> Routine:
-    """Stop what touches with impacts that have accumulated; what bounced rubs as much. What has stuck goes on to."""
+    """Stop what touches with impacts that have accumulated; what bounced rubs as much. What has stuck goes on to.
+
+    What would make energy waits for an impact to come, or where the series has nearly ended, does not rub.
+    """
     r, m, () = _open("stop")
     chosen, slow, rates, given = m.unit("chosen"), m.unit("slow"), m.row("rates"), m.unit("given")
+    series = m.unit("series")
     r.call("touching", r.arguments[0], result=INTEGER)
     with _each(r, m, "chosen") as (k, _, _), r.when(m.unit("series")[k] == 0.0):
         chosen[k] = 0.0  # it is near by, and has no such impacts
-    coming, turned = r.variable(0.0), r.variable(False, BOOLEAN)
+    coming = r.variable(0.0)
     with _each(r, m, "chosen") as (_, row, _):
         coming.now = r.most(0.0 - rates[row], coming.now)
     with _each(r, m, "chosen") as (k, row, _), r.when(rates[row] > r.most(coming.now * ALIKE, slow[k] * m.pace)):
@@ -777,6 +785,23 @@ def _stop() -> Routine:
         with r.when(slides & ~_is_still(r, m, k, way[2])):
             _give(r, m, k, way, 1.0)
     r.copy(m.row("wanted"), rates, m.size)
+    with r.when(r.call("end_impacts", r.arguments[0]) != 0):
+        with r.when(m.stops == 1):
+            m.stops, m.blur, m.pace, m.finite = 0, 1.0, 1.0, 1.0
+            r.clear(series, series.at(m.count))
+            r.give(0)
+        with r.count(m.count) as k, r.when((m.unit("slip")[k] != 0.0) & (m.unit("state")[k] != float(STICKS))):
+            chosen[k], given[k] = 0.0, 0.0
+        r.call("end_impacts", r.arguments[0])
+    m.finite = 1.0
+    r.give(r.call("push", r.arguments[0], m.row("forces")))
+    return r
+
+
+def _end_impacts() -> Routine:
+    """Find impulses that take away the rates of what is chosen, and rub as much; say where they make energy."""
+    r, m, () = _open("end_impacts")
+    chosen, rates, given, turned = m.unit("chosen"), m.row("rates"), m.unit("given"), r.variable(False, BOOLEAN)
     with r.forever() as loop:
         with r.count(m.count) as k:
             state = r.choose(given[k] != 0.0, float(GOES_ON), float(STICKS))
@@ -791,8 +816,14 @@ def _stop() -> Routine:
                 given[k], turned.now = 0.0, True
         with r.when(~turned.now):
             r.leave(loop)
-    m.finite = 1.0
-    r.give(r.call("push", r.arguments[0], m.row("forces")))
+    work, size = r.variable(0.0), r.variable(0.0)
+    with r.count(m.size) as i:
+        by, before, after = m.row("forces")[i], rates[i], m.row("motions")[i]
+        work.now = work.now + by * (before + after) * 0.5
+        size.now = size.now + r.size(by) * (r.size(before) + r.size(after)) * 0.5
+    with r.when(work.now > size.now * GAIN):
+        r.give(GAINS)
+    r.give(0)
     return r
 
 
@@ -967,7 +998,8 @@ def _end_series(r: Routine, m: Sets, spans: Value, number: Value) -> None:
     flattens = 1.0 - spans[0] / spans[1] < FLATTENS * (1.0 - share.now)
     longest = r.choose(steady.now, r.choose(flattens, m.rough, m.ahead), LATER * m.ahead)
     with r.when(left < longest):
-        m.ahead, m.stops, m.blur, m.pace, m.lasted = left, 1, NEAR_REST, NEAR_REST, 0.0
+        m.stops = r.choose(left > m.ahead * WAITS, 1, 2, INTEGER)
+        m.ahead, m.blur, m.pace, m.lasted = left, NEAR_REST, NEAR_REST, 0.0
         with r.count(even.now) as k:
             m.lasted = m.lasted + spans[k]
         sum_ = _sum_of_series(r, spans, long.now)
@@ -1008,10 +1040,11 @@ def _resolve() -> Routine:
         r.call("series", r.arguments[0], t, result=None)
     with r.when(checks != 0):
         do_or_return(r, "check_inside")
+    with r.when(m.stops != 0):
+        r.call("stop", r.arguments[0])
     r.call("touching", r.arguments[0], result=INTEGER)
     r.copy(m.unit("closed"), m.unit("chosen"), m.count)
     with r.when(m.stops != 0):
-        r.call("stop", r.arguments[0])
         r.copy(m.unit("closed"), m.unit("stopped"), m.count)  # others may pass near by
     do_or_return(r, "collide")
     do_or_return(r, "settle_contacts", t)
@@ -1022,5 +1055,6 @@ def _resolve() -> Routine:
 def write_sets() -> list[Routine]:
     """Return the routines; they take the address of the memory of sets, and ``resolve`` is the one to be called."""
     sets = (_solve, _least, _equations, _moved, _met, _contradiction, _improved, _find)
-    moments = (_read, _push, _touch, _impulses, _strike, _account, _collide, _hold, _stop, _settle, _check, _series)
-    return [_resolve(), *(write() for write in (*sets, *moments))]
+    impacts = (_impulses, _strike, _account, _collide, _stop, _end_impacts, _series)
+    moments = (_read, _push, _touch, _hold, _settle, _check)
+    return [_resolve(), *(write() for write in (*sets, *impacts, *moments))]

@@ -198,10 +198,6 @@ def build_now(
     module = write_module(parts, options)
     written = list(routines.write()) if routines is not None else []
     text = module.text
-    if module.eliminates:
-        from atwood.codegen.llvm.linear_systems import write_elimination
-
-        written += write_elimination()
     if written:
         from atwood.codegen.llvm.printer import print_routines
 
@@ -219,7 +215,7 @@ def build_now(
 
 
 def _own_addresses(names: Sequence[str]) -> dict[str, int]:
-    """Return where elementary functions are, by what they are called in a module."""
+    """Return where elementary functions and elimination are, by what they are called in a module."""
     if not names:
         return {}
     from atwood.codegen.llvm.own import address_of

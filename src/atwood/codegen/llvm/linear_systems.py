@@ -1,7 +1,8 @@
 """Linear systems in LLVM's language: elimination with partial pivoting.
 
 Systems of up to three unknowns are eliminated in registers.  Larger ones are factorised in the scratch array by
-routines (`atwood.codegen.llvm.linear_systems`).  Systems with the same matrix share its factors.  A pivot that is zero
+routines, of which a process has one copy: they are worth LLVM's work where a program that is long is not.  Systems with
+the same matrix share its factors.  A pivot that is zero
 becomes nan, and so does then every unknown.
 
 Elimination with partial pivoting of a full matrix of any size, in its place; a pivot that is zero becomes nan.
@@ -14,8 +15,8 @@ from collections.abc import Sequence
 from math import nan
 
 from atwood.codegen.llvm.layout import LARGEST_UNROLLED, MatrixKey, matrix_key
-from atwood.codegen.llvm.text import Writer
-from atwood.codegen.routines import ADDRESS, INTEGER, Lanes, Routine, Value
+from atwood.codegen.llvm.text import ELIMINATION, Writer
+from atwood.codegen.routines import ADDRESS, INTEGER, Lanes, Routine, Value, own_name
 from atwood.errors import UnsupportedError
 from atwood.expr.core.graph import Expression
 from atwood.lazy_dataclasses import dataclass
@@ -75,17 +76,18 @@ class Solver:
             raise UnsupportedError(f"there is no machine code in lanes for a linear system of {size} unknowns")
         start = self._regions[key]
         pivots, side = start + size * size, start + size * (size + 1)
-        writer.needs.elimination = True
+        writer.needs.functions.update(ELIMINATION)
+        factorise, substitute = map(own_name, ELIMINATION)
         if key not in self._large:
             self._large.add(key)
             for position, argument in enumerate(solve.arguments[: size * size]):
                 writer.store(writer.value(argument), "scratch", start + position)
             places = f"ptr {writer.address('scratch', start)}, ptr {writer.address('scratch', pivots)}"
-            writer.lines.append(f"  call void @factorise(i64 {size}, {places})")
+            writer.lines.append(f"  call void @{factorise}(i64 {size}, {places})")
         for position, value in enumerate(right):
             writer.store(value, "scratch", side + position)
         places = f"ptr {writer.address('scratch', start)}, ptr {writer.address('scratch', pivots)}"
-        writer.lines.append(f"  call void @substitute(i64 {size}, {places}, ptr {writer.address('scratch', side)})")
+        writer.lines.append(f"  call void @{substitute}(i64 {size}, {places}, ptr {writer.address('scratch', side)})")
         for unknown in unknowns:
             writer.values[unknown.index] = writer.load("scratch", side + unknown.payload)
 
@@ -142,13 +144,21 @@ def _reduce(writer: Writer, a: str, factor: str, b: str) -> str:
 _WIDTH = 4
 
 
-def write_elimination(factorise: str = "factorise", substitute: str = "substitute") -> list[Routine]:
+def write_routines() -> list[Routine]:
+    """Write the routines that programs call."""
+    factorise, substitute = map(own_name, ELIMINATION)
+    return write_elimination(factorise, substitute, exported=True)
+
+
+def write_elimination(
+    factorise: str = "factorise", substitute: str = "substitute", exported: bool = False
+) -> list[Routine]:
     """Write the routines that factorise a matrix row by row, and that solve for one right-hand side."""
-    return [_factorise_rows(factorise), _substitute_rows(substitute)]
+    return [_factorise_rows(factorise, exported), _substitute_rows(substitute, exported)]
 
 
-def _factorise_rows(name: str) -> Routine:
-    r = Routine(name, {"n": INTEGER, "a": ADDRESS, "pivots": ADDRESS}, None)
+def _factorise_rows(name: str, exported: bool) -> Routine:
+    r = Routine(name, {"n": INTEGER, "a": ADDRESS, "pivots": ADDRESS}, None, exported)
     n, a, pivots = r.arguments
     with r.count(n) as k:
         row = a.at(k * n)
@@ -191,21 +201,20 @@ def _subtract(r: Routine, target: Value, source: Value, factor: Value, start: Va
         target[rest] = target[rest] - factor * source[rest]
 
 
-def _substitute_rows(name: str) -> Routine:
-    r = Routine(name, {"n": INTEGER, "a": ADDRESS, "pivots": ADDRESS, "x": ADDRESS}, None)
+def _substitute_rows(name: str, exported: bool) -> Routine:
+    r = Routine(name, {"n": INTEGER, "a": ADDRESS, "pivots": ADDRESS, "x": ADDRESS}, None, exported)
     n, a, pivots, x = r.arguments
     with r.count(n) as k:
         other = pivots.read(k, INTEGER)
         x[k], x[other] = x[other], x[k]
-    with r.count(n, 1) as i:
-        row, total = a.at(i * n), r.variable(x[i])
-        with r.count(i) as j:
-            total.now = total.now - row[j] * x[j]
-        x[i] = total.now
+    with r.count(n) as k, r.when(x[k] != 0.0):  # what is masked has zeros, and none is waited for
+        by = x[k]
+        with r.count(n, k + 1) as i:
+            x[i] = x[i] - a[i * n + k] * by
     with r.count(n) as turn:
         i = n - 1 - turn
         row, total = a.at(i * n), r.variable(x[i])
-        with r.count(n, i + 1) as j:
+        with r.count(n, i + 1) as j, r.when(x[j] != 0.0):
             total.now = total.now - row[j] * x[j]
         x[i] = total.now / row[i]
     return r

@@ -29,7 +29,17 @@ from atwood.codegen.llvm.layout import (
 )
 from atwood.codegen.llvm.linear_systems import Solver
 from atwood.codegen.llvm.loops import Chunk, Loop, Unit, rows_of, units_of
-from atwood.codegen.llvm.text import INTRINSICS, OWN_FUNCTIONS, Needs, Position, Strided, Writer, number_type, spread
+from atwood.codegen.llvm.text import (
+    ELIMINATION,
+    INTRINSICS,
+    OWN_FUNCTIONS,
+    Needs,
+    Position,
+    Strided,
+    Writer,
+    number_type,
+    spread,
+)
 from atwood.codegen.routines import own_name
 from atwood.errors import UnsupportedError
 from atwood.expr.core.graph import Expression
@@ -81,11 +91,9 @@ class ModuleText:
     scratch
         The length of the scratch array that suits all its functions.
     functions
-        The elementary functions that it calls, by their names as operations.
+        The elementary functions that it calls, by their names as operations, and the routines of `ELIMINATION`.
     externals
         The functions in Python that it calls, as ``external.0`` and so on, each with its number of arguments.
-    eliminates
-        Whether it calls the routines of `atwood.codegen.llvm.linear_systems`, which are not in it.
     has_loops
         Whether operations that repeat are written once.
     """
@@ -94,7 +102,6 @@ class ModuleText:
     scratch: int
     functions: tuple[str, ...]
     externals: tuple[tuple[ExternalFunction, int], ...]
-    eliminates: bool
     has_loops: bool
 
 
@@ -148,7 +155,6 @@ def write_module(programs: Sequence[Part], options: CodeOptions) -> ModuleText:
         scratch * options.runs,
         tuple(sorted(needs.functions)),
         tuple(needs.externals),
-        needs.elimination,
         has_loops,
     )
 
@@ -410,6 +416,7 @@ def _declarations(needs: Needs, runs: int) -> list[str]:
             lines.append(f"declare void @{own_name(name)}({', '.join(['ptr'] * places)}) #0")
             continue
         kind, given = ("void", "double, ptr, ptr") if name == "sin_cos" else ("double", "")
+        kind, given = ("void", ELIMINATION[name]) if name in ELIMINATION else (kind, given)
         given = given or ", ".join(["double"] * OWN_FUNCTIONS[name])
         lines.append(f"declare {kind} @{own_name(name)}({given}) #0")
     for position, (_, count) in enumerate(needs.externals):

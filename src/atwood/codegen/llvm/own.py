@@ -1,4 +1,4 @@
-"""Elementary functions as machine code, of which a process has one copy that all kernels call."""
+"""Elementary functions and elimination as machine code, of which a process has one copy that all kernels call."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from atwood.arrays import FloatArray
 from atwood.codegen.llvm.build import RoutineSource, build_now, once
 from atwood.codegen.llvm.engine import LoadedCode
 from atwood.codegen.llvm.module import CodeOptions
-from atwood.codegen.llvm.text import OWN_FUNCTIONS
+from atwood.codegen.llvm.text import ELIMINATION, OWN_FUNCTIONS
 from atwood.codegen.routines import own_name
 from atwood.expr.core.elementary import FUNCTIONS, compiled
 
@@ -38,8 +38,16 @@ def _functions_of_lanes(lanes: int) -> LoadedCode:
     return build_now((), CodeOptions(level=2), [own_name(f"{one}_{lanes}") for one in names], source, True).code
 
 
+@once
+def _elimination() -> LoadedCode:
+    source = RoutineSource("codegen.llvm.linear_systems")
+    return build_now((), CodeOptions(level=2), [own_name(one) for one in ELIMINATION], source, True).code
+
+
 def address_of(name: str) -> int:
     """Return where a function is; those of lanes end with their count."""
+    if name in ELIMINATION:
+        return _elimination().addresses[own_name(name)]
     lanes = name.rpartition("_")[2]
     code = _functions_of_lanes(int(lanes)) if lanes.isdigit() else own_functions()
     return code.addresses[own_name(name)]

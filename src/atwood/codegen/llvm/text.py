@@ -22,6 +22,9 @@ OWN_FUNCTIONS: Mapping[str, int] = dict.fromkeys(
 ) | {"atan2": 2, "pow": 2}
 """Operations that functions of their own compute, with the number of arguments."""
 
+ELIMINATION = {"factorise": "i64, ptr, ptr", "substitute": "i64, ptr, ptr, ptr"}
+"""Routines for linear systems that are not eliminated in registers, with what they are given."""
+
 INTRINSICS = {"sqrt": "sqrt", "absolute": "fabs", "floor": "floor"}
 _ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 _COMPARISONS = {"less": "olt", "less_equal": "ole"}
@@ -78,18 +81,15 @@ class Needs:
     Attributes
     ----------
     functions
-        The elementary functions, by their names as operations.
+        The elementary functions, by their names as operations, and the routines of `ELIMINATION`.
     externals
         The functions in Python, each with its number of arguments and its position among them.
-    elimination
-        Whether there is a linear system that is not eliminated in registers.
     tables
         Where values lie that a loop cannot count.
     """
 
     functions: set[str] = field(default_factory=set)
     externals: dict[tuple[ExternalFunction, int], int] = field(default_factory=dict)
-    elimination: bool = False
     tables: dict[tuple[int, ...], str] = field(default_factory=dict)
 
 

@@ -97,7 +97,7 @@ class Field(FieldReference):
     def _check_expression(self, value: ParameterExpression, where: str) -> ParameterExpression:
         if value.unit is not None and not value.unit.has_dimension_of(self.unit):
             raise ParameterError(
-                f"it is bound to {value!r}, which is in {value.unit.text} and not in {self.unit.text}", where=where
+                f"it is bound to {value!r}, which is {value.unit.as_asked} and not {self.unit.as_asked}", where=where
             )
         return value
 
@@ -214,11 +214,11 @@ class ParameterSpec(Field):
     def _check_number(self, value: Any, where: str) -> float | int:
         number = parse_quantity(value, self.unit, where) if isinstance(value, str) else _plain_number(value)
         if number is None:
-            kind = "nothing" if value is None else show(value)
-            raise ParameterError(f"it needs a number, not {kind}", where=where, advice=f"Give one in {self.unit.text}.")
+            kind, asked = "nothing" if value is None else show(value), f"Give one {self.unit.as_asked}."
+            raise ParameterError(f"it needs a number, not {kind}", where=where, advice=asked)
         if not math.isfinite(number):
             raise ParameterError(
-                f"{number} is not a finite number", where=where, advice=f"Give one in {self.unit.text}."
+                f"{number} is not a finite number", where=where, advice=f"Give one {self.unit.as_asked}."
             )
         if abs(number) > _LARGEST or 0.0 < abs(number) < 1.0 / _LARGEST:
             size = "large" if abs(number) > 1.0 else "small"

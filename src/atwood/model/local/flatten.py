@@ -189,7 +189,7 @@ def _number(value: Any, model: Model, key: str, prefix: str) -> float:
     if isinstance(value, ParameterExpression):
         if wanted is not None and value.unit is not None and not value.unit.has_dimension_of(wanted):
             raise StartError(
-                f"it is bound to {value!r}, which is in {value.unit.text} and not in {wanted.text}", where=path
+                f"it is bound to {value!r}, which is {value.unit.as_asked} and not {wanted.as_asked}", where=path
             )
         value = value.worked_out(model, path)
     was_text = isinstance(value, str)

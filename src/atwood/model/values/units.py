@@ -75,6 +75,11 @@ class Unit:
     factor: float
     exponents: Exponents
 
+    @property
+    def as_asked(self) -> str:
+        """How a number is asked for, as "in m"; "without a unit" where it has none."""
+        return "without a unit" if self.text == "1" else f"in {self.text}"
+
     def has_dimension_of(self, other: Unit) -> bool:
         """Return whether a value in this unit can be given in the other; ``"any"`` takes every unit."""
         if "any" in (self.text, other.text):
@@ -189,7 +194,7 @@ def parse_quantity(text: str, unit: Unit, where: str) -> float:
     """Read a number with an optional unit, such as ``"30 cm"``, and return it in the SI unit asked for."""
     split = split_quantity(text)
     if split is None:
-        raise ParameterError(f"{text!r} is not a number", where=where, advice=f"Give a number in {unit.text}.")
+        raise ParameterError(f"{text!r} is not a number", where=where, advice=f"Give a number {unit.as_asked}.")
     number, unit_text = split
     if not unit_text:
         return number
@@ -199,7 +204,7 @@ def parse_quantity(text: str, unit: Unit, where: str) -> float:
         raise ParameterError(error.message, where=where, advice=error.advice) from None
     if not given.has_dimension_of(unit):
         raise ParameterError(
-            f"{unit_text!r} does not measure what is asked for here", where=where, advice=f"Give it in {unit.text}."
+            f"{unit_text!r} does not measure what is asked for here", where=where, advice=f"Give it {unit.as_asked}."
         )
     if "Hz" in re.findall(r"[A-Za-z]+", unit_text) and "rad" in re.findall(r"[A-Za-z]+", unit.text):
         raise ParameterError(

@@ -29,6 +29,7 @@ from atwood.integrators.set_routines import (
     SEEN,
     SPANS,
     STEADY,
+    WAITS,
 )
 from atwood.lazy_dataclasses import dataclass, made_of, replace
 from atwood.mechanics.dynamics.equations import ContactRow
@@ -260,27 +261,43 @@ class _Moment:
         found[self._series] *= times
         return found
 
-    def stop(self, left: float) -> None:
-        """Stop what has impacts that have accumulated: nothing of it opens any more, and what has stuck goes on to."""
+    def stop(self, left: float, longest: float) -> None:
+        """Stop what has impacts that have accumulated: nothing of it opens any more, and what has stuck goes on to.
+
+        What would make energy waits for an impact to come, or where the series has nearly ended, does not rub.
+        """
         still = [k for k, one in enumerate(self.first) if one.is_slip and self.before[k][0] == STICKS]
         rates = self.rates()
         speeds = {k: self.rate(k, rates) for k in self.touching if k in self._series}
         # What has just bounced much faster than the others only passes: its impacts have not come to an end.
         coming = max(0.0, *(-speed for speed in speeds.values()))
         resting = [k for k, speed in speeds.items() if speed <= max(ALIKE * coming, self.slow[k])]
-        self.resting = resting
         self.slow = self._blurred(self.slow, 1.0 / NEAR_REST)
-        self._end_impacts(resting, still)
+        push = self._end_of_impacts(resting, still, rubs=True)
+        if self._makes_energy(push):
+            if left > WAITS * longest:
+                self.small, self._series = self._blurred(self.small, 1.0 / NEAR_REST), []
+                return
+            push = self._end_of_impacts(resting, still, rubs=False)
+        self.resting = resting
+        self.u = self.u + self.values.speeds_by(push)
         self.events += [told_rest(self.t, self.first[k].row.key[:2], left) for k in resting[:1]]
 
-    def _end_impacts(self, resting: list[int], still: list[int]) -> None:
-        """Take away the rates of gaps, and rub as much.
+    def _makes_energy(self, impulses: FloatArray) -> bool:
+        """Return whether impulses do more work on what moves than rounding does."""
+        rates = self.rates()
+        after = rates + self.values.response @ impulses
+        size = 0.5 * np.abs(impulses) * (np.abs(rates) + np.abs(after))
+        return float(np.sum(0.5 * impulses * (rates + after))) > GAIN * float(np.sum(size))
 
-        Impulses yet to come are those of the forces that press from now on, and this one, with a rest of one sign or
-        the other: what still rises has been pressed, and rubbed, too much so far. What would turn round sticks.
+    def _end_of_impacts(self, resting: list[int], still: list[int], rubs: bool) -> FloatArray:
+        """Return the impulses that take away the rates of gaps, and rub as much.
+
+        Impulses yet to come are those of the forces that press from now on, and these, with a rest of one sign or the
+        other: what still rises has been pressed, and rubbed, too much so far. What would turn round sticks.
         """
         values, rates = self.values, self.rates()
-        slips = [k for k in self.slips_at(resting) if k not in still and values.gap_of[k] >= 0]
+        slips = [k for k in self.slips_at(resting) if k not in still and values.gap_of[k] >= 0 and rubs]
         sliding = self._going(slips, rates)
         while True:
             states = [
@@ -292,9 +309,8 @@ class _Moment:
             after = rates + values.response @ (push := forces_in(values, states, rates))
             turned = [k for k, way in sliding.items() if float(np.dot(after[list(self.units[k])], way)) <= 0.0]
             if not turned:
-                break
+                return push
             sliding = {k: way for k, way in sliding.items() if k not in turned}
-        self.u = self.u + values.speeds_by(push)
 
     def _impact(self, touching: list[int], rates: FloatArray) -> None:
         values, count = self.values, len(self.contacts)
@@ -842,14 +858,13 @@ def resolve(
     moment = _Moment(ContactValues(assembly, t, q, u, length), scales, relative, triggers)
     moment.t = t if told is None else told
     before = moment.values.u
-    left = moment.left_of(impacts, longest_left(relative, scales))
+    longest = longest_left(relative, scales)
+    left = moment.left_of(impacts, longest)
     if is_start:
         moment.check_start()
     if left is not None:
-        moment.stop(left)
-        touching = moment.all_closed()
-    else:
-        touching = moment.all_closed()
+        moment.stop(left, longest[0])
+    touching = moment.all_closed()
     moment.collide(one_by_one)
     moment.settle()
     was, now = list(moment.before), states_of(moment.layout, moment.held)

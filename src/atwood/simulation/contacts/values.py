@@ -230,14 +230,25 @@ class ContactValues:
             held[place] = 0.0
         return balance_of(self.assembly.with_held(held), "dae").at(self.t, self.q, self.u)
 
+    @property
+    def _sizes_by_mass(self) -> FloatArray:
+        """Displacements that take as much of inertia for each body, so that one beside a far heavier one has some."""
+        own = np.diag(to_array(self._now.mass)) * self.sizes**2
+        largest: dict[tuple[str, str], float] = {}
+        bodies = [(one.name.rpartition(".")[0], one.unit) for one in self.assembly.maximal.speed_names]
+        for body, inertia in zip(bodies, own.tolist(), strict=True):
+            largest[body] = max(inertia, largest.get(body, 0.0))
+        shares = np.array([largest[body] for body in bodies]) / (float(np.max(own, initial=0.0)) or 1.0)
+        found: FloatArray = self.sizes / np.sqrt(np.where(shares > 0.0, shares, 1.0))
+        return found
+
     @cached_property
     def _inverse(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """The inverse of that balance, and what is scaled before and after it: they depend on the place alone."""
-        now = self._now
-        each = or_one(np.max(np.abs(to_array(now.jacobian) * self.sizes), axis=1, initial=0.0))
-        matrix, unit = even_balance(now, self.sizes, each)
+        now, sizes = self._now, self._sizes_by_mass
+        each = or_one(np.max(np.abs(to_array(now.jacobian) * sizes), axis=1, initial=0.0))
+        matrix, unit = even_balance(now, sizes, each)
         inverse = least_norm(matrix, np.eye(len(matrix)), errors=LIGHT)
-        sizes = self.sizes
         return inverse, np.concatenate([sizes / unit, 1.0 / each]), np.concatenate([sizes, unit / each])
 
     def _moved(self, right: FloatArray) -> FloatArray:
