@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.arrays import FloatArray
+from atwood.arrays import FloatArray, address_of
 from atwood.codegen.llvm.build import RoutineSource, build_code, once
 from atwood.codegen.llvm.module import CodeOptions
 from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Kind, Record, Routine
@@ -126,12 +126,11 @@ class Moments:
         rows, count, size = len(changes.samples), len(changes.times), len(start)
         self.changes, self._places = changes, places
         self.values, self.held = np.empty((rows, size)), np.empty((count, changes.held[1]))
-        self.values[0], self.held[0] = start, changes.parameters[slice(*np.cumsum(changes.held))]
-        rates = np.empty((int(np.max(np.diff(changes.first))), size))
+        own, held = changes.held
+        self.values[0], self.held[0] = start, changes.parameters[own : own + held]
+        rates = np.empty((int(np.diff(changes.first).max()), size))
         self._saved = np.zeros(places.counts, dtype=np.int64)
-        self._counts = np.ctypeslib.as_array(
-            ctypes.cast(places.steps, ctypes.POINTER(ctypes.c_int64)), (places.counts,)
-        )
+        self._counts = np.frombuffer((ctypes.c_int64 * places.counts).from_address(places.steps), dtype=np.int64)
         arrays = {
             "times": changes.samples,
             "values": self.values,
@@ -144,7 +143,7 @@ class Moments:
             "parameters": changes.parameters,
             "saved": self._saved,
         }
-        given: dict[str, float] = {name: one.ctypes.data for name, one in arrays.items()}
+        given: dict[str, float] = {name: address_of(one) for name, one in arrays.items()}
         named = ("begin", "sample", "session", "limit", "steps", "filled", "counts")
         given |= {name: getattr(places, name) for name in named} | {"horizon": horizon, "end": changes.end}
         given |= dict(zip(("update", "update_data"), changes.update, strict=True))
@@ -155,9 +154,9 @@ class Moments:
         given |= {"size": size, "count": count, "row": 1, "scratch": changes.scratch, "others": others}
         given |= dict(zip(("held_at", "held_count"), changes.held, strict=True))
         self._job = np.zeros(len(FIELDS), dtype=np.int64)
+        numbers = self._job.view(np.float64)
         for name, value in given.items():
-            table: NDArray[Any] = self._job.view(np.float64) if FIELDS[name] is NUMBER else self._job
-            table[_PLACES[name]] = value
+            (numbers if FIELDS[name] is NUMBER else self._job)[_PLACES[name]] = value
         self._keep = arrays, places
         self._function = _function()
 

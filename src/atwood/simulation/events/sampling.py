@@ -8,6 +8,7 @@ any Python; what they read is one program.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -111,8 +112,11 @@ class Sampler:
 
     def due_at_each(self, times: FloatArray) -> list[tuple[int, ...]]:
         """Return which updates are due at each of some times."""
-        known = dict(zip(self.times.tolist(), self.due, strict=True))
-        return [known.get(t, ()) for t in times.tolist()]
+        return [self._due.get(t, ()) for t in times.tolist()]
+
+    @cached_property
+    def _due(self) -> dict[float, tuple[int, ...]]:
+        return dict(zip(self.times.tolist(), self.due, strict=True))
 
     @property
     def is_pure(self) -> bool:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from atwood.arrays import address_of
 from atwood.codegen.llvm.build import RoutineSource, build_code, default_options
 from atwood.codegen.llvm.module import Part
 from atwood.errors import AtwoodError
@@ -181,8 +182,8 @@ class UpdateCode:
         room = np.zeros(len(rest) + len(self.reading.inputs) + max(len(one.places) for one in self.laws))
         scratch = np.zeros(max(1, self.built.scratch))
         kept = [room, scratch, *derived]
-        data = np.array([one.ctypes.data for one in kept], dtype=np.uint64)
-        return data.ctypes.data, (data, kept, self.built)
+        data = np.array([address_of(one) for one in kept], dtype=np.uint64)
+        return address_of(data), (data, kept, self.built)
 
 
 def update_code(assembly: Assembly, sampler: Sampler) -> tuple[UpdateCode, dict[tuple[int, ...], int]] | None:

@@ -7,11 +7,11 @@ single stretches record, to the bit.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from atwood.arrays import FloatArray
+from atwood.arrays import BoolArray, FloatArray, IntArray
 from atwood.clock import check_time
 from atwood.forms.assembly import Assembly
 from atwood.integrators.explicit_session import ExplicitSession
@@ -116,7 +116,9 @@ def pass_moments(
 ) -> Passed | None:
     """Go through moments, and record what single stretches would; None where not even the first came out well."""
     way = _Way(ahead, recorder.plan)
-    samples, shown, first = _rows(ahead, way.due, first_shown)
+    given, changes = ahead.samples, tuple([bool(due) for due in way.due])
+    about = ahead.times.tobytes(), given.times.tobytes(), given.shown.tobytes(), changes, first_shown
+    samples, shown, first = _rows(*about, bool(ahead.sampler.due_at(float(given.times[-1]))))
     moments = session.through(way.changes(filling, samples, first))
     if moments is None:
         return None
@@ -141,26 +143,32 @@ def pass_moments(
     return Passed(float(samples[count - 1]), float(ahead.times[begun - 1]), held, code != DONE, way.error)
 
 
+@lru_cache(maxsize=4)
 def _rows(
-    ahead: Ahead, due: Sequence[tuple[int, ...]], first_shown: bool
-) -> tuple[FloatArray, NDArray[np.bool_], NDArray[np.int64]]:
-    """Return the samples of all stretches, each with both its ends, which are shown, and where each begins."""
-    moments, given = ahead.times, ahead.samples
-    end = float(given.times[-1])
-    later = given.times[int(given.times.searchsorted(moments[0], side="right")) :]
+    moments_: bytes, times_: bytes, shown_: bytes, due: tuple[bool, ...], first_shown: bool, changes_at_end: bool
+) -> tuple[FloatArray, BoolArray, IntArray]:
+    """Return the samples of all stretches, each with both its ends, which are shown, and where each begins.
+
+    Of moments, of samples and of which are shown; it depends on nothing else, and a run again has the same.
+    """
+    moments, given_times, given_shown = np.frombuffer(moments_), np.frombuffer(times_), np.frombuffer(shown_, bool)
+    later = given_times[int(given_times.searchsorted(moments[0], side="right")) :]
     times = np.union1d(moments, later)
     counts = np.ones(len(times), dtype=np.intp)
     counts[times.searchsorted(moments[1:])] = 2
     rows = np.repeat(times, counts)
-    place = np.minimum(given.times.searchsorted(rows), len(given.times) - 1)
-    shown = (given.times[place] == rows) & given.shown[place]
+    place = np.minimum(given_times.searchsorted(rows), len(given_times) - 1)
+    shown = (given_times[place] == rows) & given_shown[place]
     begins = rows.searchsorted(moments, side="right") - 1  # behind the state before
     shown[begins[1:] - 1] = False
-    shown[begins[np.array([k > 0 and bool(one) for k, one in enumerate(due)])]] = True
+    shown[begins[1:][np.array(due[1:], dtype=bool)]] = True
     shown[0] = first_shown
-    if ahead.sampler.due_at(end):  # the state just after it is shown
+    if changes_at_end:  # the state just after it is shown
         shown[-1] = False
-    return rows, shown, np.append(begins, len(rows)).astype(np.int64)
+    first = np.append(begins, len(rows)).astype(np.int64)
+    for values in (rows, shown, first):
+        values.flags.writeable = False
+    return rows, shown, first
 
 
 class _Way:
@@ -173,7 +181,7 @@ class _Way:
         self.held = np.zeros((0, 0))
         self.error: Exception | None = None
 
-    def changes(self, filling: Filling, samples: FloatArray, first: NDArray[np.int64]) -> Changes:
+    def changes(self, filling: Filling, samples: FloatArray, first: IntArray) -> Changes:
         """Return what happens, for the session of some rates."""
         ahead, assembly, rates = self._ahead, self._plan.assembly, filling.own.rates
         which = np.array([-1 if due else 0 for due in self.due], dtype=np.int64)

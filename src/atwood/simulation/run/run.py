@@ -334,7 +334,8 @@ class Walk:
 
     def _moments(self, schedule: Schedule) -> Ahead | None:
         """Return the moments that steps may pass by themselves from here on; None where there are none."""
-        if not (len(schedule.times) or len(self.sampler.times)) or not self.passes_moments:
+        is_over = not self.t < self.options.t_end
+        if is_over or not (len(schedule.times) or len(self.sampler.times)) or not self.passes_moments:
             return None
         from atwood.simulation.run.moments import Ahead, times_ahead
 
