@@ -219,12 +219,15 @@ def misses_of(
 
 def _misses(plan: SceneProblem) -> Callable[..., FloatArray]:
     """Return the same as machine code."""
-    from atwood.codegen.llvm.misses import compile_misses
-
     held, assembly = plan.balance.program, plan.assembly
-    places = tuple(zip(held.jacobian_rows.tolist(), held.jacobian_columns.tolist(), strict=True))
-    code = partial(compile_misses, held.constraints_alone, places)
-    made = assembly.shared.get(_MISSES, code, assembly.form)
+
+    def compiled() -> MissProgram:
+        from atwood.codegen.llvm.misses import compile_misses
+
+        places = tuple(zip(held.jacobian_rows.tolist(), held.jacobian_columns.tolist(), strict=True))
+        return compile_misses(held.constraints_alone, places)
+
+    made = assembly.shared.get(_MISSES, compiled, assembly.form)
     return assembly.kept.get(_MISSES_HERE, lambda: made.bind(assembly.parameter_values), made)
 
 
