@@ -130,7 +130,7 @@ class Moments:
         self.values[0], self.held[0] = start, changes.parameters[own : own + held]
         rates = np.empty((int(np.diff(changes.first).max()), size))
         self._saved = np.zeros(places.counts, dtype=np.int64)
-        self._counts = np.frombuffer((ctypes.c_int64 * places.counts).from_address(places.steps), dtype=np.int64)
+        self._counts = np.ctypeslib.as_array((ctypes.c_int64 * places.counts).from_address(places.steps))
         arrays = {
             "times": changes.samples,
             "values": self.values,

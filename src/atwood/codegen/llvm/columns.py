@@ -6,7 +6,9 @@ For a few dozen states that takes a tenth of the time of NumPy, which does one o
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from ctypes import c_int64, c_void_p
+from itertools import accumulate
 from time import perf_counter
 
 import numpy as np
@@ -14,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from atwood.arrays import FloatArray, address_of
 from atwood.clock import check_time
-from atwood.codegen.llvm.build import RoutineSource
+from atwood.codegen.llvm.build import Built, RoutineSource
 from atwood.codegen.llvm.module import Part
 from atwood.codegen.llvm.tiers import Tiers
 from atwood.codegen.routines import ADDRESS, INTEGER, Kind, Record, Routine
@@ -41,6 +43,17 @@ class ColumnProgram:
         self.program, self.tiers = program, tiers
         self.inputs = [len(group.symbols) for group in program.inputs]
         self.outputs = [len(group.expressions) for group in program.outputs]
+        sizes = (*self.inputs, *self.outputs)
+        self.counts = np.array(sizes, dtype=np.int64)
+        self.begins = 8 * np.array([0, *accumulate(sizes)][:-1], dtype=np.int64)
+        self._function: tuple[Built | None, Callable[[int], None]] = None, lambda _: None
+
+    def function(self) -> tuple[Built, Callable[[int], None]]:
+        """Return the present code, and its loop over the states."""
+        built = self.tiers.now
+        if self._function[0] is not built:
+            self._function = built, _COLUMNS(built.code.addresses["columns"])
+        return built, self._function[1]
 
     def bind(self, parameter_values: ArrayLike) -> ColumnKernel:
         """Compute once what depends on parameters alone."""
@@ -68,16 +81,16 @@ class ColumnKernel:
         code, states = self.code, max(one.shape[1] for one in groups)
         given = [_full(one, (size, states)) for one, size in zip(groups, code.inputs, strict=True)]
         found = [np.empty((size, states)) for size in code.outputs]
-        built, began = code.tiers.now, perf_counter()
-        room, scratch = np.empty(sum(code.inputs) + sum(code.outputs)), np.empty(built.scratch)
-        groups_of = (given, code.inputs), (found, code.outputs)
-        lists = [np.array([address_of(one) for one in arrays], dtype=np.int64) for arrays, _ in groups_of]
-        counts = [np.array(sizes, dtype=np.int64) for _, sizes in groups_of]
-        begins = 8 * np.cumsum([0, *code.inputs, *code.outputs])[:-1] + room.ctypes.data
-        data = *lists, *counts, begins, begins[len(given) :], self._derived, scratch
-        job = (c_int64 * len(_FIELDS))(*map(address_of, data), len(given), len(found), states)
-        _COLUMNS(built.code.addresses["columns"])(ctypes.addressof(job))
-        code.tiers.spend(perf_counter() - began)
+        (built, call), began, taken = code.function(), perf_counter(), len(given)
+        room = np.empty(int(code.counts.sum()) + built.scratch)
+        arrays = np.array([address_of(one) for one in (*given, *found)], dtype=np.int64)
+        places = code.begins + address_of(room)
+        tables = [(address_of(one), address_of(one) + 8 * taken) for one in (arrays, code.counts, places)]
+        scratch = address_of(room) + 8 * (len(room) - built.scratch)
+        data = *(one for pair in tables for one in pair), address_of(self._derived), scratch
+        job = (c_int64 * len(_FIELDS))(*data, taken, len(found), states)
+        call(ctypes.addressof(job))
+        code.tiers.spend_on(states, perf_counter() - began)
         return tuple(found)
 
 

@@ -66,7 +66,7 @@ class MissProgram:
         arrays = t, y, sizes, least, derived, room, self._places, found
         data = (c_int64 * len(_FIELDS))(*map(address_of, arrays), *self._sizes, self._places.shape[1])
         _MISSES(built.code.addresses["misses"])(ctypes.addressof(data), len(t))
-        self._tiers.spend(perf_counter() - began)
+        self._tiers.spend_on(len(t), perf_counter() - began)
         return found
 
 

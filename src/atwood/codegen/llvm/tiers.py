@@ -40,6 +40,9 @@ _LEAST = 0.01
 _STARTS = 10
 """What was started so often will be started again."""
 
+_STATES = 1_200
+"""The same of what was worked out for the outputs of three runs."""
+
 
 class Tiers:
     """Programs as tapes, and as machine code once they have run for as long as that takes to make, or were begun often.
@@ -94,6 +97,11 @@ class Tiers:
                 with suppress(TimeIsUp):
                     self.at_its_best()
         return self.now
+
+    def spend_on(self, states: int, seconds: float) -> None:
+        """Take note that it ran for so long, for so many states: what all outputs of runs ask will be asked again."""
+        if self._better is not None:
+            self.spend(max(seconds, self._cost * states / _STATES))
 
     def at_its_best(self) -> Built:
         """Return the code that suits many runs, or a long one."""
