@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from atwood import Component, Point, Scalar, Scene, connector, event, parameter, potential, simulate, sweep
 from atwood.study.sweeps import batch as sweep_batch
 from atwood_library import Mass1D, PointMass, TranslationalGap
+from atwood_library.scenes import DoublePendulum, FreeBody
 
 from ..helpers.latches import Latch
 from ..helpers.mechanisms import pendulum_on_a_string
@@ -101,6 +102,17 @@ CASES: dict[str, tuple[Callable[[], Scene], dict[str, Any]]] = {
     "stops": (between_stops, {"start": {"mass.speed": [0.5, 1.0, 3.0]}, "outputs": 11}),
     "other coordinates": (latched, {"start": {"one.velocity.x": [1.5, 2.0, 3.0]}, "outputs": 5}),
     "damped": (damped_stops, {"start": {"mass.speed": [0.5, 1.0, 3.0]}, "outputs": 11}),
+    "until": (ball, {"start": {"ball.velocity.z": [0.0, 2.0, 5.0]}, "until": "ball.position.x rises above 0.5"}),
+    "until one of two": (
+        DoublePendulum,
+        {
+            "start": {"rod1.angle": [0.5, 1.0, 3.0]},
+            "until": ["rod1.angle crosses 0", lambda q: q["bob2.velocity.x"] > 2.5],
+            "outputs": 23,
+            "t_end": 3.0,
+        },
+    ),
+    "until never": (DoublePendulum, {"start": {"rod1.angle": [0.5, 1.0]}, "until": "rod1.tension rises above 1e6"}),
     "nothing happens": (between_stops, {"start": {"mass.speed": [0.01, 0.02]}}),
 }
 
@@ -117,6 +129,15 @@ def test_many_at_a_time_is_one_by_one(name: str, monkeypatch: pytest.MonkeyPatch
         assert found.statistics.batched == 0
         return
     assert_same(found, single, 1e-10)
+
+
+def test_an_angle_within_one_turn_is_met_one_by_one() -> None:
+    spins = {"body.spin.y": [0.5, 1.0]}
+    found = sweep(FreeBody(), start=spins, until="body.spin.x falls below 0.5", t_end=2.0, threads=1)
+    assert found.statistics.batched == 2
+    found = sweep(FreeBody(), start=spins, until="body.psi crosses 10 deg", t_end=2.0, threads=1)
+    assert found.statistics.batched == 0
+    assert "one turn" in found.statistics.why_single
 
 
 def test_each_run_is_that_of_simulate() -> None:

@@ -23,6 +23,7 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.result.segment_quantities import reads
 from atwood.simulation.events.modes import find_event_functions
 from atwood.simulation.initialization.start import find_start
+from atwood.simulation.problem.conditions import condition_functions
 from atwood.simulation.problem.curved_laws import find_curved
 from atwood.study.sweeps.batch_values import ParameterRows, StartRows, read_starts
 from atwood.study.sweeps.modes import find_mode
@@ -58,13 +59,18 @@ def why_not_batched(request: SweepRequest) -> str:
         return "on a line, each start says on which side of each other the parts are"
     if options.accuracy is not None:
         return "each run has tolerances for its accuracy"
-    if options.conditions:
-        return "each run stops at a condition"
+    if any(one.is_there is not None for one in condition_functions(assembly, options.conditions)):
+        return "each run stops at a condition on an angle that comes out within one turn"
     if options.max_seconds is not None:
         return "each run has a limit of time"
     if request.has_turns:
         return "a quantity counts turns on the way"
-    return _first_mode(request) if find_event_functions(assembly) else find_way(request)[1]
+    return _first_mode(request) if _is_watched(request) else find_way(request)[1]
+
+
+def _is_watched(request: SweepRequest) -> bool:
+    """Return whether events are looked for: of the parts, or what runs are to stop at."""
+    return bool(request.options.conditions) or bool(find_event_functions(request.assembly))
 
 
 def _first_mode(request: SweepRequest) -> str:
@@ -87,7 +93,7 @@ def run_batches(
     count, shown = request.cases.count, len(request.times) * (len(equations.coordinates) + len(equations.speeds))
     length = max(1, min(_PIECE, -(-count // (4 * threads)), _NUMBERS // max(1, shown)))
     pieces = [np.arange(first, min(first + length, count)) for first in range(0, count, length)]
-    if find_event_functions(request.assembly):
+    if _is_watched(request):
         shared_work(Waves(request, records).work, pieces, threads, watch)
     else:
         way, _ = find_way(request)

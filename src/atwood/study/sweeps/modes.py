@@ -201,7 +201,7 @@ def find_mode(
     try:
         plan = make_problem(assembly, t, q, u, length, options.t_end - base.flat.t_start)
         chosen = choose(plan, options, t, q, u).method
-        probe = EventProbe(plan, t, q, u, options.relative_tolerance)
+        probe = EventProbe(plan, t, q, u, options.relative_tolerance, options.conditions)
     except AtwoodError:
         return None, "the first run cannot start"
     functions = probe.event_functions

@@ -162,7 +162,7 @@ def sweep(
         The largest error of the motion of each run, as for `simulate`, in place of `rtol`; `Sweep.messages` says which
         runs did not reach it. Such runs are made one by one, each about four times.
     until
-        Where each run stops: a condition in words, as for `simulate`, or several. Such runs are made one by one.
+        Where each run stops: a condition in words, as for `simulate`, or several.
 
     Returns
     -------
