@@ -22,6 +22,7 @@ from timing import best_of, options, print_table, save
 
 from atwood import Model, Scene, assemble, simulate
 from atwood.integrators.methods.dormand_prince import TABLEAU
+from atwood.integrators.stepper import NativeStepper
 from atwood_library import Ground, PointContact, PointMass, Spring
 from atwood_library.scenes import Clutches, DoublePendulum, StickSlip
 
@@ -136,6 +137,25 @@ def seconds(function: Callable[[], object]) -> float:
     return time.process_time() - began
 
 
+def compiled_seconds(function: Callable[[], object]) -> float:
+    """Return the processor time that a call spends in compiled steps: all that begins and ends in machine code."""
+    plain, spent = NativeStepper._call, [0.0]
+
+    def timed(stepper: NativeStepper, name: str, *given: float) -> int:
+        began = time.process_time()
+        try:
+            return plain(stepper, name, *given)
+        finally:
+            spent[0] += time.process_time() - began
+
+    NativeStepper._call = timed  # type: ignore[method-assign]
+    try:
+        function()
+    finally:
+        NativeStepper._call = plain  # type: ignore[method-assign]
+    return spent[0]
+
+
 def ratios(repeat: int) -> list[list[object]]:
     """Return what contacts cost that do nothing, a first run with many, and energies."""
     rows: list[list[object]] = []
@@ -177,21 +197,20 @@ def main(arguments: Sequence[str] | None = None) -> None:
             told: dict[str, object] = {"rtol": RTOL, "t_end": end, "outputs": [0.0, end]}
             events = [one for one in simulate(assembly, **told).events if one.kind != "event"]
 
-            def ours(assembly: object = assembly, told: dict[str, object] = told) -> float:
-                return seconds(partial(simulate, assembly, **told))
-
-            measures = {"ours": ours} | ({"c": lambda run=written: run()[0]} if written is not None else {})
+            again = partial(simulate, assembly, **told)
+            measures = {"ours": partial(seconds, again), "steps": partial(compiled_seconds, again)} | ({"c": lambda run=written: run()[0]} if written is not None else {})
             spent = best_of(measures, 1 if given.quick else given.repeat)
             count, theirs = max(len(events), 1), written()[1] if written is not None else None
             c = spent.get("c")
             rows.append(
                 [
                     *(name, len(events), theirs, 1e3 * spent["ours"], 1e6 * spent["ours"] / count),
-                    *(None if c is None else 1e6 * c / count, None if c is None else spent["ours"] / c),
+                    *((None,) * 3 if c is None else (1e6 * c / count, spent["ours"] / c, spent["steps"] / c)),
                     spent["ours"] / count / step,
                 ]
             )
-    head = ("scene", "events", "in C", "ms", "us an event", "C, us an event", "times C", "steps of a pendulum")
+    own = "scene", "events", "in C", "ms", "us an event"
+    head = (*own, "C, us an event", "times C", "compiled steps alone", "steps of a pendulum")
     print_table("Events beside C by hand (goals: 3 times C; a reflection 12 steps of the double pendulum)", head, rows)
     more = ratios(1 if given.quick else given.repeat)
     print_table("Contacts that do nothing, first runs, energies", ("what", "ratio"), more)

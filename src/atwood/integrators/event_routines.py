@@ -305,7 +305,7 @@ def _happening() -> Routine:
     r, m, (time, after, moment) = _open("happening", dict.fromkeys(("time", "after", "moment"), NUMBER))
     names = ("known", "crossed", "later", "old", "sign", "unsure", "origin", "carried", "fired", "found")
     known, crossed, later, old, sign, unsure, origin, carried, fired, found = map(m.row, names)
-    for moment_read, target in ((time, crossed), (after, later)):
+    for moment_read, target in ((after, later), (time, crossed)):  # the one that is settled last, as it is read then
         do_or_return(r, "read", moment_read)
         r.call("crossings", r.arguments[0], moment_read, known, target)
     with r.count(m.count) as i:
