@@ -198,7 +198,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             events = [one for one in simulate(assembly, **told).events if one.kind != "event"]
 
             again = partial(simulate, assembly, **told)
-            measures = {"ours": partial(seconds, again), "steps": partial(compiled_seconds, again)} | ({"c": lambda run=written: run()[0]} if written is not None else {})
+            measures = {"ours": partial(seconds, again), "steps": partial(compiled_seconds, again)}
+            measures |= {"c": lambda run=written: run()[0]} if written is not None else {}
             spent = best_of(measures, 1 if given.quick else given.repeat)
             count, theirs = max(len(events), 1), written()[1] if written is not None else None
             c = spent.get("c")

@@ -15,7 +15,7 @@ from atwood.codegen.llvm.module import CodeOptions
 from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Kind
 from atwood.errors import KernelEvaluationError
 from atwood.integrators.event_location import MOST, ROUNDING, EventLocator, Interpolant, Root
-from atwood.integrators.protocol import ExplicitProblem, State
+from atwood.integrators.protocol import ExplicitProblem, ImplicitProblem, State
 
 if TYPE_CHECKING:
     from atwood.codegen.llvm.build import Built
@@ -83,7 +83,7 @@ class CompiledLocator(EventLocator):
 
     def __init__(
         self,
-        problem: ExplicitProblem,
+        problem: ImplicitProblem | ExplicitProblem,
         events: EventData,
         interpolation: tuple[int, int],
         horizon: float,

@@ -345,6 +345,8 @@ class NativeCallbacks:
     has_noticed
         Asked where `events` did not return 0: whether that was to say that a value may have passed zero since they
         were called before, in which case they return 0 when they are called again.
+    watched
+        The same event functions for routines that look for their zeros; None where these are looked for in Python.
     undefined_values
         How often residual and Jacobian had no finite value so far, if somebody counts it.
     attend
@@ -366,6 +368,7 @@ class NativeCallbacks:
     events: int = 0
     restart_events: Callable[[float], None] | None = None
     has_noticed: Callable[[], bool] | None = None
+    watched: EventData | None = None
     undefined_values: Callable[[], int] | None = None
     attend: Callable[[float, FloatArray], bool | None] | None = None
     last_rate: Callable[[], float] | None = None

@@ -126,7 +126,7 @@ def test_events_are_those_of_the_explicit_method(make: Callable[[], Scene], solv
 def test_sets_are_found_by_the_routine_of_explicit_steps(
     form: str, solver: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Python finds the set of the start alone, and no zero of a series."""
+    """Python finds the set of the start alone, and no zero."""
     in_python, plain, found = [], changes.resolve, []
 
     def counted(*given: object) -> changes.Changed:
@@ -134,8 +134,7 @@ def test_sets_are_found_by_the_routine_of_explicit_steps(
         return plain(*given)  # type: ignore[arg-type]
 
     monkeypatch.setattr(changes, "resolve", counted)
-    if solver == "taylor":
-        monkeypatch.setattr(EventLocator, "search", lambda *_: pytest.fail("an event is looked for in Python"))
+    monkeypatch.setattr(EventLocator, "search", lambda *_: pytest.fail("an event is looked for in Python"))
     for counts in (1, 6):
         in_python.clear()
         found.append(simulate(StickSlip(), solver=solver, form=form, t_end=2.0, rtol=1e-8).events)

@@ -17,6 +17,7 @@ from atwood.errors import UsageError
 from atwood.integrators.ida.callbacks import JACOBIAN, Record
 from atwood.integrators.ida.library import SundialsLibrary
 from atwood.integrators.ida.linear_solvers import FixedSolver, SparseSolver
+from atwood.integrators.ida.reading import StepReader, address_in
 from atwood.integrators.protocol import ChoosePivots, StepMonitor
 from atwood.lazy_dataclasses import dataclass
 
@@ -274,6 +275,11 @@ class IdaMemory:
             return flag, self._time.value, count.value
 
         return go
+
+    def reader(self) -> StepReader:
+        """Return what reads the last step without Python."""
+        places = self._ida.value or 0, self._y, self._yp, self.y.ctypes.data, self.yp.ctypes.data
+        return StepReader(self.size, (address_in(self.library, "IDAGetDky"), *places), self)
 
     def interpolate(self, t: float) -> int:
         """Put the solution at a time inside the last step into `y` and `yp`; return IDA's flag."""

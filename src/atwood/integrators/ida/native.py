@@ -20,6 +20,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, UsageError
+from atwood.integrators.compiled_location import CompiledLocator
 from atwood.integrators.event_location import Root
 from atwood.integrators.ida.callbacks import Record, explain
 from atwood.integrators.ida.library import library
@@ -95,6 +96,10 @@ class NativeSession(SteppingSession):
         self._memory = prepare(
             problem, options, tuning or IdaTuning(), linear_solver, self._native, self._record, state
         )
+        events, self._reader = None if self._native is None else self._native.watched, None
+        if events is not None:  # nothing of a search runs in Python
+            self._reader = self._memory.reader()
+            self._locator = CompiledLocator(problem, events, self._reader.interpolation, options.horizon, None)
         self._stop_time = None if tuning is None else tuning.stop_time
         self._guard = self._memory.library.sparse_guard if linear_solver == "sparse" else nullcontext()
         # Whether IDA itself can tell in which steps something happens.
@@ -191,6 +196,8 @@ class NativeSession(SteppingSession):
         """Set all that belongs to a start of IDA."""
         if self._stop_time is not None:
             self._memory.call("IDASetStopTime", self._stop_time)
+        if self._reader is not None:
+            self._reader.hold(state)
         if self._locator is not None:
             self._locator.restart(state)
         if self._native is not None and self._native.restart_events is not None:
@@ -222,6 +229,8 @@ class NativeSession(SteppingSession):
 
     def _find_root(self, t_out: float = inf) -> Root | None:
         is_known = self._looks_on and not self._searched < t_out <= self._reached
+        if self._reader is not None and not is_known:
+            self._reader.hold(self._newest)
         return None if is_known else super()._find_root(t_out)
 
     def _arrive(self, t_out: float) -> StepResult | None:

@@ -237,6 +237,7 @@ def _with_events(problem: ImplicitProblem, probe: EventProbe) -> ImplicitProblem
             events=found.ida,
             restart_events=found.restart,
             has_noticed=found.has_noticed,
+            watched=found,
             keep=keep,
         )
 
