@@ -124,7 +124,21 @@ class MonitorCode:
         ends = [0, *accumulate(one.size for one in arrays.values())]
         places = {name: (slice(*ends[k : k + 2]), one.shape) for k, (name, one) in enumerate(arrays.items())}
         memory = np.concatenate([one.ravel() for one in arrays.values()])
-        return MonitorData(self, shared, places, memory)
+        begins = [address_of(shared[name]) if name in shared else 8 * places[name][0].start for name in FIELDS]
+        is_own = np.array([name in places for name in FIELDS])
+        return MonitorData(self, shared, places, (np.array(begins, dtype=np.int64), is_own), memory)
+
+
+class _Views(dict[str, NDArray[Any]]):
+    """Arrays within a memory, by name, made when they are asked for."""
+
+    def __init__(self, memory: NDArray[np.float64], places: dict[str, tuple[slice, tuple[int, ...]]]) -> None:
+        self._memory, self._places = memory, places
+
+    def __missing__(self, name: str) -> NDArray[Any]:
+        place, shape = self._places[name]
+        found = self[name] = self._memory[place].reshape(shape)
+        return found
 
 
 class MonitorData:
@@ -138,6 +152,8 @@ class MonitorData:
         Arrays that no look changes.
     places
         Where each other array is in the memory, and its shape.
+    begins
+        Where all of them begin, and which do so from the memory on.
     memory
         The numbers of these.
 
@@ -155,16 +171,15 @@ class MonitorData:
         code: MonitorCode,
         shared: dict[str, NDArray[Any]],
         places: dict[str, tuple[slice, tuple[int, ...]]],
+        begins: tuple[NDArray[np.int64], NDArray[np.bool_]],
         memory: NDArray[np.float64],
     ) -> None:
-        self.code, self._given, self._memory = code, (shared, places), memory
-        self._arrays = arrays = {name: memory[place].reshape(shape) for name, (place, shape) in places.items()}
-        self.rows: NDArray[np.float64] = arrays["rows"]
-        self._state, begin = arrays["state"], address_of(memory)
-        pointers = {name: address_of(one) for name, one in shared.items()}
-        pointers |= {name: begin + 8 * place.start for name, (place, _) in places.items()}
-        self._pointers = (ctypes.c_void_p * len(FIELDS))(*[pointers[name] for name in FIELDS])
-        self.address, self.due_at = ctypes.addressof(self._pointers), pointers["state"] + 8 * AT["next"]
+        self.code, self._given, self._memory = code, (shared, places, begins), memory
+        self._arrays = _Views(memory, places)
+        self.rows: NDArray[np.float64] = self._arrays["rows"]
+        self._state, begin = self._arrays["state"], address_of(memory)
+        self._pointers = begins[0] + begin * begins[1]
+        self.address, self.due_at = address_of(self._pointers), begin + 8 * (places["state"][0].start + AT["next"])
 
     def copied(self) -> MonitorData:
         """Return the same for another run, from what was noted on."""

@@ -339,7 +339,8 @@ class _Runner:
 
         monitor = singularity_monitor_of(segment.plan, segment.options.relative_tolerance, segment.end, session.here)
         self.monitor = monitor
-        if monitor is not None and not (monitor.step_monitor is not None and session.set_monitor(monitor.step_monitor)):
+        looks = None if monitor is None else monitor.step_monitor
+        if monitor is not None and (looks is None or not session.set_monitor(looks)):
             monitor.look_in_python()
 
     def _is_stiff(self, t: float, y: FloatArray) -> bool:

@@ -31,7 +31,7 @@ from atwood.tolerances import tolerances
 if TYPE_CHECKING:
     from atwood.codegen.sundials.step_monitor import MonitorData
 
-_BEGUN: Key[MonitorData | None] = Key("first looks for singular positions")
+_BEGUN: Key[tuple[MonitorData, bool] | None] = Key("first looks for singular positions")
 
 _LOOKED_AHEAD: Key[tuple[SingularCrossing | None, list[float]]] = Key("first look ahead")
 
@@ -115,12 +115,15 @@ class SingularityMonitor(Branches):
             self._begin_looks()
         elif self._compiled is None:  # a run from the same state has looked around before
             self._start_anew()
-            self._compiled = begun.copied()
+            first, self._starts_low = begun
+            self._compiled = first.copied()
             self._measures.rows, self.next = self._compiled.rows, np.inf
-            self._starts_low = self._compiled.least_share < _AT_START
 
-    def _first_looks(self) -> MonitorData | None:
-        """Look at the start, and around it; return what came of it, None where nothing can be compiled."""
+    def _first_looks(self) -> tuple[MonitorData, bool] | None:
+        """Look at the start, and around it; return what came of it, and whether something is low there.
+
+        None where nothing can be compiled.
+        """
         plan, start = self.plan, self._start
         self._compiled = compiled_monitor(plan, self._whole, len(start.y))
         if self._compiled is None:
@@ -129,7 +132,7 @@ class SingularityMonitor(Branches):
         self._compiled.rows[:] = tolerances.TRUSTED * errors
         self._measures.rows = self._compiled.rows
         self._begin_looks()
-        return self._compiled.copied()
+        return self._compiled.copied(), self._starts_low
 
     @property
     def step_monitor(self) -> StepMonitor | None:
