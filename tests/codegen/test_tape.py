@@ -12,9 +12,11 @@ from atwood.codegen.llvm.backend import NativeProgram
 from atwood.codegen.llvm.build import build_code
 from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.codegen.llvm.tape import _CODES, _computed
+from atwood.codegen.llvm.taped import TapedProgram
 from atwood.codegen.llvm.text import OWN_FUNCTIONS, has_code
+from atwood.codegen.python.walk import WALKS
 from atwood.codegen.routines import NUMBER, Routine
-from atwood.errors import UnsupportedError
+from atwood.errors import KernelEvaluationError, UnsupportedError
 from atwood.expr.core.operations import BINARY, UNARY
 from atwood_library.scenes import SCENES
 
@@ -101,7 +103,7 @@ def test_functions_in_python_have_no_tape():
     graph = ex.Graph()
     x = graph.symbol("x")
     program = program_of([ex.external(ex.ExternalFunction("half", lambda a: 0.5 * a), x)], [[x]])
-    with pytest.raises(UnsupportedError, match="no tape for the operation external"):
+    with pytest.raises(UnsupportedError, match="no tape for an operation"):
         tiers.build_tapes([Part("kernel", program)])
 
 
@@ -126,3 +128,19 @@ def test_every_program_of_a_first_run_has_the_bits_of_its_machine_code(name, for
     for program in found:
         given = [[rng.uniform(-1.2, 1.2, len(group.symbols)) for group in program.inputs] for _ in range(4)]
         assert_alike(program, given, rng.uniform(0.5, 1.5, len(program.parameters)))
+
+
+def test_what_runs_often_in_python_keeps_the_bits_of_its_walks():
+    program = simulate(SCENES["stewart-platform"](), t_end=1e-3, outputs=3).run.segments[0].plan.balance.program.program
+    assert not any(node.operation in ("external", "solve") for node in program.nodes)
+    rng = np.random.default_rng(1)
+    kernel = TapedProgram(program).bind(rng.uniform(0.5, 1.5, len(program.parameters)))
+    given = [rng.uniform(-1.2, 1.2, len(group.symbols)) for group in program.inputs]
+    rows = [kernel(*given) for _ in range(WALKS + 2)]
+    assert "main" in vars(kernel.compiled)
+    assert all(row == rows[0] for row in rows)
+    with pytest.raises(KernelEvaluationError, match="takes the groups"):
+        kernel(given[0], given[1][1:], given[2])
+    given[1][0] = math.inf
+    with pytest.raises(KernelEvaluationError, match="no finite value"):
+        kernel(*given)

@@ -96,7 +96,7 @@ def test_nothing_is_fused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ATWOOD_CACHE", "0")
     monkeypatch.setattr(own, "compiled", {})  # what is in use stays
     functions = own.own_functions.__wrapped__()
-    tiers._evaluator.__wrapped__()
+    tiers.evaluator.__wrapped__()
     simulate(SCENES["four-bar"](), form="dae", t_end=0.01)
     simulate(Chain(links=7), solver="taylor", t_end=0.01)
     simulate(SCENES["four-bar"](), solver="ida", t_end=0.01)

@@ -12,7 +12,7 @@ import numpy as np
 
 from atwood.arguments import BY_PATH, optional, takes
 from atwood.arrays import FloatArray
-from atwood.codegen import BoundKernel, CompiledProgram, compile_program
+from atwood.codegen import BoundKernel, CompiledProgram
 from atwood.display import count_of, fitted
 from atwood.errors import UsageError
 from atwood.expr import Expression, Program
@@ -388,16 +388,19 @@ class Assembly:
 
     def columns(self, program: Program) -> ColumnKernel:
         """Return a program for many states as machine code with the parameters of this scene, ready to run."""
-        from atwood.codegen.llvm.columns import compile_columns
-
         if program not in self._columns:
-            made = self.shared.get(_COLUMNS, lambda: compile_columns(program), program)
-            self._columns[program] = made.bind(self.parameter_values)
+            self._columns[program] = compiled_columns(self, program).bind(self.parameter_values)
         return self._columns[program]
 
     def compiled(self, program: Program, vectorized: bool = False) -> CompiledProgram:
-        """Return a program as Python code, for any parameter values of this structure."""
-        return self.shared.get(_CODE, lambda: compile_program(program, vectorized=vectorized), program, vectorized)
+        """Return a program as Python code or a tape, for any parameter values of this structure."""
+
+        def make() -> CompiledProgram:
+            from atwood.codegen.llvm.taped import TapedProgram
+
+            return TapedProgram(program, vectorized)
+
+        return self.shared.get(_CODE, make, program, vectorized)
 
     # -- what can be read -----------------------------------------------------------------------------------------
 
@@ -422,3 +425,10 @@ class Assembly:
         # The Lagrangian is made of assemblies, and looked up when a momentum is wanted.
         momenta = lambda: import_module("atwood.forms.lagrangian").momenta_of(self, equations)  # noqa: E731
         return observe(self.mechanism, equations, self.reactions, self.shared.lock, momenta)
+
+
+def compiled_columns(assembly: Assembly, program: Program) -> ColumnProgram:
+    """Return a program for many states as machine code, for any parameter values of a structure."""
+    from atwood.codegen.llvm.columns import compile_columns
+
+    return assembly.shared.get(_COLUMNS, lambda: compile_columns(program), program)

@@ -11,27 +11,40 @@ Each group of words begins with a code and a count.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from itertools import chain
+from collections.abc import Callable, Iterable, Sequence
 from math import nan
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.codegen.llvm.layout import LARGEST_UNROLLED, Body, MatrixKey, matrix_key, places_of
+from atwood.codegen.llvm.layout import (
+    LARGEST_UNROLLED,
+    Body,
+    MatrixKey,
+    main_body,
+    matrix_key,
+    places_of,
+    prologue_body,
+)
 from atwood.codegen.llvm.linear_systems import write_elimination
 from atwood.codegen.llvm.text import OWN_FUNCTIONS
 from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Routine, Value, Variable
 from atwood.errors import UnsupportedError
 from atwood.expr.core.analysis import live
 from atwood.expr.core.graph import Expression
+from atwood.expr.core.program import Program
 from atwood.lazy_dataclasses import dataclass
 
 _TWO = ("mul", "add", "sub", "div", "minimum", "maximum", "less", "less_equal", "logical_and", "logical_or")
 _ONE = ("neg", "sqrt", "absolute", "floor", "sign", "logical_not")
 _OTHERS = ("copy", "store", "end", "sin_cos", "call1", "call2", "select", "small", "factorise", "substitute")
 _CODES = {one: k for k, one in enumerate((*_TWO[:3], *_OTHERS, *_TWO[3:], *_ONE))}
-_PARTNERS = {"sin": "cos", "cos": "sin"}
+_NAMES = ("", *_TWO, *_ONE, *OWN_FUNCTIONS, "sin_cos", "select", "solve", "component")
+_NUMBERS = {one: k for k, one in enumerate(_NAMES)}
+_KINDS = len(_NAMES)
+_PAIRED = ("sin", "cos")
+_KEPT = frozenset({*_PAIRED, "solve", "component"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,15 +63,37 @@ class Tape:
     scratch: int
 
 
-def write_tape(body: Body, functions: Callable[[str], int]) -> Tape:
-    """Return a body as a tape; a function tells where the elementary ones are, by their names as operations.
+def tapes_of(program: Program, functions: Callable[[str], int], positions: Sequence[int] | None = None) -> list[Tape]:
+    """Return what a program computes in every call, and once a run, as tapes.
+
+    Parameters
+    ----------
+    program
+        The program.
+    functions
+        Tells where the elementary functions are, by their names as operations.
+    positions
+        Where all results go in the arrays of their groups, if not one after the other.
 
     Raises
     ------
     UnsupportedError
         If it calls functions in Python.
     """
-    return _Writer(body, functions).tape()
+    known = _KNOWN.get(program)
+    if known is None or positions is not None:
+        once = _Writer(prologue_body(program), functions).tape(live(program.prologue))
+        known = [_Writer(main_body(program, positions), functions).tape(program.nodes), once]
+        if positions is None:
+            _KNOWN[program] = known
+    return known
+
+
+_KNOWN: WeakKeyDictionary[Program, list[Tape]] = WeakKeyDictionary()
+
+
+_Group = tuple[list[int], list[int]]
+"""Operations of one kind: their indices, and those of all their arguments."""
 
 
 class _Writer:
@@ -67,27 +102,16 @@ class _Writer:
     def __init__(self, body: Body, functions: Callable[[str], int]) -> None:
         self.body, self.functions = body, functions
         self.known = places_of(body)
-        nodes = live([node for node, _, _ in body.results])
-        self.constants = [node.payload for node in nodes if node.is_constant]
-        self.places = {node.index: k for k, node in enumerate(one for one in nodes if one.is_constant)}
+        self.constants: list[float] = []
+        self.places: dict[int, int] = {}
         self.words: list[int] = []
         self.regions: dict[MatrixKey, int] = {}
         self.tables: dict[str, int] = {}
-        self.nodes = self._needed(nodes)
+        self.kept: dict[int, Expression] = {}
 
-    def _needed(self, nodes: Sequence[Expression]) -> list[Expression]:
-        """Return what is computed, arguments before users."""
-        known, wanted = self.known, {node.index for node, _, _ in self.body.results}
-        found = []
-        for node in reversed(nodes):
-            if node.index in wanted and node.index not in known and node.arguments:
-                wanted.update([one.index for one in node.arguments])
-                found.append(node)
-        return found[::-1]
-
-    def tape(self) -> Tape:
-        """Return the whole tape."""
-        groups = self._groups()
+    def tape(self, nodes: Iterable[Expression]) -> Tape:
+        """Return the whole tape; the nodes are all that results need, arguments before users."""
+        groups = self._groups(nodes)
         for kind in sorted({kind for kind, _ in groups} & {*OWN_FUNCTIONS, "sin_cos"}):
             self.tables[kind] = len(self.constants)
             self.constants.append(float(np.array(self.functions(kind), dtype=np.uint64).view(np.float64)))
@@ -95,61 +119,89 @@ class _Writer:
         for pointer, given in self.body.given:
             number = 0 if pointer == "derived" else 1 + int(pointer.removeprefix("in"))
             self.words += [_CODES["copy"], len(given), number]
-            self._place(given)
-        for kind, several in groups:
-            self._write(kind, several)
+            self._place([node.index for node in given])
+        for kind, group in groups:
+            self._write(kind, *group)
         self._write_results()
         padding = [0] * (1 + len(self.words) % 2)
         words = np.array([*self.words, _CODES["end"], *padding], dtype=np.int32)
         head = np.array([len(self.constants)], dtype=np.int64).view(np.float64)
         return Tape(np.concatenate([head, self.constants, words.view(np.float64)]), self.end)
 
-    def _groups(self) -> list[tuple[str, list[Expression]]]:
-        """Return operations of one kind together, behind those whose values they read."""
-        levels: dict[int, int] = {}
-        groups: dict[tuple[int, str], list[Expression]] = {}
-        waves = {(one.operation, one.arguments[0].index) for one in self.nodes if one.operation in _PARTNERS}
-        for node in self.nodes:
-            kind, arguments = node.operation, node.arguments
-            level = 1 + max([levels.get(one.index, 0) for one in arguments])
-            levels[node.index] = level
-            if kind in _PARTNERS and (_PARTNERS[kind], arguments[0].index) in waves:
-                if kind == "cos":
+    def _groups(self, nodes: Iterable[Expression]) -> list[tuple[str, _Group]]:
+        """Return operations of one kind together, behind those whose values they read.
+
+        What reads nothing that is given in every call is left out: it is given, or only such values read it.
+        """
+        known, groups = self.known, dict[int, _Group]()
+        levels = {index: 0 for index, (pointer, _) in known.items() if pointer != "derived"}
+        level_of, is_prologue = levels.get, all(pointer != "derived" for pointer, _ in self.body.given)
+        waves, numbers, kept = dict[int, dict[str, int]](), _NUMBERS, _KEPT
+        for node in nodes:
+            index, arguments, kind = node.index, node.arguments, node.operation
+            if not arguments:
+                if kind == "constant":
+                    self.places[index] = len(self.constants)
+                    self.constants.append(node.payload)
+                continue
+            if index in known:
+                continue
+            if len(arguments) == 2:
+                a, b = arguments
+                read: Sequence[int] = (a.index, b.index)
+                level, other = level_of(a.index, -1), level_of(b.index, -1)
+                if other > level:
+                    level = other
+            else:
+                read = [one.index for one in arguments]
+                level = max([level_of(one, -1) for one in read])
+            if level < 0:
+                if not is_prologue:
                     continue
-                kind = "sin_cos"
-            groups.setdefault((level, kind), []).append(node)
-        self.cosines = {one.arguments[0].index: one for one in self.nodes if one.operation == "cos"}
-        return [(kind, several) for (_, kind), several in sorted(groups.items(), key=lambda one: one[0])]
+                level = 0
+            levels[index] = level = level + 1
+            if kind in kept:
+                if kind in _PAIRED:
+                    waves.setdefault(read[0], {})[kind] = index
+                    continue
+                self.kept[index] = node
+            key = level * _KINDS + numbers.get(kind, 0)
+            group = groups.get(key)
+            if group is None:
+                group = groups[key] = ([], [])
+            group[0].append(index)
+            group[1].extend(read)
+        for angle, several in waves.items():
+            kind = "sin_cos" if len(several) == 2 else next(iter(several))
+            level = levels[next(iter(several.values()))]
+            group = groups.setdefault(level * _KINDS + _NUMBERS[kind], ([], []))
+            group[0].extend(several[one] for one in _PAIRED if one in several)
+            group[1].append(angle)
+        return [(_NAMES[key % _KINDS], groups[key]) for key in sorted(groups)]
 
-    def _place(self, nodes: Sequence[Expression]) -> None:
+    def _place(self, indices: Sequence[int]) -> None:
         """Give values the next places."""
-        self.places.update((node.index, self.end + k) for k, node in enumerate(nodes))
-        self.end += len(nodes)
+        self.places.update(zip(indices, range(self.end, self.end + len(indices)), strict=True))
+        self.end += len(indices)
 
-    def _arguments(self, nodes: Sequence[Expression]) -> list[int]:
-        places = self.places
-        return [places[one.index] for node in nodes for one in node.arguments]
-
-    def _write(self, kind: str, nodes: Sequence[Expression]) -> None:
+    def _write(self, kind: str, indices: Sequence[int], read: Sequence[int]) -> None:
         """Write operations of one kind."""
+        places = self.places
         if kind == "component":
-            self.places.update((one.index, self.places[one.arguments[0].index] + one.payload) for one in nodes)
+            of = ((index, self.kept[index].payload, solve) for index, solve in zip(indices, read, strict=True))
+            places.update((index, places[solve] + unknown) for index, unknown, solve in of)
         elif kind == "solve":
-            for one in nodes:
-                self._solve(one)
-        elif kind == "sin_cos":
-            self.words += [_CODES[kind], len(nodes), self.tables[kind], *self._arguments(nodes)]
-            pairs = [(one, self.cosines[one.arguments[0].index]) for one in nodes]
-            self._place(list(chain.from_iterable(pairs)))
-        elif kind in OWN_FUNCTIONS:
-            self.words += [_CODES[f"call{OWN_FUNCTIONS[kind]}"], len(nodes), self.tables[kind]]
-            self.words += self._arguments(nodes)
-            self._place(nodes)
-        elif kind in _CODES:
-            self.words += [_CODES[kind], len(nodes), *self._arguments(nodes)]
-            self._place(nodes)
+            for index in indices:
+                self._solve(self.kept[index])
+        elif not kind:
+            raise UnsupportedError("there is no tape for an operation, such as a function in Python")
         else:
-            raise UnsupportedError(f"there is no tape for the operation {kind} in {nodes[0]!r}")
+            code, head = kind, []
+            if kind in self.tables:
+                code, head = f"call{OWN_FUNCTIONS[kind]}" if kind in OWN_FUNCTIONS else kind, [self.tables[kind]]
+            count = len(indices) // 2 if kind == "sin_cos" else len(indices)
+            self.words += [_CODES[code], count, *head, *map(places.__getitem__, read)]
+            self._place(indices)
 
     def _solve(self, node: Expression) -> None:
         """Write a linear system; its unknowns lie side by side."""

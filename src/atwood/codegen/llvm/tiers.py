@@ -24,10 +24,9 @@ from atwood.codegen.llvm.build import (
     once,
 )
 from atwood.codegen.llvm.engine import compile_text, load_code, target_description
-from atwood.codegen.llvm.layout import main_body, prologue_body
 from atwood.codegen.llvm.module import CodeOptions, Part, stub_text, write_module
 from atwood.codegen.llvm.own import address_of
-from atwood.codegen.llvm.tape import Tape, write_tape
+from atwood.codegen.llvm.tape import Tape, tapes_of
 from atwood.errors import UnsupportedError
 from atwood.stages import stage
 
@@ -37,8 +36,8 @@ _COST = (1.5e-5, 4e-5)
 _LEAST = 0.01
 """Seconds that it takes at least."""
 
-_STARTS = 10
-"""What was started so often will be started again."""
+_STARTS, _START = 10, 5e-3
+"""What was started so often will be started again; a start counts for no more than so many seconds."""
 
 _STATES = 1_200
 """The same of what was worked out for the outputs of three runs."""
@@ -92,7 +91,7 @@ class Tiers:
     def spend(self, seconds: float) -> Built:
         """Take note that it ran for so long, or, with 0, that it begins; return what is best to go on with."""
         if self._better is not None:
-            self._left -= seconds or self._cost / _STARTS
+            self._left -= seconds or min(self._cost / _STARTS, _START)
             if self._left <= 0.0:
                 with suppress(TimeIsUp):
                     self.at_its_best()
@@ -127,19 +126,19 @@ def build_tapes(parts: Sequence[Part], exports: Sequence[str] = (), routines: Ro
 def _build_tapes(parts: Sequence[Part], exports: Sequence[str], routines: RoutineSource | None) -> Built:
     tapes: dict[str, Tape] = {}
     for part in parts:
-        tapes[part.name] = write_tape(main_body(part.program, part.positions), address_of)
-        tapes[f"{part.name}_values"] = write_tape(prologue_body(part.program), address_of)
+        tapes[part.name], tapes[f"{part.name}_values"] = tapes_of(part.program, address_of, part.positions)
     names = [*exports, *(name for part in parts for name in (part.name, f"{part.name}_prologue"))]
-    evaluator = _evaluator()
+    interpreter = evaluator()
     addresses = {f"tape.{name}": one.words.ctypes.data for name, one in tapes.items()}
-    addresses["evaluate"] = evaluator.code.addresses["evaluate"]
+    addresses["evaluate"] = interpreter.code.addresses["evaluate"]
     code = _code_of_tapes(tuple(part.name for part in parts), routines)
-    loaded = load_code(code, names, addresses, (evaluator, *tapes.values()))
+    loaded = load_code(code, names, addresses, (interpreter, *tapes.values()))
     return Built(loaded, max(one.scratch for one in tapes.values()), False, None)
 
 
 @once
-def _evaluator() -> Built:
+def evaluator() -> Built:
+    """Return what runs tapes: it is called with one, and then with what a program's function takes."""
     return build_now([], CodeOptions(level=2), ["evaluate"], RoutineSource("codegen.llvm.tape"), True)
 
 

@@ -121,6 +121,10 @@ class CompiledProgram:
 
     @cached_property
     def _walks(self) -> dict[str, Iterator[int]]:
+        return self._patience()
+
+    def _patience(self) -> dict[str, Iterator[int]]:
+        """Return what counts how often functions are walked through before they are compiled."""
         count = WALKS if self.program.size < LONG else LONG_WALKS
         return {"main": iter(range(count)), "_prologue": iter(range(count))}
 

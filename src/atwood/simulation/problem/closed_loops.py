@@ -24,7 +24,7 @@ from atwood.clock import check_time
 from atwood.codegen import BoundKernel
 from atwood.errors import KernelEvaluationError
 from atwood.expr import DivisionByExactZeroError, Expression, Program, dependencies
-from atwood.forms.assembly import Assembly
+from atwood.forms.assembly import Assembly, compiled_columns
 from atwood.forms.caches import Key
 from atwood.forms.loops.assur_groups import Loops
 from atwood.forms.loops.closed_form import ClosedForm, Place, closed_form
@@ -34,9 +34,8 @@ from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.projection import misses_of
 
 if TYPE_CHECKING:
-    from atwood.codegen.llvm.columns import ColumnKernel, ColumnProgram
+    from atwood.codegen.llvm.columns import ColumnKernel
 
-_COLUMNS: Key[ColumnProgram] = Key("machine code of all coordinates from independent ones")
 
 _NEAR = 0.1
 """Nearer to a dead centre of every choice, as the square of a sine, the constraints are kept from there on.
@@ -125,10 +124,7 @@ class Solved:
 
     @cached_property
     def _columns(self) -> ColumnKernel:
-        from atwood.codegen.llvm.columns import compile_columns
-
-        program = self.form.states
-        return self.assembly.shared.get(_COLUMNS, lambda: compile_columns(program), program).bind(self.values)
+        return compiled_columns(self.assembly, self.form.states).bind(self.values)
 
     def state(self, t: float, y: FloatArray) -> FloatArray:
         """Return the same of one state."""

@@ -28,6 +28,7 @@ from atwood.simulation.problem.problem import SceneProblem
 from atwood.topology.graph import connected_groups
 
 if TYPE_CHECKING:
+    from atwood.codegen.llvm.columns import ColumnKernel
     from atwood.integrators.embedded.lanes import RatesOfMany
     from atwood.integrators.jumps import JumpCode
     from atwood.mechanics.dynamics.equations import ContactRow
@@ -81,7 +82,9 @@ def first_order(kernel: BoundKernel, coordinates: int) -> Callable[[float, Float
     return rates
 
 
-def first_order_rows(kernel: BoundKernel, coordinates: int) -> Callable[[FloatArray, FloatArray], FloatArray]:
+def first_order_rows(
+    kernel: BoundKernel | ColumnKernel, coordinates: int
+) -> Callable[[FloatArray, FloatArray], FloatArray]:
     """Return the same for many states, one row each, from a kernel for many."""
 
     def rates(t: FloatArray, states: FloatArray) -> FloatArray:

@@ -25,7 +25,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, KernelEvaluationError, UsageError, suggestion
 from atwood.expr import Expression, depends_on
 from atwood.forms.accelerations import accelerations_of
-from atwood.forms.assembly import Assembly
+from atwood.forms.assembly import Assembly, compiled_columns
 from atwood.forms.caches import Key
 from atwood.integrators.methods import AUTO, EXPLICIT, IDA, IDA_SUNDAE, METHODS, TAYLOR, Method, advise
 from atwood.lazy_dataclasses import dataclass
@@ -266,7 +266,9 @@ def stiffness_of(
         if found is None or not len(q):
             return None
         program, values = found.program, assembly.parameter_values
-    many = first_order_rows(assembly.compiled(program, vectorized=True).bind(values), count)
+    is_long = program.size >= _LONG and not plan.not_compilable
+    code = compiled_columns(assembly, program) if is_long else assembly.compiled(program, vectorized=True)
+    many = first_order_rows(code.bind(values), count)
 
     def rates(states: FloatArray) -> FloatArray:
         return many(np.full(len(states), t), states)
@@ -278,6 +280,9 @@ def stiffness_of(
     about = program, t, *judged, *(one.tobytes() for one in (values, y, scale))
     return assembly.kept.get(_STIFFNESS, lambda: find_stiffness(rates, y, scale, *judged), *about)
 
+
+_LONG = 2000
+"""Programs of so many nodes are worked out for all states by a tape, and not with NumPy."""
 
 _STIFFNESS: Key[Stiffness] = Key("how stiff a scene is at the state that was last asked about")
 
