@@ -68,7 +68,7 @@ def test_a_start(break_down: Break) -> None:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_projection_in_the_middle_of_a_run(form: str, break_down: Break, monkeypatch: pytest.MonkeyPatch) -> None:
-    project = record.project_states
+    project = record.project_rows
 
     def doubtful(plan: Any, t: Any, *given: Any) -> Any:
         made = project(plan, t, *given)
@@ -77,7 +77,7 @@ def test_a_projection_in_the_middle_of_a_run(form: str, break_down: Break, monke
             break_down("lstsq", "dynamics.balance")
         return made
 
-    monkeypatch.setattr(record, "project_states", doubtful)
+    monkeypatch.setattr(record, "project_rows", doubtful)
     with pytest.raises(SolveError, match="its numbers could not be worked with") as caught:
         simulate(SliderCrank(), form=form, t_end=1.0)
     assert "what moves fastest there is" in caught.value.message
