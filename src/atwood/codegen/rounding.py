@@ -8,7 +8,7 @@ operation say the same for one sum, and grow without need from rotation to rotat
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -85,18 +85,26 @@ class RoughProgram:
     Parameters
     ----------
     symbols
-        What they depend on: the parameters, and groups of inputs.
+        What they depend on: the parameters, and groups of inputs, one after the other or with the place of each.
     results
         The expressions.
     """
 
-    def __init__(self, symbols: Sequence[Sequence[Expression]], results: Sequence[Expression]) -> None:
+    def __init__(
+        self, symbols: Sequence[Sequence[Expression] | Mapping[Expression, int]], results: Sequence[Expression]
+    ) -> None:
         nodes = live(results)
+        read = [node for node in nodes if node.operation == "symbol"]
         place = {node.index: i for i, node in enumerate(nodes)}
         self._count = len(nodes)
         self._constants = [(place[n.index], float(n.payload)) for n in nodes if n.operation == "constant"]
         self._rounded = {i for i, value in self._constants if not (2.0 * value).is_integer()}
-        self._groups = [[(place[s.index], k) for k, s in enumerate(group) if s.index in place] for group in symbols]
+        self._groups = [
+            [(place[one.index], group[one]) for one in read if one in group]
+            if isinstance(group, Mapping)
+            else [(place[one.index], k) for k, one in enumerate(group) if one.index in place]
+            for group in symbols
+        ]
         self._steps = [
             (place[node.index], *_function_of(node), [place[argument.index] for argument in node.arguments])
             for node in nodes

@@ -7,6 +7,8 @@ bodies are attached greedily, the cheapest way first, and a body waits while a c
 
 from __future__ import annotations
 
+import heapq
+import itertools
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import field
@@ -222,30 +224,43 @@ class _Grower:
             at.setdefault(self.bodies.body_of[joint.a], []).append((joint, False))
             at.setdefault(self.bodies.body_of[joint.b], []).append((joint, True))
         cheapest = {body: min(self._cost(j, body) for j, _ in around) for body, around in at.items()}
-        frontier = list(at.get(0, []))
-        waiting = [body.index for body in self.bodies.bodies if not body.is_fixed]
-        while True:
-            best: tuple[tuple[int, int, int], Joint, bool] | None = None
-            open_ends = []
-            for order, (joint, backwards) in enumerate(frontier):
-                parent, child = self._ends(joint, backwards)
-                if child in self.placed or not self._usable(joint):
-                    continue
-                open_ends.append((joint, backwards))
+        frontier: list[tuple[tuple[int, int, int, int], Joint, bool]] = []  # a heap; ways that became cheaper are twice
+        telling: dict[Expression, list[tuple[int, Joint, bool]]] = {}
+        numbers = itertools.count()
+
+        def offer(number: int, joint: Joint, backwards: bool) -> None:
+            parent, child = self._ends(joint, backwards)
+            if child not in self.placed and self._usable(joint):
                 cost = self._cost(joint, child)
-                key = (cost - cheapest[child], self.placed[parent], order)
-                if cost <= self._freedom(child) and (best is None or key < best[0]):
-                    best = (key, joint, backwards)
-            frontier = open_ends
-            if best is not None:
-                self._hang(best[1], best[2])
-                frontier += at[self._ends(best[1], best[2])[1]]
-                continue
-            rest = [body for body in waiting if body not in self.placed and body in at]
-            if not rest:
+                if cost <= self._freedom(child):
+                    key = cost - cheapest[child], self.placed[parent], number, next(numbers)
+                    heapq.heappush(frontier, (key, joint, backwards))
+
+        def reach(body: int) -> None:
+            for joint, backwards in at.get(body, ()):
+                way = next(numbers), joint, backwards
+                for symbol in {*joint.moves, *joint.turns}:
+                    telling.setdefault(symbol, []).append(way)
+                offer(*way)
+
+        reach(0)
+        waiting = (body.index for body in self.bodies.bodies if not body.is_fixed and body.index in at)
+        while True:
+            while frontier:
+                _, joint, backwards = heapq.heappop(frontier)
+                _, child = self._ends(joint, backwards)
+                if child not in self.placed:
+                    told = len(self.told)
+                    self._hang(joint, backwards)
+                    for symbol in itertools.islice(reversed(self.told), len(self.told) - told):
+                        for way in telling.get(symbol, ()):
+                            offer(*way)
+                    reach(child)
+            body = next((body for body in waiting if body not in self.placed), None)
+            if body is None:
                 return
-            self._free(rest[0])
-            frontier += at[rest[0]]
+            self._free(body)
+            reach(body)
 
     def _ends(self, joint: Joint, backwards: bool) -> tuple[int, int]:
         a, b = self.bodies.body_of[joint.a], self.bodies.body_of[joint.b]

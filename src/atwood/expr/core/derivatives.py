@@ -333,10 +333,9 @@ def jacobian(
     SparseMatrix
         The entries in the order of compressed columns.
     """
-    directions = [{column: 1.0} if isinstance(column, Expression) else column for column in wrt]
-    if not directions or not any(isinstance(output, Expression) for output in outputs):
+    if not wrt or not any(isinstance(output, Expression) for output in outputs):
         return SparseMatrix((), (), ())
-    graph = _graph_of(outputs, *directions)
+    graph = _graph_of(outputs)
     nodes = live(outputs)
     by_index = {node.index: node for node in nodes}
     users = _users(nodes)
@@ -347,7 +346,13 @@ def jacobian(
     rows: list[int] = []
     columns: list[int] = []
     entries: list[Expression] = []
-    for column, direction in enumerate(directions):
+    for column, one in enumerate(wrt):
+        if isinstance(one, Expression):
+            if one.index not in by_index:
+                continue
+            direction: Mapping[Expression, Expression | float] = {one: 1.0}
+        else:
+            direction = one
         seeds = {key.index: graph.convert(rate) for key, rate in direction.items()}
         reached = _reached(seeds, users)
         moved = _sweep([by_index[index] for index in reached if index in by_index], seeds)

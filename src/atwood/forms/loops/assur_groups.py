@@ -13,9 +13,11 @@ constraint at other places: what is left must be rounding (`atwood.mechanics.con
 
 from __future__ import annotations
 
+import heapq
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,7 +26,7 @@ from atwood.expr import Expression, atan2, cos, evaluate, hypot, jacobian, jvp, 
 from atwood.forms.loops.closed_form import ClosedLoops, Group, Heading, Place
 from atwood.forms.loops.joint_groups import three_unknowns, two_unknowns
 from atwood.forms.loops.roots import ConstraintShapes, Vector, Wave, one_unknown, sum_of_waves, waves_of
-from atwood.mechanics.constraints.elimination import rounds_to_zero
+from atwood.mechanics.constraints.elimination import rough_place, rounds_to_zero
 from atwood.mechanics.dynamics.equations import Equations
 
 _LEAST = 1e-9
@@ -41,6 +43,28 @@ _MOST_UNKNOWNS = 3
 
 _PLACES = 2
 """At so many other places forms are compared with constraints."""
+
+
+class _Offer(NamedTuple):
+    """Constraints that may give coordinates once the others that they read are known.
+
+    Attributes
+    ----------
+    constraints, reads
+        Their numbers, and those of the coordinates that they depend on.
+    least, most
+        How many unknown coordinates they give.
+    """
+
+    constraints: tuple[int, ...]
+    reads: frozenset[int]
+    least: int
+    most: int
+
+    def ready(self, known: Collection[int]) -> tuple[int, ...]:
+        """Return the unknown coordinates, in order, if they are as many as that."""
+        unknown = tuple(sorted(number for number in self.reads if number not in known))
+        return unknown if self.least <= len(unknown) <= self.most else ()
 
 
 class Loops:
@@ -63,39 +87,56 @@ class Loops:
         numbers = {symbol: k for k, symbol in enumerate(equations.speeds)}
         self.own_speeds = {i: numbers[rate] for i, rate in enumerate(equations.rates) if rate in numbers}
         self.values = [self.graph.zero if one.value is None else one.value for one in equations.constraints]
-        self.elsewhere = _elsewhere(equations, place)
+        self.elsewhere = [rough_place(one) for one in _elsewhere(equations, place)]
         self.reads = self._reads()
         self.joints: dict[tuple[str, str], list[int]] = {}
         for k, one in enumerate(equations.constraints):
             self.joints.setdefault(one.key[:2], []).append(k)
-        self.pairs = tuple(self._pairs())
-        self.shapes = ConstraintShapes(self.values, self.q, place, self.elsewhere[0])
+        self._offers = tuple(self._every_offer())
+        self._offers_of: dict[int, list[int]] = {number: [] for number in range(len(self.q))}
+        for at, offer in enumerate(self._offers):
+            for number in offer.reads:
+                self._offers_of[number].append(at)
+        self._numbers = {one: number for number, one in enumerate(self.q)}
+        self.shapes = ConstraintShapes(self.values, self.q, place, self.elsewhere[0].values)
         self._number = 0
         self._known: dict[tuple[tuple[int, ...], tuple[int, ...]], tuple[Group, ...]] = {}
 
     def solve(self, independent: Sequence[int]) -> ClosedLoops | None:
         """Return the others as functions of these, as many as there are freedoms; None where groups do not give all."""
-        known = set(independent)
         groups: list[Group] = []
-        while len(known) < len(self.q):
-            found = next((one for one in self._candidates(known) if one), None)
-            if found is None:
-                return None
-            groups += found
-            known.update(number for one in found for number in one.unknowns)
+
+        def take(ks: tuple[int, ...], unknowns: tuple[int, ...]) -> bool:
+            if (ks, unknowns) not in self._known:
+                made = self._made(ks, unknowns)
+                self._known[ks, unknowns] = made if all(self._is_far(one) for one in made) else ()
+            found = self._known[ks, unknowns]
+            groups.extend(found)
+            return bool(found)
+
+        if not self._walk(independent, take):
+            return None
         dependent = {self.own_speeds[number] for one in groups for number in one.unknowns}
         speeds = (k for k in range(len(self.equations.speeds)) if k not in dependent)
         return ClosedLoops(tuple(independent), tuple(speeds), self.own_speeds, tuple(groups))
 
     def can_be_solved(self, independent: Sequence[int]) -> bool:
         """Return whether there are constraints enough for each group, whatever their form."""
+        return self._walk(independent, lambda *_: True)
+
+    def _walk(self, independent: Sequence[int], take: Callable[[tuple[int, ...], tuple[int, ...]], bool]) -> bool:
+        """Offer what is ready, always the first that is and is not yet refused; return whether all becomes known."""
         known = set(independent)
-        while len(known) < len(self.q):
-            ready = next(self._ready(known), None)
-            if ready is None:
-                return False
-            known.update(ready[1])
-        return True
+        left = [at for at, one in enumerate(self._offers) if one.ready(known)]
+        heapq.heapify(left)
+        while left and len(known) < len(self.q):
+            offer = self._offers[heapq.heappop(left)]
+            unknowns = offer.ready(known)
+            if unknowns and take(offer.constraints, unknowns):
+                known.update(unknowns)
+                for at in {at for number in unknowns for at in self._offers_of[number]}:
+                    heapq.heappush(left, at)
+        return len(known) == len(self.q)
 
     def choices(self, count: int) -> Iterator[tuple[int, ...]]:
         """Yield which coordinates may be independent, for so many freedoms: those of orientations always are."""
@@ -103,13 +144,6 @@ class Loops:
         plain = sorted(self.own_speeds)
         for chosen in itertools.combinations(plain, count - (len(self.equations.speeds) - len(plain))):
             yield tuple(sorted((*chosen, *turned)))
-
-    def _candidates(self, known: set[int]) -> Iterator[tuple[Group, ...]]:
-        for key in self._ready(known):
-            if key not in self._known:
-                made = self._made(*key)
-                self._known[key] = made if all(self._is_far(one) for one in made) else ()
-            yield self._known[key]
 
     def _made(self, ks: tuple[int, ...], unknowns: tuple[int, ...]) -> tuple[Group, ...]:
         """Return what gives these unknowns, one after the other; nothing where it is of no known form."""
@@ -119,28 +153,27 @@ class Loops:
         except AtwoodError:  # a coefficient that is always zero would be divided by
             return ()
 
-    def _ready(self, known: set[int]) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
-        """Yield constraints with one unknown, and then joints with two or three."""
+    def _every_offer(self) -> Iterator[_Offer]:
+        """Yield constraints that may have one unknown, and then joints with two or three, and pairs of laws."""
         for k, read in enumerate(self.reads):
-            left = read - known
-            if len(left) == 1:
-                yield (k,), tuple(left)
+            yield _Offer((k,), frozenset(read), 1, 1)
         for ks in self.joints.values():
-            left = set().union(*(self.reads[k] for k in ks)) - known
-            if 1 < len(left) <= min(len(ks), _MOST_UNKNOWNS):
-                yield tuple(ks), tuple(sorted(left))
-        for pair in self.pairs:
-            left = set().union(*(self.reads[k] for k in pair)) - known
-            if len(left) == len(pair):
-                yield pair, tuple(sorted(left))
+            yield _Offer(tuple(ks), self._read_by(ks), 2, min(len(ks), _MOST_UNKNOWNS))
+        for pair in self._pairs():
+            yield _Offer(pair, self._read_by(pair), len(pair), len(pair))
+
+    def _read_by(self, ks: Iterable[int]) -> frozenset[int]:
+        return frozenset[int]().union(*(self.reads[k] for k in ks))
 
     def _pairs(self) -> Iterator[tuple[int, int]]:
         """Yield two laws of one joint, as the guide and the lock of a slide: of each the constraint that says most."""
-        sizes = evaluate(self.values, {**self.place.parameters, **self.elsewhere[0]})
+        sizes = evaluate(self.values, {**self.place.parameters, **self.elsewhere[0].values})
         most = {law: max(ks, key=lambda k: abs(sizes[k])) for law, ks in self.joints.items()}
-        for one, other in itertools.combinations(most, 2):
-            if one[0] == other[0]:
-                yield most[one], most[other]
+        of_part: dict[str, list[int]] = {}
+        for (part, _), k in most.items():
+            of_part.setdefault(part, []).append(k)
+        for ks in of_part.values():
+            yield from itertools.combinations(ks, 2)
 
     def _reads(self) -> list[set[int]]:
         """Return which coordinates each constraint depends on, by more than rounding."""
@@ -159,7 +192,7 @@ class Loops:
         """Return whether the position is far enough from the group's dead centres."""
         if not group.margins:
             return True
-        return min(evaluate(group.margins, {**self.place.parameters, **self.place.here})) > _LEAST
+        return min(evaluate(group.margins, self.place.known)) > _LEAST
 
     def vanish(self, values: Vector) -> bool:
         """Return whether values are zero but for rounding, wherever coordinates are."""
@@ -219,7 +252,7 @@ class Loops:
     ) -> tuple[Expression, Heading] | None:
         """Return the direction of (p, q) as counted from a sum of known angles that it never turns away from."""
         sizes = {orders: hypot(*z) for orders, z in waves.items()}
-        known = {**self.place.parameters, **self.place.here}
+        known = self.place.known
         orders = max(waves, key=lambda n: evaluate([sizes[n]], known)[0])
         lead = sizes[orders]
         for other, size in sizes.items():
@@ -236,10 +269,11 @@ class Loops:
 
     def _angles_read(self, p: Expression, q: Expression) -> list[Expression] | None:
         """Return the angles that a direction depends on; None if it depends on anything else that moves."""
-        angles, reached = [], set(live([p, q]))
-        for one, is_angle in zip((*self.q, self.equations.time), (*self.is_angle, False), strict=True):
-            if one in reached and not self.vanish(jvp([p, q], {one: 1.0})):
-                if not is_angle:
+        angles = []
+        reached = [one for one in live([p, q]) if one in self._numbers or one is self.equations.time]
+        for one in sorted(reached, key=lambda one: self._numbers.get(one, len(self.q))):
+            if not self.vanish(jvp([p, q], {one: 1.0})):
+                if one is self.equations.time or not self.is_angle[self._numbers[one]]:
                     return None
                 angles.append(one)
         return angles

@@ -13,6 +13,7 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
+from functools import cached_property
 
 from atwood.expr import (
     Expression,
@@ -21,7 +22,7 @@ from atwood.expr import (
     Program,
     absolute,
     cos,
-    dependencies,
+    depends_on,
     floor,
     jacobian,
     live,
@@ -55,6 +56,11 @@ class Place:
     parameters: Mapping[Expression, float]
     here: Mapping[Expression, float]
     length: float
+
+    @cached_property
+    def known(self) -> Mapping[Expression, float]:
+        """The values of parameters, and time and coordinates."""
+        return {**self.parameters, **self.here}
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,7 +292,7 @@ def closed_form(
         *(one for i, one in enumerate(q) if i not in free),
         *(one for i, one in enumerate(u) if i not in moving),
     ]
-    if any(dependencies((*found, *places.values(), *speeds.values(), *looked_at), dependent)):
+    if depends_on((*found, *places.values(), *speeds.values(), *looked_at), dependent):
         return None
     title = f"{name} (closed form)"
     values, conditions = loops.values()
@@ -365,7 +371,10 @@ class _Moved:
         used = sorted({k for group in loops.groups for k in group.constraints})
         chosen = [equations.constraints[k] for k in used]
         found = jacobian([one.rate for one in chosen], list(equations.speeds))
-        self.slopes = {(used[r], c): entry for r, c, entry in found.triples}
+        self.slopes: dict[int, dict[int, Expression]] = {k: {} for k in used}
+        for r, c, entry in found.triples:
+            self.slopes[used[r]][c] = entry
+        self.place = {c: i for i, c in enumerate(self.free)}  # of a speed, among those that are known
         rates = substitute([one.rate for one in chosen], dict.fromkeys(equations.speeds, 0.0))
         seconds = substitute([one.second for one in chosen], dict.fromkeys(equations.accelerations, 0.0))
         self.explicit = dict(zip(used, rates, strict=True))
@@ -387,18 +396,25 @@ class _Moved:
             found = _cramer(matrix, right)
             target.update((c, one) for c, one in zip(unknowns, found, strict=True) if not one.is_zero)
         self.order += unknowns
+        for c in unknowns:
+            self.place[c] = len(self.place)
+
+    def _reads(self, group: Group) -> list[int]:
+        """Return the known speeds that the constraints of a group read, in the order in which they became known."""
+        found = {c for k in group.constraints for c in self.slopes[k] if c in self.place}
+        return sorted(found, key=self.place.__getitem__)
 
     def _slope(self, group: Group, row: Sequence[Expression], column: int) -> Expression:
         total = self.graph.zero
         for factor, k in zip(row, group.constraints, strict=True):
-            if (k, column) in self.slopes:
-                total = total + factor * self.slopes[k, column]
+            if column in self.slopes[k]:
+                total = total + factor * self.slopes[k][column]
         return total
 
     def _along(self, group: Group, row: Sequence[Expression], k: int) -> Expression:
         """Return the rate of an equation for a unit of an independent speed, with what is known to follow it."""
         total = self.graph.zero
-        for c in (*self.free, *self.order):
+        for c in self._reads(group):
             if (c, k) in self.weights:
                 total = total + self._slope(group, row, c) * self.weights[c, k]
         return total
@@ -414,7 +430,7 @@ class _Moved:
         total = self.graph.zero
         for factor, k in zip(row, group.constraints, strict=True):
             total = total + factor * start[k]
-        for c in self.order:
+        for c in self._reads(group):
             if c in known:
                 total = total + self._slope(group, row, c) * known[c]
         return total

@@ -306,7 +306,7 @@ def _offset(
     y: Expression,
 ) -> Expression | None:
     """Return t, for which the square of w does not depend on the second angle; None if there is none."""
-    known = {**loops.place.parameters, **loops.place.here}
+    known = loops.place.known
     ways = [at([rise, dot(p, p)], {**aside, y: quarter}) for quarter in _QUARTERS]
     risen, across = max(ways, key=lambda one: abs(evaluate([one[0]], known)[0]))
     if not abs(evaluate([risen], known)[0]) > _LEAST * loops.place.length:
@@ -318,7 +318,7 @@ def _offset(
 
 def _somewhere(loops: Loops, p: Vector, y: Expression, z: Expression | None) -> dict[Expression, float] | None:
     """Return values of the second angle, and of a length, at which the arm about the first axis is long."""
-    known, length = {**loops.place.parameters, **loops.place.here}, loops.place.length
+    known, length = loops.place.known, loops.place.length
     ways: list[dict[Expression, float]] = [{y: quarter} for quarter in _QUARTERS]
     if z is not None:
         ways = [{**way, z: aside} for way in ways for aside in (0.0, loops.place.here[z], length)]

@@ -215,6 +215,8 @@ class ConstraintShapes:
         self._rows = {one: k for k, one in enumerate(elsewhere)}
         self._at = np.repeat(np.array(list(elsewhere.values()))[:, None], WAYS, axis=1)
         self._coordinates = coordinates
+        self._places = {one: k for k, one in enumerate(place.parameters)}
+        self._parameters = np.array(list(place.parameters.values()))
         self._programs: dict[tuple[int, ...], RoughProgram] = {}
         random = np.random.default_rng(1)
         self._shares = random.uniform(-1.0, 1.0, (2, WAYS))
@@ -237,7 +239,7 @@ class ConstraintShapes:
             moved[0] = moved[0] - nested * moved[1]
         for number, values in zip(unknowns, moved, strict=True):
             at[self._rows[self._coordinates[number]]] = values
-        found = self._program(ks)(np.array(list(self._place.parameters.values())), at)
+        found = self._program(ks)(self._parameters, at)
         return _is_combination(found, np.array(basis))
 
     def turns_about(self, ks: tuple[int, ...], number: int, others: Sequence[int]) -> bool:
@@ -249,7 +251,7 @@ class ConstraintShapes:
                 at[self._rows[self._coordinates[other]]] = share * self._place.length
             angle = np.pi * self._shares[0]
             at[self._rows[self._coordinates[number]]] = angle
-            found = self._program(ks)(np.array(list(self._place.parameters.values())), at)
+            found = self._program(ks)(self._parameters, at)
             basis = np.array([np.ones(WAYS), np.cos(angle), np.sin(angle)])
             if not np.all(np.isfinite(found)):
                 return True
@@ -261,8 +263,7 @@ class ConstraintShapes:
 
     def _program(self, ks: tuple[int, ...]) -> RoughProgram:
         if ks not in self._programs:
-            symbols = tuple(self._place.parameters), tuple(self._rows)
-            self._programs[ks] = RoughProgram(symbols, [self._values[k] for k in ks])
+            self._programs[ks] = RoughProgram((self._places, self._rows), [self._values[k] for k in ks])
         return self._programs[ks]
 
 

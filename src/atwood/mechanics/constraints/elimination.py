@@ -14,9 +14,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from atwood.arrays import FloatArray
 from atwood.codegen.rounding import ROUGHNESS, RoughProgram, roughly
 from atwood.errors import TopologyError
 from atwood.expr import Expression, affine_coefficients, depends_on, evaluate, live, substitute
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.constraints.values import Values
 from atwood.mechanics.dynamics.inertia import Masses
 from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide, extent
@@ -177,19 +179,44 @@ def _check_closed(where: str, value: Expression, is_length: bool, mechanism: Mec
         )
 
 
+@dataclass(frozen=True, eq=False)
+class RoughPlace:
+    """Values at which it is asked whether expressions vanish, and the same as rounding may have made them.
+
+    Attributes
+    ----------
+    values
+        The values.
+    rows, near
+        The row of each symbol, and its values with their last digits changed, shape (symbols, ways).
+    """
+
+    values: Mapping[Expression, float]
+    rows: Mapping[Expression, int]
+    near: FloatArray
+
+
+def rough_place(values: Mapping[Expression, float]) -> RoughPlace:
+    """Return a place at which many expressions are looked at."""
+    at = np.array(list(values.values()))
+    return RoughPlace(values, {one: k for k, one in enumerate(values)}, at[:, None] * roughly(len(at)))
+
+
 def rounds_to_zero(
     expressions: Sequence[Expression],
     parameters: Mapping[Expression, float],
-    place: Mapping[Expression, float] | None = None,
+    place: Mapping[Expression, float] | RoughPlace | None = None,
 ) -> NDArray[np.bool_]:
     """Return which expressions are no larger than what rounding could have made of them."""
-    where = place or {}
     if all(one.is_constant for one in expressions):
         return np.array([one.is_zero for one in expressions], dtype=bool)
-    at = np.array(list(where.values()))
-    rough = RoughProgram((tuple(parameters), tuple(where)), list(expressions))
-    ways = rough(np.array(list(parameters.values())), at[:, None] * roughly(len(at)))
-    numbers = np.abs(evaluate(expressions, {**parameters, **where}))
+    where = place if isinstance(place, RoughPlace) else rough_place(place or {})
+    read = [node for node in live(expressions) if node.is_symbol]
+    own, moving = ([one for one in read if one in known] for known in (parameters, where.rows))
+    held = np.array([parameters[one] for one in own])
+    ways = RoughProgram((own, moving), list(expressions))(held, where.near[[where.rows[one] for one in moving]])
+    known = {**{one: parameters[one] for one in own}, **{one: where.values[one] for one in moving}}
+    numbers = np.abs(evaluate(expressions, known))
     spread = np.maximum(np.ptp(ways, axis=1), ROUGHNESS * numbers)  # not finite next to a place without a value
     return np.array((numbers <= tolerances.CERTAIN * spread) & np.isfinite(spread), dtype=bool)
 

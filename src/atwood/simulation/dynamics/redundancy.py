@@ -226,21 +226,36 @@ _SETTLED = 1.01
 """Exchanges go on until no entry is larger."""
 
 
+_LOST = 1e-20
+"""What is so small beside the largest entry of its row is rounding, and taken as zero: so little else is touched."""
+
+_ALL = 50
+"""Of so many constraints each is taken to touch all others, which takes no longer."""
+
+
 def choose_dependent_coordinates(jacobian: FloatArray, scales: FloatArray) -> tuple[int, ...]:
-    """Return the coordinates that the constraints determine best: in turn, the column of which most is left."""
+    """Return the coordinates that the constraints determine best: in turn, the column of which most is left.
+
+    Of a large mechanism each touches few others, and only these are worked on.
+    """
     count = jacobian.shape[0]
     rows = or_one(np.max(np.abs(jacobian * scales), axis=1, initial=0.0))
     left = jacobian * scales / rows[:, None]
+    sizes = np.einsum("ij,ij->j", left, left)
     chosen: list[int] = []
     for _ in range(count):
-        sizes = np.einsum("ij,ij->j", left, left)
-        sizes[chosen] = -1.0
         best = int(np.argmax(sizes))
         chosen.append(best)
         if sizes[best] > 0.0:
-            direction = left[:, best] / np.sqrt(sizes[best])
+            own = np.flatnonzero((left[:, best] != 0.0) | (count <= _ALL))
+            columns = np.flatnonzero(np.any(left[own] != 0.0, axis=0) | (count <= _ALL))
+            direction, part = left[own, best] / np.sqrt(sizes[best]), left.take(own, axis=0).take(columns, axis=1)
             for _ in range(2):  # once more, against rounding
-                left = left - direction[:, None] * (direction @ left)
+                part = part - direction[:, None] * (direction @ part)
+            left[np.ix_(own, columns)] = np.where((np.abs(part) < _LOST) & (count > _ALL), 0.0, part)
+            whole = left.take(columns, axis=1)
+            sizes[columns] = np.einsum("ij,ij->j", whole, whole)
+        sizes[chosen] = -1.0
     return tuple(sorted(chosen))
 
 
