@@ -124,6 +124,9 @@ SEEN = 2.0
 BEGINS = 0.05
 """Times what is slow: the fastest of what begins to slip in two directions goes by that, lest rounding turn it."""
 
+ASTRAY = 0.9
+"""Cosine of the angle by which what begins to slip may move otherwise than friction holds it back."""
+
 NEAR_REST = 100.0
 """Times what is small and slow, where impacts have accumulated."""
 
@@ -827,8 +830,11 @@ def _end_impacts() -> Routine:
     return r
 
 
-def _going(r: Routine, m: Sets, some: Variable) -> None:
-    """Find the directions of the slips that go on already, and of those that begin to, which is as their event says."""
+def _going(r: Routine, m: Sets, some: Variable, repeated: Variable) -> None:
+    """Find the directions of the slips that go on already, and of those that begin to, which is as their event says.
+
+    It also finds whether the forces of what has held until something begins to slip were not determined.
+    """
     given, trigger, slip, state = m.unit("given"), m.unit("trigger"), m.unit("slip"), m.unit("state")
     yields = r.variable(False, BOOLEAN)
     with r.count(m.count) as k:
@@ -841,6 +847,7 @@ def _going(r: Routine, m: Sets, some: Variable) -> None:
             for one in ("", "_x", "_y"):
                 m.unit(f"next{one}")[k] = m.unit(f"state{one}")[k]
         r.call("meet_states", r.arguments[0])
+        repeated.now = m.repeats != 0
         with r.count(m.count) as k:
             m.unit("chosen")[k], given[k] = m.unit("struck")[k], 0.0
     with _each(r, m, "chosen") as (k, row, is_pair), r.when(slip[k] != 0.0):
@@ -857,6 +864,18 @@ def _going(r: Routine, m: Sets, some: Variable) -> None:
         some.now = some.now | True
 
 
+def _look_at_begins(r: Routine, m: Sets) -> None:
+    """Leave to others what begins to slip in a plane and moves otherwise than it is given, or nowhere: `_turned`."""
+    moved, fallen = r.variable(0.0), r.variable(0.0)
+    with r.count(m.size) as i:
+        moved.now = r.most(moved.now, r.size(m.row("motions")[i]))
+        fallen.now = r.most(fallen.now, r.size(m.row("wanted")[i]))
+    with _each(r, m, "given") as (k, row, is_pair), r.when(m.unit("trigger")[k] == float(YIELDS)):
+        a, b, size = _size_of_slip(r, row, is_pair, m.row("motions"))
+        is_astray = a * m.unit("given_x")[k] + b * m.unit("given_y")[k] < size * ASTRAY
+        m.shared = r.choose(is_pair & (is_astray | (size <= (moved.now + fallen.now) * SLACK)), 1, m.shared, INTEGER)
+
+
 def _settle() -> Routine:
     """Find the states that hold from now on."""
     r, m, (t,) = _open("settle_contacts", {"t": NUMBER})
@@ -870,7 +889,7 @@ def _settle() -> Routine:
     _choose_slips(r, m)
     do_or_return(r, "read_contacts", t)
     r.copy(m.row("wanted"), m.result("free"), m.size)
-    _going(r, m, some)
+    _going(r, m, some, repeated := r.variable(False, BOOLEAN))
     with r.when(some.now), r.when(r.call("find_states", r.arguments[0]) != 0):
         r.give(NO_SET)
     rests = r.variable(True, BOOLEAN)  # it starts, or has just come to touch: what can rest does, with some share
@@ -879,6 +898,8 @@ def _settle() -> Routine:
         rests.now = rests.now & ((trigger == 0.0) | (trigger == float(CLOSES)))
     with _each(r, m, "chosen") as (k, _, _), r.when(rests.now & (state[k] == float(GOES_ON))):
         m.shared = r.choose(m.unit("given")[k] == 0.0, 1, m.shared, INTEGER)
+    with r.when(repeated.now):
+        _look_at_begins(r, m)
     with r.count(m.count) as k:
         off = (chosen[k] == 0.0) | (state[k] == float(OPEN))
         state[k] = r.choose(off, float(OPEN), state[k])

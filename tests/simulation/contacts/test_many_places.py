@@ -20,6 +20,7 @@ from atwood_library import (
     PointContact,
     PointMass,
     RigidBody,
+    Torque,
     VertexContact,
 )
 
@@ -245,3 +246,52 @@ def test_a_place_next_to_a_hinge_bears_what_its_lever_asks(form: str, lever: flo
 def test_a_share_that_only_rows_nearly_alike_hold_is_none() -> None:
     """Two floors that differ by 1e-4 held a crank with 8,700 N, which nothing asks for, and forces were off by .8 %."""
     assert run_trial("sets", 990300129)[0].findings == ()
+
+
+@FORMS
+def test_a_crate_that_a_growing_force_pushes_off_its_middle_rests_until_no_share_is_known(form: str) -> None:
+    """Its corners, all of one part, reach their limits one by one: each slipped and stuck again without end."""
+    scene = crate()
+    push, turn = (
+        scene.add("push", Force(direction=(0.0, 1.0, 0.0), value=lambda t: 6.0 * t)),
+        scene.add("turn", Torque(axis=(0.0, 0.0, 1.0), value=lambda t: 0.12 * t)),
+    )
+    scene.connect(scene.box.frame, push.point)
+    scene.connect(scene.box.frame, turn.frame)
+    scene.start.update({f"box.velocity.{axis}": 0.0 for axis in "xy"})
+    with pytest.raises(SolveError, match=r"at t = 0\.4.*how forces are shared.*corner\[0\], floor\.corner\[2\]"):
+        simulate(scene, form=form, t_end=1.0, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [({}, r"how forces are shared.*\(c0, c1\)"), ({"stiffness": 1e5}, r"at its limit where other places hold.*\(c0\)")],
+)
+def test_a_bar_of_which_one_end_reaches_its_limit_first_is_not_pushed_without_end(
+    given: dict[str, float], said: str
+) -> None:
+    """Its ends slipped and stuck again at one moment. Where friction falls as they slip both begin together."""
+
+    def pushed(static: float | None) -> Scene:
+        scene = Scene(space="space")
+        ground = scene.add("ground", Ground())
+        bar = scene.add("bar", RigidBody(mass=1.0, moments=(0.02, 0.1, 0.1), center=(0.0, 0.0, -0.1)))
+        for i, x in enumerate((-0.5, 0.5)):
+            end = scene.add(f"c{i}", VertexContact(place=(x, 0.0, 0.0), friction=0.4, static_friction=static, **given))
+            scene.connect(ground.frame, end.plane)
+            scene.connect(bar.frame, end.body)
+        push, turn = (
+            scene.add("push", Force(direction=(1.0, 0.0, 0.0), value=lambda t: 3.0 * t)),
+            scene.add("turn", Torque(axis=(0.0, 0.0, 1.0), value=lambda t: 0.3 * t)),
+        )
+        scene.connect(bar.frame, push.point)
+        scene.connect(bar.frame, turn.frame)
+        for name in ("position", "velocity", "angular_velocity"):
+            scene.start.update({f"bar.{name}.{axis}": 0.0 for axis in "xyz"})
+        return scene
+
+    with pytest.raises(SolveError, match=r"at t = 1\.28.*" + said):
+        simulate(pushed(None), t_end=2.0, rtol=1e-9)
+    result = simulate(pushed(0.5), t_end=2.0, rtol=1e-9)
+    assert [one.part for one in result.events if one.kind == "slips"][-2:] == ["c0", "c1"]
+    assert result["bar.velocity.x"][-1] > 0.5

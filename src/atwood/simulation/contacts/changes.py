@@ -7,7 +7,7 @@ gap closes with a speed, and the states are found anew such that no inequality i
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import combinations, islice, pairwise
 
 import numpy as np
@@ -17,6 +17,7 @@ from atwood.errors import SolveError, StartError
 from atwood.forms.assembly import Assembly
 from atwood.integrators.set_routines import (
     ALIKE,
+    ASTRAY,
     BEGINS,
     BEND,
     EVEN,
@@ -82,6 +83,9 @@ _POISSON = "Choose Poisson's law for the part, with impact_law='poisson' for it 
 
 _UNDETERMINED = "friction depends on how forces are shared, which nothing determines"
 _SHARES = "Give each of them a stiffness, as a place that gives way a little has, or one of them no friction."
+
+_HELD = "friction is at its limit where other places hold what would slip, so that nothing says which way it rubs"
+_TOGETHER = "With static friction above that of slipping all begin to slip together."
 
 _SHARED = 100.0
 """Times the slack of one inequality: shares that nothing determines come from other equations."""
@@ -399,16 +403,21 @@ class _Moment:
         self._rest(gaps, slips)
         self.values = self.values.with_speeds(self.u)
         given = self._going(slips, self.rates())
-        given |= {k: self._yielding(k) for k in slips if k not in given and self.trigger(k) == YIELDS}
+        given |= (begins := self._begins([k for k in slips if k not in given]))
         chosen = [*gaps, *slips]
         still = *gaps, *self._stopped(slips)
         states = [(STICKS, (0.0,) * len(self.units[k])) if k in still else self.before[k] for k in chosen]
         found = self._found(chosen, states, given)
         if found is None:
-            found = self._jammed(chosen)
+            found, begins = self._jammed(chosen), {}
+        turned = self._turned(chosen, found, begins)
+        if turned:
+            self._check_shared_before(turned)
+            known = {k: way for k, way in given.items() if k not in begins}
+            found = self._begun(chosen, states, known, {k: begins[k] for k in turned}) or found
         self._check_determined(chosen, found)
         if found.is_redundant:
-            found = self._shared(chosen, found)
+            found = self._shared(chosen, found, turned)
         self._take(chosen, found)
         self._hold(self._on_every(chosen, found), self._going(slips, self.rates()))
         return None
@@ -419,11 +428,69 @@ class _Moment:
             if len({self.first[chosen[i]].row.key[0].rpartition(".")[0] or i for i in some}) > 1:
                 raise self._contradiction(_UNDETERMINED, [chosen[i] for i in some], _SHARES)
 
-    def _shared(self, chosen: list[int], found: Found) -> Found:
+    def _turned(self, chosen: list[int], found: Found, begins: Mapping[int, tuple[float, ...]]) -> list[int]:
+        """Return what begins to slip in a plane of directions and moves otherwise than the force says that it passes.
+
+        Something else holds it that way, or at all, and bears a part of the force that nothing determines.
+        """
+        place, turned = {row: i for i, row in enumerate(row for k in chosen for row in self.units[k])}, []
+        least = SLACK * float(np.max(np.abs(found.motions), initial=0.0) + np.max(np.abs(self.values.accelerations())))
+        for k, way in begins.items():
+            motion = found.motions[[place[row] for row in self.units[k]]]
+            size = math.hypot(*motion)
+            is_astray = size <= least or float(np.dot(motion, way)) < ASTRAY * size
+            if len(way) == 2 and is_astray and self._is_held_by_others(k, self._on_every(chosen, found)):
+                turned.append(k)
+        return turned
+
+    def _begun(
+        self,
+        chosen: list[int],
+        states: list[State],
+        given: dict[int, tuple[float, ...]],
+        turned: Mapping[int, tuple[float, ...]],
+    ) -> Found | None:
+        """Return states in which what is at its limit goes where it moves, or sticks as another share allows it to."""
+        states = [(GOES_ON, turned[k]) if k in turned else one for k, one in zip(chosen, states, strict=True)]
+        found = self._found(chosen, states, given)
+        if found is not None and not found.is_redundant:
+            known = dict(zip(chosen, found.states, strict=True))
+            left = self._turned(chosen, found, {k: known[k][1] for k in turned})
+            if left:
+                raise self._contradiction(_HELD, left, _TOGETHER)
+        return found
+
+    def _is_held_by_others(self, k: int, states: list[State]) -> bool:
+        """Return whether a unit cannot move in all its directions in some states, even if it does not stick."""
+        without = self._without(states, [k])
+        sticks = [(STICKS, one[1]) if j == k else one for j, one in enumerate(without)]
+        return self._rank(sticks) < self._rank(without) + len(self.units[k])
+
+    def _held_with(self, k: int) -> list[int]:
+        """Return what has held so far and moves with a unit."""
+        response, rows = self.values.response, self.units[k]
+        held = [j for j, one in enumerate(self.before) if one[0] == STICKS]
+        return [j for j in held if np.any(response[np.ix_(rows, self.units[j])])]
+
+    def _repeats(self, held: list[int]) -> bool:
+        """Return whether forces of some units that hold may be shared otherwise."""
+        states = [one if j in held else (OPEN, (0.0,) * len(one[1])) for j, one in enumerate(self.before)]
+        return self._rank(states) < len(_holding(self.units, states))
+
+    def _check_shared_before(self, turned: list[int]) -> None:
+        """Refuse what slips by a share of a load on several parts that nothing has determined."""
+        for k in turned:
+            held = self._held_with(k)
+            parts = {self.first[j].row.key[0].rpartition(".")[0] or j for j in held if self.layout.is_slip[j]}
+            soft = self.values.compliance[[row for j in held for row in self.units[j]]]
+            if len(parts) > 1 and not np.all(soft > 0.0):
+                raise self._contradiction(_UNDETERMINED, held, _SHARES)
+
+    def _shared(self, chosen: list[int], found: Found, turned: Collection[int] = ()) -> Found:
         """Let go what need not hold, as long as the least forces that hold contradict a law.
 
         Where rows depend on each other some forces meet all laws, and others move everything alike. What is let go
-        neither presses nor rubs, and stays where it is.
+        neither presses nor rubs, and stays where it is. What would have to slip with the shares so far needs others.
         """
         states, is_slip = self._on_every(chosen, found), self.layout.is_slip
         own = np.diag(self.values.response)
@@ -439,11 +506,11 @@ class _Moment:
         least = self._rank(states)
         for gone in islice(some, _MOST_SHARES):
             tried = self._without(states, gone)
-            if self._rank(tried, FIRM) == least and self._is_shared(tried, holding):
+            if self._rank(tried, FIRM) == least and self._is_shared(tried, holding, turned):
                 return replace(found, states=tuple(tried[k] for k in chosen))
         raise self._contradiction(_UNDETERMINED, chosen, _SHARES)
 
-    def _is_shared(self, states: list[State], holding: list[int]) -> bool:
+    def _is_shared(self, states: list[State], holding: list[int], turned: Collection[int]) -> bool:
         """Return whether the forces that are reported contradict no law, and hold what has to stay."""
         values = self.values
         forces = forces_in(values, states)
@@ -455,6 +522,7 @@ class _Moment:
             return False
         for k, (rows, one) in enumerate(zip(self.units, states, strict=True)):
             own, most = forces[list(rows)], float(limits.static_free[k] + limits.static_shares[k] @ forces)
+            most -= 2.0 * small if k in turned else 0.0
             if one[0] == STICKS and (math.hypot(*own) - most if self.layout.is_slip[k] else -most - own[0]) > small:
                 return False
         return True
@@ -533,10 +601,23 @@ class _Moment:
                 break
         return found
 
-    def _yielding(self, k: int) -> tuple[float, ...]:
-        """Return the direction in which what sticks begins to slip: against the force that could hold it no longer."""
-        own = forces_in(self.values, self.before)[list(self.units[k])]
-        return tuple(-float(x) / (math.hypot(*own) or 1.0) for x in own)
+    def _begins(self, slips: list[int]) -> dict[int, tuple[float, ...]]:
+        """Return the directions in which what sticks begins to slip: against forces that could hold it no longer.
+
+        What shares a load with it, and has as little reserve, begins with it.
+        """
+        yields = [k for k in slips if self.trigger(k) == YIELDS]
+        if not yields:
+            return {}
+        values, forces = self.values, forces_in(self.values, self.before)
+        limits, small = values.limits_at(forces)[0], _SHARED * SLACK * float(np.max(np.abs(forces)))
+        for k in [one for one in yields if len(self.units[one]) == 2 and self._repeats(self._held_with(one))]:
+            for j in (one for one in self._held_with(k) if one in slips and one not in yields):
+                most = float(limits.static_free[j] + limits.static_shares[j] @ forces)
+                if len(self.units[j]) == 2 and math.hypot(*forces[list(self.units[j])]) > most - small:
+                    yields.append(j)
+        own = {k: forces[list(self.units[k])] for k in yields}
+        return {k: tuple(-float(x) / (math.hypot(*one) or 1.0) for x in one) for k, one in own.items()}
 
     def _jammed(self, chosen: list[int]) -> Found:
         """Where no accelerations contradict nothing an impulse acts (Painleve's paradox); then states are found."""
