@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.errors import StartError, UsageError
+from atwood.errors import KernelEvaluationError, StartError, UsageError
 from atwood.integrators.compiled_location import FOUND, CompiledLocator
 from atwood.integrators.event_location import ROUNDING, EventLocator, Root
 from atwood.integrators.jumps import JumpLog
@@ -103,7 +103,7 @@ class ExplicitSession(SteppingSession):
         """Start a run that has cost nothing so far."""
         self._end = end
         self._on_stiff, self._judged, self._is_left = on_stiff, 0, False
-        self._leaps = False
+        self._leaps = self._is_handed = False
         self.reinitialize(t, y)
         if self._compiled is not None and self._jumps is not None:
             self._jumps.begin(t)
@@ -179,6 +179,7 @@ class ExplicitSession(SteppingSession):
         events, began = self._problem.compiled_events, self._here[0]
         assert events is not None
         assert self._compiled is not None
+        self._is_handed = True
         self._stepper.take_over(handed)
         events.take_over(*handed.looked)
         self._searched = self._stepper.begin_of_step()
@@ -299,9 +300,22 @@ class ExplicitSession(SteppingSession):
                     filled += count
                 if outcome is Outcome.TOO_SMALL or self._sees:
                     break
+            if self._is_handed:  # no clock is looked at there
+                filled += self._read_before_root(times[filled:], values[filled:], rates[filled:])
 
         stopped = self._timed(fill)
         return filled, stopped
+
+    def _read_before_root(self, times: FloatArray, values: FloatArray, rates: FloatArray) -> int:
+        """Fill tables within the last step up to an event that is located; return how many times are before it."""
+        count = 0 if self._root is None or self._sees else int(np.searchsorted(times, self._root.state[0]))
+        if count:
+            try:
+                values[:count], rates[:count], _ = self._stepper.sample(times[:count], 0)
+            except KernelEvaluationError:  # they are read one by one as far as there are values
+                return 0
+            self._here = float(times[count - 1]), values[count - 1].copy(), rates[count - 1].copy()
+        return count
 
     def _fill(self, times: FloatArray, values: FloatArray, rates: FloatArray) -> tuple[int, Outcome]:
         """Let the stepper fill tables for a moment; return how many times it reached."""
