@@ -13,7 +13,7 @@ import pytest
 import atwood
 from atwood import Result, Scene, simulate
 from atwood.simulation.dynamics.scales import scene_length
-from atwood_library import Ground, Mass1D, Pivot, PointMass, Potential, RigidBody, Spring
+from atwood_library import Ground, Link, Mass1D, Pivot, PointMass, Potential, RigidBody, Spring
 
 REST, START, STIFFNESS = 0.9, 1.2, 4.0
 
@@ -143,3 +143,25 @@ def test_sweeps_are_as_right_as_single_runs() -> None:
     found = atwood.sweep(scene, {"ps.stiffness": [STIFFNESS, 2.0 * STIFFNESS]}, quantities=["ps.length"], rtol=1e-9)
     for rate, values in ((FAST, found["ps.length"][0]), (math.sqrt(2.0) * FAST, found["ps.length"][1])):
         assert abs(values[..., -1] - REST - (START - REST) * math.cos(10.0 * rate)) < 1e-7
+
+
+@pytest.mark.parametrize("space", ["plane", "space"])
+def test_linkages_that_float_far_from_each_other_start_where_they_are_said(space: str) -> None:
+    """Pairs of bodies on hinges, 0.3 m long and up to 800 m apart: one body of each is placed, its angle guessed."""
+    scene, places = Scene(space=space), {"a": -3.0, "b": 7.5, "c": 800.0}
+    for name, x in places.items():
+        for body in ("1", "2"):
+            scene.add(name + body, RigidBody(mass=1.0, moments=(0.02, 0.02, 0.02)))
+            scene.add(f"{name}arm{body}", Link(length=0.15))
+        hinge = scene.add(name, Pivot())
+        scene.connect(scene[f"{name}1"].frame, scene[f"{name}arm1"].a)
+        scene.connect(scene[f"{name}arm1"].b, hinge.a)
+        scene.connect(hinge.b, scene[f"{name}arm2"].a)
+        scene.connect(scene[f"{name}arm2"].b, scene[f"{name}2"].frame)
+        scene.start.update({f"{name}1.position.x": x, f"{name}1.position.z": 1.2})
+        scene.guess[f"{name}.angle"] = 0.7
+    start = simulate(scene, t_end=0.01, outputs=2)
+    for name, x in places.items():
+        assert float(start[f"{name}1.position.x"][0]) == pytest.approx(x, rel=1e-12)
+        assert float(start[f"{name}1.position.z"][0]) == pytest.approx(1.2, rel=1e-12)
+        assert float(start[f"{name}.angle"][0]) == pytest.approx(0.7, abs=0.3)

@@ -71,7 +71,7 @@ def newton(
     met: float = 0.0,
     exact: float = 0.0,
     still: float = 0.0,
-    longest: float = inf,
+    longest: float | FloatArray = inf,
     halvings: int = 0,
     is_even: bool = False,
     refused: tuple[type[Exception], ...] = (),
@@ -87,11 +87,11 @@ def newton(
         matrix, right = scaled(now.slopes(), scales, rows), now.value / rows
         for off in (largest(right), 0.0) if is_even else (0.0,):
             units = least_norm(matrix, right, float(is_even), off)  # of the scales, some of which may be zero
-            far = largest(units)
-            step = scales * units * (longest / far if far > longest else 1.0)
+            far, over = largest(units), max(1.0, largest(units / longest))
+            step = scales * units * np.where(np.isinf(longest), 1.0, 1.0 / over)
             if not halvings:
                 break
-            trial, there, left = _nearer(look, moved, place, step, now, min(far, longest), halvings, refused)
+            trial, there, left = _nearer(look, moved, place, step, now, far / over, halvings, refused)
             if left < _MUCH * miss:
                 break
         if halvings:

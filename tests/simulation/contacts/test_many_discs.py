@@ -74,6 +74,30 @@ def test_a_stack_rests_and_does_not_creep(form: str) -> None:
         assert abs(result[f"d{i}.position.x"][-1]) < 1e-12
 
 
+def test_a_column_that_falls_is_of_order_one_beside_solvers_with_events() -> None:
+    """Six discs with gaps of 1 cm fall on each other and stay: twelve events."""
+    starts, end = [place(0.0, 0.15 + 0.21 * i) for i in range(6)], 0.6
+    scene = group(starts)
+    apart = Scene()
+    floor, ground = apart.add("f", BallContact(radius=0.1)), apart.add("g", Ground())
+    for i in range(6):
+        apart.add(f"d{i}", Disc(mass=1.0 + i % 2, radius=0.1))
+        touch = apart.add(f"t{i}", BallPairContact(radius_a=0.1, radius_b=0.1)) if i else floor
+        apart.connect(apart[f"d{i - 1}"].frame if i else ground.frame, touch.a if i else touch.plane)
+        apart.connect(apart[f"d{i}"].frame, touch.b if i else touch.ball)
+    apart.start.update(scene.start)
+    times = np.linspace(0.0, end, 13)
+
+    def places(result: aw.Result) -> np.ndarray:
+        return np.array([np.interp(times, result.time, result[f"d{i}.position.z"]) for i in range(6)])
+
+    exact = simulate(apart, t_end=end, outputs=13, rtol=1e-9)
+    assert len(exact.events) > 9
+    steps = 8e-3 * 0.5 ** np.arange(4)
+    errors = [np.mean(np.abs(places(run(scene, end, h, outputs=13)) - places(exact))) for h in steps]
+    assert 0.7 < np.polyfit(np.log(steps), np.log(errors), 1)[0] < 1.4
+
+
 def test_a_heap_of_three_holds_by_friction_and_slides_apart_without() -> None:
     starts = [place(-0.1, 0.1), place(0.1, 0.1), place(0.0, 0.1 + 0.1 * math.sqrt(3.0))]
     held = state(run(group(starts, friction=0.6), 1.0, 0.01), 3)

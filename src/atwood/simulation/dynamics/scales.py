@@ -13,6 +13,7 @@ from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, evaluate, jacobian, jvp
@@ -255,6 +256,15 @@ def spread(assembly: Assembly, given: Sequence[tuple[Expression, float]]) -> flo
         rest = [each for slope, each in zip(moved, rest, strict=True) if slope is not one]
         largest = max(largest, max(inside, default=0.0) - min(inside, default=0.0))
     return max(largest, max((abs(at) for _, at in rest), default=0.0))
+
+
+def floating_alone(assembly: Assembly) -> NDArray[np.intp]:
+    """Return the speeds along which a group of bodies that floats moves as a whole, each alone along its axis."""
+    equations = assembly.regular
+    speeds = {one: i for i, one in enumerate(equations.speeds)}
+    groups = (one for one in _movable(assembly, equations) if len(one) == 1 and _floats(assembly, equations, one))
+    found = (speeds.get(equations.rates[place], -1) for (place,) in groups)
+    return np.array([one for one in found if one >= 0], dtype=np.intp)
 
 
 def seen_from_afar(

@@ -29,6 +29,7 @@ from atwood.numerics.rank import certain, independent_rows, open_directions, row
 from atwood.numerics.sparse import free_columns
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.rounding import RowErrors
+from atwood.simulation.dynamics.scales import FAR, floating_alone
 from atwood.tolerances import tolerances
 
 
@@ -106,10 +107,23 @@ class System:
         self.errors = RowErrors(
             assembly, made.program, ("values", "jacobian"), laws, places, kinematic_map, not of_speeds
         )
+        self._assembly = assembly if equations is assembly.regular else None  # what starts closed may float no more
         self.targets, self.constraints = targets, made.shape[0] - len(targets)
         self.wrapped = [one.observable.periodic or (whole_turns and one.observable.unit == "rad") for one in targets]
         self.speed_names = tuple(one.name for one in equations.speed_names)
         self.speeds = len(equations.speeds)
+
+    def longest(self, scales: FloatArray) -> float | FloatArray:
+        """Return how far a step leads at most, in the scene's sizes: what floats far away may come from anywhere."""
+        far = max((abs(one.value) for one in self.targets if one.observable.unit == "m"), default=0.0)
+        if self._assembly is None or not far:
+            return _LONGEST
+        along = np.array([one.unit == "m/s" for one in self._assembly.regular.speed_names], dtype=bool)
+        if far <= FAR * float(np.max(scales[along], initial=0.0)):
+            return _LONGEST
+        found = np.full(len(scales), _LONGEST)
+        found[floating_alone(self._assembly)] = np.inf
+        return found
 
     def at(self, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, Matrix]:
         """Return what is missing in each equation, and the derivatives."""
@@ -147,7 +161,7 @@ def nearest(
         steps=iterations,
         met=tolerances.MET,
         exact=_EXACT,
-        longest=_LONGEST,
+        longest=system.longest(scales),
         halvings=_HALVINGS,
         is_even=True,
     )
