@@ -14,7 +14,7 @@ from atwood.integrators.explicit_session import ExplicitSession
 from atwood.simulation.run.run import Walk
 from atwood.simulation.run.session import KeptSession
 from atwood_library import Force, Ground, PointMass, Rod
-from atwood_library.scenes import CartPole, FourBar, Kepler, SliderCrank
+from atwood_library.scenes import CartPole, FourBar, Kepler, ScottRussellLift, SliderCrank
 
 
 def switched() -> Scene:
@@ -121,3 +121,17 @@ def test_the_next_run_goes_on_with_formulas_of_loops_and_judged_steps(
         for path, values in anew.table().items():
             assert_array_equal(one[path], values, err_msg=path)
         assert one.statistics.steps == anew.statistics.steps
+
+
+@pytest.mark.parametrize("solver", ["explicit", "taylor"])
+def test_loops_that_look_out_for_dead_centres_begin_their_session_again(solver: str, opened: list[int]) -> None:
+    assembly = assemble(ScottRussellLift())
+    first = simulate(assembly, outputs=21, solver=solver)
+    opened.clear()
+    again = simulate(assembly, outputs=21, solver=solver)
+    assert not opened
+    alone = simulate(assemble(ScottRussellLift()), outputs=21, solver=solver)
+    assert first.run.statistics.event_evaluations
+    for path, values in first.table().items():
+        assert_array_equal(again[path], values, err_msg=path)
+        assert_array_equal(alone[path], values, err_msg=path)

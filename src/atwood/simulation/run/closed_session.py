@@ -208,10 +208,13 @@ class ClosedLoopSession(Session):
         if not solved.is_clear:
             longest = self._longest_step(solved, t, y)
         can_go_on = self._method.tableau is not None or self._method.kind == "series"
-        is_kept = can_go_on and not (directions or self._before.steps) and guard is None
+        # What dead centres and counts are looked out for with has the values of these loops; events of parts have more.
+        is_kept = can_go_on and not (probe.directions or self._before.steps) and guard is None
         known = request.kept.begin_again(request, self._method, t, y, asked, solved) if is_kept else None
         if known is not None:
             known.limit_steps(longest)
+            code = self._event_code(solved) if directions else None
+            self._events = None if code is None else code[0]
             return known
         problem = explicit_problem_of(
             assembly, found, solved.values, self._function(solved, shifts) if directions else None, directions
@@ -241,7 +244,7 @@ class ClosedLoopSession(Session):
             hamiltonian=canonical,
         )
         session = self._method.open(task)
-        if is_kept and problem.compiled is not None:
+        if is_kept and problem.compiled is not None and not (directions and problem.compiled_events is None):
             request.kept.keep(request, self._method, asked, session, lambda _: None, solved)
         if np.isfinite(longest):
             session.limit_steps(longest)
@@ -290,14 +293,18 @@ class ClosedLoopSession(Session):
 
     def _with_compiled(self, problem: ExplicitProblem, solved: Solved, shifts: FloatArray) -> ExplicitProblem:
         """Return a problem whose event functions are machine code too, if they can be."""
-        probe, kept, key = self._request.probe, self._request.plan.finding.kept, self._request.probe.key
-        shared = solved.assembly.shared
-        made = shared.get(_CODE, lambda: _event_code(self._request, solved), solved.form, solved.is_clear, kept, key)
+        made = self._event_code(solved)
         if made is None:
             return problem
         self._events, code = made
-        data = code.bind(solved.values, np.concatenate([probe.shift, shifts]))
+        data = code.bind(solved.values, np.concatenate([self._request.probe.shift, shifts]))
         return replace(problem, events=data.function(), compiled_events=data)
+
+    def _event_code(self, solved: Solved) -> tuple[Program, EventCode] | None:
+        """Return all event functions, and their machine code; None where there is none."""
+        request, shared = self._request, solved.assembly.shared
+        about = solved.form, solved.is_clear, request.plan.finding.kept, request.probe.key
+        return shared.get(_CODE, lambda: _event_code(request, solved), *about)
 
 
 _CODE: Key[tuple[Program, EventCode] | None] = Key("event functions with dead centres")
