@@ -20,7 +20,6 @@ from atwood.integrators.embedded.steps import (
     RETREAT,
     SAFETY,
     SHRINKAGE,
-    distance,
     first_step,
     root_of,
     write_inner,
@@ -28,7 +27,7 @@ from atwood.integrators.embedded.steps import (
 from atwood.integrators.embedded.tableau import Tableau
 from atwood.integrators.lanes import LanePlaces, failures, write_batch
 from atwood.integrators.protocol import SolverOptions
-from atwood.integrators.stepper import CALM, STIFF, WIDTH, Memory, in_lanes
+from atwood.integrators.stepper import WIDTH, Memory, in_lanes
 from atwood.lazy_dataclasses import dataclass, replace
 
 
@@ -67,7 +66,7 @@ def rates_of_many(program: Program, runs: int) -> RatesOfMany:
 def write_routines(pair: Tableau, runs: int) -> list[Routine]:
     """Write the routines of sessions of so many runs; ``batch`` is called from outside."""
     memory = partial(Memory, MANY_FIELDS, pair.rows, runs=runs)
-    own = [write(pair, runs) for write in (_evaluate, _begin, _step, _stability, _read)]
+    own = [write(pair, runs) for write in (_evaluate, _begin, _step, _read)]
     batch = write_batch(runs, memory, "absolute", looks=True)
     return [*batch, *own, *write_look(pair, runs), *write_inner(pair, runs)]
 
@@ -147,22 +146,6 @@ def _step(pair: Tableau, runs: int) -> Routine:
     m.t_old, m.h = r.choose(good, t, m.t_old), r.choose(good, h, m.h)
     m.t, m.taken = r.choose(good, t + h, t), m.taken + r.choose(good, 1.0, 0.0)
     r.give(stuck)
-    return r
-
-
-def _stability(pair: Tableau, runs: int) -> Routine:
-    """Count steps at the edge of stability of the runs whose step is kept."""
-    r, m, (h, accepted) = open_routine(pair, "stability", {"h": NUMBER, "accepted": INTEGER}, runs=runs)
-    turned, apart = distance(r, m, "end slope", pair.end - 1), distance(r, m, "trial", "last")
-    is_edgy = (h * r.sqrt(turned / apart) > pair.edge) & (apart > 0.0)
-    good, before, calm_before = accepted.conditions(runs), m.edgy, m.calm
-    edgy = r.choose(is_edgy, before + 1.0, before)
-    calm = r.choose(is_edgy, 0.0, calm_before + 1.0)
-    found = is_edgy & (edgy == float(STIFF))
-    m.edges = m.edges + r.choose(found & good, 1.0, 0.0)
-    m.calm = r.choose(good, calm, calm_before)
-    m.edgy = r.choose(good, r.choose((calm == float(CALM)) | found, 0.0, edgy), before)
-    r.give(0)
     return r
 
 

@@ -63,10 +63,10 @@ FIELDS = fields_of(
     ),
     (
         *("t", "t_old", "h", "next", "stop", "relative", "longest", "horizon", "first", "looked", "likeness", "tried"),
-        *("last", "finish"),
+        *("last", "finish", "edgy", "calm"),
     ),
     (
-        *("size", "padded", "is_dense", "edgy", "calm", "event_count", "watches_stiffness", "seen", "looks"),
+        *("size", "padded", "is_dense", "event_count", "watches_stiffness", "seen", "looks"),
         *("waits", "found"),
     ),
 )
@@ -74,7 +74,6 @@ FIELDS = fields_of(
 
 MANY_FIELDS: dict[str, Kind] = {
     **FIELDS,
-    **dict.fromkeys(("edgy", "calm"), NUMBER),
     **LANE_FIELDS,
     "shortened": NUMBER,
     **dict.fromkeys(("derived", "scratch", "looks_at", "events_derived", "events_scratch"), ADDRESS),

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from math import inf, nan, prod
 
-from atwood.codegen.routines import ADDRESS, BOOLEAN, INTEGER, NUMBER, Record, Routine, Value
+from atwood.codegen.routines import ADDRESS, BOOLEAN, INTEGER, NUMBER, Kind, Record, Routine, Value
 from atwood.integrators.compiled_location import FIELDS as LOCATOR, FOUND, NO_STATE, ROWS
 from atwood.integrators.embedded.dense_output import slopes, weighted, write_dense_output, write_polynomial
 from atwood.integrators.embedded.stepper import open_routine
@@ -104,7 +104,7 @@ def _size(r: Routine, m: Memory, a: Value, less: Value | None = None) -> Value:
     return r.sqrt(_sum(r, m, square) / m.size.number())
 
 
-def distance(r: Routine, m: Memory, a: int | str, b: int | str) -> Value:
+def _distance(r: Routine, m: Memory, a: int | str, b: int | str) -> Value:
     """Return the square of the distance between two rows."""
     first, second = m.row(a), m.row(b)
 
@@ -275,17 +275,24 @@ def _error(pair: Tableau, runs: int = 1) -> Routine:
     return r
 
 
-def _stability(pair: Tableau) -> Routine:
-    """Count steps at the edge of stability; 1 where the problem has just turned out stiff."""
-    r, m, (h,) = open_routine(pair, "stability", {"h": NUMBER})
-    turned, apart = distance(r, m, "end slope", pair.end - 1), distance(r, m, "trial", "last")
+def _stability(pair: Tableau, runs: int = 1) -> Routine:
+    """Count steps at the edge of stability, of many runs those that are kept; 1 where one has just turned out stiff."""
+    more: dict[str, Kind] = {"h": NUMBER} if runs == 1 else {"h": NUMBER, "accepted": INTEGER}
+    r, m, (h, *accepted) = open_routine(pair, "stability", more, runs=runs)
+    turned, apart = _distance(r, m, "end slope", pair.end - 1), _distance(r, m, "trial", "last")
     is_edgy = (h * r.sqrt(turned / apart) > pair.edge) & (apart > 0.0)
-    edgy = r.choose(is_edgy, m.edgy + 1, m.edgy)
-    calm = r.choose(is_edgy, 0, m.calm + 1, INTEGER)
-    found = is_edgy & (edgy == STIFF)
-    m.stiff, m.calm = m.stiff + found.integer(), calm
-    m.edgy = r.choose((calm == CALM) | found, 0, edgy, INTEGER)
-    r.give(found.code())
+    before, calm_before = m.edgy, m.calm
+    edgy, calm = r.choose(is_edgy, before + 1.0, before), r.choose(is_edgy, 0.0, calm_before + 1.0)
+    found = is_edgy & (edgy == float(STIFF))
+    edgy = r.choose((calm == float(CALM)) | found, 0.0, edgy)
+    if runs == 1:
+        m.stiff, m.calm, m.edgy = m.stiff + found.integer(), calm, edgy
+        r.give(found.code())
+        return r
+    good = accepted[0].conditions(runs)
+    m.edges = m.edges + r.choose(found & good, 1.0, 0.0)
+    m.calm, m.edgy = r.choose(good, calm, calm_before), r.choose(good, edgy, before)
+    r.give(0)
     return r
 
 
@@ -519,4 +526,4 @@ def write_routines(pair: Tableau) -> list[Routine]:
 def write_inner(pair: Tableau, runs: int) -> list[Routine]:
     """Return what runs that are taken side by side do as one alone."""
     stages = [_stage(pair, stage, runs) for stage in range(1, len(pair.nodes))]
-    return [_error(pair, runs), *stages, write_polynomial(pair, runs)]
+    return [_error(pair, runs), _stability(pair, runs), *stages, write_polynomial(pair, runs)]
