@@ -80,7 +80,7 @@ def in_child(make: Callable[[], Any], form: str, known: str, folder: Path) -> An
 def first_result(make: Callable[[], Any], form: str, known: str, own: Path) -> dict[str, float] | None:
     """Make a scene and its first result, and those again; None where the scene does not run in this form."""
     from atwood import AtwoodError, simulate
-    from atwood.codegen.llvm import build
+    from atwood.codegen.llvm import build, tiers
 
     os.environ["ATWOOD_CACHE_DIR"] = str(shutil.copytree(known, own))
     compiling, awaited = build.compile_text, [0.0]
@@ -92,7 +92,7 @@ def first_result(make: Callable[[], Any], form: str, known: str, own: Path) -> d
         finally:
             awaited[0] += time.perf_counter() - began
 
-    build.compile_text = timed
+    build.compile_text = tiers.compile_text = timed
     spent = {}
     for key in ("", " again"):
         processor, clock = time.process_time(), time.perf_counter()

@@ -40,6 +40,7 @@ from atwood.expr import ExternalFunction
 from atwood.pipeline import assemble
 from atwood.simulation.events.time_events import find_schedule
 from atwood_library import Drive, Force, Ground, Link, Pivot, PointMass, Rod, Rope, RotaryDrive
+from atwood_library.scenes import SCENES
 
 from ..helpers.runs import FORMS
 
@@ -450,3 +451,13 @@ def test_scenes_without_switches_have_no_schedule() -> None:
     assembly = assemble(driven(lambda t: 0.1 * sin(t)))
     assert not assembly.relations
     assert not len(find_schedule(assembly, 0.0, 1.0).times)
+
+
+def test_a_scene_with_the_values_of_the_last_has_its_moments() -> None:
+    made = [simulate(SCENES["six-axis-arm"](), t_end=2.0, outputs=3).run.segments for _ in range(2)]
+    assert [one.time.tolist() for one in made[0]] == [one.time.tolist() for one in made[1]]
+    plans = [segments[0].plan.assembly for segments in made]
+    schedules = [find_schedule(one, 0.0, 2.0) for one in plans]
+    assert len(schedules[0].times) > 0
+    assert schedules[0] is schedules[1]
+    assert find_schedule(plans[0], 0.0, 1.0).times.tolist() == [t for t in schedules[0].times.tolist() if t < 1.0]

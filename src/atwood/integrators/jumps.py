@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from atwood.arrays import FloatArray
-from atwood.codegen.llvm.build import Built, RoutineSource, build_code, default_options, once
+from atwood.codegen.llvm.build import Built, RoutineSource, build_code, once
 from atwood.codegen.llvm.module import CodeOptions, Part
+from atwood.codegen.llvm.tiers import Tiers
 from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Kind
 from atwood.expr.core.program import Program
 
@@ -94,8 +95,7 @@ class JumpCode:
     def __init__(self, program: Program) -> None:
         self.program = program
         _, self.coordinates, self.speeds, self.gaps = (len(group.symbols) for group in program.inputs)
-        part = Part("kernel", program)
-        self.built, self.routines = build_code([part], default_options([part])), _routines()
+        self.tiers, self.routines = Tiers([Part("kernel", program)]), _routines()
 
 
 class Jumps:
@@ -111,13 +111,14 @@ class Jumps:
 
     def __init__(self, code: JumpCode, events: EventData, rates: CompiledRates) -> None:
         self.code, self._size, count = code, code.coordinates + code.speeds, events.count
+        self._built = code.tiers.spend(0.0)
         self._stride = len(ENTRY) + 2 * self._size
         self._room = ROOM // self._stride
         room = self._size + 4 * code.gaps + 1  # what the program gives, and what it is asked
         counts = (
             len(FIELDS),
             len(code.program.prologue),
-            code.built.scratch,
+            self._built.scratch,
             len(TABLE) * count,
             *[code.gaps] * 2,
             room,
@@ -131,7 +132,7 @@ class Jumps:
         places = (one.ctypes.data for one in pieces[1:])
         names = ("derived", "scratch", "table", "parts", "moved", "room", "log")
         self._set(**dict(zip(names, places, strict=True)), gaps=code.gaps, log_stride=self._stride)
-        self._set(coordinates=code.coordinates, speeds=code.speeds, program=code.built.code.addresses["kernel"])
+        self._set(coordinates=code.coordinates, speeds=code.speeds, program=self._built.code.addresses["kernel"])
         self._set(shift=events.arrays[1].ctypes.data, seen=events.memory.ctypes.data)
         self._set(rates=rates.function, rates_data=rates.data)
         self.function, self.data = code.routines.code.addresses["jump"], self._numbers.ctypes.data
@@ -149,7 +150,7 @@ class Jumps:
         past: Sequence[tuple[float, int]],
     ) -> None:
         """Begin again with other parameters, and with jumps that have been: their times and parts."""
-        self._derived[:] = self.code.built.derive("kernel", self.code.program, parameter_values)[0]
+        self._derived[:] = self._built.derive("kernel", self.code.program, parameter_values)[0]
         self._table[:], self._parts[:] = table, parts
         known = past[-_PAST:]
         self._log[: len(known), [0, 2]] = np.reshape(known, (-1, 2))

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.codegen.llvm.build import Built, RoutineSource, build_code, default_options, once
+from atwood.codegen.llvm.build import Built, RoutineSource, build_code, once
 from atwood.codegen.llvm.module import CodeOptions, Part
+from atwood.codegen.llvm.tiers import Tiers
 from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Kind
 from atwood.expr.core.program import Program
 from atwood.integrators.jumps import ROOM, JumpLog, Jumps
@@ -130,8 +131,7 @@ class SetCode:
     def __init__(self, program: Program) -> None:
         self.program = program
         _, self.coordinates, self.speeds = (len(group.symbols) for group in program.inputs)
-        part = Part("contacts", program)
-        self.built, self.routines = build_code([part], default_options([part])), _routines()
+        self.tiers, self.routines = Tiers([Part("contacts", program)]), _routines()
 
 
 class SetSolver:
@@ -162,11 +162,12 @@ class SetSolver:
         own, size, number = code.coordinates + code.speeds, count, units.shape[1]
         self.set_code, self._size, self._units = code, own, units.copy()
         self._each = size + len(ENTRY)
+        self._built = code.tiers.spend(0.0)
         lengths = {
             "sets": len(FIELDS),
             "values": len(code.program.parameters),
             "derived": len(code.program.prologue),
-            "room": code.built.scratch,
+            "room": self._built.scratch,
             "y": own,
             "out": len(code.program.results),
             "units": units.size,
@@ -188,10 +189,10 @@ class SetSolver:
         same = ("derived", "y", "out", "units", "rows", "matrix", "left", "shares", "pattern", "past")
         self._put("sets", {name: self._at[name] for name in same})
         self._put("sets", {"scratch": self._at["room"], "log": self._at["struck"]})
-        self._put("sets", {"program": code.built.code.addresses["contacts"]})
+        self._put("sets", {"program": self._built.code.addresses["contacts"]})
         self._put("sets", {"coordinates": code.coordinates, "speeds": code.speeds})
         self._put("sets", {"count": number, "size": size, "entries": len(pattern), "inside": 1.0})
-        self._derive = _PROLOGUE(code.built.code.addresses["contacts_prologue"])
+        self._derive = _PROLOGUE(self._built.code.addresses["contacts_prologue"])
         self._resolve = _RESOLVE(code.routines.code.addresses["resolve"])
 
     def _put(self, piece: str, fields: Mapping[str, float]) -> None:

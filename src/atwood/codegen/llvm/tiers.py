@@ -66,8 +66,8 @@ class Tiers:
     def __init__(
         self,
         parts: Sequence[Part],
-        exports: Sequence[str],
-        routines: RoutineSource,
+        exports: Sequence[str] = (),
+        routines: RoutineSource | None = None,
         is_brief: bool = False,
         of_tapes: RoutineSource | None = None,
         is_quick: bool = True,

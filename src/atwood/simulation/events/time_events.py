@@ -24,6 +24,7 @@ from atwood.lazy_dataclasses import dataclass
 
 _RELATION: Key[Program] = Key("relation of functions of time")
 _SCHEDULE: Key[Schedule] = Key("schedule")
+_LAST_SCHEDULE: Key[dict[tuple[float, float, bytes], Schedule]] = Key("when relations change in the last scene")
 _RATE_OF_RELATION: Key[list[Expression]] = Key("its derivative")
 
 
@@ -113,7 +114,20 @@ def find_schedule(assembly: Assembly, start: float, end: float) -> Schedule:
             pieces = pieces.with_relation(assembly, number)
         return pieces.schedule()
 
-    return assembly.kept.get(_SCHEDULE, find, start, end)
+    def look() -> Schedule:
+        """Return what the last scene of this structure has, if it has these values; what warns does so each time."""
+        if any(node.operation == "external" for node in live([one.zero for one in relations])):
+            return find()
+        about = start, end, assembly.parameter_values[: len(assembly.parameters) - len(relations)].tobytes()
+        last = assembly.shared.get(_LAST_SCHEDULE, dict)
+        found = last.get(about)
+        if found is None:
+            found = find()
+            last.clear()
+            last[about] = found
+        return found
+
+    return assembly.kept.get(_SCHEDULE, look, start, end)
 
 
 @dataclass(frozen=True, eq=False)
