@@ -181,7 +181,7 @@ def _jump() -> Routine:
     r.call("sharpen", place, locator)
     with r.count(size) as j:
         y[j], m.before[j] = search.y[j] - m.late * search.yp[j], search.y[j] - (t - m.now) * search.yp[j]
-    sets.ahead, sets.rough = m.ahead, m.rough
+    sets.ahead, sets.rough, sets.later = m.ahead, m.rough, m.later
     with r.when(r.call("resolve", m.sets, m.then, r.value(0, INTEGER), r.value(1, INTEGER)) != 0):
         _back(r, m, search)
     some = r.variable(False, BOOLEAN)

@@ -34,7 +34,7 @@ JUMP: dict[str, Kind] = {
     **dict.fromkeys(("sets", "table", "shift", "margins", "seen", "states", "near", "before", "values"), ADDRESS),
     **dict.fromkeys(("places", "log", "project", "project_data", "scratch", "event_scratch", *_PROGRAMS), ADDRESS),
     **dict.fromkeys(("rates", "rates_data"), ADDRESS),
-    **dict.fromkeys(("now", "then", "late", "began", "shortest", "ahead", "rough", "time"), NUMBER),
+    **dict.fromkeys(("now", "then", "late", "began", "shortest", "ahead", "rough", "later", "time"), NUMBER),
     **dict.fromkeys(("events", "size", "stride", "logged", "capacity", "stays"), INTEGER),
 }
 """The memory of changes. `late` is by how much an event was seen after its zero, `then` the time of that zero,
@@ -45,6 +45,9 @@ _PLACES = {
     piece: {name: (kind, place) for place, (name, kind) in enumerate(fields.items())}
     for piece, fields in (("own", JUMP), ("sets", FIELDS))
 }
+
+LIMITS = ("ahead", "rough", "later")
+"""How long impacts may still go on that are summed."""
 
 EVENTS = ("unit", "code", "small", "placed")
 """Of each event: whose it is, what happens, what is zero but for errors, and whether it is that of a gap on places."""
@@ -223,7 +226,7 @@ class SetSolver:
         self._put("sets", {"known": len(known)})
 
     def resolve(
-        self, t: float, y: FloatArray, triggers: FloatArray, longest: tuple[float, float], is_start: bool
+        self, t: float, y: FloatArray, triggers: FloatArray, longest: tuple[float, float, float], is_start: bool
     ) -> tuple[SetJump, FloatArray] | None:
         """Return what becomes of gaps and slips at a moment, and which gaps were closed; None where it is not clear.
 
@@ -231,7 +234,7 @@ class SetSolver:
         """
         units, pieces = self._own_units, self._pieces
         units[UNITS["trigger"]], pieces["y"][:] = triggers, y
-        self._put("sets", dict(zip(("ahead", "rough"), longest, strict=True)))
+        self._put("sets", dict(zip(LIMITS, longest, strict=True)))
         if self._resolve(pieces["sets"].ctypes.data, t, is_start, 1) or self._said("shared"):
             return None
         struck = pieces["struck"][: self._said("logged") * self._each].reshape(-1, self._each).copy()
@@ -315,14 +318,14 @@ class SetJumps(SetSolver, Jumps):
     def _got(self, name: str) -> int:
         return int(self._pieces["own"].view(np.int64)[_PLACES["own"][name][1]])
 
-    def begin_again(self, table: FloatArray, scales: tuple[float, float, float, float]) -> None:
+    def begin_again(self, table: FloatArray, scales: tuple[float, ...]) -> None:
         """Take the events of another run, from what was given on.
 
-        Scales are how long a set lasts at least, how long impacts may go on that are summed, as a rule and where
-        rounding tells in them, and the time of the scene.
+        Scales are how long a set lasts at least, how long impacts may go on that are summed, as a rule, where rounding
+        tells in them, and where they are uneven, and the time of the scene.
         """
         self._pieces["table"][:] = table.ravel()
-        self._put("own", {"logged": 0, **dict(zip(("shortest", "ahead", "rough", "time"), scales, strict=True))})
+        self._put("own", {"logged": 0, **dict(zip(("shortest", *LIMITS, "time"), scales, strict=True))})
         self._told = 0
 
     def begin(self, t: float) -> None:

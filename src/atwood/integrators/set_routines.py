@@ -32,7 +32,7 @@ from atwood.numerics.contact_sets import CLEAR, GOES_ON, OPEN, SLACK, STICKS, ST
 FIELDS: dict[str, Kind] = {
     **dict.fromkeys(("program", "derived", "scratch", "y", "out", "units", "rows", "matrix", "left"), ADDRESS),
     **dict.fromkeys(("shares", "pattern", "past", "log"), ADDRESS),
-    **dict.fromkeys(("finite", "blur", "pace", "tolerance", "inside", "ahead", "rough"), NUMBER),
+    **dict.fromkeys(("finite", "blur", "pace", "tolerance", "inside", "ahead", "rough", "later"), NUMBER),
     **dict.fromkeys(("better_x", "better_y", "lasted"), NUMBER),
     **dict.fromkeys(("count", "size", "entries", "coordinates", "speeds", "number", "better"), INTEGER),
     **dict.fromkeys(("logged", "known", "stops", "repeats", "shared"), INTEGER),
@@ -40,24 +40,24 @@ FIELDS: dict[str, Kind] = {
 """The memory of sets. `finite` is 0 where limits are of impulses, which finite forces do not have; `blur` and `pace`
 are multiples of what is small and slow; `inside` is how deep a gap may be, in multiples of what is small; `ahead` is
 how long impacts may still go on that are summed, and then how long they do, `rough` how long where rounding tells the
-length of their intervals, `lasted` how long these have gone on; `stops` is 1 where these come to an end and may still
-wait for one more, 2 where they come to an end; `shared` is 1 where forces of a set that was found are
-not determined, as rows repeat each other, or where another share might let rest what begins to slip, and `repeats`
-where those solved for last are not."""
+length of their intervals, `later` how long where these are uneven, `lasted` how long these have gone on; `stops` is 1
+where these come to an end and may still wait for one more, 2 where they come to an end; `shared` is 1 where forces of a
+set that was found are not determined, as rows repeat each other, or where another share might let rest what begins to
+slip, and `repeats` where those solved for last are not."""
 
 UNITS = {
     name: k
     for k, name in enumerate(
         (
-            *("first", "width", "slip", "at", "speed", "poisson", "part", "small", "slow"),
+            *("first", "width", "slip", "at", "speed", "poisson", "part", "small", "slow", "rounding"),
             *("trigger", "state", "state_x", "state_y", "next", "next_x", "next_y", "closed"),
             *("chosen", "given", "given_x", "given_y", "turned_x", "turned_y", "struck", "stopped", "acts", "series"),
         )
     )
 }
-"""Of each gap and slip: its first row and their number, its kind and gap, what is zero but for errors, what has
-happened, its state and direction before and after, and whether it was closed at that moment; the rest is work. Of what
-has impacts that accumulate `series` is 1."""
+"""Of each gap and slip: its first row and their number, its kind and gap, what is zero but for errors, and but for
+rounding, what has happened, its state and direction before and after, and whether it was closed at that moment; the
+rest is work. Of what has impacts that accumulate `series` is 1."""
 
 ROWS = {
     name: k
@@ -106,6 +106,12 @@ EVEN = 4.0
 STEADY, LATER = 1.5, 0.001
 """Where factors differ by more than the first from their mean, a series is summed later: at this share of its rest."""
 
+LEVEL, SHORT = 0.97, 4.0
+"""Intervals that do not shrink, by more than the first, and are so many times those of uneven ones, are rounding."""
+
+RECENT = 6
+"""So many factors since which a series is steady are enough, whatever came before."""
+
 WAITS = 0.1
 """Of how long impacts may still go on that are summed: so long may those that wait for one more."""
 
@@ -132,6 +138,12 @@ NEAR_REST = 100.0
 
 _SETS = 12
 """Times the number of gaps and slips: so many sets are tried."""
+
+ROUNDED = 0.25 * 2.0**-52
+"""Of the scene's size: a bounce that is no higher is rounding."""
+
+FAST = 1e3
+"""What bounces no higher than rounding is looked for where forces pull it back by so much times what falls, at most."""
 
 GAIN = 1e-9
 """Of the work of impulses: more than this is energy that an impact would make."""
@@ -716,13 +728,13 @@ def _hold() -> Routine:
     acting, right, forces, rates, size = m.row("acting"), m.row("right"), m.row("forces"), m.row("rates"), m.size
     response, matrix, solution, n = m.result("response"), m.matrix, m.row("solution"), r.variable(0, INTEGER)
     moment, falls = r.variable(0.0), m.row("motions")
-    with _each(r, m, "chosen") as (k, row, is_pair), r.when(m.unit("next")[k] == float(GOES_ON)):
+    with _each(r, m, "chosen") as (k, row, is_pair), r.when((m.unit("next")[k] == float(GOES_ON)) & is_pair):
         fall = _size_of_slip(r, row, is_pair, falls)[2]
         with r.when(fall > 0.0):
             soon = BEGINS * m.unit("slow")[k] * m.pace / fall
             moment.now = r.choose(moment.now > 0.0, r.least(moment.now, soon), soon)
-    with _each(r, m, "chosen") as (k, _, _), _rows(r, m, k) as (_, row):
-        share = r.choose(m.unit("next")[k] == float(GOES_ON), moment.now, 0.0)
+    with _each(r, m, "chosen") as (k, _, is_pair), _rows(r, m, k) as (_, row):
+        share = r.choose((m.unit("next")[k] == float(GOES_ON)) & is_pair, moment.now, 0.0)
         acting[n.now], right[n.now] = row.number(), falls[row] * share - rates[row]
         n.now = n.now + 1
     with r.when(n.now == 0):
@@ -876,14 +888,41 @@ def _look_at_begins(r: Routine, m: Sets) -> None:
         m.shared = r.choose(is_pair & (is_astray | (size <= (moved.now + fallen.now) * SLACK)), 1, m.shared, INTEGER)
 
 
+def _barely_rising() -> Routine:
+    """Mark gaps that rise by no more than rounding before they are back: ``v^2 <= 2 A f`` times that."""
+    r, m, () = _open("barely_rising")
+    struck, rates, rounding, free = m.unit("struck"), m.row("rates"), m.unit("rounding"), m.result("free")
+    largest, some = r.variable(0.0), r.variable(False, BOOLEAN)
+    with r.count(m.size) as i:
+        largest.now = r.most(r.size(free[i]), largest.now)
+    with r.count(m.count) as k:
+        struck[k], m.unit("given")[k], m.unit("next")[k] = 0.0, 0.0, float(OPEN)
+    with _each(r, m, "chosen") as (k, row, _), r.when(m.unit("speed")[k] == 0.0):
+        rate, is_near = rates[row], rates[row] * rates[row] <= rounding[k] * largest.now * (2.0 * FAST)
+        rises = rate > m.unit("slow")[k] * m.pace
+        struck[k] = r.choose(rises & is_near, 1.0, 0.0)
+        m.unit("next")[k] = r.choose(rises & ~is_near, float(OPEN), float(STICKS))
+        some.now = some.now | (rises & is_near)
+    with r.when(~some.now):
+        r.give(0)
+    r.copy(m.row("wanted"), free, m.size)
+    r.call("meet_states", r.arguments[0])
+    with _each(r, m, "struck") as (k, row, _):
+        pulls = m.result("response")[row * m.size + row] * m.row("forces")[row]
+        struck[k] = r.choose(rates[row] * rates[row] <= pulls * rounding[k] * 2.0, 1.0, 0.0)
+    r.give(0)
+    return r
+
+
 def _settle() -> Routine:
     """Find the states that hold from now on."""
     r, m, (t,) = _open("settle_contacts", {"t": NUMBER})
     chosen, state, x, y = m.unit("chosen"), m.unit("next"), m.unit("next_x"), m.unit("next_y")
     some = r.variable(False, BOOLEAN)
     r.call("touching", r.arguments[0], result=INTEGER)
+    r.call("barely_rising", r.arguments[0])
     with _each(r, m, "chosen") as (k, row, _):
-        passes = r.size(m.row("rates")[row]) > m.unit("slow")[k] * m.pace
+        passes = (r.size(m.row("rates")[row]) > m.unit("slow")[k] * m.pace) & (m.unit("struck")[k] == 0.0)
         with r.when(passes | (m.unit("trigger")[k] == float(OPENS))):
             chosen[k] = 0.0
     _choose_slips(r, m)
@@ -909,8 +948,9 @@ def _settle() -> Routine:
         state[k], x[k], y[k] = float(OPEN), 0.0, 0.0
     with r.count(m.count) as k:
         is_pair = m.unit("width")[k] == 2.0
-        size = _size_of_slip(r, r.truncated(m.unit("first")[k]), is_pair, m.row("rates"))[2]
-        begins = (state[k] == float(GOES_ON)) & is_pair & _is_still(r, m, k, size)
+        row, rates = r.truncated(m.unit("first")[k]), m.row("rates")
+        size, is_back = _size_of_slip(r, row, is_pair, rates)[2], rates[row] * x[k] < 0.0
+        begins = (state[k] == float(GOES_ON)) & (is_pair | is_back) & _is_still(r, m, k, size)
         chosen[k] = r.choose((state[k] == float(STICKS)) | begins, 1.0, 0.0)
     r.give(r.call("hold", r.arguments[0]))
     return r
@@ -963,7 +1003,8 @@ def _series() -> Routine:
             r.repeat(loop)
         end.now = time
         span = last.now - time
-        with r.when((count.now > 0) & (span <= spans[r.choose(count.now > 0, count.now - 1, 0, INTEGER)])):
+        newer = spans[r.choose(count.now > 0, count.now - 1, 0, INTEGER)]
+        with r.when((count.now > 0) & (span <= newer * LEVEL)):
             r.leave(loop)
         spans[count.now] = span
         count.now, last.now = count.now + 1, time
@@ -997,13 +1038,11 @@ def _end_series(r: Routine, m: Sets, spans: Value, number: Value) -> None:
     cube, typical = spans[0] / spans[SPANS[0] - 1], r.variable(0.5)
     with r.count(60):  # the cube root: the mean factor of three intervals
         typical.now = typical.now - (typical.now - cube / (typical.now * typical.now)) * (1.0 / 3.0)
-    even, steady = r.variable(1, INTEGER), r.variable(True, BOOLEAN)
-    long = r.variable(1, INTEGER)
+    even, long = r.variable(1, INTEGER), r.variable(1, INTEGER)
     with r.count(number, 1) as k:
         factor = spans[k - 1] / spans[k] / typical.now
         is_even, is_steady = ((factor <= by) & (factor * by >= 1.0) for by in (EVEN, STEADY))
         is_near = (even.now == k) & (k < SPANS[1])
-        steady.now = steady.now & (~(is_near & is_even) | is_steady)
         even.now = r.choose(is_near & is_even, k + 1, even.now)
         long.now = r.choose((long.now == k) & is_steady, k + 1, long.now)
     with r.when(even.now < SPANS[0]):
@@ -1015,9 +1054,12 @@ def _end_series(r: Routine, m: Sets, spans: Value, number: Value) -> None:
         with r.count(even.now - 2):
             power.now = power.now * share.now
         share.now = share.now - (share.now - ratio / power.now) / (even.now - 1).number()
-    left = spans[0] * share.now / (1.0 - share.now)
+    rest = r.choose(share.now < 1.0, spans[0] * share.now / (1.0 - share.now), inf)
+    is_level = (share.now > LEVEL) & (spans[0] < m.later * SHORT)
+    left = r.choose(is_level, spans[0], rest)
     flattens = 1.0 - spans[0] / spans[1] < FLATTENS * (1.0 - share.now)
-    longest = r.choose(steady.now, r.choose(flattens, m.rough, m.ahead), LATER * m.ahead)
+    is_steady = long.now >= r.choose(even.now < RECENT + 1, even.now, RECENT + 1, INTEGER)
+    longest = r.choose(is_steady, r.choose(flattens, m.rough, m.ahead), m.later)
     with r.when(left < longest):
         m.stops = r.choose(left > m.ahead * WAITS, 1, 2, INTEGER)
         m.ahead, m.blur, m.pace, m.lasted = left, NEAR_REST, NEAR_REST, 0.0
@@ -1077,5 +1119,5 @@ def write_sets() -> list[Routine]:
     """Return the routines; they take the address of the memory of sets, and ``resolve`` is the one to be called."""
     sets = (_solve, _least, _equations, _moved, _met, _contradiction, _improved, _find)
     impacts = (_impulses, _strike, _account, _collide, _stop, _end_impacts, _series)
-    moments = (_read, _push, _touch, _hold, _settle, _check)
+    moments = (_read, _push, _touch, _hold, _barely_rising, _settle, _check)
     return [_resolve(), *(write() for write in (*sets, *impacts, *moments))]

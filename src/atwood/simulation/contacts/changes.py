@@ -21,13 +21,18 @@ from atwood.integrators.set_routines import (
     BEGINS,
     BEND,
     EVEN,
+    FAST,
     FLATTENS,
     GAIN,
     LATER,
+    LEVEL,
     LONG,
     NEAR_REST,
     OFTEN,
+    RECENT,
+    ROUNDED,
     SEEN,
+    SHORT,
     SPANS,
     STEADY,
     WAITS,
@@ -135,6 +140,7 @@ class _Moment:
         near = NEAR * max(relative, 1e-13)
         self.small = np.array([near * scales.of(ALONG[one.law.options.unit]) for one in self.first])
         self.slow = self.small / scales.time
+        self.rounding = ROUNDED / near * self.small
         self.triggers = {(one.part, one.law): one.target for one in triggers}
         self.events: list[EventRecord] = []
         self.resting: list[int] | None = None
@@ -207,7 +213,7 @@ class _Moment:
             advice="With impacts='together' they are solved at once.",
         )
 
-    def left_of(self, impacts: Sequence[tuple[float, str]], longest: tuple[float, float]) -> float | None:
+    def left_of(self, impacts: Sequence[tuple[float, str]], longest: tuple[float, float, float]) -> float | None:
         """Return in how long impacts that follow each other ever faster have come to an end; None if they do not.
 
         Intervals that shrink by a factor r are a geometric series: what is left of it is the last one times r/(1 - r).
@@ -225,7 +231,7 @@ class _Moment:
             if part not in parts or time == end:
                 continue
             end = time
-            if len(spans) == LONG or (spans and last - time <= spans[-1]):
+            if len(spans) == LONG or (spans and last - time <= LEVEL * spans[-1]):
                 break
             spans.append(last - time)
             last = time
@@ -239,10 +245,12 @@ class _Moment:
         if count < SPANS[0] - 1:
             return None
         share = float(np.exp(np.mean(np.log(ratios[:count]))))
-        left: float = spans[0] * share / (1.0 - share)
-        is_steady = np.all(np.abs(np.log(ratios[:count] / typical)) <= math.log(STEADY))
+        left: float = spans[0] * share / (1.0 - share) if share < 1.0 else math.inf
+        if share > LEVEL and spans[0] < SHORT * longest[2]:  # rounding makes each bounce from the one before
+            left = spans[0]
+        is_steady = long >= min(count, RECENT)
         flattens = 1.0 - ratios[0] < FLATTENS * (1.0 - share)
-        if not left < (longest[1 if flattens else 0] if is_steady else LATER * longest[0]):
+        if not left < (longest[1 if flattens else 0] if is_steady else longest[2]):
             return None
         self._series = self._accumulating(closing, impacts, self.t - float(np.sum(spans[: count + 1])))
         self.small, self.slow = (self._blurred(one, NEAR_REST) for one in (self.small, self.slow))
@@ -395,8 +403,10 @@ class _Moment:
 
     def settle(self) -> None:
         """Find the states that hold from now on."""
-        rates = self.rates()
-        gaps = [k for k in self.touching if abs(self.rate(k, rates)) <= self.slow[k] and self.trigger(k) != OPENS]
+        rates, touching = self.rates(), self.touching
+        slow = {k for k in touching if abs(self.rate(k, rates)) <= self.slow[k]}
+        slow |= self._barely_rising(touching, slow, rates)
+        gaps = [k for k in touching if k in slow and self.trigger(k) != OPENS]
         slips = self.slips_at(gaps)
         if not gaps and not slips:
             return self._take([], Found((), np.zeros(0), np.zeros(0)))
@@ -421,6 +431,17 @@ class _Moment:
         self._take(chosen, found)
         self._hold(self._on_every(chosen, found), self._going(slips, self.rates()))
         return None
+
+    def _barely_rising(self, touching: list[int], slow: set[int], rates: FloatArray) -> set[int]:
+        """Return the gaps that rise by no more than rounding before they are back: ``v^2 <= 2 A f`` times that."""
+        values, rises = self.values, {k: self.rate(k, rates) for k in touching if k not in self.layout.speeds}
+        highest = {k: rises[k] ** 2 / (2.0 * self.rounding[k]) for k in rises if rises[k] > self.slow[k]}
+        if not highest or min(highest.values()) > FAST * float(np.max(np.abs(free := values.accelerations()))):
+            return set()
+        near = {k: pull for k, pull in highest.items() if pull <= FAST * float(np.max(np.abs(free)))}
+        every = [(STICKS if k in slow or k in near else OPEN, (0.0,) * len(rows)) for k, rows in enumerate(self.units)]
+        pulls = np.diag(values.response) * forces_in(values, every)
+        return {k for k, pull in near.items() if pull <= pulls[self.units[k][0]]}
 
     def _check_determined(self, chosen: list[int], found: Found) -> None:
         """Refuse friction that depends on shares that nothing determines; corners of one part share by least forces."""
@@ -697,13 +718,15 @@ def _first(is_one: BoolArray) -> int:
 
 
 def sum_of_series(spans: FloatArray) -> float:
-    """Return how long impacts go on after the last; infinity where intervals, the last first, are too few to say.
+    """Return how long impacts go on after the last; infinity where intervals, the last first, do not say.
 
     Factors of early intervals are not yet the last one, and those of late ones are rounding. So the sum is formed from
     each on, extrapolated by the way in which it changes (Aitken), and taken where its neighbours agree best.
     """
     since = np.cumsum(spans) - spans
     shares = spans[:-1] / spans[1:]
+    if np.any(shares >= 1.0):
+        return math.inf
     sums = spans[:-1] * shares / (1.0 - shares) - since[:-1]
     change, before = sums[:-2] - sums[1:-1], sums[1:-1] - sums[2:]
     bends = (change * before > 0.0) & (np.abs(change) < BEND * np.abs(before))
@@ -713,10 +736,14 @@ def sum_of_series(spans: FloatArray) -> float:
     return float(sums[np.argmin(worst) if len(worst) else 0]) if len(sums) else math.inf
 
 
-def longest_left(relative: float, scales: Scales) -> tuple[float, float]:
-    """Return how long impacts may still go on that are summed, s: as a rule, and where rounding tells in them."""
-    usual = LEFT * relative**0.5 * scales.time
-    return usual, max(usual, ROUGH * scales.time)
+def longest_left(relative: float, scales: Scales) -> tuple[float, float, float]:
+    """Return how long impacts may still go on that are summed, s.
+
+    The first is the rule, the second where rounding tells in them, the third where they are uneven: then longer than
+    bounces of which rounding makes the next.
+    """
+    usual, bounce = LEFT * relative**0.5 * scales.time, (64.0 * ROUNDED) ** 0.5 * scales.time
+    return usual, max(usual, ROUGH * scales.time), max(LATER * usual, 2.0 * bounce)
 
 
 def told_rest(t: float, key: tuple[str, str], left: float) -> EventRecord:

@@ -136,6 +136,7 @@ def _units(layout: Layout, plan: SceneProblem) -> FloatArray:
             "part": parts[one.row.key[0]],
             "small": size,
             "slow": size / plan.scales.time,
+            "rounding": sets.ROUNDED * size,
         }
         for name, value in values.items():
             found[UNITS[name], k] = value
