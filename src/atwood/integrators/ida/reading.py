@@ -13,7 +13,7 @@ from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Kind, Record
 from atwood.integrators.protocol import State
 
 FIELDS: dict[str, Kind] = {
-    **dict.fromkeys(("read", "ida", "y", "yp", "y_at", "yp_at", "known", "known_rates"), ADDRESS),
+    **dict.fromkeys(("read", "memory", "y", "yp", "y_at", "yp_at", "known", "known_rates"), ADDRESS),
     "newest": NUMBER,
     "size": INTEGER,
 }
@@ -32,9 +32,9 @@ def write_routines() -> list[Routine]:
         for target, source in zip(out, (m.known, m.known_rates), strict=True):
             r.copy(target, source, m.size)
         r.give(0)
-    read, ida, size = m.read, m.ida, m.size
+    read, memory, size = m.read, m.memory, m.size
     for order, (target, vector, place) in enumerate(zip(out, (m.y, m.yp), (m.y_at, m.yp_at), strict=True)):
-        with r.when(r.call(read, ida, time, r.value(order, CODE), vector) != 0):
+        with r.when(r.call(read, memory, time, r.value(order, CODE), vector) != 0):
             r.give(3)
         r.copy(target, place, size)
     r.give(0)
