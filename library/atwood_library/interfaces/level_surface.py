@@ -18,7 +18,9 @@ class LevelSurface(Component):
     function: Any = parameter(
         "z", function_of={"x": "1", "y": "1", "z": "1"}, doc="What is zero there; of place in units of scale."
     )
-    scale: Number = parameter(1.0, unit="m", above=0.0, doc="Unit of length of the function.", symbol="a")
+    scale: Number = parameter(
+        1.0, unit="m", above=0.0, unit_length=True, doc="Unit of length of the function.", symbol="a"
+    )
     a: Frame = connector(Frame, "The frame that carries the surface.")
     b: Point = connector(Point, "The point.")
 

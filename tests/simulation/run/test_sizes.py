@@ -6,7 +6,18 @@ import numpy as np
 import pytest
 
 from atwood import DeclarationError, Scene, parameter, simulate, sweep
-from atwood_library import Ground, Link, Mass1D, Pivot, RigidBody, Spring, Weld
+from atwood_library import (
+    Ground,
+    Link,
+    Mass1D,
+    Pivot,
+    PointMass,
+    PointOnLevelSurface,
+    RigidBody,
+    Spring,
+    SurfaceContact,
+    Weld,
+)
 
 from ...helpers.runs import FORMS
 
@@ -43,6 +54,29 @@ def test_steps_do_not_depend_on_the_size_of_the_scene(level: str, size: float) -
     assert 0.8 * steps[0] < steps[1] < 1.25 * steps[0]
 
 
+def bounces_in_bowl(size: float, form: str) -> tuple[list[tuple[str, float]], float]:
+    """Return events in units of the time of fall, and where the ball is then; the size is in the formula alone."""
+    scene = Scene()
+    ground, ball = scene.add("ground", Ground()), scene.add("ball", PointMass(mass=1.0))
+    bowl = scene.add("bowl", SurfaceContact(function=f"z - {0.5 / size!r}*x**2", restitution=0.5, friction=0.1))
+    scene.connect(ground.frame, bowl.a)
+    scene.connect(ball.point, bowl.b)
+    scene.start.update({"ball.position.x": 0.1 * size, "ball.position.z": 0.5 * size})
+    scene.start.update({"ball.velocity.x": 0.0, "ball.velocity.z": 0.0})
+    run = simulate(scene, t_end=1.5 * size**0.5, rtol=1e-6, form=form)
+    return [(e.kind, e.time / size**0.5) for e in run.events], float(run["ball.position.x"][-1]) / size
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_length_in_a_formula_alone_does_not_count_as_a_metre(form: str) -> None:
+    whole, at = bounces_in_bowl(1.0, form)
+    for size in (1e-3, 1e3):
+        events, place = bounces_in_bowl(size, form)
+        assert [kind for kind, _ in events] == [kind for kind, _ in whole]
+        np.testing.assert_allclose([when for _, when in events], [when for _, when in whole], rtol=1e-9)
+        np.testing.assert_allclose(place, at, rtol=1e-9)
+
+
 def two_masses(place: float, space: str) -> Scene:
     """Return two masses on guides, with a spring between them, somewhere in the world."""
     scene = Scene(t_end=10.0, gravity=0.0, space=space, **({"line_axis": (1.0, 0.0, 0.0)} if space == "line" else {}))
@@ -76,6 +110,22 @@ def test_the_size_of_a_scene_in_a_sweep_is_that_of_a_run() -> None:
     np.testing.assert_allclose(many["pivot.angle"][1], alone["pivot.angle"], rtol=1e-12)
 
 
+def test_a_unit_of_length_counts_in_a_sweep_as_in_a_run() -> None:
+    scene = Scene(t_end=2.0)
+    ground, bead = scene.add("ground", Ground()), scene.add("bead", PointMass(mass=1.0))
+    bowl = scene.add("bowl", PointOnLevelSurface(function="z - 3.0*x**2"))
+    scene.connect(ground.frame, bowl.a)
+    scene.connect(bead.point, bowl.b)
+    scene.start.update({"bead.position.x": 0.05, "bead.velocity.x": 0.1})
+    many = sweep(scene, {"bowl.scale": [1.0, 20.0]}, quantities=["bead.position.x"], outputs=11, solver="explicit")
+    for place, scale in enumerate((1.0, 20.0)):
+        scene["bowl"].scale = scale
+        alone = simulate(scene, outputs=11, solver="explicit")
+        np.testing.assert_allclose(many["bead.position.x"][place], alone["bead.position.x"], rtol=1e-11)
+
+
 def test_a_place_is_in_metres() -> None:
     with pytest.raises(DeclarationError, match="a place in the world is in metres"):
         parameter(1.0, unit="rad", place=True, doc="An angle.")
+    with pytest.raises(DeclarationError, match="a unit of length is in metres"):
+        parameter(1.0, unit="rad", unit_length=True, doc="An angle.")

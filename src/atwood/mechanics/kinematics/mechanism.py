@@ -220,12 +220,16 @@ def extent(mechanism: Mechanism) -> float:
 
     Of a vector that is its magnitude, which does not depend on how the scene is turned.
     """
-    values = (mechanism.locals_[path].part.values[name] for path, name in sizing_parameters(mechanism))
+    found = ((mechanism.locals_[path].part.values[name], unsaid) for path, name, unsaid in sizing_parameters(mechanism))
+    values = (value for value, unsaid in found if value != unsaid)
     return max((math.hypot(*one) if isinstance(one, tuple) else abs(one) for one in values), default=0.0)
 
 
-def sizing_parameters(mechanism: Mechanism) -> Iterator[tuple[str, str]]:
-    """Yield the part and the name of each parameter that is a length of what moves, and no place in the world."""
+def sizing_parameters(mechanism: Mechanism) -> Iterator[tuple[str, str, float]]:
+    """Yield the part and the name of each parameter that is a length of what moves, and no place in the world.
+
+    With them goes the value that says nothing: of a unit of length its default, else zero.
+    """
     for path, local in mechanism.locals_.items():
         bodies = {mechanism.bodies.body_of[mechanism.graph.node_of[path, name]] for name in local.connectors}
         if bodies == {0}:
@@ -233,7 +237,7 @@ def sizing_parameters(mechanism: Mechanism) -> Iterator[tuple[str, str]]:
         for name, spec in local.part.component.parameter_specs().items():
             is_length = spec.unit.exponents == (0, 1, 0, 0) and not spec.place
             if is_length and local.part.values[name] is not None:
-                yield path, name
+                yield path, name, spec.default if spec.unit_length else 0.0
 
 
 def check_closures(mechanism: Mechanism) -> None:

@@ -57,6 +57,7 @@ _BOUND = optional(number())
     direction=FLAG,
     turning=FLAG,
     place=FLAG,
+    unit_length=FLAG,
     text=FLAG,
     function_of=optional(BY_PATH),
     array=either(FLAG, CALLBACK),
@@ -77,6 +78,7 @@ def parameter(
     direction: bool = False,
     turning: bool = False,
     place: bool = False,
+    unit_length: bool = False,
     text: bool = False,
     function_of: Mapping[str, str] | None = None,
     array: Callable[[Any, str], Any] | bool = False,
@@ -114,6 +116,9 @@ def parameter(
     place
         Whether it says where something is in the world, as a position or one coordinate of it. It then says nothing of
         how large the scene is, by which tolerances are measured: a scene that is moved runs as before.
+    unit_length
+        Whether it is a unit of length in which a function is written. Left at its default it says nothing of how large
+        the scene is: lengths are then in the function alone, and start values tell the size.
     text
         Whether it is text, as the path of a file is.
     function_of
@@ -131,10 +136,12 @@ def parameter(
     Raises
     ------
     DeclarationError
-        If there is no line of meaning, the unit is no SI unit, or a place is not in metres.
+        If there is no line of meaning, the unit is no SI unit, or a place or a unit of length is not in
+        metres.
     """
-    if place and unit.strip() != "m":
-        raise DeclarationError(f"a place in the world is in metres, not in {unit}", advice='Give unit="m".')
+    if (place or unit_length) and unit.strip() != "m":
+        what = "a place in the world" if place else "a unit of length"
+        raise DeclarationError(f"{what} is in metres, not in {unit}", advice='Give unit="m".')
     return ParameterSpec(
         default,
         unit,
@@ -149,6 +156,7 @@ def parameter(
         direction=direction or turning,
         turning=turning,
         place=place,
+        unit_length=unit_length,
         text=text,
         function_of=function_of,
         array=array,

@@ -149,6 +149,7 @@ class ParameterSpec(Field):
         direction: bool = False,
         turning: bool = False,
         place: bool = False,
+        unit_length: bool = False,
         text: bool = False,
         function_of: Mapping[str, str] | None = None,
         array: Callable[[Any, str], Any] | bool = False,
@@ -161,6 +162,7 @@ class ParameterSpec(Field):
         self.minimum, self.above, self.maximum = minimum, above, maximum
         self.size, self.integer, self.choices = size, integer, choices
         self.direction, self.turning, self.place, self.text = direction, turning, place, text
+        self.unit_length = unit_length
         self.structural = structural or direction or integer or text or bool(choices or function_of or array)
 
     def check(self, value: Any, where: str) -> Any:

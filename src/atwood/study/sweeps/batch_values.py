@@ -323,12 +323,13 @@ def _of(given: FloatArray | float, runs: NDArray[np.intp]) -> FloatArray | float
 def _moving_lengths(assembly: Assembly, parameters: FloatArray) -> FloatArray:
     """Return the largest length among the parameters of what moves, for each row of parameters; see `extent`."""
     numbers = {symbol.name: i for i, symbol in enumerate(assembly.parameters)}
-    counted = set(sizing_parameters(assembly.mechanism))
+    counted = {(path, name): unsaid for path, name, unsaid in sizing_parameters(assembly.mechanism)}
     squares: dict[tuple[str, str], FloatArray] = {}
     for name, slot in find_slots(assembly.flat):
         key = slot.part, slot.name
         if key not in counted:
             continue
         value = parameters[:, numbers[name]] if name in numbers else np.float64(slot.read(assembly.flat))
-        squares[key] = squares.get(key, np.zeros(len(parameters))) + value**2
+        said = np.where(value == counted[key], 0.0, value)
+        squares[key] = squares.get(key, np.zeros(len(parameters))) + said**2
     return np.sqrt(np.max(list(squares.values()), axis=0)) if squares else np.zeros(len(parameters))
