@@ -17,7 +17,8 @@ from atwood.integrators.protocol import CompiledRates
 from atwood.mechanics.dynamics.equations import ContactRow
 from atwood.mechanics.outputs.event_functions import CLOSES
 from atwood.model.values.units import ALONG
-from atwood.simulation.contacts.changes import NEAR, longest_left, told_impact
+from atwood.simulation.contacts.changes import NEAR, longest_left
+from atwood.simulation.contacts.event_records import told_impact
 from atwood.simulation.events.modes import LAST, EventProbe, EventRecord, ToldLater
 from atwood.simulation.problem.explicit_scene import impact_code, values_on_constraints
 from atwood.simulation.problem.problem import SceneProblem

@@ -37,8 +37,7 @@ from atwood.integrators.set_routines import (
     STEADY,
     WAITS,
 )
-from atwood.lazy_dataclasses import dataclass, made_of, replace
-from atwood.mechanics.dynamics.equations import ContactRow
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.outputs.event_functions import CLOSES, OPENS, RESTS, STOPS, YIELDS
 from atwood.model.values.units import ALONG
 from atwood.numerics.contact_sets import (
@@ -50,21 +49,21 @@ from atwood.numerics.contact_sets import (
     SLACK,
     STICKS,
     Found,
-    Limits,
     State,
     all_states,
-    balancing,
     find_states,
-    is_back,
     sizes_of,
 )
-from atwood.numerics.matrices import least_norm, or_one
+from atwood.numerics.matrices import least_norm
 from atwood.numerics.rank import rank
-from atwood.simulation.contacts.values import ContactValues, Layout
+from atwood.simulation.contacts.event_records import in_own_words, told_changes, told_impact, told_rest
+from atwood.simulation.contacts.forces import MOST_TURNS, forces_in, is_same, of_impulses, rows_that_hold
+from atwood.simulation.contacts.states import states_of, values_of_states
+from atwood.simulation.contacts.values import ContactValues
 from atwood.simulation.dynamics.orientation_coordinates import to_regular
 from atwood.simulation.dynamics.scales import Scales
 from atwood.simulation.events.mode_change import generalized_speeds
-from atwood.simulation.events.modes import EventRecord, Impact
+from atwood.simulation.events.modes import EventRecord
 from atwood.tolerances import tolerances
 
 NEAR = 10.0
@@ -78,9 +77,6 @@ What still rises in one interval rises by some tolerances, and rounding mostly d
 
 ROUGH = 0.01
 """In units of the scene's time: so long may impacts still go on that are summed where rounding tells in them."""
-
-MOST_TURNS = 50
-"""Limits that are curved in the forces are met in so many turns at most."""
 
 CONTRADICT = "Contacts contradict each other here: look at what moves them, and at their friction."
 
@@ -372,7 +368,7 @@ class _Moment:
         values, found = self.values, np.zeros(len(self.contacts))
         pressed = np.zeros(len(self.contacts)) if pressed is None else pressed
         for _ in range(MOST_TURNS):
-            limits = _of_impulses(values.limits_at(found + pressed), pressed)
+            limits = of_impulses(values.limits_at(found + pressed), pressed)
             asked = values.chosen(chosen, free, {}, limits, pressed)
             solved = find_states(asked, self._at_rest(chosen))
             if solved is None:
@@ -496,7 +492,7 @@ class _Moment:
     def _repeats(self, held: list[int]) -> bool:
         """Return whether forces of some units that hold may be shared otherwise."""
         states = [one if j in held else (OPEN, (0.0,) * len(one[1])) for j, one in enumerate(self.before)]
-        return self._rank(states) < len(_holding(self.units, states))
+        return self._rank(states) < len(rows_that_hold(self.units, states))
 
     def _check_shared_before(self, turned: list[int]) -> None:
         """Refuse what slips by a share of a load on several parts that nothing has determined."""
@@ -559,7 +555,7 @@ class _Moment:
 
     def _rank(self, states: list[State], clear: float = CLEAR) -> int:
         """Return how many of the rows that hold are independent."""
-        held = _holding(self.units, states)
+        held = rows_that_hold(self.units, states)
         response = self.values.response[np.ix_(held, held)]
         size = sizes_of(np.diag(response))
         return rank(response / size / size[:, None], clear) if held else 0
@@ -643,7 +639,7 @@ class _Moment:
     def _jammed(self, chosen: list[int]) -> Found:
         """Where no accelerations contradict nothing an impulse acts (Painleve's paradox); then states are found."""
         values = self.values
-        limits = _of_impulses(values.limits_at(np.zeros(len(self.contacts))))
+        limits = of_impulses(values.limits_at(np.zeros(len(self.contacts))))
         every = all_states(values.chosen(chosen, self.rates(), {}, limits))
         best = max(every, key=lambda one: float(np.sum(np.abs(one.forces))), default=None)
         if best is None or not float(np.sum(np.abs(best.forces))) > 0.0:
@@ -744,187 +740,6 @@ def longest_left(relative: float, scales: Scales) -> tuple[float, float, float]:
     """
     usual, bounce = LEFT * relative**0.5 * scales.time, (64.0 * ROUNDED) ** 0.5 * scales.time
     return usual, max(usual, ROUGH * scales.time), max(LATER * usual, 2.0 * bounce)
-
-
-def told_rest(t: float, key: tuple[str, str], left: float) -> EventRecord:
-    """Return the event of a gap whose impacts have accumulated, which have come to an end some time later."""
-    return EventRecord(t + left, *key, "impacts have accumulated: it rests", "", True, "rests")
-
-
-def told_change(t: float, first: ContactRow, before: State, after: State) -> EventRecord | None:
-    """Return the event of a gap or a slip that has another state; None where it has none, or is loose."""
-    (was, last), (state, way) = before, after
-    part, name, _ = first.row.key
-    said = ""
-    if not first.is_slip and state != was:
-        said, kind = (f"{name} closes", "closes") if state else (f"{name} opens", "opens")
-    elif first.is_slip and state == was == GOES_ON and float(np.dot(way, last)) < 0.0:
-        said, kind = f"{name} reverses", "reverses"
-    elif first.is_slip and state != was and state:
-        said, kind = (f"{name} sticks", "sticks") if state == STICKS else (f"{name} goes on", "slips")
-    return EventRecord(t, part, name, said, "", False, kind) if said else None
-
-
-def told_impact(
-    t: float,
-    key: tuple[str, str],
-    unit: str,
-    impulses: tuple[float, ...],
-    speeds: tuple[float, float],
-    loss: float | None = None,
-) -> EventRecord:
-    """Return the event of an impact at a gap: impulses along it and along its slips, its rates before and after.
-
-    Without friction the loss follows from these.
-    """
-    part, law = key
-    before, after = speeds
-    loss = -0.5 * impulses[0] * (before + after) if loss is None else loss
-    own = {"time": t, "part": part, "law": law}
-    struck = made_of(Impact, **own, impulse=impulses[0], friction=impulses[1:], before=before, after=after, loss=loss)
-    said = f"an impact at {-before:.6g} {ALONG[unit]}/s"
-    return made_of(EventRecord, **own, message=said, target="", impact=True, kind="impact", struck=struck)
-
-
-def in_own_words(
-    assembly: Assembly,
-    layout: Layout,
-    t: float,
-    events: Sequence[EventRecord],
-    states: tuple[Sequence[State], Sequence[State]],
-) -> list[EventRecord]:
-    """Return events in which gaps that have words of their own for what happens are told of in these.
-
-    Parameters
-    ----------
-    assembly, layout, t
-        The scene, its gaps and slips, and the time.
-    events
-        What has happened, as of any gap.
-    states
-        Those of all gaps and slips before and after it.
-    """
-    found = list(events)
-    for one, (before, _), (after, _) in zip(layout.first, *states, strict=True):
-        words, key = one.told(assembly.flat.parts), one.row.key[:2]
-        if not any(words):
-            continue
-        own = [each for each in found if (each.part, each.law) == key]
-        struck = next((each for each in own if each.impact), None)
-        told = [] if struck is None or before == OPEN else [struck]
-        happened = (before == OPEN and (after != OPEN or struck), after == OPEN and (before != OPEN or struck))
-        for has, said, kind in zip(happened, words, ("closes", "opens"), strict=True):
-            if not has:
-                continue
-            if said is None:
-                told += [each for each in own if (each.kind == "opens") == (kind == "opens")]
-                continue
-            known = struck if kind == "closes" and struck else EventRecord(t, *key, "", "", False, kind)
-            told.append(replace(known, **said._asdict()))
-        place = found.index(own[0]) if own else len(found)
-        found[place:] = [*told, *(each for each in found[place:] if (each.part, each.law) != key)]
-    return found
-
-
-def _of_impulses(limits: tuple[Limits, Limits], pressed: FloatArray | None = None) -> tuple[Limits, Limits]:
-    """Return limits of impulses: finite forces have none, and what follows from other forces is a share of these.
-
-    Those of impulses that act already are known.
-    """
-    known = np.zeros(limits[0].shares.shape[1]) if pressed is None else pressed
-    ahead, back = (
-        Limits(one.shares @ known, one.shares, one.static_shares @ known, one.static_shares) for one in limits
-    )
-    return ahead, back
-
-
-def values_of_states(layout: Layout, held: Sequence[float], states: Sequence[State]) -> list[float]:
-    """Return discrete states with those of all units; a slip at a gap that is open is open, too."""
-    found = list(held)
-    for one, at, places, (state, way) in zip(layout.first, layout.gap_of, layout.places, states, strict=True):
-        if one.is_slip and at >= 0 and states[at][0] == OPEN:
-            state, way = OPEN, (0.0,) * len(way)
-        for place, value in zip(
-            places, (float(state), *way) if one.is_slip else (float(state == STICKS),), strict=True
-        ):
-            found[place] = value
-    return found
-
-
-def told_changes(t: float, layout: Layout, before: Sequence[State], states: Sequence[State]) -> list[EventRecord]:
-    """Return what is told of units whose states change."""
-    events: list[EventRecord] = []
-    for one, at, was, (state, way) in zip(layout.first, layout.gap_of, before, states, strict=True):
-        (part, name, _), is_loose = one.row.key, one.is_slip and at >= 0 and states[at][0] == OPEN
-        said = ""
-        if not one.is_slip and state != was[0]:
-            said, kind = (f"{name} closes", "closes") if state else (f"{name} opens", "opens")
-        elif one.is_slip and not is_loose and state == was[0] == GOES_ON and float(np.dot(way, was[1])) < 0.0:
-            said, kind = f"{name} reverses", "reverses"
-        elif one.is_slip and not is_loose and state != was[0] and state:
-            said, kind = (f"{name} sticks", "sticks") if state == STICKS else (f"{name} goes on", "slips")
-        if said:
-            events.append(EventRecord(t, part, name, said, "", False, kind))
-    return events
-
-
-def states_of(layout: Layout, held: Sequence[float]) -> list[State]:
-    """Return the states of all units that discrete states say."""
-    found: list[State] = []
-    for one, places in zip(layout.first, layout.places, strict=True):
-        state, *way = (held[place] for place in places)
-        found.append((int(state), tuple(way)) if one.is_slip else ((STICKS if state else OPEN), (0.0,)))
-    return found
-
-
-def _holding(units: Sequence[Sequence[int]], states: Sequence[State]) -> list[int]:
-    """Return the rows that hold."""
-    return [row for rows, one in zip(units, states, strict=True) if one[0] == STICKS for row in rows]
-
-
-def forces_in(values: ContactValues, states: Sequence[State], rates: FloatArray | None = None) -> FloatArray:
-    """Return the forces of all rows in some states of the units, or impulses, whatever their signs and sizes are.
-
-    Parameters
-    ----------
-    values, states
-        Gaps and slips, and what they do.
-    rates
-        Of all rows, which impulses take away where something sticks; accelerations are, by forces, if not given.
-    """
-    free, count = values.accelerations() if rates is None else rates, len(values.contacts)
-    forces = np.zeros(count)
-    for _ in range(MOST_TURNS):
-        limits = values.limits_at(forces) if rates is None else _of_impulses(values.limits_at(forces))
-        matrix, right = np.eye(count), np.zeros(count)
-        for number, (rows, (state, way)) in enumerate(zip(values.units, states, strict=True)):
-            for row, part in zip(rows, way, strict=True):
-                if state == STICKS:
-                    matrix[row], right[row] = values.response[row], -free[row]
-                elif state == GOES_ON:
-                    side = limits[is_back(way)]
-                    matrix[row] = matrix[row] + part * side.shares[number]
-                    right[row] = -part * side.free[number]
-        more, least = np.zeros((0, count)), np.zeros(0)
-        holding = _holding(values.units, states)
-        if len(holding) > 1:
-            slopes, offset = values.sharing
-            gives = np.diag(slopes)[holding] > 0.0
-            alone = balancing(values.response[np.ix_(holding, holding)], gives).T
-            more, least = alone @ slopes[holding], np.zeros(len(alone))
-            if rates is None:  # joints have no impulses before
-                least = alone @ offset[holding]
-            size = or_one(np.max(np.abs(more), axis=1, initial=0.0))
-            more, least = more / size[:, None], least / size
-        last, forces = forces, least_norm(np.vstack([matrix, more]), np.append(right, -least))
-        if not values.layout.is_curved or is_same(last, forces):
-            break
-    return forces
-
-
-def is_same(last: FloatArray, now: FloatArray) -> bool:
-    """Return whether forces are the same but for rounding."""
-    return float(np.max(np.abs(now - last), initial=0.0)) <= 1e-12 * float(np.max(np.abs(now), initial=0.0))
 
 
 def resolve(

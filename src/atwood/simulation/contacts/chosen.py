@@ -28,8 +28,10 @@ from atwood.model.declare.laws import Law
 from atwood.model.local.flatten import FlatScene
 from atwood.model.values.units import ALONG
 from atwood.numerics.contact_sets import GOES_ON, OPEN, STICKS, State
-from atwood.simulation.contacts.changes import forces_in, resolve, states_of
+from atwood.simulation.contacts.changes import resolve
+from atwood.simulation.contacts.forces import forces_in
 from atwood.simulation.contacts.groups import refuse_groups
+from atwood.simulation.contacts.states import states_of
 from atwood.simulation.contacts.values import ContactValues, layout_of
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.dynamics.reactions import maximal_state

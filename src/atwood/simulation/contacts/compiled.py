@@ -24,16 +24,9 @@ from atwood.mechanics.outputs.event_functions import CLOSES, CONTACT, OPENS, RES
 from atwood.model.values.units import ALONG
 from atwood.numerics.contact_sets import STICKS, State
 from atwood.simulation.contacts.bounces import has_plain_impacts
-from atwood.simulation.contacts.changes import (
-    NEAR,
-    Changed,
-    in_own_words,
-    longest_left,
-    states_of,
-    told_change,
-    told_impact,
-    told_rest,
-)
+from atwood.simulation.contacts.changes import NEAR, Changed, longest_left
+from atwood.simulation.contacts.event_records import in_own_words, told_change, told_impact, told_rest
+from atwood.simulation.contacts.states import states_of
 from atwood.simulation.contacts.values import Layout, layout_of
 from atwood.simulation.events.modes import MARGIN, EventProbe, EventRecord, ToldLater
 from atwood.simulation.problem.explicit_scene import light_speeds, program_on_constraints, values_on_constraints

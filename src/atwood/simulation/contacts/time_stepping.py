@@ -19,16 +19,11 @@ from atwood.integrators.time_stepping.session import ImpulsiveProblem, Pushed
 from atwood.mechanics.outputs.event_functions import CONTACT
 from atwood.model.values.units import ALONG
 from atwood.numerics.contact_sets import OPEN, STICKS, Limits, State, find_states
-from atwood.simulation.contacts.changes import (
-    CONTRADICT,
-    MOST_TURNS,
-    is_same,
-    states_of,
-    told_changes,
-    told_impact,
-    values_of_states,
-)
+from atwood.simulation.contacts.changes import CONTRADICT
 from atwood.simulation.contacts.crowd import crowd_of
+from atwood.simulation.contacts.event_records import told_changes, told_impact
+from atwood.simulation.contacts.forces import MOST_TURNS, is_same
+from atwood.simulation.contacts.states import states_of, values_of_states
 from atwood.simulation.contacts.values import ContactValues, layout_of
 from atwood.simulation.dynamics.orientation_coordinates import to_regular
 from atwood.simulation.dynamics.scales import Scales

@@ -19,8 +19,8 @@ from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.contact_sets import GOES_ON, OPEN, STICKS, State
 from atwood.numerics.rank import null_space
-from atwood.simulation.contacts.changes import forces_in
 from atwood.simulation.contacts.chosen import ContactSet, in_set, margins_in, set_of, state_in_set, states_by_path
+from atwood.simulation.contacts.forces import forces_in
 from atwood.simulation.contacts.values import ContactValues, layout_of
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.scales import Scales, find_scales
