@@ -9,6 +9,7 @@ import pytest
 
 import atwood as aw
 from atwood import simulate
+from atwood.simulation.run.run_record import run_again
 from atwood_library.scenes import (
     Billiards,
     BouncingBall,
@@ -117,4 +118,18 @@ def test_woodpecker(form: str) -> None:
     assert np.all(np.abs(np.diff(periods))[1:] < 0.8 * np.abs(np.diff(periods))[:-1])
     assert result["sleeve.position.z"][-1] < -0.05
     assert {one.part for one in result.events if one.kind == "impact"} == {"lower", "upper", "beak"}
+    assert result.energy.max_drift < 1e-8
+
+
+@FORMS
+def test_samples_in_between_change_no_bit_of_a_run_with_impacts(form: str) -> None:
+    """States at events were rounded by how many samples came before, so that work was none within the steps."""
+    result = simulate(Woodpecker(), form=form, t_end=0.3)
+    again = run_again(result.run, np.linspace(0.0, 0.3, 3001)[1:-1])
+    assert again is not None
+    assert [one.time for one in again.events] == [one.time for one in result.events]
+    ends = [
+        [np.append(one.coordinates[:, -1], one.speeds[:, -1]) for one in each.segments] for each in (result.run, again)
+    ]
+    np.testing.assert_array_equal(*ends)
     assert result.energy.max_drift < 1e-8

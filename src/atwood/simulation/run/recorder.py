@@ -258,10 +258,9 @@ class Recorder:
             self._jumps.append(jumps[0])
         if not len(t):
             return
-        if self.plan.balance.constraints and _count(pending) + len(t) < _PENDING:  # projected with what follows
-            pending.append((t, y, shown))
-            return
-        self._finish(*_joined([*pending, (t, y, shown)]))
+        pending.append((t, y, shown))
+        if not self.plan.balance.constraints or _count(pending) >= _PENDING:  # else projected with what follows
+            self.settle()
 
     def take_pieces(
         self,
@@ -312,7 +311,13 @@ class Recorder:
         self._samples = (tuple(one for one in kept if len(one.time)), [one for one in waiting if len(one[0])])
 
     def settle(self) -> None:
-        """Project all that waits."""
+        """Project all that waits; the last by itself, since a run goes on from it, whatever samples are before it.
+
+        What is projected together rounds as the number of states has it.
+        """
+        count = _count(self._samples[1])
+        if count > 1 and self.plan.is_projected:
+            self._settle(count - 1)
         self._settle(None)
 
     def _settle(self, count: int | None) -> None:
