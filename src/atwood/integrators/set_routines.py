@@ -109,6 +109,10 @@ STEADY, LATER = 1.5, 0.001
 LEVEL, SHORT = 0.97, 4.0
 """Intervals that do not shrink, by more than the first, and are so many times those of uneven ones, are rounding."""
 
+SQUEEZED, LOSSLESS = 10.0, 0.01
+"""Times how long uneven impacts may go on that are summed: those of what is squeezed, before both sides touch at once,
+and those that lose nothing, which come to no end but by rounding."""
+
 RECENT = 6
 """So many factors since which a series is steady are enough, whatever came before."""
 
@@ -1010,7 +1014,7 @@ def _series() -> Routine:
         count.now, last.now = count.now + 1, time
     with r.when((count.now < SPANS[0]) | ~(spans[0] > 0.0)):
         r.give()
-    _end_series(r, m, spans, count.now)
+    _end_series(r, m, spans, count.now, (t, closing.now, largest.now * _MOVED))
     with r.when(m.stops != 0):
         _mark_series(r, m, t)
     r.give()
@@ -1030,7 +1034,7 @@ def _mark_series(r: Routine, m: Sets, t: Value) -> None:
         series[k] = r.choose((m.unit("slip")[k] == 0.0) & is_in, 1.0, 0.0)
 
 
-def _end_series(r: Routine, m: Sets, spans: Value, number: Value) -> None:
+def _end_series(r: Routine, m: Sets, spans: Value, number: Value, closing: tuple[Value, Value, Value]) -> None:
     """Stop what has a series of intervals, the last first, that ends soon.
 
     Impacts that only happen to be near each other are no series: each interval shrinks about as the one before.
@@ -1058,16 +1062,39 @@ def _end_series(r: Routine, m: Sets, spans: Value, number: Value) -> None:
     is_level = (share.now > LEVEL) & (spans[0] < m.later * SHORT)
     left = r.choose(is_level, spans[0], rest)
     flattens = 1.0 - spans[0] / spans[1] < FLATTENS * (1.0 - share.now)
+    lasted = r.variable(0.0)
+    with r.count(even.now) as k:
+        lasted.now = lasted.now + spans[k]
+    is_elastic, pull = _bouncing(r, m, lasted.now, *closing)
+    speed = r.size(m.row("rates")[r.truncated(m.unit("first")[closing[1]])])
     is_steady = long.now >= r.choose(even.now < RECENT + 1, even.now, RECENT + 1, INTEGER)
-    longest = r.choose(is_steady, r.choose(flattens, m.rough, m.ahead), m.later)
+    is_squeezed = flattens & (speed > pull * lasted.now)
+    soon = r.choose(is_squeezed, m.later * SQUEEZED, m.later)
+    longest = r.choose(is_steady & ~is_squeezed, r.choose(flattens, m.rough, m.ahead), soon)
+    with r.when(is_elastic & ((share.now <= LEVEL) | (spans[0] > m.later * LOSSLESS))):
+        r.give()
     with r.when(left < longest):
         m.stops = r.choose(left > m.ahead * WAITS, 1, 2, INTEGER)
-        m.ahead, m.blur, m.pace, m.lasted = left, NEAR_REST, NEAR_REST, 0.0
-        with r.count(even.now) as k:
-            m.lasted = m.lasted + spans[k]
+        m.ahead, m.blur, m.pace, m.lasted = left, NEAR_REST, NEAR_REST, lasted.now
         sum_ = _sum_of_series(r, spans, long.now)
         with r.when(r.size(sum_ - left) <= left):
             m.ahead = sum_
+
+
+def _bouncing(r: Routine, m: Sets, lasted: Value, t: Value, closes: Value, least: Value) -> tuple[Value, Value]:
+    """Tell whether impacts of a series lose nothing, and how fast what they move falls, at most."""
+    is_elastic, pull, bounces = r.variable(True, BOOLEAN), r.variable(0.0), r.variable(False, BOOLEAN)
+    past, moved = m.past, m.result("response").at(r.truncated(m.unit("first")[closes]) * m.size)
+    with r.count(m.count) as k, r.when(m.unit("slip")[k] == 0.0):
+        row = r.truncated(m.unit("first")[k])
+        bounces.now = k == closes
+        with r.count(m.known) as i:
+            is_one = (past[i * 2 + 1] == m.unit("part")[k]) & (past[i * 2] >= t - lasted)
+            bounces.now = bounces.now | is_one
+        with r.when(bounces.now & (r.size(moved[row]) > least)):
+            is_elastic.now = is_elastic.now & (m.result("restitution")[row] >= 1.0)
+            pull.now = r.most(r.size(m.result("free")[row]), pull.now)
+    return is_elastic.now, pull.now
 
 
 def _sum_of_series(r: Routine, spans: Value, count: Value) -> Value:

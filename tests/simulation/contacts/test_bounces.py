@@ -18,6 +18,7 @@ from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.preparation import problem_of_run
 from atwood.simulation.run import session
 from atwood_library import (
+    DistanceContact,
     Force,
     Ground,
     Inertia,
@@ -310,3 +311,54 @@ def test_what_time_events_make_of_a_set_is_the_same_by_the_routine_and_in_python
     for other in found[1:]:
         assert [(one.part, one.kind) for one in other] == [(one.part, one.kind) for one in found[0]]
         assert [one.time for one in other] == pytest.approx([one.time for one in found[0]], abs=1e-12)
+
+
+def squeezed_impacts(restitution: float, ratio: float, heights: tuple[float, float], end: float) -> list[float]:
+    """Return when a light ball meets the floor, and a heavy one that falls upon it, by the formulas of free fall."""
+    t, z, v, found = 0.0, list(heights), [0.0, 0.0], list[float]()
+    while True:
+        rate, gap = v[1] - v[0], z[1] - z[0] - 0.2
+        on_floor = (v[0] + math.sqrt(v[0] ** 2 + 2.0 * 9.81 * z[0])) / 9.81
+        together = max(-gap / rate, 0.0) if rate < 0.0 else math.inf
+        step = min(on_floor, together)
+        if t + step > end:
+            return found
+        t, z = t + step, [a + b * step - 0.5 * 9.81 * step**2 for a, b in zip(z, v, strict=True)]
+        v = [b - 9.81 * step for b in v]
+        if on_floor < together:
+            z[0], v[0] = 0.0, -restitution * v[0]
+        else:
+            push = -(1.0 + restitution) * (v[1] - v[0]) / (1.0 + 1.0 / ratio)
+            v = [v[0] - push, v[1] + push / ratio]
+        found.append(t)
+
+
+@pytest.mark.parametrize("by", ["routine", "python"])
+@pytest.mark.parametrize(
+    ("restitution", "ratio", "rtol"), [(1.0, 100.0, 1e-6), (1.0, 1e4, 1e-6), (1.0, 1e5, 1e-10), (0.9, 100.0, 1e-10)]
+)
+def test_what_is_squeezed_by_what_is_heavy_bounces_on(
+    restitution: float, ratio: float, rtol: float, by: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Intervals shrink while the heavy ball comes down, and grow as it rises again: the light one never rests."""
+    if by == "python":
+        monkeypatch.setattr(session, "_MANY_IMPACTS", math.inf)
+        monkeypatch.setattr(session, "MANY_CHANGES", math.inf)
+        monkeypatch.setattr(compiled, "FEW_ROWS", 0)
+        ratio = min(ratio, 1000.0)
+    scene = Scene(gravity=9.81)
+    ground, a = scene.add("ground", Ground()), scene.add("a", PointMass(mass=1.0))
+    b = scene.add("b", PointMass(mass=ratio))
+    floor = scene.add("floor", PointContact(restitution=restitution))
+    between = scene.add("between", DistanceContact(lower=0.2, restitution=restitution))
+    for first, second in ((ground.frame, floor.plane), (a.point, floor.point), (a.point, between.a)):
+        scene.connect(first, second)
+    scene.connect(b.point, between.b)
+    for name, height in (("a", 1.0), ("b", 1.5)):
+        scene.start.update({f"{name}.position.x": 0.0, f"{name}.velocity.x": 0.0})
+        scene.start.update({f"{name}.position.z": height, f"{name}.velocity.z": 0.0})
+    wanted = squeezed_impacts(restitution, ratio, (1.0, 1.5), 0.53)
+    run = simulate(scene, t_end=0.53, rtol=rtol)
+    assert len(run.impacts) == len(wanted) > 25
+    assert not [one for one in run.events if one.kind == "rests"]
+    np.testing.assert_allclose([one.time for one in run.impacts], wanted, rtol=1e-9)

@@ -27,6 +27,7 @@ from atwood.integrators.set_routines import (
     LATER,
     LEVEL,
     LONG,
+    LOSSLESS,
     NEAR_REST,
     OFTEN,
     RECENT,
@@ -34,6 +35,7 @@ from atwood.integrators.set_routines import (
     SEEN,
     SHORT,
     SPANS,
+    SQUEEZED,
     STEADY,
     WAITS,
 )
@@ -214,7 +216,9 @@ class _Moment:
 
         Intervals that shrink by a factor r are a geometric series: what is left of it is the last one times r/(1 - r).
         It counts what moves together with the gap that closes now. Where rounding tells, as far from the origin or at
-        the tightest tolerances, r grows to 1, and nothing is gained by going on (see `longest_left`).
+        the tightest tolerances, r grows to 1, and nothing is gained by going on (see `longest_left`). It also grows
+        where what bounces is squeezed by what is heavier, faster than it falls: that is no series, and impacts that
+        lose nothing are none.
         """
         closing = [k for k, one in enumerate(self.first) if self.trigger(k) == CLOSES and not one.is_speed]
         if not closing or len(impacts) < SPANS[0]:
@@ -244,14 +248,32 @@ class _Moment:
         left: float = spans[0] * share / (1.0 - share) if share < 1.0 else math.inf
         if share > LEVEL and spans[0] < SHORT * longest[2]:  # rounding makes each bounce from the one before
             left = spans[0]
-        is_steady = long >= min(count, RECENT)
+        lasted = float(np.sum(spans[: count + 1]))
         flattens = 1.0 - ratios[0] < FLATTENS * (1.0 - share)
-        if not left < (longest[1 if flattens else 0] if is_steady else longest[2]):
+        is_elastic, pull = self._bouncing(
+            closing[0], moved, {part for time, part in impacts if time >= self.t - lasted}
+        )
+        is_squeezed = flattens and abs(self.values.rates[self.units[closing[0]][0]]) > pull * lasted
+        soon = longest[2] * (SQUEEZED if is_squeezed else 1.0)
+        is_steady = long >= min(count, RECENT) and not is_squeezed
+        if is_elastic and (share <= LEVEL or spans[0] > LOSSLESS * longest[2]):
             return None
-        self._series = self._accumulating(closing, impacts, self.t - float(np.sum(spans[: count + 1])))
+        if not left < (longest[1 if flattens else 0] if is_steady else soon):
+            return None
+        self._series = self._accumulating(closing, impacts, self.t - lasted)
         self.small, self.slow = (self._blurred(one, NEAR_REST) for one in (self.small, self.slow))
         found = sum_of_series(np.array(spans[: long + 1]))
         return found if abs(found - left) <= left else left
+
+    def _bouncing(self, closes: int, moved: BoolArray, parts: Collection[str]) -> tuple[bool, float]:
+        """Return whether impacts of some parts lose nothing, and how fast what they move falls, at most."""
+        rows = [
+            own[0]
+            for k, (one, own) in enumerate(zip(self.first, self.units, strict=True))
+            if not one.is_slip and moved[own[0]] and (k == closes or one.row.key[0] in parts)
+        ]
+        falls = np.abs(self.values.accelerations()[rows])
+        return bool(np.all(self.values.restitution[rows] >= 1.0)), float(np.max(falls, initial=0.0))
 
     def _accumulating(self, closing: Collection[int], impacts: Sequence[tuple[float, str]], since: float) -> list[int]:
         """Return the gaps that rest where impacts accumulate: those that close, are closed, or have impacts of it."""
