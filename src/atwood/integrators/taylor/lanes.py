@@ -138,7 +138,7 @@ def _read(runs: int) -> Routine:
     return r
 
 
-_FILES = tuple(f"integrators/{name}.py" for name in ("lanes", "stepper", "taylor/stepper", "taylor/steps"))
+_FILES = tuple(f"integrators/{name}.py" for name in ("batch", "lanes", "stepper", "taylor/stepper", "taylor/steps"))
 
 
 @once

@@ -9,12 +9,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Collection, Hashable, Mapping
+from typing import TYPE_CHECKING
 
 from atwood.model.declare.law_results import Carried
 from atwood.model.local.bound import ParameterTable, read_parameter
 from atwood.model.local.flatten import FlatScene, Part
 from atwood.model.local.parts import LocalPart
-from atwood.model.local.record import Record, take_down
+
+if TYPE_CHECKING:
+    from atwood.model.local.record import Record
 
 OWN = frozenset({"_parent", "_name", "_settings", "_token", "_declared"})
 """What components keep of themselves. One that keeps more may have laws that depend on it."""
@@ -67,6 +70,8 @@ class Kinds:
             for name, given in part.signals.items():
                 self._table.scalar(f"{part.path}.{name}", given)
             return self._writers[kind](part)
+        from atwood.model.local.record import take_down  # small scenes have no kinds of so many parts
+
         start = len(graph)
         local = read_laws(part)
         record = take_down(local, graph, start)
