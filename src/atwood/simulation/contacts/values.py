@@ -289,10 +289,15 @@ class ContactValues:
         """
         n, soft = len(self.u), self.compliance > 0.0
         jacobian = to_array(self._now.jacobian)
-        weights = np.where(soft, self.compliance, self._gives(self.slopes, zip(*self.layout.slopes, strict=True)))
+        weights = np.where(soft, self.compliance, self.alone)
         by_each, free = self._by_each[n:], self._free[n:]
         joints = by_each.T * (0.0 if soft.any() else self._gives(jacobian, zip(*np.nonzero(jacobian), strict=True)))
         return np.diag(weights) + joints @ by_each, joints @ free
+
+    @property
+    def alone(self) -> FloatArray:
+        """How each row moves by a unit of its own force with nothing else held."""
+        return self._gives(self.slopes, zip(*self.layout.slopes, strict=True))
 
     def _gives(self, slopes: FloatArray, pattern: Iterable[tuple[int, int]]) -> FloatArray:
         """Return by how much rows give way that have no stiffness."""

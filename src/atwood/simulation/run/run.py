@@ -180,6 +180,7 @@ class Walk:
         self._unsettled: tuple[EventRecord, ...] | None = ()
         self._late: tuple[float, FloatArray] | None = None
         self._impacts: list[tuple[float, str]] = []
+        self._told: set[tuple[float, ...] | None] = set()
         self.probe: EventProbe | None = None
         self.choice: Choice
 
@@ -293,6 +294,8 @@ class Walk:
         record = recorder.stretch(self.impact, after_time_event, self.rests)
         self.segments.append(self._sides.recorded(record, self.plan, self.assembly, bool(outcome.sides)))
         self._follow(outcome)
+        if contacts and outcome.error is None and options.looks_for_events:
+            self._check_told(self.assembly, *recorder.last()[:3])
         return recorder, outcome
 
     def _first_event(self) -> list[float]:
@@ -440,10 +443,19 @@ class Walk:
         self.assembly = self.assembly.with_held(self.held)
         self.probe, self._plans, self._handed = None, {}, ()
         made = plan.in_piece(self._sides.like(self.assembly, plan))
+        self._check_told(made.assembly, t, self.q, self.u)
         if rest:
             q, u = split(rates_on_constraints(made, self.t, self.q, self.u))
             self.q, self.u = self.q + rest * q, self.u + rest * u
         return made
+
+    def _check_told(self, assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> None:
+        """Refuse places whose forces formulas do not give, once for each set that holds."""
+        if self.held not in self._told:
+            from atwood.simulation.contacts.told_forces import check_told_forces
+
+            self._told.add(self.held)
+            check_told_forces(assembly, (t, q, u), self.start.length)
 
     def _becomes(
         self,
