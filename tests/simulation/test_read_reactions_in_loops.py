@@ -32,6 +32,7 @@ from atwood_library import (
     RigidBody,
     RotationalCoupling,
     RotationalSource,
+    Slider,
     Weld,
 )
 from atwood_library.scenes import SliderCrank
@@ -54,6 +55,16 @@ class RoughPivot(Pivot):
             load -= axis * dot(load, axis)
         rate = dot(self.b.angular_velocity - self.a.angular_velocity, axis)
         torque = axis * (-self.friction * rate * sqrt(dot(load, load) + 0.01))
+        return [Load(self.b, Vector(0.0, 0.0, 0.0), torque), Load(self.a, Vector(0.0, 0.0, 0.0), -torque)]
+
+
+class LiftedPivot(Pivot):
+    """A hinge with a torque that grows with what lifts it."""
+
+    @force
+    def rub(self) -> Iterable[Load]:
+        """Return the torque."""
+        torque = self.a.to_world(as_vector(self.axis)) * (1e-9 * self.reaction("force.z"))
         return [Load(self.b, Vector(0.0, 0.0, 0.0), torque), Load(self.a, Vector(0.0, 0.0, 0.0), -torque)]
 
 
@@ -198,3 +209,37 @@ def test_what_is_read_beside_redundant_constraints_is_written_out() -> None:
     sizes = [node.payload for node in live(list(read.values())) if node.operation == "solve"]
     assert max(sizes) <= len(read)
     assert len(live(list(read.values()))) <= 18_980  # six times 38 unknowns, and Newton's method
+
+
+@pytest.mark.parametrize("apart", [1e-3, 1e-5])
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+def test_a_reaction_that_formulas_do_not_give_is_refused(form: str, apart: float) -> None:
+    """Of two hinges 1e-5 m apart that hold a body on a sledge, a torque read 32 % of the force, in silence."""
+    scene = Scene()
+    ground, slide, first, second = (
+        scene.add("ground", Ground()),
+        scene.add("slide", Slider(axis=(1.0, 0.0, 0.0))),
+        scene.add("first", Pivot()),
+        scene.add("second", LiftedPivot()),
+    )
+    sledge = scene.add("sledge", RigidBody(mass=1.0, moments=(0.1, 0.1, 0.1)))
+    body = scene.add("body", RigidBody(mass=1.0, moments=(0.1, 0.1, 0.1), center=(0.5, 0.0, 0.0)))
+    one, other = (scene.add(name, Weld(displacement=(apart, 0.0, 0.0))) for name in ("one", "other"))
+    for a, b in (
+        (ground.frame, slide.a),
+        (slide.b, sledge.frame),
+        (sledge.frame, first.a),
+        (first.b, body.frame),
+        (sledge.frame, one.a),
+        (one.b, second.a),
+        (body.frame, other.a),
+        (other.b, second.b),
+    ):
+        scene.connect(a, b)
+    scene.start.update({"first.angle": 0.0, "second.angle": 0.0, "slide.displacement": 0.0, "slide.speed": 1.0})
+    if apart < 1e-4:
+        with pytest.raises(UnsupportedError, match="second: a force reads a reaction"):
+            simulate(scene, form=form, t_end=0.01)
+    else:
+        result = simulate(scene, form=form, t_end=0.01)
+        assert result["second.force.z"] == pytest.approx(0.5 * 9.81 / apart, rel=1e-6)

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError, UnsupportedError
-from atwood.expr import Expression, depends_on, evaluate
+from atwood.expr import Expression, Program, depends_on, evaluate
 from atwood.forms.accelerations import accelerations_of
 from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.balance_program import BalanceProgram
 from atwood.forms.caches import Key
-from atwood.forms.quantities import internal_reactions_of, to_maximal
+from atwood.forms.quantities import coordinate_program, internal_reactions_of, to_maximal
 from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.matrices import is_best_full, least_size, or_one, solve_even, to_array
 from atwood.numerics.rank import decompose
@@ -295,6 +295,15 @@ class ReactionSolver:
 _TRIALS = 3
 """So many multipliers at random are tried."""
 
+_NEARLY, _OFF = 1e-3, 1e-3
+"""Where rows repeat others but for less, what formulas give for them is looked at; what is off by more of the largest
+is refused."""
+
+_TOLD: Key[Program] = Key("reactions that are read")
+
+_MOST = 300
+"""With more constraints no decomposition is made."""
+
 _SHOWN = 6
 """So many constraints are named."""
 
@@ -312,6 +321,7 @@ def check_read_reactions(assembly: Assembly, t: float, q: FloatArray, u: FloatAr
     big_q, big_u = (one[:, 0] for one in maximal_state(assembly, np.array([t]), q[:, None], u[:, None]))
     scales = motion_scales(maximal, length)
     finding = find_rank(balance, t, big_q, scales)
+    _check_formulas(assembly, (t, q, u), balance, big_q, scales, len(finding.kept))
     if not finding.redundant:
         return
     open_ways = _balancing(balance, t, big_q, scales, len(finding.kept))
@@ -320,6 +330,45 @@ def check_read_reactions(assembly: Assembly, t: float, q: FloatArray, u: FloatAr
     known |= dict.fromkeys(maximal.accelerations, 0.0)
     if _depend_on(assembly, known, scales, open_ways):
         raise _not_determined(assembly, open_ways.in_units)
+
+
+def _check_formulas(
+    assembly: Assembly,
+    state: tuple[float, FloatArray, FloatArray],
+    balance: Balance,
+    big_q: FloatArray,
+    scales: FloatArray,
+    rank: int,
+) -> None:
+    """Refuse reactions that formulas do not give, since rows nearly repeat others: they add a share to what does."""
+    t, q, u = state
+    now = balance.constraints_at(t, big_q, np.zeros_like(scales))
+    rows = balance.row_scales(now, t, big_q, scales)
+    number = {symbol: i for i, symbol in enumerate(assembly.maximal.multipliers)}
+    own = assembly.own_equations
+    asked = [symbol for symbol in own.read if symbol in number]
+    if not asked or len(rows) > _MOST:
+        return
+    found = decompose(to_array(now.jacobian) * scales / rows[:, None], rank=rank)
+    if not rank or found.values[rank - 1] > _NEARLY * found.values[0]:
+        return
+    program = assembly.shared.get(
+        _TOLD, lambda: coordinate_program(assembly, _TOLD.name, own, [own.read[x] for x in asked])
+    )
+    (told,) = assembly.kernel(program)([t], q, u)
+    along = ReactionSolver(assembly, t, q, u).balance_along(np.array([t]), q[:, None], u[:, None])
+    multipliers, places = along.multipliers[:, 0] * rows, [number[x] for x in asked]
+    open_rows = np.max(np.abs(found.left_null_space), axis=1, initial=0.0)[places] > tolerances.FREE
+    off = np.where(open_rows, 0.0, np.abs(np.array(told) * rows[places] - multipliers[places]))
+    worst = int(np.argmax(off))
+    if off[worst] > _OFF * np.max(np.abs(multipliers)):
+        one = assembly.maximal.constraints[places[worst]]
+        raise UnsupportedError(
+            f"a force reads a reaction that is {along.multipliers[places[worst], 0]:.4g} here, and formulas give "
+            f"{told[worst]:.4g}: others hold all but next to nothing of what it holds",
+            where=one.key[0],
+            advice="Move it away from the joint next to it, or leave one of them out, or let no force read it.",
+        )
 
 
 @dataclass(frozen=True, eq=False)
