@@ -100,3 +100,18 @@ def test_scenes_of_the_library_too(monkeypatch: pytest.MonkeyPatch, request: pyt
     monkeypatch.setattr(kinds, "_FEWEST", 10**9)
     for name, found in zip(names, several, strict=True):
         assert found == made(assemble(SCENES[name]())), name
+
+
+class NamedSpring(Spring):
+    """A spring whose stiffness depends on where it is."""
+
+    def signed_stiffness(self) -> Any:
+        """Return one that only one of a row has."""
+        return self.stiffness * (5.0 if self.path == "s7" else 1.0)
+
+
+def test_parts_whose_laws_ask_for_their_path_are_read_by_themselves(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(globals(), "Spring", NamedSpring)
+    found = made(assemble(net()))
+    monkeypatch.setattr(kinds, "_FEWEST", 10**9)
+    assert found == made(assemble(net()))

@@ -344,6 +344,8 @@ class Component(metaclass=ComponentType):
     @property
     def path(self) -> str:
         """The dotted path of the component from the outermost model; empty for the outermost itself."""
+        if self._bound is not None:
+            self._bound.asked["path"] = True
         if self._parent is None:
             return ""
         prefix = self._parent.path
@@ -453,6 +455,8 @@ class Binding:
         Reactions by name.
     energies
         Energies and totals of the model that the component is placed in, by name; see `Component.total_around`.
+    asked
+        What laws have asked of the component itself, noted as they are evaluated: ``path``.
     """
 
     values: Mapping[str, Any]
@@ -464,6 +468,7 @@ class Binding:
     known: Mapping[str, Any] = field(default_factory=dict)
     reactions: Mapping[str, Any] = field(default_factory=dict)
     energies: Mapping[str, Any] = field(default_factory=dict)
+    asked: dict[str, bool] = field(default_factory=dict)
 
 
 def bind(component: Component, binding: Binding) -> Any:

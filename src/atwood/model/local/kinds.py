@@ -1,8 +1,9 @@
 """Parts of one kind: laws are evaluated for two of them, and written down for the others on symbols of their own.
 
 Parts are of one kind if they have the same class, the same values where these shape laws (choices, counts, exact
-zeros), and keep nothing else. What laws make of the symbols of one they make of those of another: the same nodes in
-the same order. That this is so is seen at two of them, and not taken for granted; what differs is evaluated for each.
+zeros), keep nothing else, and have laws that do not ask for their path. What laws make of the symbols of one they make
+of those of another: the same nodes in the same order. That this is so is seen at two of them, and not taken for
+granted; what differs is evaluated for each. Laws depend on nothing else, such as how often they were called.
 """
 
 from __future__ import annotations
@@ -74,7 +75,7 @@ class Kinds:
 
         start = len(graph)
         local = read_laws(part)
-        record = take_down(local, graph, start)
+        record = None if local.binding.asked else take_down(local, graph, start)
         if record is not None and seen and seen[-1] == record:
             self._writers[kind] = record.writer(graph)
         seen.append(record)

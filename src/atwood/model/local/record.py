@@ -225,9 +225,9 @@ class _Writer:
         return name
 
     def _made(self, number: int, word: str, kind: type, names: Sequence[str], inner: Sequence[_Tree]) -> _Term:
-        """Return the name of something composed; what nothing of the part is in stays what it is."""
+        """Return the name of something composed; what nothing of the part is in, and cannot change, stays what it is."""
         found = [self._value(one) for one in inner]
-        if word != "bound" and not any(is_own for _, is_own in found):
+        if word != "bound" and kind not in (dict, list) and not any(is_own for _, is_own in found):
             return self._constant(self._record.composed[number]), False
         name, made = f"v{number}", self._constant(kind)
         terms = [term for term, _ in found]

@@ -170,16 +170,23 @@ def find_times(
         times = [np.full((*falling.shape, 1), span), falling[..., None]]
         times += [sizes / np.abs(speeds), np.sqrt(sizes / np.abs(accelerations))]
     every = np.concatenate(times, axis=-1)
-    return np.asarray(np.min(np.where(every > 0.0, every, np.inf), axis=-1))
+    return _without_rounding(np.min(np.where(every > 0.0, every, np.inf), axis=-1))
+
+
+def _without_rounding(sizes: FloatArray) -> FloatArray:
+    """Return sizes to 30 bits: one run and many work them out in other ways, and are to go on with the same."""
+    share, power = np.frexp(sizes)
+    return np.asarray(np.ldexp(np.round(np.ldexp(share, 30)), power - 30))
 
 
 def total_masses(assembly: Assembly, rows: FloatArray | None = None) -> FloatArray | float:
     """Return the mass of all that moves, at the start, kg; 1 kg where nothing that moves has a mass."""
     if rows is None:
-        return float(sum(assembly.kernel(_masses(assembly))([assembly.flat.t_start])[0])) or 1.0
+        total = float(sum(assembly.kernel(_masses(assembly))([assembly.flat.t_start])[0])) or 1.0
+        return float(_without_rounding(np.asarray(total)))
     kernel = assembly.compiled(_masses(assembly), vectorized=True).bind(rows.T)
     found = np.sum(kernel(np.full((1, len(rows)), assembly.flat.t_start))[0], axis=0)
-    return or_one(found)
+    return _without_rounding(or_one(found))
 
 
 def _masses(assembly: Assembly) -> Program:
