@@ -29,11 +29,14 @@ _Term = tuple[str, bool]
 
 
 class _UntoldError(Exception):
-    """Something of a part is none of what is known here."""
+    """A part has something that cannot be written down."""
 
 
 def take_down(local: LocalPart, graph: Graph, start: int) -> Record | None:
-    """Return what laws made of a part, on nodes that were made from a place on, or before; None if that is not told."""
+    """Return what laws made of a part; None if it has something in it that cannot be written down.
+
+    The nodes from `start` on were made by these laws. Others that they use were there before.
+    """
     taken = _Taken(local.part, graph)
     try:
         tree = taken.tree(local)
@@ -225,7 +228,7 @@ class _Writer:
         return name
 
     def _made(self, number: int, word: str, kind: type, names: Sequence[str], inner: Sequence[_Tree]) -> _Term:
-        """Return the name of something composed; what nothing of the part is in, and cannot change, stays what it is."""
+        """Return the name of something composed; what cannot change, and has nothing of the part, stays what it is."""
         found = [self._value(one) for one in inner]
         if word != "bound" and kind not in (dict, list) and not any(is_own for _, is_own in found):
             return self._constant(self._record.composed[number]), False

@@ -174,9 +174,9 @@ def find_times(
 
 
 def _without_rounding(sizes: FloatArray) -> FloatArray:
-    """Return sizes to 30 bits: one run and many work them out in other ways, and are to go on with the same."""
+    """Return sizes to 34 bits: one run and many work them out in other ways, and are to go on with the same."""
     share, power = np.frexp(sizes)
-    return np.asarray(np.ldexp(np.round(np.ldexp(share, 30)), power - 30))
+    return np.asarray(np.ldexp(np.round(np.ldexp(share, 34)), power - 34))
 
 
 def total_masses(assembly: Assembly, rows: FloatArray | None = None) -> FloatArray | float:
