@@ -109,9 +109,11 @@ STEADY, LATER = 1.5, 0.001
 LEVEL, SHORT = 0.97, 4.0
 """Intervals that do not shrink, by more than the first, and are so many times those of uneven ones, are rounding."""
 
-SQUEEZED, LOSSLESS = 10.0, 0.01
-"""Times how long uneven impacts may go on that are summed: those of what is squeezed, before both sides touch at once,
-and those that lose nothing, which come to no end but by rounding."""
+SQUEEZED = 30.0
+"""Times what is as good as closed: in a gap as narrow as that, impacts of what is squeezed are summed."""
+
+LOSSLESS = 0.01
+"""Times how long uneven impacts may go on that are summed: those that lose nothing come to no end but by rounding."""
 
 RECENT = 6
 """So many factors since which a series is steady are enough, whatever came before."""
@@ -1059,21 +1061,21 @@ def _end_series(r: Routine, m: Sets, spans: Value, number: Value, closing: tuple
             power.now = power.now * share.now
         share.now = share.now - (share.now - ratio / power.now) / (even.now - 1).number()
     rest = r.choose(share.now < 1.0, spans[0] * share.now / (1.0 - share.now), inf)
-    is_level = (share.now > LEVEL) & (spans[0] < m.later * SHORT)
-    left = r.choose(is_level, spans[0], rest)
-    flattens = 1.0 - spans[0] / spans[1] < FLATTENS * (1.0 - share.now)
     lasted = r.variable(0.0)
     with r.count(even.now) as k:
         lasted.now = lasted.now + spans[k]
     is_elastic, pull = _bouncing(r, m, lasted.now, *closing)
-    speed = r.size(m.row("rates")[r.truncated(m.unit("first")[closing[1]])])
-    is_steady = long.now >= r.choose(even.now < RECENT + 1, even.now, RECENT + 1, INTEGER)
-    is_squeezed = flattens & (speed > pull * lasted.now)
-    soon = r.choose(is_squeezed, m.later * SQUEEZED, m.later)
-    longest = r.choose(is_steady & ~is_squeezed, r.choose(flattens, m.rough, m.ahead), soon)
     with r.when(is_elastic & ((share.now <= LEVEL) | (spans[0] > m.later * LOSSLESS))):
         r.give()
-    with r.when(left < longest):
+    speed = r.size(m.row("rates")[r.truncated(m.unit("first")[closing[1]])])
+    is_squeezed = speed > pull * lasted.now
+    is_level = (share.now > LEVEL) & (spans[0] < m.later * SHORT) & ~is_squeezed
+    left = r.choose(is_level, spans[0], rest)
+    flattens = 1.0 - spans[0] / spans[1] < FLATTENS * (1.0 - share.now)
+    is_steady = long.now >= r.choose(even.now < RECENT + 1, even.now, RECENT + 1, INTEGER)
+    longest = r.choose(is_steady, r.choose(flattens, m.rough, m.ahead), m.later)
+    is_closed = (rest < inf) & (spans[0] * speed < m.unit("small")[closing[1]] * SQUEEZED)
+    with r.when(r.choose(is_squeezed, is_closed, left < longest, BOOLEAN)):
         m.stops = r.choose(left > m.ahead * WAITS, 1, 2, INTEGER)
         m.ahead, m.blur, m.pace, m.lasted = left, NEAR_REST, NEAR_REST, lasted.now
         sum_ = _sum_of_series(r, spans, long.now)

@@ -246,19 +246,19 @@ class _Moment:
             return None
         share = float(np.exp(np.mean(np.log(ratios[:count]))))
         left: float = spans[0] * share / (1.0 - share) if share < 1.0 else math.inf
-        if share > LEVEL and spans[0] < SHORT * longest[2]:  # rounding makes each bounce from the one before
-            left = spans[0]
         lasted = float(np.sum(spans[: count + 1]))
-        flattens = 1.0 - ratios[0] < FLATTENS * (1.0 - share)
         is_elastic, pull = self._bouncing(
             closing[0], moved, {part for time, part in impacts if time >= self.t - lasted}
         )
-        is_squeezed = flattens and abs(self.values.rates[self.units[closing[0]][0]]) > pull * lasted
-        soon = longest[2] * (SQUEEZED if is_squeezed else 1.0)
-        is_steady = long >= min(count, RECENT) and not is_squeezed
-        if is_elastic and (share <= LEVEL or spans[0] > LOSSLESS * longest[2]):
-            return None
-        if not left < (longest[1 if flattens else 0] if is_steady else soon):
+        speed = abs(float(self.values.rates[self.units[closing[0]][0]]))
+        if speed > pull * lasted:  # it is squeezed
+            is_over = math.isfinite(left) and spans[0] * speed < SQUEEZED * self.small[closing[0]]
+        else:
+            if share > LEVEL and spans[0] < SHORT * longest[2]:  # rounding makes each bounce from the one before
+                left = spans[0]
+            flattens = 1.0 - ratios[0] < FLATTENS * (1.0 - share)
+            is_over = left < (longest[1 if flattens else 0] if long >= min(count, RECENT) else longest[2])
+        if not is_over or (is_elastic and (share <= LEVEL or spans[0] > LOSSLESS * longest[2])):
             return None
         self._series = self._accumulating(closing, impacts, self.t - lasted)
         self.small, self.slow = (self._blurred(one, NEAR_REST) for one in (self.small, self.slow))
