@@ -26,7 +26,7 @@ _LAP = 2000
 _REPEATED, _ENDLESS = 0.25, 1e9
 """Steps do not get on if such a share of them had to be repeated, and it would take so many to the end."""
 
-_TRAPPED, _NO_GROWTH, _RARE_GROWTH = 0.5, 1e6, 4.0
+_TRAPPED, _NO_GROWTH, _RARE_GROWTH = 0.3, 1e6, 4.0
 """Where so large a share is repeated, no step of the next lap is longer, and later ones only by such a factor.
 
 In what dies away fast, a step of order one that is made longer starts a new transient, and is repeated. IDA looks at
