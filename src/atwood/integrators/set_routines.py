@@ -675,6 +675,11 @@ def _strike() -> Routine:
     return r
 
 
+def _work_of(r: Routine, by: Value, before: Value, after: Value) -> tuple[Value, Value]:
+    """Return the work that an impulse does between two rates, and the size of its terms."""
+    return by * (before + after) * 0.5, r.size(by) * (r.size(before) + r.size(after)) * 0.5
+
+
 def _account() -> Routine:
     """Refuse impulses that make energy, and log the impacts of gaps that approach."""
     r, m, () = _open("account")
@@ -684,9 +689,8 @@ def _account() -> Routine:
     with r.count(size) as i:
         by, before = impulses[i], rates[i]
         after[i] = before + _sum(r, size, response.at(i * size), impulses)
-        work[i] = by * (before + after[i]) * 0.5
-        total.now = total.now + work[i]
-        sizes.now = sizes.now + r.size(by) * (r.size(before) + r.size(after[i])) * 0.5
+        work[i], size_of_work = _work_of(r, by, before, after[i])
+        total.now, sizes.now = total.now + work[i], sizes.now + size_of_work
     with r.when(total.now > sizes.now * GAIN):
         with _each(r, m, "chosen") as (k, row, _), r.when((m.unit("slip")[k] == 0.0) & (work[row] > worst.now)):
             worst.now, m.number = work[row], k
@@ -839,9 +843,8 @@ def _end_impacts() -> Routine:
             r.leave(loop)
     work, size = r.variable(0.0), r.variable(0.0)
     with r.count(m.size) as i:
-        by, before, after = m.row("forces")[i], rates[i], m.row("motions")[i]
-        work.now = work.now + by * (before + after) * 0.5
-        size.now = size.now + r.size(by) * (r.size(before) + r.size(after)) * 0.5
+        done, size_of_work = _work_of(r, m.row("forces")[i], rates[i], m.row("motions")[i])
+        work.now, size.now = work.now + done, size.now + size_of_work
     with r.when(work.now > size.now * GAIN):
         r.give(GAINS)
     r.give(0)

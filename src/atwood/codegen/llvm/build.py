@@ -35,7 +35,7 @@ from atwood.codegen.routines import own_name
 from atwood.errors import KernelEvaluationError, UnsupportedError
 from atwood.expr.core.operations import ExternalFunction
 from atwood.expr.core.program import Program
-from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.stages import stage
 
 if TYPE_CHECKING:
@@ -164,6 +164,17 @@ def default_options(parts: Sequence[Part], is_brief: bool = False) -> CodeOption
     """Return how to compile programs of this size on this machine; brief ones are run for short stretches at a time."""
     size = sum(part.program.size for part in parts)
     return CodeOptions(level=1 if size <= (_BRIEF if is_brief else _SMALL) else 0)
+
+
+def build_lanes(parts: Sequence[Part], runs: int) -> Built:
+    """Compile programs for so many runs side by side.
+
+    Raises
+    ------
+    UnsupportedError
+        If there is no code in lanes for an operation of a program.
+    """
+    return build_code(parts, replace(default_options(parts), runs=runs))
 
 
 def build_code(

@@ -8,7 +8,7 @@ from math import inf
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.codegen.llvm.build import Built, RoutineSource, build_code, default_options, once
+from atwood.codegen.llvm.build import Built, RoutineSource, build_code, build_lanes, once
 from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Routine, Value, addresses, place_of, places_of
 from atwood.expr.core.program import Program
@@ -28,7 +28,7 @@ from atwood.integrators.embedded.tableau import Tableau
 from atwood.integrators.lanes import LanePlaces, failures, write_batch
 from atwood.integrators.protocol import SolverOptions
 from atwood.integrators.stepper import WIDTH, Memory, in_lanes
-from atwood.lazy_dataclasses import dataclass, replace
+from atwood.lazy_dataclasses import dataclass
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +59,7 @@ def rates_of_many(program: Program, runs: int) -> RatesOfMany:
     UnsupportedError
         If there is no code in lanes for an operation of the program.
     """
-    parts = [Part("kernel", program)]
-    return RatesOfMany(runs, build_code(parts, replace(default_options(parts), runs=runs)), program)
+    return RatesOfMany(runs, build_lanes([Part("kernel", program)], runs), program)
 
 
 def write_routines(pair: Tableau, runs: int) -> list[Routine]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
-from atwood.codegen.llvm.build import Built, build_code, default_options
+from atwood.codegen.llvm.build import Built, build_lanes
 from atwood.codegen.llvm.module import Part
 from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Kind, Record, Routine, Value, addresses, place_of
 from atwood.codegen.sundials.events import may_pass_zero
@@ -21,7 +21,7 @@ from atwood.integrators.embedded.tableau import Tableau
 from atwood.integrators.lanes import LookPlaces
 from atwood.integrators.protocol import Handed
 from atwood.integrators.stepper import Memory, in_lanes
-from atwood.lazy_dataclasses import dataclass, replace
+from atwood.lazy_dataclasses import dataclass
 
 TABLES = ("shifts", "signs", "lasts", "slopes", "values", "others")
 """What is known of each event: what is added to it, its sign, and values and slopes at the last point and now."""
@@ -49,8 +49,7 @@ def events_of_many(program: Program, runs: int) -> EventsOfMany:
     UnsupportedError
         If there is no code in lanes for an operation of the program.
     """
-    parts = [Part("kernel", program)]
-    return EventsOfMany(program, build_code(parts, replace(default_options(parts), runs=runs)))
+    return EventsOfMany(program, build_lanes([Part("kernel", program)], runs))
 
 
 def handed(pair: Tableau, size: int, count: int, numbers: FloatArray) -> Handed:

@@ -34,7 +34,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from atwood.arrays import FloatArray
-from atwood.codegen.llvm.build import RoutineSource, build_code, default_options, once
+from atwood.codegen.llvm.build import RoutineSource, build_lanes, once
 from atwood.codegen.llvm.module import Part
 from atwood.codegen.routines import ADDRESS, CODE, Kind, Lanes, Routine, Value, places_of
 from atwood.expr.core.graph import Expression
@@ -53,7 +53,7 @@ from atwood.integrators.stepper import (
     open_routine as session_routine,
     routines_of,
 )
-from atwood.lazy_dataclasses import dataclass, names_of, replace
+from atwood.lazy_dataclasses import dataclass, names_of
 
 if TYPE_CHECKING:
     from atwood.expr.series.taylor import TaylorPrograms
@@ -225,7 +225,7 @@ class CompiledRecurrences:
         self.programs, self.runs = programs, runs
         self.size = len(programs.start.inputs[1].symbols)
         parts = [Part("start", programs.start), _order_alone(programs) if runs == 1 else _order_of_many(programs)]
-        self.built = build_code(parts, replace(default_options(parts), runs=runs))
+        self.built = build_lanes(parts, runs)
         self.addresses = self.built.code.addresses
         self.layout = _Layout(self)
 

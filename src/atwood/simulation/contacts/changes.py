@@ -304,7 +304,7 @@ class _Moment:
         resting = [k for k, speed in speeds.items() if speed <= max(ALIKE * coming, self.slow[k])]
         self.slow = self._blurred(self.slow, 1.0 / NEAR_REST)
         push = self._end_of_impacts(resting, still, rubs=True)
-        if self._makes_energy(push):
+        if self._work_of(push, rates)[2]:
             if left > WAITS * longest:
                 self.small, self._series = self._blurred(self.small, 1.0 / NEAR_REST), []
                 return
@@ -313,12 +313,11 @@ class _Moment:
         self.u = self.u + self.values.speeds_by(push)
         self.events += [told_rest(self.t, self.first[k].row.key[:2], left) for k in resting[:1]]
 
-    def _makes_energy(self, impulses: FloatArray) -> bool:
-        """Return whether impulses do more work on what moves than rounding does."""
-        rates = self.rates()
+    def _work_of(self, impulses: FloatArray, rates: FloatArray) -> tuple[FloatArray, FloatArray, bool]:
+        """Return the rates after impulses, the work that each does, and whether together they do more than rounding."""
         after = rates + self.values.response @ impulses
-        size = 0.5 * np.abs(impulses) * (np.abs(rates) + np.abs(after))
-        return float(np.sum(0.5 * impulses * (rates + after))) > GAIN * float(np.sum(size))
+        work, size = 0.5 * impulses * (rates + after), 0.5 * np.abs(impulses) * (np.abs(rates) + np.abs(after))
+        return after, work, float(np.sum(work)) > GAIN * float(np.sum(size))
 
     def _end_of_impacts(self, resting: list[int], still: list[int], rubs: bool) -> FloatArray:
         """Return the impulses that take away the rates of gaps, and rub as much.
@@ -358,9 +357,8 @@ class _Moment:
             again[poisson] = share[poisson] * impulses[poisson]
             impulses = impulses + again
             impulses = impulses + self._impulses(chosen, free + values.response @ impulses, again)
-        after = rates + values.response @ impulses
-        work, size = 0.5 * impulses * (rates + after), 0.5 * np.abs(impulses) * (np.abs(rates) + np.abs(after))
-        if float(np.sum(work)) > GAIN * float(np.sum(size)):
+        after, work, makes_energy = self._work_of(impulses, rates)
+        if makes_energy:
             worst = max(touching, key=lambda k: float(work[self.units[k][0]]))
             raise SolveError(
                 f"at t = {self.t:.9g} Newton's law of impact would make energy, {float(np.sum(work)):.3g} J",
@@ -454,9 +452,10 @@ class _Moment:
         """Return the gaps that rise by no more than rounding before they are back: ``v^2 <= 2 A f`` times that."""
         values, rises = self.values, {k: self.rate(k, rates) for k in touching if k not in self.layout.speeds}
         highest = {k: rises[k] ** 2 / (2.0 * self.rounding[k]) for k in rises if rises[k] > self.slow[k]}
-        if not highest or min(highest.values()) > FAST * float(np.max(np.abs(free := values.accelerations()))):
+        most = FAST * float(np.max(np.abs(values.accelerations()))) if highest else 0.0
+        near = {k: pull for k, pull in highest.items() if pull <= most}
+        if not near:
             return set()
-        near = {k: pull for k, pull in highest.items() if pull <= FAST * float(np.max(np.abs(free)))}
         every = [(STICKS if k in slow or k in near else OPEN, (0.0,) * len(rows)) for k, rows in enumerate(self.units)]
         pulls = np.diag(values.response) * forces_in(values, every)
         return {k for k, pull in near.items() if pull <= pulls[self.units[k][0]]}
@@ -472,6 +471,8 @@ class _Moment:
 
         Something else holds it that way, or at all, and bears a part of the force that nothing determines.
         """
+        if not begins:
+            return []
         place, turned = {row: i for i, row in enumerate(row for k in chosen for row in self.units[k])}, []
         least = SLACK * float(np.max(np.abs(found.motions), initial=0.0) + np.max(np.abs(self.values.accelerations())))
         for k, way in begins.items():
