@@ -17,8 +17,9 @@ from atwood.errors import SolveError
 from atwood.forms.quantities import observer
 from atwood.integrators.ida import library as sundials_library
 from atwood.result.about import describe_run
+from atwood.simulation.singular.arc_routine import Sweep
 from atwood.simulation.singular.collocation import find_arc
-from atwood_library.scenes import FourBar, FourBarRow, SimplePendulum, SliderCrank
+from atwood_library.scenes import Bricard, FourBar, FourBarRow, RollingDisc, SimplePendulum, SliderCrank
 
 from ..helpers.mechanisms import double_four_bar, parallel_four_bar
 from ..helpers.runs import FORMS, prepare
@@ -442,3 +443,28 @@ def test_an_arc_is_the_motion_to_rounding(form: str) -> None:
     kernel = plan.assembly.kernel(observer(plan.assembly, ("rod.angle",)), vectorized=True)
     found = kernel(times[None, :], q, u, a, np.zeros((len(plan.assembly.reactions), 2)))[0][0]
     assert np.max(np.abs(found - exact.angle(times))) < 1e-13
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("scene", [FourBarRow(), RollingDisc(), Bricard()])
+def test_arcs_of_machine_code_are_those_of_numpy(scene: Any, form: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    prepared = prepare(scene, form)
+    plan, swept = prepared.plan, [0]
+    sweep = Sweep.__call__
+
+    def counted(self: Sweep) -> int:
+        swept[0] += 1
+        return sweep(self)
+
+    monkeypatch.setattr(Sweep, "__call__", counted)
+    found = []
+    for plan.has_rates in (False, True):
+        before = swept[0]
+        found.append(find_arc(plan, 0.0, prepared.q, prepared.u, 0.05))
+        assert (swept[0] > before) == plan.has_rates
+    plain, compiled = found
+    assert plain is not None
+    assert compiled is not None
+    times = np.linspace(0.0, 0.05, 7)
+    for one, other in zip(plain.at(times), compiled.at(times), strict=True):
+        assert np.allclose(one, other, rtol=1e-9, atol=1e-9 * np.max(np.abs(one)))

@@ -9,12 +9,13 @@ import pytest
 
 from atwood import simulate
 from atwood.codegen.python.backend import BoundKernel
-from atwood.codegen.sundials.step_monitor import slope_lists
+from atwood.codegen.sundials.step_monitor import MonitorData, slope_lists
 from atwood.integrators.ida import library as sundials_library
 from atwood.numerics.matrices import to_array
 from atwood.simulation.singular.branches import Sample
+from atwood.simulation.singular.crossing import RankMeasure
 from atwood.simulation.singular.monitor import SingularityMonitor
-from atwood_library.scenes import Bricard, FourBar, SliderCrank
+from atwood_library.scenes import Bricard, FourBar, FourBarRow, ScottRussellLift, SliderCrank, Strandbeest
 
 from ..helpers.runs import FORMS
 
@@ -117,3 +118,42 @@ def test_conditions_that_depend_on_no_coordinate_have_lists() -> None:
     """As of a rope along a rod on a line, which the rod holds already."""
     lists = slope_lists(1, ())
     assert all(len(numbers) == 0 for numbers in lists.values())
+
+
+@pytest.mark.parametrize(
+    ("scene", "end", "crossings"), [(ScottRussellLift(), 0.4, 0), (Strandbeest(), 2.0, 0), (FourBarRow(), 2.0, 2)]
+)
+def test_looks_that_find_nothing_stay_in_machine_code(
+    scene: Any, end: float, crossings: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    count, look = [0], SingularityMonitor.look
+
+    def looking(self: SingularityMonitor, step_result: Any, between: bool, at_end: bool) -> Any:
+        count[0] += between
+        return look(self, step_result, between, at_end)
+
+    monkeypatch.setattr(SingularityMonitor, "look", looking)
+    judged = simulate(scene, form="dae", t_end=end)
+    few, count[0] = count[0], 0
+    monkeypatch.setattr(MonitorData, "judge_from", lambda self, start: None)
+    asked = simulate(scene, form="dae", t_end=end)
+    assert few <= (count[0] if crossings else 0) < 2 * count[0]
+    times = [[one.time for one in run.singular_crossings] for run in (judged, asked)]
+    assert times[0] == times[1]
+    assert len(times[0]) == crossings
+    assert all(np.array_equal(judged[path], asked[path]) for path in judged.paths)
+
+
+@pytest.mark.parametrize("scene", [FourBarRow(), FourBar(space="space"), Strandbeest()])
+def test_machine_code_measures_what_numpy_does(scene: Any, guards: list[SingularityMonitor]) -> None:
+    simulate(scene, form="dae", t_end=0.5)
+    monitor, random = guards[0], np.random.default_rng(1)
+    plan, data = monitor.plan, monitor._compiled
+    y = np.array([one[1][: monitor._n] for one in data.take()]).T
+    q = y + 1e-2 * random.normal(size=y.shape) * plan.coordinate_sizes[:, None]
+    plain, t = RankMeasure(plan), np.zeros(q.shape[1])
+    for known in (2, q.shape[1]):
+        rows, found = data.rows.copy(), data.measures(t, q, known, np.zeros(len(data.rows)))
+        plain.rows = rows
+        assert np.allclose(found, plain.learn(t, q, known), rtol=1e-9, atol=1e-13)
+        assert np.allclose(data.rows, rows, rtol=1e-12)

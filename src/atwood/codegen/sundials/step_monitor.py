@@ -2,7 +2,8 @@
 
 IDA is sent from look to look. At each the slopes of some conditions are worked out, and how much of each of those that
 are kept is left by the ones before it: the pivots of ``G G^T``, of which one vanishes where rank is lost. Nobody is
-asked anything as long as none of them has fallen to a small share of the most that it has been.
+asked anything as long as none of them has fallen to a small share of the most that it has been, and then only where
+what was noted, or what is just ahead, is near a singular position (`atwood.codegen.sundials.rank_looks`).
 
 Routines that look at a motion while SUNDIALS IDA goes on; see `atwood.codegen.sundials.step_monitor`.
 """
@@ -33,6 +34,7 @@ from atwood.codegen.routines import (
     call_kernel,
     place_of,
 )
+from atwood.codegen.sundials.rank_looks import write_measures, write_products
 from atwood.errors import UsageError
 from atwood.expr.core.program import Program
 from atwood.lazy_dataclasses import dataclass
@@ -40,6 +42,8 @@ from atwood.lazy_dataclasses import dataclass
 _MODULE = "codegen.sundials.step_monitor"
 
 _LOOK = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, *[ctypes.c_void_p] * 3)
+_JUDGE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_int64)
+_MEASURES = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 2, *[ctypes.c_int64] * 2, *[ctypes.c_void_p] * 3)
 
 
 @dataclass(frozen=True)
@@ -95,10 +99,18 @@ class MonitorCode:
         self.drive, self.fill = (built.code.addresses[name] for name in ("drive", "fill"))
         self.look_address = built.code.addresses["look"]
         self.look = _LOOK(self.look_address)
+        self.judge, self.measures = _JUDGE(built.code.addresses["judge"]), _MEASURES(built.code.addresses["measures"])
 
-    def bind(self, parameter_values: ArrayLike, sizes: ArrayLike, kept: Sequence[int], rate: LookRate) -> MonitorData:
-        """Return the data of one run; they must live as long as it goes on."""
+    def bind(
+        self, parameter_values: ArrayLike, sizes: ArrayLike, kept: Sequence[int], rate: LookRate, is_small: bool
+    ) -> MonitorData:
+        """Return the data of one run; they must live as long as it goes on.
+
+        Where there are few conditions the measure is a singular value, and looks can tell whether it is near zero.
+        """
         shape, program = self.shape, self.program
+        position = np.full(shape.conditions, -1)
+        position[list(kept)] = np.arange(len(kept))
         derived, scratch = self.built.derive("held", program, parameter_values)
         arrays: dict[str, NDArray[Any]] = {
             "derived": derived,
@@ -111,14 +123,17 @@ class MonitorCode:
             "changes": np.empty(shape.conditions),
             "matrix": np.empty(shape.conditions**2),
             **{name: np.zeros(shape.conditions) for name in ("pivots", "first", "most", "least", "earlier", "known")},
-            "kept": np.array([len(kept), *kept], dtype=np.int64),
+            "left": np.empty(shape.conditions),
+            "work": np.empty(len(kept) * (shape.speeds + 2) + shape.speeds if is_small else 1),
+            "right": np.sin(_GOLDEN * np.arange(1.0, shape.conditions + 1.0)),
+            "kept": np.array([len(kept), *kept, *position], dtype=np.int64),
             **self._lists,
             "notes": np.empty((CAPACITY, shape.note)),
             "best": np.zeros(1 + shape.coordinates),
             "state": np.zeros(len(STATE)),
         }
         numbers = {"move": rate.move, "whole": rate.whole, "idle": rate.idle, "low": rate.low**2}
-        numbers["worn"] = rate.worn**2
+        numbers |= {"worn": rate.worn**2, "is_small": float(is_small)}
         arrays["state"][[AT[name] for name in numbers]] = list(numbers.values())
         shared = {name: arrays.pop(name) for name in SHARED}
         ends = [0, *accumulate(one.size for one in arrays.values())]
@@ -187,8 +202,29 @@ class MonitorData:
 
     def restart(self) -> None:
         """Forget what was noted; not how much conditions have changed."""
-        self._state[[AT["count"], AT["is_low"], AT["falls"], AT["later"]]] = 0.0
+        self._state[[AT["count"], AT["is_low"], AT["falls"], AT["later"], AT["judges"]]] = 0.0
         self._arrays["least"][:] = self._arrays["earlier"][:] = np.inf
+
+    def judge_from(self, start: float) -> None:
+        """From here on tell by itself what need not be looked at; not before a time."""
+        self._state[[AT["judges"], AT["start"], AT["judged"]]] = 1.0, start, -np.inf
+
+    def finds_at_end(self) -> bool:
+        """Return whether there may be something to find at the looks noted, the last of a motion among them."""
+        return not self._state[AT["judges"]] or self.code.judge(self.address, 1) != 0
+
+    @property
+    def largest(self) -> float:
+        """The largest measure that a look has had."""
+        return float(self._state[AT["largest"]])
+
+    def measures(
+        self, t: NDArray[np.float64], q: NDArray[np.float64], known: int, least: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the measure of states of shape (coordinates, states), after the first of them have been learned."""
+        t, q, least, away = (np.ascontiguousarray(one) for one in (t, q.T, least, np.empty(len(t))))
+        self.code.measures(*map(address_of, (t, q)), len(t), known, *map(address_of, (least, away)), self.address)
+        return away
 
     def settle(self) -> None:
         """Take the last look as that at which the choice of conditions was looked at."""
@@ -227,7 +263,7 @@ class MonitorData:
         is_still_low = self._state[AT["falls"]]  # so that it is asked again when what comes behind is known
         self._state[[AT["is_low"], AT["later"], AT["count"]]] = is_still_low, 0.0, len(carried)
         self._arrays["least"][:] = self._arrays["earlier"][:] = np.inf
-        return [(float(one[0]), one[1 : 1 + size], one[1 + size :]) for one in noted]
+        return [(float(one[0]), one[1 : 1 + size], one[1 + size : -1]) for one in noted]
 
     @property
     def best(self) -> tuple[float, NDArray[np.float64]]:
@@ -244,9 +280,12 @@ def compile_monitor(program: Program, speeds: int, size: int, places: tuple[Arra
     lists = slope_lists(outputs[0], list(zip(rows, columns, strict=True)))
     shape = Shape(inputs[1], speeds, size, outputs[0], len(rows), len(lists["product"]))
     part = Part("held", program)
-    routines = RoutineSource(_MODULE, (), (shape,))
+    routines = RoutineSource(_MODULE, ("codegen/sundials/rank_looks.py",), (shape,))
     built = build_code(
-        [part], default_options([part], is_brief=True), exports=["look", "drive", "fill"], routines=routines
+        [part],
+        default_options([part], is_brief=True),
+        exports=["look", "drive", "fill", "judge", "measures"],
+        routines=routines,
     )
     return MonitorCode(program, shape, lists, built)
 
@@ -277,15 +316,18 @@ PAUSED, UNREADABLE = 96, 97
 CAPACITY, CARRIED = 24, 6
 """So many looks are noted; of those among which nothing was low the last few are carried on."""
 
+_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
+
 _LATER = 2
 """So many looks that are no longer low must follow those that are, before somebody is asked."""
 
 _ARRAYS: tuple[str, ...] = ("derived", "scratch", "sizes", "values", "slopes", "drifts", "rows", "changes", "matrix")
-_ARRAYS += ("pivots", "first", "most", "least", "earlier", "known")
+_ARRAYS += ("pivots", "first", "most", "least", "earlier", "known", "left", "work", "right")
 LISTS = ("kept", "row", "column", "one", "other", "product")
-SHARED = ("derived", "sizes", *LISTS)
+SHARED = ("derived", "sizes", "right", *LISTS)
 FIELDS = (*_ARRAYS, *LISTS, "notes", "best", "state")
-STATE = ("next", "count", "is_low", "falls", "later", "move", "whole", "idle", "low", "worn", "best")
+STATE: tuple[str, ...] = ("next", "count", "is_low", "falls", "later", "move", "whole", "idle", "low", "worn", "best")
+STATE += ("is_small", "judges", "judged", "start", "largest", "stride")
 AT = {name: number for number, name in enumerate(STATE)}
 
 
@@ -310,7 +352,12 @@ class Shape:
 
     @property
     def note(self) -> int:
-        """The length of a note: time, y, y'."""
+        """The length of a note: time, y, y', and its measure, below zero until it is asked for."""
+        return 2 + 2 * self.size
+
+    @property
+    def measured(self) -> int:
+        """Where a note has its measure."""
         return 1 + 2 * self.size
 
 
@@ -319,7 +366,9 @@ def write_routines(shape: Shape | None) -> list[Routine]:
 
     The last alone where nobody looks; its data are then the length of y.
     """
-    return [_fill(None)] if shape is None else [_look(shape), _drive(), _fill(shape)]
+    if shape is None:
+        return [_fill(None)]
+    return [*write_measures(shape, _opened), _look(shape), _drive(), _fill(shape)]
 
 
 @once
@@ -328,17 +377,22 @@ def table_filler() -> Built:
     return build_code([], CodeOptions(level=2), exports=["fill"], routines=RoutineSource(_MODULE, (), (None,)))
 
 
+def _opened(_: Routine, given: Value) -> tuple[dict[str, Value], Record]:
+    """Return the arrays and the state of a monitor from the address of its data."""
+    data = {name: given.read(k, ADDRESS) for k, name in enumerate(FIELDS)}
+    return data, Record(data["state"], dict.fromkeys(STATE, NUMBER))
+
+
 def _look(shape: Shape) -> Routine:
     """Write the function that notes a state, and returns whether somebody should look at what was noted."""
     r = Routine("look", {"t": NUMBER, "y": ADDRESS, "yp": ADDRESS, "data": ADDRESS}, exported=True)
     t, y, yp, given = r.arguments
-    data = {name: given.read(k, ADDRESS) for k, name in enumerate(FIELDS)}
-    state = Record(data["state"], dict.fromkeys(STATE, NUMBER))
+    data, state = _opened(r, given)
     outputs = [data["values"], data["slopes"], data["drifts"]]  # what is not finite there shows in what follows
     call_kernel(r, "held", [place_of(r, t), y, y.at(shape.coordinates)], data["derived"], data["scratch"], outputs)
     count = r.truncated(state.count)
     note = data["notes"].at(count * shape.note)
-    note[0] = t
+    note[0], note[shape.measured] = t, -1.0
     r.copy(note.at(1), y, shape.size)
     r.copy(note.at(1 + shape.size), yp, shape.size)
     _measure_slopes(r, data, shape)
@@ -362,13 +416,29 @@ def _look(shape: Shape) -> Routine:
         with r.count(shape.conditions) as i:
             data["least"][i] = np.inf
     state.count = r.choose(carries, CARRIED, noted).number()
+    with r.when(asks & (state.judges != 0.0)), r.when(r.call("judge", given, r.value(0, INTEGER)) == 0):
+        _forget(r, data, state, shape)
+        r.give(0)
     r.give(asks.code())
     return r
 
 
+def _forget(r: Routine, data: dict[str, Value], state: Record, shape: Shape) -> None:
+    """Write what becomes of looks among which there is nothing to find; see `MonitorData.take` and `settle`."""
+    count, notes = r.truncated(state.count), data["notes"]
+    with r.when(count > CARRIED):
+        with r.count(CARRIED * shape.note) as i:
+            notes[i] = notes[(count - CARRIED) * shape.note + i]
+        state.count = CARRIED
+    state.is_low, state.later = state.falls, 0.0
+    with r.count(shape.conditions) as i:
+        data["least"][i] = data["earlier"][i] = np.inf
+        data["known"][i] = data["pivots"][i]
+
+
 def _measure_slopes(r: Routine, data: dict[str, Value], shape: Shape) -> None:
     """Write how much each condition changes, and ``G G^T``."""
-    slopes, changes, rows, matrix = (data[name] for name in ("slopes", "changes", "rows", "matrix"))
+    slopes, changes, rows = (data[name] for name in ("slopes", "changes", "rows"))
     r.clear(changes, changes.at(shape.conditions))
     with r.count(shape.slopes) as e:
         row, column = (data[name].read(e, INTEGER) for name in ("row", "column"))
@@ -377,10 +447,7 @@ def _measure_slopes(r: Routine, data: dict[str, Value], shape: Shape) -> None:
         changes[row] = r.most(r.size(slope), changes[row])
     with r.count(shape.conditions) as i:
         rows[i] = r.most(changes[i], rows[i])
-    r.clear(matrix, matrix.at(shape.conditions**2))
-    with r.count(shape.products) as p:
-        one, other, target = (data[name].read(p, INTEGER) for name in ("one", "other", "product"))
-        matrix[target] = matrix[target] + slopes[one] * slopes[other]
+    write_products(r, data, shape)
 
 
 def _eliminate(r: Routine, data: dict[str, Value], state: Record, shape: Shape) -> tuple[Value, Value, Value, Value]:
@@ -432,6 +499,7 @@ def _plan_next(r: Routine, arguments: Sequence[Value], sizes: Value, state: Reco
     speed, pull = (one.now for one in largest)
     below = speed + r.sqrt(speed * speed + 2.0 * pull * move)
     stride = 2.0 * move / below
+    state.stride = stride  # without end where nothing moves
     moves = (stride < state.whole) & r.is_finite(total.now)
     later = t + r.choose(moves, stride, state.idle)
     state.next = r.choose(later > t, later, np.inf)

@@ -207,7 +207,7 @@ def misses_of(
     held = plan.balance.program
     if plan.pays(held.constraints_alone, len(t)):
         rows = np.concatenate([q, u]).T if rows is None else rows
-        return _misses(plan)(t, rows, plan.sizes, tolerances.TRUSTED * _errors(plan, t, q))
+        return _misses(plan)(t, rows, plan.sizes, tolerances.TRUSTED * errors_at(plan, t, q))
     chunk = _chunk(plan)
     found = np.zeros((2, len(t)))
     for i in range(0, len(t), chunk):
@@ -231,7 +231,7 @@ def _misses(plan: SceneProblem) -> Callable[..., FloatArray]:
     return assembly.kept.get(_MISSES_HERE, lambda: made.bind(assembly.parameter_values), made)
 
 
-def _errors(plan: SceneProblem, t: FloatArray, q: FloatArray) -> FloatArray:
+def errors_at(plan: SceneProblem, t: FloatArray, q: FloatArray) -> FloatArray:
     """Return how far rounding can take the constraints at states."""
     farthest = int(np.abs(q.T).argmax()) // len(q) if q.size else 0
     return plan.balance.errors.near(float(t[farthest]), q[:, farthest], plan.sizes)
@@ -252,12 +252,12 @@ def once(make: Misses) -> Misses:
 def _chunk(plan: SceneProblem) -> int:
     """Return how many states to work on at once."""
     program = plan.balance.program
-    normal = _normal(plan)
+    normal = normal_equations(plan)
     volume = program.constraints * program.speeds if normal is None else normal.volume + program.program.size
     return max(1, _CHUNK // max(1, volume))
 
 
-def _normal(plan: SceneProblem) -> Normal | None:
+def normal_equations(plan: SceneProblem) -> Normal | None:
     """Return the normal equations of the independent constraints by their entries; None where arrays are better."""
     program = plan.balance.program
     plain = plan.balance.kinematic_map.is_plain and len(program.holonomic) == program.constraints
@@ -302,11 +302,11 @@ def constraints_at(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArr
     else:
         value, entries, explicit_rate = plan.columns(program, count)(t[None, :], q, u)
     kept, pattern = list(plan.finding.kept), _pattern(plan)
-    errors = _errors(plan, t, q)
+    errors = errors_at(plan, t, q)
     entries = entries * plan.sizes[pattern.columns, None]
     rows = trusted_sizes(pattern.largest(entries).T, errors)
     entries /= rows.T[pattern.rows]
-    return ConstraintsAt(value.T / rows, entries, explicit_rate.T / rows, kept, pattern, _normal(plan), rows)
+    return ConstraintsAt(value.T / rows, entries, explicit_rate.T / rows, kept, pattern, normal_equations(plan), rows)
 
 
 def _project_rows(plan: SceneProblem, t: FloatArray, y: FloatArray, nearest: TakesNearest | None) -> Projected:

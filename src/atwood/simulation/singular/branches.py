@@ -23,6 +23,7 @@ from atwood.simulation.singular.crossing import (
     SingularCrossing,
     find_crossing,
     find_loss,
+    has_few,
     is_slow,
     nearly_lost,
     rests_at,
@@ -106,7 +107,7 @@ def compiled_monitor(plan: SceneProblem, whole: float, size: int) -> MonitorData
         size,
     )
     rate = LookRate(_MOVE, whole, _SHARE * whole, _LOW, _WORN if plan.finding.redundant else 0.0)
-    return code.bind(assembly.parameter_values, plan.sizes, plan.finding.kept, rate)
+    return code.bind(assembly.parameter_values, plan.sizes, plan.finding.kept, rate, has_few(plan))
 
 
 def as_step_monitor(data: MonitorData) -> StepMonitor:

@@ -9,7 +9,7 @@ repeated integration, with each state projected onto the constraints before forc
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache, partial
+from functools import cache
 from typing import TypeAlias
 
 import numpy as np
@@ -17,16 +17,20 @@ from numpy.polynomial import legendre
 
 from atwood.arrays import FloatArray
 from atwood.clock import check_time
-from atwood.errors import AtwoodError, KernelEvaluationError
-from atwood.integrators.protocol import PROJECTION, RATES, CompiledRates
+from atwood.errors import AtwoodError
+from atwood.integrators.protocol import CompiledRates
 from atwood.lazy_dataclasses import dataclass
 from atwood.simulation.dynamics.reactions import accelerations_at
 from atwood.simulation.problem.explicit_scene import compiled_on_constraints
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.projection import ProjectedStates, nearly_projected, project_safely, project_states
+from atwood.simulation.singular.arc_routine import ELSEWHERE, NOWHERE, SWEPT, Sweep
 
 States: TypeAlias = tuple[FloatArray, FloatArray]
 """Coordinates and speeds, each of shape (number, times)."""
+
+State: TypeAlias = tuple[float, FloatArray, FloatArray]
+"""A time, coordinates and speeds."""
 
 _POINTS = 12
 """Of the polynomials."""
@@ -147,7 +151,7 @@ _REACH = legendre.legvander(legendre.leggauss(_POINTS)[0], _POINTS)
 
 def _settle(
     plan: SceneProblem,
-    begin: tuple[float, FloatArray, FloatArray],
+    begin: State,
     end: float,
     times: FloatArray,
     guess: States,
@@ -155,28 +159,22 @@ def _settle(
 ) -> Arc | None:
     """Integrate the rates at the points again and again until nothing changes."""
     t, q, u = begin
-    integral = _points()[1]
-    half = 0.5 * (end - t)
-    kept = np.asarray(plan.finding.kept, dtype=np.intp)
-    last, sizes, balance = np.inf, [], plan.columns(plan.balance.program.program)
-    places, speeds = guess
+    half, last, sizes = 0.5 * (end - t), np.inf, list[float]()
+    states = np.ascontiguousarray(np.concatenate(guess).T)
     code = compiled_on_constraints(plan, t, np.concatenate([q, u])) if plan.has_rates else None
+    sweep = None if code is None else _compiled(plan, code, begin, half, times, states)
     for _ in range(_SWEEPS):
-        held = None if code is None else _held_by(code, times, places, speeds)
-        held = _projected(plan, times, places, speeds, is_far) if held is None else held
-        state = times, held.coordinates, held.speeds
-        accelerations = None if code is None else _rates_by(code, *state)[len(q) :]
-        if accelerations is None:
-            accelerations = accelerations_at(plan.assembly, plan.assembly.form, *state, kept, balance)
-        turned = half * (integral @ accelerations.T)
-        turned[0] += u
-        later = (_REACH @ turned).T  # known already, and twice as near as what the places would follow from
-        rates = plan.balance.kinematic_map.rates_each(times, held.coordinates, held.hold(later))
-        moved = half * (integral @ rates.T)
-        moved[0] += q
-        now = (_REACH @ moved).T, later
-        change = _size(plan, now[0] - places, now[1] - speeds)
-        places, speeds = now
+        check_time()
+        went = ELSEWHERE if sweep is None else sweep()
+        if went == NOWHERE:
+            return None
+        if sweep is not None and went == SWEPT:
+            change, integrated = sweep.change, sweep.integrated
+        else:
+            integrated = _sweep(plan, begin, half, times, states, is_far)
+            now = _REACH @ integrated
+            change = _size(plan, *_parts(now - states, len(q)))
+            states[:] = now
         if not np.isfinite(change) or change > 1e3:
             return None
         sizes.append(change)
@@ -184,41 +182,45 @@ def _settle(
             return None
         left = change * change / last if last < np.inf else change  # what the next sweep would change, about
         if min(change, 10.0 * left) < _SETTLED or (change < _ROUNDED and change >= 0.5 * last):
-            rest = np.sum(np.abs(moved[-_LAST:]), axis=0), np.sum(np.abs(turned[-_LAST:]), axis=0)
-            return Arc(t, end, moved, turned, max(min(change, left), _size(plan, *rest)))
+            rest = _size(plan, *_parts(np.sum(np.abs(integrated[-_LAST:]), axis=0)[None, :], len(q)))
+            return Arc(t, end, integrated[:, : len(q)], integrated[:, len(q) :], max(min(change, left), rest))
         last, is_far = change, change > _CLOSE
     return None
 
 
-def _held_by(code: CompiledRates, t: FloatArray, q: FloatArray, u: FloatArray) -> ProjectedStates | None:
-    """Return states that machine code takes onto the constraints; None where it cannot all."""
-    project, n = PROJECTION(code.project), len(q)
-
-    def taken(speeds: FloatArray, places: FloatArray) -> FloatArray | None:
-        check_time()
-        y = np.ascontiguousarray(np.concatenate([places, speeds]).T)
-        first, width = y.ctypes.data, y.strides[0]
-        flags = [project(one, first + i * width, code.project_data) for i, one in enumerate(t.tolist())]
-        return None if any(flags) or not np.all(np.isfinite(y)) else y.T
-
-    def hold(places: FloatArray, speeds: FloatArray) -> FloatArray:
-        found = taken(speeds, places)
-        if found is None:
-            raise KernelEvaluationError("speeds cannot be taken onto the constraints")
-        return found[n:]
-
-    near = taken(u, q)
-    return None if near is None else ProjectedStates(near[:n], near[n:], partial(hold, near[:n]))
+def _parts(states: FloatArray, coordinates: int) -> States:
+    """Return coordinates and speeds of states, one row each."""
+    return states[:, :coordinates].T, states[:, coordinates:].T
 
 
-def _rates_by(code: CompiledRates, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatArray:
-    """Return rates of coordinates and speeds by machine code, shape (number, states)."""
-    check_time()
-    function, y = RATES(code.function), np.ascontiguousarray(np.concatenate([q, u]).T)
-    found, width = np.empty_like(y), y.strides[0]
-    for i, one in enumerate(t.tolist()):
-        function(one, y.ctypes.data + i * width, found.ctypes.data + i * width, code.data)
-    return found.T
+def _compiled(
+    plan: SceneProblem, code: CompiledRates, begin: State, half: float, times: FloatArray, states: FloatArray
+) -> Sweep:
+    """Return sweeps by machine code."""
+    _, q, u = begin
+    sizes = np.concatenate([plan.coordinate_sizes, plan.sizes / plan.scales.time])
+    arrays = times, _points()[1], _REACH, np.concatenate([q, u]), states, sizes
+    return Sweep(code, arrays, half, len(q), plan.balance.kinematic_map.is_plain)
+
+
+def _sweep(
+    plan: SceneProblem, begin: State, half: float, times: FloatArray, states: FloatArray, is_far: bool
+) -> FloatArray:
+    """Return coefficients of coordinates and speeds from states at the points, one row each."""
+    _, q, u = begin
+    integral = _points()[1]
+    held = _projected(plan, times, *_parts(states, len(q)), is_far)
+    kept, balance = np.asarray(plan.finding.kept, dtype=np.intp), plan.columns(plan.balance.program.program)
+    accelerations = accelerations_at(
+        plan.assembly, plan.assembly.form, times, held.coordinates, held.speeds, kept, balance
+    )
+    turned = half * (integral @ accelerations.T)
+    turned[0] += u
+    later = (_REACH @ turned).T  # known already, and twice as near as what the places would follow from
+    rates = plan.balance.kinematic_map.rates_each(times, held.coordinates, held.hold(later))
+    moved = half * (integral @ rates.T)
+    moved[0] += q
+    return np.concatenate([moved, turned], axis=1)
 
 
 def _projected(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray, is_far: bool) -> ProjectedStates:
@@ -253,7 +255,7 @@ _NOISE, _LOUDEST = 1e-13, 2e-7
 
 def follow(
     plan: SceneProblem,
-    state: tuple[float, FloatArray, FloatArray],
+    state: State,
     end: float,
     tolerance: float,
     measure: Callable[[FloatArray, FloatArray], FloatArray],

@@ -21,6 +21,7 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
+from atwood.codegen.sundials.rank_looks import SMALL, UNEVEN
 from atwood.errors import SolveError
 from atwood.integrators.event_location import EventLocator, Root
 from atwood.integrators.protocol import State
@@ -30,11 +31,12 @@ from atwood.numerics.matrices import scaled, to_array
 from atwood.numerics.rank import decompose, lost_rank, rank, singular_values
 from atwood.simulation.events.modes import EventProbe
 from atwood.simulation.problem.problem import SceneProblem
-from atwood.simulation.problem.projection import ConstraintsAt, constraints_at
+from atwood.simulation.problem.projection import ConstraintsAt, constraints_at, errors_at, normal_equations
 from atwood.simulation.singular.collocation import Arc
 from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
+    from atwood.codegen.sundials.step_monitor import MonitorData
     from atwood.simulation.singular.collocation import Path
 
 _PIECES = 8
@@ -182,14 +184,12 @@ def rests_at(
     return rest if near and is_slow(plan, arc, rest, fastest, tolerance) else None
 
 
-_UNEVEN = 0.5
-"""By so large a share steps on both sides of a zero may differ."""
-
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 
 
-_SMALL = 40
-"""Up to so many constraints singular values cost little."""
+def has_few(plan: SceneProblem) -> bool:
+    """Return whether there are so few constraints that their singular values cost little."""
+    return len(plan.finding.kept) <= SMALL and normal_equations(plan) is None
 
 
 @dataclass(frozen=True)
@@ -227,20 +227,26 @@ class RankMeasure:
     def __init__(self, plan: SceneProblem) -> None:
         self.plan = plan
         self.rows = np.zeros(plan.balance.constraints)
+        self.compiled: MonitorData | None = None
 
     def learn(self, t: FloatArray, q: FloatArray, known: int | None = None) -> FloatArray:
         """Learn from states, the first if so many are given, how much constraints change; return the measure of all."""
+        if self.compiled is not None:
+            least = tolerances.TRUSTED * errors_at(self.plan, t, q)
+            return self.compiled.measures(t, q, len(t) if known is None else known, least)
         now = self._constraints(t, q)
         np.maximum(self.rows, np.max(now.rows[:known], axis=0), out=self.rows)
         return self._of(now)
 
     def at(self, t: FloatArray, q: FloatArray) -> FloatArray:
         """Return the measure, shape (states,)."""
+        if self.compiled is not None:
+            return self.compiled.measures(t, q, 0, self.rows)
         return self._of(self._constraints(t, q))
 
     def _of(self, now: ConstraintsAt) -> FloatArray:
         share, count = now.rows / self.rows, len(now.value)
-        if now.normal is None and len(now.kept) <= _SMALL:
+        if now.normal is None and len(now.kept) <= SMALL:
             slopes = (now.jacobian * share[:, :, None])[:, now.kept]
             if not slopes.shape[1]:
                 return np.ones(count)  # what constraints there are follow from what is eliminated
@@ -345,7 +351,7 @@ def zero_ahead(times: FloatArray, away: FloatArray) -> float | None:
         return None
     before, here, after = away[least - 1 : least + 2].tolist()
     higher, lower, way = (before, after, 1.0) if before > after else (after, before, -1.0)
-    if not abs((higher - here) - (here + lower)) < _UNEVEN * (higher - here):
+    if not abs((higher - here) - (here + lower)) < UNEVEN * (higher - here):
         return None  # it turns back before zero
     share = way * here / (here + lower)
     return float(times[least] + share * (times[1] - times[0]))

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from atwood.arrays import FloatArray
+from atwood.codegen.sundials.rank_looks import AHEAD, FALLEN, LOW
 from atwood.forms.caches import Key
 from atwood.integrators.protocol import Status, StepMonitor, StepResult
 from atwood.simulation.problem.problem import SceneProblem
@@ -25,7 +26,7 @@ from atwood.simulation.singular.branches import (
     going_on,
     stride_from,
 )
-from atwood.simulation.singular.crossing import SingularCrossing, zero_ahead
+from atwood.simulation.singular.crossing import SingularCrossing, has_few, zero_ahead
 from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
@@ -37,16 +38,6 @@ _LOOKED_AHEAD: Key[tuple[SingularCrossing | None, list[float]]] = Key("first loo
 
 _REVIEW = 8
 """So many looks are judged together where they are not compiled."""
-
-_LOW = 0.3
-"""Only where the measure is so small, relative to the largest so far, is it looked at more closely."""
-
-_FALLEN = 1e-2
-"""The same where the motion may be at a singular position already, and stay there."""
-
-_AHEAD = -0.8, 1.6, 13
-"""A position is looked for from so far behind to so far ahead of the last look, in strides between looks, at so many
-points: what is just ahead lies between two of them."""
 
 _AT_START = 0.7
 """Where less than this share is left at a start of what constraints are around it, it is looked ahead from there."""
@@ -117,7 +108,8 @@ class SingularityMonitor(Branches):
             self._start_anew()
             first, self._starts_low = begun
             self._compiled = first.copied()
-            self._measures.rows, self.next = self._compiled.rows, np.inf
+            self._measure_with(self._compiled)
+            self.next = np.inf
 
     def _first_looks(self) -> tuple[MonitorData, bool] | None:
         """Look at the start, and around it; return what came of it, and whether something is low there.
@@ -130,9 +122,14 @@ class SingularityMonitor(Branches):
             return None
         errors = plan.balance.errors.near(start.t, start.y[: self._n], plan.sizes)
         self._compiled.rows[:] = tolerances.TRUSTED * errors
-        self._measures.rows = self._compiled.rows
+        self._measure_with(self._compiled)
         self._begin_looks()
         return self._compiled.copied(), self._starts_low
+
+    def _measure_with(self, compiled: MonitorData) -> None:
+        """Take rows, and where there are few of them the measure, from machine code."""
+        self._measures.rows = compiled.rows
+        self._measures.compiled = compiled if has_few(self.plan) else None
 
     @property
     def step_monitor(self) -> StepMonitor | None:
@@ -142,7 +139,7 @@ class SingularityMonitor(Branches):
     def look_in_python(self) -> None:
         """Sample step by step, since the session cannot."""
         if self._compiled is not None:
-            self._compiled = None
+            self._compiled = self._measures.compiled = None
             self._begin_looks()
 
     def restart(self, step_result: StepResult, is_behind: bool = False) -> None:
@@ -167,6 +164,8 @@ class SingularityMonitor(Branches):
         self._compiled.note(self._start.t, self._start.y, self._start.yp)
         self._compiled.settle()
         self._starts_low = self._compiled.least_share < _AT_START and not self._is_behind
+        if self.plan.balance.kinematic_map.is_plain and not self.plan.finding.redundant:
+            self._compiled.judge_from(self._start.t)
 
     def _look_around(self) -> None:
         """See how independent constraints are around the start, which may be near a singular position itself."""
@@ -220,8 +219,9 @@ class SingularityMonitor(Branches):
         if at_end or ended:
             compiled.note(step_result.t, step_result.y, step_result.yp)
         compiled.settle()
-        if not compiled.has_seen_low and not ended:
+        if not ended and not (compiled.has_seen_low and (not at_end or compiled.finds_at_end())):
             return False
+        self._largest = max(self._largest, compiled.largest)
         self._samples, self._away = [Sample(*one) for one in compiled.take()], []
         self._best = compiled.best
         return True
@@ -285,7 +285,7 @@ class SingularityMonitor(Branches):
 
     @staticmethod
     def _times_ahead(last: Sample, stride: float) -> FloatArray:
-        return last.t + stride * np.linspace(*_AHEAD)
+        return last.t + stride * np.linspace(*AHEAD)
 
     def _measure(self, looks_ahead: bool = False) -> None:
         """Measure what was noted, the best look that is not noted any more, and what may be ahead, all at once."""
@@ -323,8 +323,8 @@ class SingularityMonitor(Branches):
             self._judged = t
             before = away[i - 1] if i else np.inf
             behind = away[i + 1] if i + 1 < len(away) else np.inf
-            is_least = away[i] <= min(before, behind, _LOW * self._largest)
-            if not is_least and not away[i] <= _FALLEN * self._largest < before < np.inf:
+            is_least = away[i] <= min(before, behind, LOW * self._largest)
+            if not is_least and not away[i] <= FALLEN * self._largest < before < np.inf:
                 continue
             rest = self._rest(max(i - 1, 0), min(i + 1, len(away) - 1)) if is_least else None
             if rest is not None:

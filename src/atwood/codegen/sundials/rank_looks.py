@@ -1,0 +1,299 @@
+"""How near a motion is to a singular position at its looks, and just ahead of them, as machine code.
+
+The measure is the smallest singular value of the slopes that are kept, each row in units of the most that it has
+changed: by reflections to two diagonals (G. Golub and W. Kahan, *Calculating the singular values and pseudo-inverse of
+a matrix*, SIAM J. Numer. Anal. 2, 1965), and by counting eigenvalues of the tridiagonal matrix with these two in turn
+beside zeros (J. Demmel and W. Kahan, *Accurate singular values of bidiagonal matrices*, SIAM J. Sci. Stat. Comput. 11,
+1990). Of many rows it is the length of the shortest displacement that changes all of them by about as much. What is
+judged by it is what `atwood.simulation.singular.monitor` judges, which is asked only where there is something to find.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf, nan
+from typing import TYPE_CHECKING, TypeAlias
+
+from atwood.codegen.routines import (
+    ADDRESS,
+    BOOLEAN,
+    INTEGER,
+    NUMBER,
+    Lanes,
+    Record,
+    Routine,
+    Value,
+    call_kernel,
+    place_of,
+)
+
+if TYPE_CHECKING:
+    from atwood.codegen.sundials.step_monitor import Shape
+
+Opened: TypeAlias = Callable[[Routine, Value], tuple[dict[str, Value], Record]]
+"""Gives the arrays and the state of a monitor from the address of its data."""
+
+SMALL = 40
+"""Up to so many rows singular values cost little."""
+
+LOW, FALLEN = 0.3, 1e-2
+"""Shares of the largest measure so far: a least one below the first is looked at more closely, and what has fallen
+below the second at once, since the motion may stay there."""
+
+AHEAD = -0.8, 1.6, 13
+"""A position is looked for from so far behind to so far ahead of the last look, in strides between looks, at so many
+points: what is just ahead lies between two of them."""
+
+UNEVEN = 0.5
+"""By so large a share steps on both sides of a zero may differ."""
+
+_ROUNDED, _NOTHING = 1e-16, 1e-290
+
+_PLACES, _SECTIONS = 8, 20
+"""At so many places eigenvalues are counted at once, so often at most: the last interval is as long as rounding."""
+
+
+def write_measures(shape: Shape, opened: Opened) -> list[Routine]:
+    """Write what measures states, and what judges looks by it."""
+    return [_smallest(), _measure(shape, opened), _measures(shape, opened), _judge(shape, opened)]
+
+
+def _smallest() -> Routine:
+    """Write the smallest singular value of a matrix, row by row, that has no more rows than columns and is used up."""
+    r = Routine("smallest", {"a": ADDRESS, "rows": INTEGER, "columns": INTEGER, "room": ADDRESS}, NUMBER)
+    a, rows, columns, room = r.arguments
+    squares, sums = room, room.at(rows * 2)
+    total = r.variable(0.0)
+    with r.count(rows * columns) as i:
+        total.now = total.now + a[i]
+    with r.when(~r.is_finite(total.now)):
+        r.give(nan)
+    with r.count(rows) as k:
+        row, below = a.at(k * columns), a.at((k + 1) * columns + k)
+        half, square = _reflect(r, row.at(k), columns - k, 1)
+        squares[k * 2] = square
+        with r.when(half > 0.0), r.count(rows, k + 1) as i:
+            other, dot = a.at(i * columns), r.variable(0.0)
+            with r.count(columns, k) as j:
+                dot.now = dot.now + other[j] * row[j]
+            share = dot.now / half
+            with r.count(columns, k) as j:
+                other[j] = other[j] - share * row[j]
+        squares[k * 2 + 1] = 0.0
+        with r.when(k + 1 < rows):
+            half, square = _reflect(r, below, rows - k - 1, columns)
+            squares[k * 2 + 1] = square
+            with r.when(half > 0.0):
+                r.clear(sums, sums.at(columns))
+                with r.count(rows, k + 1) as i:
+                    other = a.at(i * columns)
+                    with r.count(columns, k + 1) as j:
+                        sums[j] = sums[j] + other[k] * other[j]
+                with r.count(rows, k + 1) as i:
+                    other = a.at(i * columns)
+                    share = other[k] / half
+                    with r.count(columns, k + 1) as j:
+                        other[j] = other[j] - share * sums[j]
+    r.give(_least_of(r, squares, rows))
+    return r
+
+
+def _reflect(r: Routine, place: Value, count: Value, stride: Value | int) -> tuple[Value, Value]:
+    """Make numbers in memory the vector that reflects them into their first place.
+
+    Return half of its square, and the square of what is left there.
+    """
+    square = r.variable(0.0)
+    with r.count(count) as i:
+        one = place[i * stride]
+        square.now = square.now + one * one
+    first, length = place[0], r.sqrt(square.now)
+    left = r.choose(first > 0.0, -1.0 * length, length)
+    place[0] = first - left
+    return square.now - first * left, square.now
+
+
+def _least_of(r: Routine, squares: Value, rows: Value) -> Value:
+    """Write the smallest singular value from the squares of both diagonals in turn, by counts at several places."""
+    low, high, before = r.variable(0.0), r.variable(inf), r.variable(0.0)
+    with r.count(rows) as k:
+        high.now = r.least(r.sqrt(squares[k * 2] + before.now), high.now)
+        before.now = squares[k * 2 + 1]
+    least, many = high.now * _ROUNDED, Lanes(_PLACES)
+    ahead, places, counts = (r.array(_PLACES) for _ in range(3))
+    for number in range(_PLACES):
+        ahead[number] = (number + 1) / (_PLACES + 1)
+    with r.count(_SECTIONS), r.when(high.now - low.now > least):
+        begin, width = low.now, high.now - low.now
+        at = begin + width * ahead.read(0, many)
+        places.write(0, at)
+        pivot, negative = r.variable(0.0 - at, many), r.variable(1.0, many)
+        with r.count(rows * 2 - 1) as k:
+            now = 0.0 - at - squares[k] / pivot.now
+            now = r.choose(r.size(now) < _NOTHING, -_NOTHING, now)
+            pivot.now, negative.now = now, negative.now + r.choose(now < 0.0, 1.0, 0.0)
+        counts.write(0, negative.now)
+        with r.count(_PLACES) as k:
+            is_above = counts[k] > rows.number()
+            low.now = r.choose(is_above, low.now, places[k])
+            high.now = r.choose(is_above & (places[k] < high.now), places[k], high.now)
+    return 0.5 * (low.now + high.now)
+
+
+def _measure(shape: Shape, opened: Opened) -> Routine:
+    """Write the measure of coordinates at a time."""
+    r = Routine("measure", {"t": NUMBER, "q": ADDRESS, "data": ADDRESS}, NUMBER)
+    t, q, given = r.arguments
+    data, state = opened(r, given)
+    work, count = data["work"], data["kept"].read(0, INTEGER)
+    _slopes(r, data, shape, t, q)
+    with r.when(count == 0):
+        r.give(1.0)
+    with r.when(state.is_small != 0.0):
+        end = count * shape.speeds
+        r.clear(work, work.at(end))
+        with r.count(shape.slopes) as e:
+            row, column = (data[name].read(e, INTEGER) for name in ("row", "column"))
+            place = data["kept"].at(count + 1).read(row, INTEGER)
+            with r.when(place >= 0):
+                work[place * shape.speeds + column] = data["slopes"][e] / _unit(r, data, row)
+        r.give(r.call("smallest", work, count, r.value(shape.speeds, INTEGER), work.at(end), result=NUMBER))
+    write_products(r, data, shape)
+    r.give(_displacement(r, data, shape, count))
+    return r
+
+
+def _slopes(r: Routine, data: dict[str, Value], shape: Shape, t: Value, q: Value) -> None:
+    """Write slopes along displacements of the sizes; speeds do not enter."""
+    outputs = [data["values"], data["slopes"], data["drifts"]]
+    call_kernel(r, "held", [place_of(r, t), q, data["sizes"]], data["derived"], data["scratch"], outputs)
+    with r.count(shape.slopes) as e:
+        data["slopes"][e] = data["slopes"][e] * data["sizes"][data["column"].read(e, INTEGER)]
+
+
+def write_products(r: Routine, data: dict[str, Value], shape: Shape) -> None:
+    """Write ``G G^T`` from slopes."""
+    slopes, matrix = data["slopes"], data["matrix"]
+    r.clear(matrix, matrix.at(shape.conditions**2))
+    with r.count(shape.products) as p:
+        one, other, target = (data[name].read(p, INTEGER) for name in ("one", "other", "product"))
+        matrix[target] = matrix[target] + slopes[one] * slopes[other]
+
+
+def _unit(r: Routine, data: dict[str, Value], row: Value) -> Value:
+    unit = data["rows"][row]
+    return r.choose(unit > 0.0, unit, 1.0)
+
+
+def _displacement(r: Routine, data: dict[str, Value], shape: Shape, count: Value) -> Value:
+    """Write the measure of many rows, by elimination in ``G G^T``."""
+    matrix, left, kept = data["matrix"], data["left"], data["kept"].at(1)
+    size, length = r.variable(0.0), r.variable(0.0)
+    with r.count(count) as a:
+        row = kept.read(a, INTEGER)
+        wanted = data["right"][row]
+        left[row], size.now = wanted * _unit(r, data, row), size.now + wanted * wanted
+    with r.count(count) as a:
+        pivot = kept.read(a, INTEGER)
+        own, known = matrix[pivot * shape.conditions + pivot], left[pivot]
+        length.now = length.now + known * known / own
+        with r.count(count, a + 1) as b:
+            below = kept.read(b, INTEGER)
+            row = matrix.at(below * shape.conditions)
+            entry = row[pivot]
+            with r.when(entry != 0.0):
+                factor = entry / own
+                left[below] = left[below] - factor * known
+                with r.count(b + 1, a + 1) as c:
+                    column = kept.read(c, INTEGER)
+                    row[column] = row[column] - factor * matrix[column * shape.conditions + pivot]
+    return r.sqrt(size.now / length.now)
+
+
+def _measures(shape: Shape, opened: Opened) -> Routine:
+    """Write the measure of many states, one row of coordinates each; rows are learned from the first of them."""
+    kinds = {"t": ADDRESS, "q": ADDRESS, "states": INTEGER, "known": INTEGER, "least": ADDRESS}
+    r = Routine("measures", kinds | {"away": ADDRESS, "data": ADDRESS}, None, exported=True)
+    t, q, states, known, least, away, given = r.arguments
+    data, _ = opened(r, given)
+    changes, rows = data["changes"], data["rows"]
+    with r.count(known) as s:
+        _slopes(r, data, shape, t[s], q.at(s * shape.coordinates))
+        r.clear(changes, changes.at(shape.conditions))
+        with r.count(shape.slopes) as e:
+            row = data["row"].read(e, INTEGER)
+            changes[row] = r.most(r.size(data["slopes"][e]), changes[row])
+        with r.count(shape.conditions) as i:
+            change = r.most(changes[i], least[i])
+            rows[i] = r.most(r.choose(change > 0.0, change, 1.0), rows[i])
+    with r.count(states) as s:
+        away[s] = r.call("measure", t[s], q.at(s * shape.coordinates), given, result=NUMBER)
+    return r
+
+
+def _judge(shape: Shape, opened: Opened) -> Routine:
+    """Write the function that tells whether there is something to find at the looks noted, or just ahead of them.
+
+    At an end the last look is judged as well, and nothing is ahead. What has no measure is to be looked at.
+    """
+    r = Routine("judge", {"data": ADDRESS, "at_end": INTEGER}, exported=True)
+    given, at_end = r.arguments
+    data, state = opened(r, given)
+    count, notes, best = r.truncated(state.count), data["notes"], data["best"]
+    largest = r.variable(r.most(r.call("measure", best[0], best.at(1), given, result=NUMBER), state.largest))
+    with r.count(count) as i:
+        note = notes.at(i * shape.note)
+        with r.when(note[shape.measured] < 0.0):
+            note[shape.measured] = r.call("measure", note[0], note.at(1), given, result=NUMBER)
+        away = note[shape.measured]
+        with r.when(~r.is_finite(away)):
+            r.give(1)
+        largest.now = r.most(away, largest.now)
+    state.largest = largest.now
+    asks, last = r.variable(0, BOOLEAN), count - 1 + at_end
+    with r.count(last) as i:
+        note = notes.at(i * shape.note)
+        before, behind = r.variable(inf), r.variable(inf)
+        with r.when(i > 0):
+            before.now = notes[(i - 1) * shape.note + shape.measured]
+        with r.when(i + 1 < count):
+            behind.now = notes[(i + 1) * shape.note + shape.measured]
+        away, fallen = note[shape.measured], largest.now * FALLEN
+        is_least = away <= r.least(r.least(before.now, behind.now), largest.now * LOW)
+        falls = (away <= fallen) & (fallen < before.now) & (before.now < inf)
+        asks.now = asks.now | ((note[0] > state.judged) & (is_least | falls))
+    with r.when(asks.now):
+        r.give(1)
+    with r.when(last > 0):
+        state.judged = notes[(last - 1) * shape.note]
+    with r.when(at_end != 0):
+        r.give(0)
+    _look_ahead(r, shape, (data, state, given), notes.at((count - 1) * shape.note))
+    r.give(0)
+    return r
+
+
+def _look_ahead(r: Routine, shape: Shape, of: tuple[dict[str, Value], Record, Value], note: Value) -> None:
+    """Write what returns 1 where the measure falls to zero at an even rate just ahead of a look, and rises again."""
+    _, state, given = of
+    begin, end, points = AHEAD
+    stride, now, rates = state.stride, note[0], note.at(1 + shape.size + shape.coordinates)
+    with r.when(~((stride < inf) & (note[shape.measured] > 0.0))):
+        r.give(0)
+    q, away, least = r.array(shape.coordinates), r.array(points), r.variable(0, INTEGER)
+    with r.count(points) as k:
+        later = stride * (begin + k.number() * ((end - begin) / (points - 1)))
+        with r.count(shape.coordinates) as i:
+            q[i] = note[1 + i] + (note[1 + shape.coordinates + i] + 0.5 * rates[i] * later) * later
+        t = r.least(r.most(now + later, state.start), state.start + state.whole)
+        away[k] = r.call("measure", t, q, given, result=NUMBER)
+        with r.when(~r.is_finite(away[k])):
+            r.give(1)
+        with r.when(away[k] < away[least.now]):
+            least.now = k
+    with r.when((least.now == 0) | (least.now == points - 1)):
+        r.give(0)
+    one, here, other = (away[least.now + k] for k in (-1, 0, 1))
+    higher, lower = r.most(one, other), r.least(one, other)
+    uneven = r.size((higher - here) - (here + lower))
+    r.give((uneven < UNEVEN * (higher - here)).code())
