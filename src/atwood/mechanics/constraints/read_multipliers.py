@@ -387,7 +387,6 @@ def _give_way(system: _System) -> dict[int, Expression]:
 def _solve_system(system: _System) -> list[Expression]:
     """Return accelerations and multipliers: written out if that is short, else in numbers."""
     n, size, full, right = system.masses, len(system.right), system.mass, system.right
-    graph = right[0].graph
     upper = {(r, c): e for (r, c), e in full.items() if r <= c} | {(c, r): e for (r, c), e in system.slopes.items()}
     upper |= {(n + i, n + i): one for i, one in enumerate(system.diagonal) if not one.is_zero}
     places, light = list(upper), {i for i in range(n) if (i, i) not in full}
@@ -409,12 +408,35 @@ def _solve_system(system: _System) -> list[Expression]:
             for step in reversed(steps):
                 known[step.unknown] = back_substitute(step, known)
             return [known[i] for i in range(size)]
-    matrix = [[full.get((i, j), graph.zero) for j in range(size)] for i in range(size)]
+    matrix = dict(full)
     for (i, j), entry in system.slopes.items():
-        matrix[i][j], matrix[j][i] = entry, -entry
-    for i, entry in enumerate(system.diagonal, n):
-        matrix[i][i] = entry
-    return [graph.convert(one) for one in solve(matrix, list(right))]
+        matrix[i, j], matrix[j, i] = entry, -entry
+    matrix |= {(i, i): entry for i, entry in enumerate(system.diagonal, n)}
+    return _solve_apart(matrix, right)
+
+
+def _by_row(matrix: Mapping[tuple[int, int], Expression]) -> dict[int, list[tuple[int, Expression]]]:
+    """Return the columns and entries of each row."""
+    found: dict[int, list[tuple[int, Expression]]] = {}
+    for (row, column), entry in matrix.items():
+        found.setdefault(row, []).append((column, entry))
+    return found
+
+
+def _solve_apart(matrix: Mapping[tuple[int, int], Expression], right: Sequence[Expression]) -> list[Expression]:
+    """Return what solves a system in numbers: unknowns that share nothing are factored by themselves."""
+    from networkx import Graph, connected_components
+
+    graph, found = right[0].graph, list(right)
+    places: Graph[int] = Graph()
+    places.add_nodes_from(range(len(right)))
+    places.add_edges_from(place for place, entry in matrix.items() if not entry.is_zero)
+    groups: Any = connected_components(places)  # sets, which its types do not say
+    for group in sorted(sorted(one) for one in groups):
+        rows = [[matrix.get((i, j), graph.zero) for j in group] for i in group]
+        for i, one in zip(group, solve(rows, [right[i] for i in group]), strict=True):
+            found[i] = graph.convert(one)
+    return found
 
 
 def _after(places: Sequence[tuple[int, int]], n: int, size: int) -> list[tuple[int, int]]:
@@ -452,12 +474,11 @@ def _fixed_point(
             total[r] = total[r] + entry * vector[c]
         return total
 
-    matrix = [[graph.one if i == j else graph.zero for j in range(count)] for i in range(count)]
+    matrix = {(i, i): graph.one for i in range(count)}
+    turns_of = _by_row(turns)
     for (r, k), share in shares.items():
-        for (k2, c), turn in turns.items():
-            if k == k2:
-                matrix[r][c] = matrix[r][c] - share * turn
-    entries = [entry for row in matrix for entry in row]
+        for c, turn in turns_of.get(k, ()):
+            matrix[r, c] = matrix.get((r, c), graph.zero) - share * turn
 
     def gaps_at(values: Sequence[Expression]) -> list[Expression]:
         """Return by how much values miss the equations."""
@@ -465,10 +486,9 @@ def _fixed_point(
         return [z - r - g for z, r, g in zip(values, rest, given, strict=True)]
 
     def step(values: Sequence[Expression]) -> list[Expression]:
-        there = substitute(entries, dict(zip(unknowns, values, strict=True)))
-        rows = [there[i * count : (i + 1) * count] for i in range(count)]
+        there = substitute(list(matrix.values()), dict(zip(unknowns, values, strict=True)))
         gaps = gaps_at(values)
-        moves = [graph.convert(one) for one in solve(rows, gaps)]
+        moves = _solve_apart(dict(zip(matrix, there, strict=True)), gaps)
         if is_affine:
             return [value - move for value, move in zip(values, moves, strict=True)]
         # A solution stays where it is: where nothing presses, the size of a force has no slope.
@@ -497,12 +517,12 @@ def _met_by_forces(
 ) -> list[Expression]:
     """Return z with ``z = rest + S w``, ``w = forces + T (z - rest)``, by ``(1 - T S) w = forces``: they are fewer."""
     graph, count = rest[0].graph, len(forces)
-    matrix = [[graph.one if i == j else graph.zero for j in range(count)] for i in range(count)]
+    matrix = {(i, i): graph.one for i in range(count)}
+    shares_of = _by_row(shares)
     for (r, k), turn in turns.items():
-        for c in range(count):
-            if (k, c) in shares:
-                matrix[r][c] = matrix[r][c] - turn * shares[k, c]
-    met, found = solve(matrix, list(forces)), list(rest)
+        for c, share in shares_of.get(k, ()):
+            matrix[r, c] = matrix.get((r, c), graph.zero) - turn * share
+    met, found = _solve_apart(matrix, forces), list(rest)
     for (k, c), share in shares.items():
         found[k] = found[k] + share * met[c]
     return found

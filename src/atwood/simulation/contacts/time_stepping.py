@@ -108,6 +108,8 @@ class ContactsInSteps:
         chosen = [*closed, *(k for k, is_slip in enumerate(layout.is_slip) if is_slip and layout.gap_of[k] in places)]
         if not chosen and not any(state for state, _ in self.states):
             return None
+        if self.assembly.form == "dae":  # so that what repeats itself is not contradicted
+            values = values.with_speeds(values.allowed(u))
         return _InStep(self, values, y[: self.coordinates], u, h, closed, chosen)
 
     def _is_closed(self, k: int, values: ContactValues, h: float) -> bool:
@@ -145,8 +147,10 @@ class _InStep:
             self.contacts.states = states = states_of(values.layout, [0.0] * len(assembly.held_now))
             none = np.zeros(0)
             return Pushed(0.0 * free, False, 0.0, None, partial(self._told, [], none, none, none, states))
-        start, ahead = values.rates, free
-        if assembly.form == "reduced":
+        start = values.rates
+        if assembly.form == "dae":
+            ahead = values.allowed(free)
+        else:
             ahead = np.asarray(assembly.kernel(to_maximal(assembly))([values.t], self.q, free)[1], dtype=float)
         rates = start + values.slopes @ (ahead - values.u)
         wanted, by_forces = rates.copy(), np.abs(rates - start)

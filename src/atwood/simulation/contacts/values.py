@@ -262,6 +262,13 @@ class ContactValues:
         """Accelerations and multipliers of joints without these forces."""
         return self._moved(np.concatenate([-self._now.bias, -self._now.gamma])[:, None])[:, 0]
 
+    def allowed(self, u: FloatArray) -> FloatArray:
+        """Return the nearest speeds of the maximal coordinates, by masses, that joints allow at this place."""
+        now = self._now
+        rate = np.asarray(now.jacobian @ u, dtype=float) + now.explicit_rate
+        change: FloatArray = self._moved(np.concatenate([np.zeros(len(u)), -rate])[:, None])[: len(u), 0]
+        return u + change if len(rate) else u
+
     @property
     def falling(self) -> FloatArray:
         """Accelerations without these forces."""
