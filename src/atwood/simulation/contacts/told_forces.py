@@ -23,6 +23,8 @@ from atwood.simulation.contacts.values import ContactValues, layout_of
 
 _TOLD: Key[Program] = Key("forces of gaps and slips by formulas")
 
+_ALIKE: Key[bool] = Key("that numbers give the same forces, at the state that was last asked about")
+
 _OFF = 1e-3
 """Of the largest force: what is off by more is refused. Forces are in units in which each moves its own row alike."""
 
@@ -48,16 +50,22 @@ def check_told_forces(assembly: Assembly, state: tuple[float, FloatArray, FloatA
     UnsupportedError
         If a force is off by more than a thousandth of the largest.
     """
+    t, q, u = state
+    assembly.kept.get(_ALIKE, lambda: _are_alike(assembly, state, length), t, q.tobytes(), u.tobytes(), length)
+
+
+def _are_alike(assembly: Assembly, state: tuple[float, FloatArray, FloatArray], length: float) -> bool:
+    """Return that no force is off, or refuse places of which one is."""
     equations, contacts = assembly.own_equations, layout_of(assembly).contacts
     told = [equations.read[one.row.multiplier] for one in contacts if one.row.multiplier in equations.read]
     if len(told) < len(contacts) or (len(contacts) == 1 and not assembly.maximal.constraints):
-        return
+        return True
     values = ContactValues(assembly, *state, length)
     rows = rows_that_hold(values.units, states_of(values.layout, assembly.held_now))
     sizes = np.sqrt(or_one(values.alone[rows]))
     moved, ways = np.linalg.eigh(values.response[np.ix_(rows, rows)] / sizes / sizes[:, None])
     if not np.any((moved > NOTHING) & (moved < _NEXT_TO_NONE)):
-        return
+        return True
     program = assembly.shared.get(_TOLD, lambda: coordinate_program(assembly, _TOLD.name, equations, told))
     (given,) = assembly.kernel(program)([state[0]], *state[1:])
     found = forces_in(values, states_of(values.layout, assembly.held_now))
@@ -76,3 +84,4 @@ def check_told_forces(assembly: Assembly, state: tuple[float, FloatArray, FloatA
             advice="Move it away from the joint or the place next to it, or leave it out"
             + (f"; the same is so of {also}." if also else "."),
         )
+    return True

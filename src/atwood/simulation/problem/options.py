@@ -183,21 +183,22 @@ class Samples:
 
 def sample_times(t: float, options: RunOptions) -> Samples:
     """Return all samples, the start among them."""
-    if isinstance(options.outputs, (int, np.integer)):
-        return _even_samples(t, options.t_end, int(options.outputs), options.samples)
     asked = options.outputs
+    if isinstance(asked, (int, np.integer)):
+        return _samples(t, options.t_end, int(asked), options.samples)
     if asked[0] < t or asked[-1] > options.t_end:
         raise UsageError(
             f"outputs go from {asked[0]:g} to {asked[-1]:g} s",
             advice=f"Give times between {t:g} and {options.t_end:g}.",
         )
-    return _filled(t, options.t_end, asked, options.samples)
+    return _samples(t, options.t_end, np.asarray(asked, dtype=np.float64).tobytes(), options.samples)
 
 
 @lru_cache(maxsize=4)
-def _even_samples(t: float, t_end: float, outputs: int, samples: int) -> Samples:
-    """Return samples with evenly spread outputs; a run again has the same."""
-    found = _filled(t, t_end, np.linspace(t, t_end, outputs), samples)
+def _samples(t: float, t_end: float, outputs: int | bytes, samples: int) -> Samples:
+    """Return samples with so many evenly spread outputs, or with those at times; a run again has the same."""
+    asked = np.linspace(t, t_end, outputs) if isinstance(outputs, int) else np.frombuffer(outputs)
+    found = _filled(t, t_end, asked, samples)
     for values in (found.times, found.shown, found.between):
         values.flags.writeable = False
     return found
