@@ -109,6 +109,18 @@ class ExplicitSession(SteppingSession):
             self._jumps.begin(t)
             self._leaps = self._stepper.leap(self._compiled, self._jumps, end)
 
+    def change_at(self, times: FloatArray, relations: FloatArray, place: int, end: float) -> bool:
+        """Go on beyond times at which parameters change, up to another end; return whether it can, as by jumps.
+
+        `relations` are those from a place on, before the first of the times and from each of them on.
+        """
+        if not self._leaps or self._jumps is None or not self._jumps.change_at(times, relations, place):
+            return False
+        assert self._compiled is not None
+        self._end = end
+        self._compiled.change_at(float(times[0]))
+        return self._stepper.leap(self._compiled, self._jumps, end)
+
     def take_jumps(self) -> JumpLog | None:
         """Return the jumps since this was last asked; None where there are none."""
         made = None if self._jumps is None else self._jumps.take()

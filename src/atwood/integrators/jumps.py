@@ -161,6 +161,10 @@ class Jumps:
     def begin(self, t: float) -> None:
         """Learn when the steps begin, where that matters."""
 
+    def change_at(self, times: FloatArray, relations: FloatArray, place: int) -> bool:
+        """Learn when parameters change, and to what; return whether that can be on the way."""
+        return False
+
     def rates(self, t: float, y: FloatArray) -> FloatArray | None:
         """Return the rates after the last jump, where these are others than before; else None."""
         return None

@@ -96,6 +96,17 @@ def _take() -> Routine:
     return r
 
 
+def _take_relations() -> Routine:
+    """Give the programs the relations that hold from the last change of parameters on."""
+    r = Routine("take_relations", {"place": ADDRESS}, CODE)
+    m = _Leap(r.arguments[0], JUMP)
+    sets, values = Sets(m.sets, FIELDS), m.values
+    r.copy(values.at(m.relations_at), m.relations.at(m.changed * m.others), m.others)
+    r.call(m.set_prologue, values, sets.derived, sets.scratch, result=None)
+    r.give(0)
+    return r
+
+
 def _meet() -> Routine:
     """Take the coordinates to where what was found to be closed is met."""
     r, m, _, sets = _open("meet_closed")
@@ -170,35 +181,47 @@ def _log() -> Routine:
 
 
 def _jump() -> Routine:
-    """Change the set at an event: the state becomes that after it; 1 where that is left to Python, and all stays."""
+    """Change the set at an event: the state becomes that after it; 1 where that is left to Python, and all stays.
+
+    Where nothing has passed zero, parameters change as the set may.
+    """
     r, m, search, sets = _open("jump", exported=True)
     place, locator, t = r.arguments
     size, y, states, count = m.size, sets.y, sets.unit("next"), sets.count
     with r.when((m.logged >= m.capacity) | (t - m.began <= m.shortest)):
         r.give(1)
+    found, happens = search.row("found"), r.variable(False, BOOLEAN)
+    with r.count(search.count) as i:
+        happens.now = happens.now | (found[i] != 0.0)
+    changes = ~happens.now
     r.copy(m.margins, m.shift, search.count)
     r.call("take_triggers", place, locator)
-    r.call("sharpen", place, locator)
+    m.late, m.now, m.then = 0.0, t, t
+    with r.when(changes):
+        m.changed = m.changed + 1
+        r.call("take_relations", place)
+    with r.otherwise():
+        r.call("sharpen", place, locator)
     with r.count(size) as j:
         y[j], m.before[j] = search.y[j] - m.late * search.yp[j], search.y[j] - (t - m.now) * search.yp[j]
     sets.ahead, sets.rough, sets.later = m.ahead, m.rough, m.later
     with r.when(r.call("resolve", m.sets, m.then, r.value(0, INTEGER), r.value(1, INTEGER)) != 0):
-        _back(r, m, search)
+        _back(r, m, search, changes)
     some = r.variable(False, BOOLEAN)
     with r.count(count) as k:
         some.now = some.now | (states[k] != float(OPEN))
     with r.when(~(some.now | (m.stays != 0)) | (sets.logged > MOST_IMPACTS) | (sets.shared != 0)):
-        _back(r, m, search)
+        _back(r, m, search, changes)
     with r.when(r.call("meet_closed", place, locator) != 0):
-        _back(r, m, search)
+        _back(r, m, search, changes)
     r.call("take_states", place, states)
     with r.when(r.call(m.rates, m.now, y, m.near, m.rates_data) != 0):
-        _back(r, m, search)
+        _back(r, m, search, changes)
     rest = m.late - (t - m.now)
     with r.count(size) as j:
         y[j] = y[j] + rest * m.near[j]
     with r.when(r.call("arm", place, locator) != 0):
-        _back(r, m, search)
+        _back(r, m, search, changes)
     r.call("log_jump", place, locator)
     r.copy(search.y, y, size)
     r.copy(sets.unit("state"), states, count * 3)
@@ -209,12 +232,17 @@ def _jump() -> Routine:
     r.clear(seen, seen.at(search.count * 3 + 3))
     seen[0] = m.now
     search.is_first = 1
+    with r.when(changes):
+        search.change = m.changes[m.changed]
     r.give(0)
     return r
 
 
-def _back(r: Routine, m: _Leap, search: Search) -> None:
-    """Leave it to Python, with the states and margins of before."""
+def _back(r: Routine, m: _Leap, search: Search, changes: Value) -> None:
+    """Leave it to Python, with the states, margins and relations of before."""
+    with r.when(changes):
+        m.changed = m.changed - 1
+        r.call("take_relations", r.arguments[0])
     r.call("take_states", r.arguments[0], Sets(m.sets, FIELDS).unit("state"))
     r.copy(m.shift, m.margins, search.count)
     r.give(1)
@@ -222,4 +250,7 @@ def _back(r: Routine, m: _Leap, search: Search) -> None:
 
 def write_routines() -> list[Routine]:
     """Return the routine ``jump``, and what it calls; it takes the address of its memory, a search, and a time."""
-    return [*write_sets(), *(write() for write in (_triggers, _sharpen, _take, _meet, _arm, _log, _jump))]
+    return [
+        *write_sets(),
+        *(write() for write in (_triggers, _sharpen, _take, _take_relations, _meet, _arm, _log, _jump)),
+    ]

@@ -33,13 +33,16 @@ _PROGRAMS = tuple(f"{name}_{what}" for name in ("kernel", "nearer", "event") for
 JUMP: dict[str, Kind] = {
     **dict.fromkeys(("sets", "table", "shift", "margins", "seen", "states", "near", "before", "values"), ADDRESS),
     **dict.fromkeys(("places", "log", "project", "project_data", "scratch", "event_scratch", *_PROGRAMS), ADDRESS),
-    **dict.fromkeys(("rates", "rates_data"), ADDRESS),
+    **dict.fromkeys(("rates", "rates_data", "changes", "relations", "set_prologue"), ADDRESS),
     **dict.fromkeys(("now", "then", "late", "began", "shortest", "ahead", "rough", "later", "time"), NUMBER),
     **dict.fromkeys(("events", "size", "stride", "logged", "capacity", "stays"), INTEGER),
+    **dict.fromkeys(("changed", "others", "relations_at"), INTEGER),
 }
 """The memory of changes. `late` is by how much an event was seen after its zero, `then` the time of that zero,
 `now` that of the event, which is later where only rounding made it late, `began` when the set did, `shortest` how long
-one lasts at least, `time` that of the scene, `stays` whether all may open."""
+one lasts at least, `time` that of the scene, `stays` whether all may open; `changes`: when parameters change, infinity
+last, `relations` the last `others` of them before the first of these times and from each on, `changed` how many times
+are over."""
 
 _PLACES = {
     piece: {name: (kind, place) for place, (name, kind) in enumerate(fields.items())}
@@ -298,6 +301,7 @@ class SetJumps(SetSolver, Jumps):
         )
         self._place(events, rates, given)
         self._rates = RATES(rates.function), rates.data
+        self._put("own", {"set_prologue": self._built.code.addresses["contacts_prologue"]})
         self.function, self.data = code.routines.code.addresses["jump"], self._at["own"]
 
     def _place(
@@ -331,6 +335,14 @@ class SetJumps(SetSolver, Jumps):
     def begin(self, t: float) -> None:
         """Learn when the present set begins."""
         self._put("own", {"began": t})
+
+    def change_at(self, times: FloatArray, relations: FloatArray, place: int) -> bool:
+        """Learn when parameters change, and what those from a place on are before and from each of the times on."""
+        self._changes = np.append(times, inf), np.ascontiguousarray(relations)
+        changes, rows = (one.ctypes.data for one in self._changes)
+        self._put("own", {"changes": changes, "relations": rows, "changed": 0})
+        self._put("own", {"others": relations.shape[1], "relations_at": place})
+        return True
 
     def rates(self, t: float, y: FloatArray) -> FloatArray:
         """Return the rates in the present set."""

@@ -384,26 +384,39 @@ def _run(pair: Tableau) -> Routine:
 
 
 def _settles(pair: Tableau) -> Routine:
-    """Tell whether nothing is known yet of the first step after a start."""
+    """Tell whether nothing is known yet of the first step after a start, or parameters change in the last step."""
     r, m, () = open_routine(pair, "settles")
     with r.when(r.is_null(m.jump)):
         r.give(0)
-    r.give((Record(m.locator, LOCATOR).settling != 0).code())
+    own = Record(m.locator, LOCATOR)
+    r.give(((own.settling != 0) | (m.t >= own.change)).code())
     return r
 
 
 def _seek(pair: Tableau) -> Routine:
-    """Locate the first event in the last step; it then waits until the run comes there, or until Python asks."""
+    """Locate the first event in the last step; it then waits until the run comes there, or until Python asks.
+
+    A change of parameters is one in which nothing has passed zero.
+    """
     r, m, () = open_routine(pair, "seek")
-    until, own = r.least(m.t, m.last), Record(m.locator, LOCATOR)
+    own = Record(m.locator, LOCATOR)
+    last = r.least(m.last, own.change)
+    until = r.least(m.t, last)
     with r.when(m.t_old < until):
         r.copy(own.kept, own.rows, own.count * len(ROWS))
         found = r.variable(r.call(m.search, m.locator, m.t_old, until).integer(), INTEGER)
         with r.when(found.now == FOUND), r.when(r.call("shorten", m.session, own.root) != 0):
             r.copy(own.rows, own.kept, own.count * len(ROWS))
-            found.now = r.call(m.search, m.locator, m.t_old, r.least(m.t, m.last)).integer()
+            found.now = r.call(m.search, m.locator, m.t_old, r.least(m.t, last)).integer()
         m.found = found.now
         m.waits = r.choose(found.now == 0, 0, r.choose(found.now == FOUND, 1, 2, INTEGER), INTEGER)
+    with r.when((m.waits == 0) & (m.t >= own.change)):
+        places, found = own.rows.at(own.count * ROWS["found"]), r.variable(FOUND, INTEGER)
+        r.clear(places, places.at(own.count))
+        with r.when(r.call("interpolate", m.session, own.change, own.y, own.yp) != 0):
+            found.now = NO_STATE
+        own.root, own.here, m.found = own.change, nan, found.now
+        m.waits = r.choose(found.now == FOUND, 1, 2, INTEGER)
     r.give(0)
     return r
 

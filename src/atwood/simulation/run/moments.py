@@ -16,6 +16,7 @@ from atwood.clock import check_time
 from atwood.forms.assembly import Assembly
 from atwood.integrators.explicit_session import ExplicitSession
 from atwood.integrators.moments import DONE, PAUSES, USED_UP, Changes
+from atwood.integrators.session import Session
 from atwood.lazy_dataclasses import dataclass
 from atwood.simulation.events.impacts_in_time import motion_switches
 from atwood.simulation.events.sampling import Sampler, Updated
@@ -92,17 +93,26 @@ def times_ahead(plan: SceneProblem, schedule: Schedule, sampler: Sampler, t: flo
     is_plain = not (
         plan.finding.redundant
         or plan.dependent_speeds
-        or own.contacts
+        or (own.contacts and sampler.updates)
         or assembly.sides is not None
         or plan.balance.kinematic_map.has_homogeneous
         or motion_switches(assembly)
-        or options.max_steps is not None
+        or (options.max_steps is not None and not own.contacts)
         or options.on_step is not None
         or options.conditions
         or any(one.law.options.at for one in sampler.updates)
     )
     gaps = np.diff(np.append(times, end))
     return times if is_plain and np.all(gaps > MOMENT * np.spacing(np.abs(times) + end)) else np.array([t])
+
+
+def change_on_the_way(session: Session, ahead: Ahead, plan: SceneProblem) -> bool:
+    """Let steps that change sets of contacts pass the time events ahead, too; return whether they can."""
+    if not isinstance(session, ExplicitSession):
+        return False
+    relations = ahead.schedule.values[:, ahead.schedule.times.searchsorted(ahead.times, side="right")].T
+    place = len(plan.assembly.parameters) - relations.shape[1]
+    return session.change_at(ahead.times[1:], relations, place, float(ahead.samples.times[-1]))
 
 
 def pass_moments(

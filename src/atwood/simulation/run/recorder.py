@@ -15,6 +15,7 @@ from atwood.clock import TimeIsUp, more_time
 from atwood.errors import SolveError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, made_of
+from atwood.simulation.events.time_events import Schedule
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.projection import Misses, TakesNearest, misses_of, once, project_rows, project_safely
 
@@ -105,6 +106,8 @@ class Stretch:
         Make the changes of the states of contacts, in order.
     plan_at
         Gives the plan of each record by its number, where these begin at moments and not at jumps.
+    pieces
+        The time events among the changes, where there are some.
     """
 
     plan: SceneProblem
@@ -121,10 +124,12 @@ class Stretch:
     lost: FloatArray | None
     rests: bool
     plan_at: Callable[[int], SceneProblem] | None = None
+    pieces: Schedule | None = None
 
     def records(self) -> Iterable[SegmentRecord]:
         """Return the records from jump to jump."""
-        known: dict[tuple[float, ...], SceneProblem] = {}
+        known: dict[tuple[tuple[float, ...], int], SceneProblem] = {}
+        passed = set(() if self.pieces is None else self.pieces.times.tolist())
         changes = list(chain.from_iterable(make() for make in self.changes))
         found = np.searchsorted([one.time for one in changes], self.time[self.starts], side="right").tolist()
         ends = [*self.starts.tolist(), len(self.time)]
@@ -142,17 +147,23 @@ class Stretch:
                 misses=partial(_columns, self.misses, each),
                 singular_crossings=self.singular_crossings,
                 lost=None if self.lost is None else self.lost[each],
-                after_time_event=self.after_time_event if first == 0 else is_moment,
+                after_time_event=self.after_time_event
+                if first == 0
+                else is_moment or (change is not None and change.time in passed),
                 rests=self.rests if first == 0 else change is not None and change.rests,
             )
 
-    def _plan_of(self, change: Change | None, known: dict[tuple[float, ...], SceneProblem]) -> SceneProblem:
+    def _plan_of(self, change: Change | None, known: dict[tuple[tuple[float, ...], int], SceneProblem]) -> SceneProblem:
         """Return the plan in the states that contacts have from a change on."""
         if change is None or change.held is None:
             return self.plan
-        if change.held not in known:
-            known[change.held] = self.plan.in_piece(self.plan.assembly.with_held(change.held))
-        return known[change.held]
+        piece = -1 if self.pieces is None else self.pieces.piece(change.time)
+        if (place := (change.held, piece)) not in known:
+            assembly = self.plan.assembly
+            if self.pieces is not None:
+                assembly = self.pieces.applied(assembly, piece)
+            known[place] = self.plan.in_piece(assembly.with_held(change.held))
+        return known[place]
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,6 +204,7 @@ class Recorder:
         self.nearest: TakesNearest | None = None
         self._jumps: list[FloatArray] = []
         self._changes: list[Callable[[], Sequence[Change]]] = []
+        self.pieces: Schedule | None = None
         self._plan_at: Callable[[int], SceneProblem] | None = None
         self.loss_until: Callable[[FloatArray], FloatArray] | None = None
         # What is done, and states that wait: changed together, so that an interruption loses and repeats nothing.
@@ -237,11 +249,11 @@ class Recorder:
         y: FloatArray,
         shown: NDArray[np.bool_],
         jumps: tuple[FloatArray, FloatArray] | None = None,
-        shows_jumps: bool = True,
+        shows_jumps: NDArray[np.bool_] | bool = True,
     ) -> None:
         """Record states of the solver after the last sample, one row each, with those at jumps among them.
 
-        Jumps are times, and states before and after.
+        Jumps are times, and states before and after; the last argument says which of these are outputs.
         """
         pending = self._samples[1]
         if jumps is not None and len(jumps[0]):
@@ -251,8 +263,12 @@ class Recorder:
             rest[own] = False
             for one, given, inserted in zip(merged, (t, y), (times, states), strict=True):
                 one[rest], one[own] = given, inserted
-            (all_t, all_y), all_shown = merged, np.full(count, shows_jumps)
-            all_shown[rest], once = shown, np.ones(count, dtype=bool)  # an output at a jump is that after it
+            (all_t, all_y), all_shown = merged, np.empty(count, dtype=bool)
+            all_shown[rest], all_shown[own], once = (
+                shown,
+                shows_jumps,
+                np.ones(count, dtype=bool),
+            )  # an output at a jump is that after it
             once[2:] = (all_t[2:] != all_t[1:-1]) | (all_t[2:] != all_t[:-2])
             t, y, shown = all_t[once], all_y[once], all_shown[once]
             self._jumps.append(jumps[0])
@@ -368,7 +384,7 @@ class Recorder:
             starts = np.append(starts, np.searchsorted(time, np.concatenate(self._jumps)) + 1)
             starts = starts[starts < len(time)]
         lost = None if self.loss_until is None else self.loss_until(time)
-        rest = crossings, starts, tuple(self._changes), lost, rests, self._plan_at
+        rest = crossings, starts, tuple(self._changes), lost, rests, self._plan_at, self.pieces
         return Stretch(self.plan, impact, after_time_event, time, q, u, shown, misses, *rest)
 
     def _finish(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_], waiting: Sequence[_States] = ()) -> None:

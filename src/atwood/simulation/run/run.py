@@ -273,7 +273,7 @@ class Walk:
         ahead = self.samples.until(t, limit)
         if limit < options.t_end or (t < limit and self.sampler.due_at(limit)):  # the state just after it is shown
             ahead = ahead.without_last_shown()
-        coming = None if contacts else self._moments(schedule)
+        coming = self._moments(schedule)
         stretch = self.plan, self.probe, options, self.choice, ahead, self.show, self.statistics, self._kept
         segment = Segment(*stretch, coming)
         recorder = Recorder(self.plan)
@@ -323,8 +323,11 @@ class Walk:
         assert self.plan is not None
         if outcome.passed is not None:
             self._passed(outcome.passed)
-        elif outcome.held is not None and outcome.held != self.held:  # sets of contacts have changed on the way
+        elif outcome.held is not None and (outcome.held != self.held or outcome.begun is not None):
+            # Sets of contacts have changed on the way, and perhaps the piece.
             self.held, self.assembly = outcome.held, self.assembly.with_held(outcome.held)
+            self._piece_start = self._piece_start if outcome.begun is None else outcome.begun
+            self.assembly = self._in_piece(self.assembly)
             self.plan, self.probe, self._plans = self.plan.in_piece(self.assembly), None, {}
         self.statistics = self.statistics + outcome.statistics
         for choice in outcome.choices:
@@ -337,12 +340,14 @@ class Walk:
 
     def _moments(self, schedule: Schedule) -> Ahead | None:
         """Return the moments that steps may pass by themselves from here on; None where there are none."""
-        is_over = not self.t < self.options.t_end
-        if is_over or not (len(schedule.times) or len(self.sampler.times)) or not self.passes_moments:
+        assert self.plan is not None
+        cannot = not self.t < self.options.t_end or not self.passes_moments or self.choice.method.tableau is None
+        if cannot or not (len(schedule.times) or len(self.sampler.times)):
+            return None
+        if self.plan.assembly.own_equations.contacts and not self._kept.jumps(self.plan.assembly):
             return None
         from atwood.simulation.run.moments import Ahead, times_ahead
 
-        assert self.plan is not None
         times, end = times_ahead(self.plan, schedule, self.sampler, self.t, self.options), self.options.t_end
         if len(times) < 2:
             return None

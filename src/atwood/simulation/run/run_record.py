@@ -213,6 +213,8 @@ class Outcome:
         The discrete states at its end, if it has some.
     passed
         The moments that it went through, if there are any.
+    begun
+        Since when the last set of contacts and the last piece have held, s, where it went through time events.
     late
         How long after its zero an event was seen, s, and the rates of the state there; None where that is not known.
     """
@@ -230,6 +232,7 @@ class Outcome:
     sides: tuple[int, ...] = ()
     held: tuple[float, ...] | None = None
     passed: Passed | None = None
+    begun: float | None = None
     late: tuple[float, FloatArray] | None = None
 
 

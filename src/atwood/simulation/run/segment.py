@@ -33,7 +33,7 @@ from atwood.simulation.dynamics.orientation_coordinates import (
 from atwood.simulation.dynamics.redundancy import RankFinding
 from atwood.simulation.events.modes import EventProbe, EventRecord, ToldLater, seen_late, without_margin
 from atwood.simulation.events.sides import SIDE
-from atwood.simulation.events.time_events import MOMENT
+from atwood.simulation.events.time_events import MOMENT, Schedule
 from atwood.simulation.problem.preparation import pack_state
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.projection import project_safely
@@ -135,6 +135,7 @@ class _Runner:
         self.opened: StepResult | None = None
         self.noted: list[EventRecord | ToldLater] = []
         self.jumped: list[_Jumps] = []
+        self.pieces: Schedule | None = None
 
     @property
     def method(self) -> Method:
@@ -146,6 +147,7 @@ class _Runner:
         self.began, done = t, 0
         try:
             session = self._open(t, y, yp)
+            self._change_on_the_way(session)
             passed = self._pass_moments(session, y)
             if passed is not None:
                 return passed
@@ -173,6 +175,17 @@ class _Runner:
             if not is_numerical(error):
                 raise
             return self._failed(self._numerical_failure(error, (t, y)))
+
+    def _change_on_the_way(self, session: Session) -> None:
+        """Go on to the end of the run where the time events ahead are passed by steps that change sets of contacts."""
+        segment = self.segment
+        if segment.ahead is not None and segment.plan.assembly.own_equations.contacts:
+            from atwood.simulation.run.moments import change_on_the_way
+
+            if change_on_the_way(session, segment.ahead, segment.plan):
+                self.pieces = segment.ahead.schedule
+                self.recorder.pieces = self.pieces
+                self.segment = replace(segment, samples=segment.ahead.samples)
 
     def _pass_moments(self, session: Session, y: FloatArray) -> Outcome | None:
         """Go on through the moments ahead; None where the session has begun anew, or there are none to pass."""
@@ -217,6 +230,7 @@ class _Runner:
             noted=tuple(self.noted),
             handed=self._handed_on(),
             held=self.segment.plan.assembly.held,
+            begun=None if self.pieces is None else self.began,
         )
 
     def _handed_on(self) -> tuple[int, ...]:
@@ -233,6 +247,11 @@ class _Runner:
         if step_result is None:
             self.recorder.settle()
             return self._ended(self.segment.end, "finished", "")
+        if _is_change(step_result):  # that of the next piece, which steps have left
+            self.recorder.rewind(step_result.t)
+            self.recorder.take(step_result.t, step_result.y, False)
+            self.recorder.settle()
+            return self._ended(step_result.t, "finished", "")
         if step_result.status is Status.EVENT:
             probe, split = self.segment.probe, self.segment.plan.program.split
             at_event = (lambda t, y: probe.values(t, *split(y))), probe.shift
@@ -269,7 +288,7 @@ class _Runner:
 
     def _notes(self, step_result: StepResult) -> bool:
         """After an event that changes nothing, note it: the solver then goes on as if nothing had happened."""
-        if step_result.status is not Status.EVENT:
+        if step_result.status is not Status.EVENT or _is_change(step_result):
             return False
         noted = self.segment.probe.noted(step_result)
         self.noted += noted
@@ -360,10 +379,13 @@ class _Runner:
 
     def _change_solver(self, step_result: StepResult) -> tuple[float, FloatArray, FloatArray]:
         """Return the state from which another solver goes on."""
+        self.recorder.settle()  # another one's states have other unknowns
         self.segment.probe.handed = self._handed_on()
         self.before, self.session = self._cost(), None
         self.choices[-1] = replace(self.choices[-1], time=step_result.t)
-        plan = self.segment.plan
+        segment, plan = self.segment, self.segment.plan
+        if self.pieces is not None and (limit := self.pieces.next(self.began, segment.end)) < segment.end:
+            self.segment = replace(segment, samples=segment.samples.until(-np.inf, limit).without_last_shown())
         return step_result.t, *pack_state(plan, step_result.t, *plan.program.split(step_result.y))
 
     def _sample(self, session: Session, done: int) -> tuple[int, StepResult | None]:
@@ -383,7 +405,7 @@ class _Runner:
                 y, step_result = y[: strayed + 1], session.here
             count = len(y)
             jumps = self._all_jumps(session)
-            shows = isinstance(segment.options.outputs, (int, np.integer))  # or just the times that were asked for
+            shows = self._shows(jumps)
             self.recorder.take_many(times[:count], y, segment.samples.shown[done : done + count], jumps, shows)
             done += count
             if step_result.status is not Status.REACHED:
@@ -396,6 +418,16 @@ class _Runner:
             if progress is not None:
                 progress(float(times[-1]))
         return done, None
+
+    def _shows(self, jumps: _Jumps | None) -> NDArray[np.bool_]:
+        """Return whether states before and after jumps are outputs: those before time events are none."""
+        is_any = isinstance(self.segment.options.outputs, (int, np.integer))  # or just the times that were asked for
+        times = np.zeros(0) if jumps is None else jumps[0]
+        shows = np.full((len(times), 2), is_any)
+        if self.pieces is not None:
+            for i in np.flatnonzero(np.isin(times, self.pieces.times)).tolist():
+                shows[i] = False, self.segment.samples.shows(float(times[i]))
+        return shows.ravel()
 
     def _strayed(self, y: FloatArray, ends: NDArray[np.intp]) -> int | None:
         """Return the first of some rows in which coordinates of an orientation need another size; None if none does."""
@@ -446,7 +478,10 @@ class _Runner:
         self.recorder.take_changes(changes)
         self.recorder.nearest = None  # it takes states onto what holds now
         [last] = log.last.changes()
-        plan = segment.plan.in_piece(kept_touching(assembly.with_held(held_after(last, assembly))))
+        held = held_after(last, assembly)
+        if self.pieces is not None:
+            assembly = self.pieces.applied(assembly, self.pieces.piece(last.time))
+        plan = segment.plan.in_piece(kept_touching(assembly.with_held(held)))
         q, u = plan.program.split(last.states[1])
         probe = EventProbe(plan, last.time, q, u, options.relative_tolerance, options.conditions)
         self.segment, self.began = replace(segment, plan=plan, probe=probe), last.time
@@ -638,6 +673,11 @@ class _Runner:
         drift = float(np.max(misses()[:, -1] * [1.0, plan.scales.time]))  # of places, and of speeds
         if needs_normalization or drift > 100.0 * self.segment.options.relative_tolerance:
             session.reinitialize(step_result.t, *pack_state(plan, step_result.t, q, u))
+
+
+def _is_change(step_result: StepResult) -> bool:
+    """Return whether nothing has passed zero at an event: parameters change."""
+    return step_result.status is Status.EVENT and not any(step_result.events)
 
 
 def _both(
