@@ -359,7 +359,7 @@ def simulate(
 def _solve(assembly: Assembly, options: RunOptions, clock: Clock) -> Run:
     """Find the start of an assembly, and run it from there."""
     try:
-        with clock.kept(GRACE), stage("start"):
+        with clock.kept(GRACE), stage("start"), without_collection():
             assembly, start = start_with_line_signs(assembly)
     except TimeIsUp:
         return run_out_of_time(assembly, None, options)

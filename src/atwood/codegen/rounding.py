@@ -88,12 +88,17 @@ class RoughProgram:
         What they depend on: the parameters, and groups of inputs, one after the other or with the place of each.
     results
         The expressions.
+    nodes
+        What is live in them, where that is known.
     """
 
     def __init__(
-        self, symbols: Sequence[Sequence[Expression] | Mapping[Expression, int]], results: Sequence[Expression]
+        self,
+        symbols: Sequence[Sequence[Expression] | Mapping[Expression, int]],
+        results: Sequence[Expression],
+        nodes: Sequence[Expression] | None = None,
     ) -> None:
-        nodes = live(results)
+        nodes = live(results) if nodes is None else nodes
         read = [node for node in nodes if node.operation == "symbol"]
         place = {node.index: i for i, node in enumerate(nodes)}
         self._count = len(nodes)

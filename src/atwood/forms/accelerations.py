@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Literal, cast
 
 from atwood.errors import AtwoodError
 from atwood.expr import Expression, OutputGroup, Program, jacobian, live, solve, substitute
-from atwood.expr.simplify.collect import cost
+from atwood.expr.simplify.collect import cost_of_nodes
 from atwood.expr.simplify.polynomial import Effort
 from atwood.forms.caches import Key, derive_once
 from atwood.forms.program import rates_are_speeds, state_groups
@@ -131,13 +131,14 @@ def _cheapest(assembly: Assembly, method: Method | None, is_tree: bool) -> tuple
 
 def _price(values: Sequence[Expression], parameters: Sequence[Expression]) -> int:
     """Return what an evaluation costs, where a sine comes with the cosine of the same angle for little more."""
-    return cost(values, parameters) - _PAIR * (_waves(values) - _waves(values, in_pairs=True))
+    nodes = live(values)
+    waves = _waves(nodes)
+    return cost_of_nodes(nodes, parameters) - _PAIR * (len(waves) - len({wave.arguments[0] for wave in waves}))
 
 
-def _waves(values: Sequence[Expression], in_pairs: bool = False) -> int:
-    """Return how many sines and cosines there are; `in_pairs` counts one for both of an angle."""
-    waves = [n for n in live(values) if n.operation in ("sin", "cos") and not n.is_parametric]
-    return len({wave.arguments[0] for wave in waves}) if in_pairs else len(waves)
+def _waves(nodes: Sequence[Expression]) -> list[Expression]:
+    """Return the sines and cosines of what varies."""
+    return [n for n in nodes if n.operation in ("sin", "cos") and not n.is_parametric]
 
 
 def _candidates(assembly: Assembly, method: Method | None, is_tree: bool) -> Iterator[tuple[Method, list[Expression]]]:
@@ -155,7 +156,7 @@ def _candidates(assembly: Assembly, method: Method | None, is_tree: bool) -> Ite
                 if found is None:
                     return
                 yield name, found
-                if _waves(found) <= 2 * len(tree.angles):
+                if len(_waves(live(found))) <= 2 * len(tree.angles):
                     if name == "joint forces" and len(tree.u) > _FEW and tree.rewrites:
                         return  # nothing can be much shorter
                     break
@@ -212,14 +213,12 @@ def _solve_in_order(entries: Mapping[tuple[int, int], Expression], right: Sequen
 
 def _is_tree(assembly: Assembly) -> bool:
     """Return whether the joints of a mechanism form a tree in which each takes away freedom of its own."""
-    reduced, maximal = assembly.reduced, assembly.maximal
-    return (
-        not reduced.eliminated
-        and not reduced.solved_speeds
-        and not reduced.forest.loop_joints
-        and bool(maximal.constraints or maximal.orientation_coordinates)
-        and len(reduced.speeds) == len(maximal.speeds) - len(maximal.constraints)
-    )
+    reduced = assembly.reduced
+    if reduced.eliminated or reduced.solved_speeds or reduced.forest.loop_joints:
+        return False
+    maximal = assembly.maximal
+    has_joints = bool(maximal.constraints or maximal.orientation_coordinates)
+    return has_joints and len(reduced.speeds) == len(maximal.speeds) - len(maximal.constraints)
 
 
 class _Tree:

@@ -25,7 +25,7 @@ from atwood.forms.quantities import with_reactions
 from atwood.forms.reassembly import follow, other_mode, recipe, with_flat
 from atwood.forms.residuals import dae_form, keep_constraints, reduced_form
 from atwood.lazy_dataclasses import dataclass, replace
-from atwood.mechanics.build import build_equations
+from atwood.mechanics.build import build_equations, resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import Mechanism, discrete_states_of
 from atwood.mechanics.outputs.observables import Observable, observe
@@ -183,9 +183,16 @@ class Assembly:
     def relations(self) -> tuple[Relation, ...]:
         """The relations of functions of time alone, whose values are the last parameters."""
         _ = self.own_equations  # in which the last of them are met: those of inputs that are linked to outputs
-        if self.mechanism.links:
+        if self.mechanism.links and (self.form == "dae" or self._has_timed_inputs()):
             _ = self.regular, self.maximal
         return tuple(self.mechanism.relations.found)
+
+    def _has_timed_inputs(self) -> bool:
+        """Return whether an input is linked to what is a function of time alone, as it then is in other coordinates."""
+        relations, equations = self.mechanism.relations, self.reduced
+        with self.shared.lock, relations.reading():
+            found = resolve_signals(self.mechanism, equations.site, equations.kinematics)
+            return any(relations.are_timed(value) for value in found.values())
 
     @cached_property
     def relation_values(self) -> tuple[float, ...]:

@@ -285,6 +285,9 @@ def build(graph: Graph, operation: str, arguments: Sequence[Expression], payload
 
     A ``solve`` node is returned as it stands; simplify it through :func:`solve`.
     """
+    builder = _BINARY_BUILDERS.get(operation)
+    if builder is not None:
+        return builder(arguments[0], arguments[1])
     if operation in UNARY:
         return unary(operation, arguments[0])
     if operation in BINARY:

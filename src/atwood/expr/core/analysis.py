@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from operator import attrgetter
 from typing import Any
 
 from atwood.clock import check_time
@@ -14,6 +15,8 @@ from atwood.errors import AtwoodError
 from atwood.expr.core import algebra
 from atwood.expr.core.graph import Expression, Graph
 from atwood.expr.core.operations import BINARY, LEAVES, UNARY, UNCOUNTED, solve_or_nan
+
+_INDEX = attrgetter("index")
 
 
 def live(outputs: Iterable[Expression | float]) -> list[Expression]:
@@ -29,16 +32,15 @@ def live(outputs: Iterable[Expression | float]) -> list[Expression]:
     for output in stack:
         if output.graph is not stack[0].graph:
             raise AtwoodError("the outputs belong to different graphs")
-    found = {output.index: output for output in stack}
-    stack = list(found.values())
+    found = set(stack)
+    add, pop, push = found.add, stack.pop, stack.append
     while stack:
-        for node in stack.pop().arguments:
-            index = node.index
-            if index not in found:
-                found[index] = node
+        for node in pop().arguments:
+            if node not in found:
+                add(node)
                 if node.arguments:
-                    stack.append(node)
-    return [found[index] for index in sorted(found)]
+                    push(node)
+    return sorted(found, key=_INDEX)
 
 
 def dependents(nodes: Sequence[Expression], roots: Iterable[Expression]) -> set[int]:
@@ -114,7 +116,11 @@ def count_operations(outputs: Sequence[Expression | float], parameters: Collecti
     dict
         Counts by the name of the operation, such as ``{"add": 2, "sin": 1}``, without those that are zero.
     """
-    nodes = live(outputs)
+    return count_nodes(live(outputs), parameters)
+
+
+def count_nodes(nodes: Sequence[Expression], parameters: Collection[Expression] = ()) -> dict[str, int]:
+    """Return the same for all nodes that outputs need, arguments before users."""
     needed = varying(nodes, parameters)
     counts = Counter(node.operation for node in nodes if node.index in needed and node.operation not in UNCOUNTED)
     return dict(sorted(counts.items()))
@@ -173,6 +179,7 @@ def _graph_of(outputs: Sequence[Expression | float], mapping: Mapping[Expression
 def evaluate(
     outputs: Sequence[Expression | float],
     values: Mapping[Expression, float] | Mapping[str, float] | Mapping[Expression | str, float],
+    nodes: Sequence[Expression] | None = None,
 ) -> list[float]:
     """Return the values of expressions, one node at a time: the reference for compiled programs.
 
@@ -182,6 +189,8 @@ def evaluate(
         The expressions to evaluate.
     values
         The value of every symbol that they need, by symbol or by name.
+    nodes
+        What is live in the expressions, where that is known.
 
     Returns
     -------
@@ -191,7 +200,7 @@ def evaluate(
     given: Mapping[Any, float] = values  # a large scene has many, of which few are asked for
     known: dict[int, float] = {}
     unknowns: dict[int, list[float]] = {}
-    for node in live(outputs):
+    for node in live(outputs) if nodes is None else nodes:
         value = given.get(node)
         if value is None and node.operation == "symbol":
             value = given.get(node.name)

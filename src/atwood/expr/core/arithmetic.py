@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     from atwood.expr.core.graph import Expression
 
 
+_SIGNED = frozenset({"neg", "mul", "div"})
+"""What may be the opposite of something plainer, or have a factor; nothing else is looked at for these."""
+
+
 def add(a: Expression, b: Expression) -> Expression:
     """Return ``a + b``."""
     if b.operation == "constant":
@@ -21,17 +25,18 @@ def add(a: Expression, b: Expression) -> Expression:
         if b.operation == "constant":
             return graph.constant(a.payload + b.payload)
         return _shift(a.payload, b)
-    if a.operation == "neg" and b.operation == "neg":
-        return negate(add(a.arguments[0], b.arguments[0]))
-    opposite = plainer_opposite(b)
-    if opposite is not None:
-        return subtract(a, opposite)
-    opposite = plainer_opposite(a)
-    if opposite is not None:
-        return subtract(b, opposite)
-    merged = _merge(a, b, 1.0)
-    if merged is not None:
-        return merged
+    if a is b or a.operation in _SIGNED or b.operation in _SIGNED:
+        if a.operation == "neg" and b.operation == "neg":
+            return negate(add(a.arguments[0], b.arguments[0]))
+        opposite = plainer_opposite(b)
+        if opposite is not None:
+            return subtract(a, opposite)
+        opposite = plainer_opposite(a)
+        if opposite is not None:
+            return subtract(b, opposite)
+        merged = _merge(a, b, 1.0)
+        if merged is not None:
+            return merged
     if a.operation == "sub" and a.arguments[1] is b:
         return a.arguments[0]
     if b.operation == "sub" and b.arguments[1] is a:
@@ -48,17 +53,18 @@ def subtract(a: Expression, b: Expression) -> Expression:
         return graph.zero
     if a.operation == "constant":
         return _shift_minus(a.payload, b)
-    opposite = plainer_opposite(b)
-    if opposite is not None:
-        return add(a, opposite)
-    if a.operation == "neg":
-        opposite = negate(b)
-        if opposite.operation != "neg":
-            return subtract(opposite, a.arguments[0])
-        return negate(add(a.arguments[0], b))
-    merged = _merge(a, b, -1.0)
-    if merged is not None:
-        return merged
+    if a.operation in _SIGNED or b.operation in _SIGNED:
+        opposite = plainer_opposite(b)
+        if opposite is not None:
+            return add(a, opposite)
+        if a.operation == "neg":
+            opposite = negate(b)
+            if opposite.operation != "neg":
+                return subtract(opposite, a.arguments[0])
+            return negate(add(a.arguments[0], b))
+        merged = _merge(a, b, -1.0)
+        if merged is not None:
+            return merged
     left = _without(a, b)
     if left is not None:
         return left
@@ -199,6 +205,8 @@ def multiply(a: Expression, b: Expression) -> Expression:
         found = _meet_known_products(known, other)
         if found is not None:
             return found
+        return graph.node("mul", _in_order(a, b))
+    if a.operation != "mul" and b.operation != "mul":
         return graph.node("mul", _in_order(a, b))
     for product, symbol in ((a, b), (b, a)):  # (x u) u is x (u u), whose square others share
         if symbol.operation == "symbol" and product.operation == "mul" and symbol in product.arguments:

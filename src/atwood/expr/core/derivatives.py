@@ -148,8 +148,8 @@ def _tangent(n: Expression, tangents: Mapping[int, Expression], seeds: Mapping[i
     moving = [(k, tangents[a.index]) for k, a in enumerate(arguments) if a.index in tangents]
     if not moving or operation in PIECEWISE_CONSTANT:
         return None
-    zero = n.graph.zero
     if operation == "select":
+        zero = n.graph.zero
         a, b = (tangents.get(argument.index, zero) for argument in arguments[1:])
         return select(arguments[0], a, b)
     if len(moving) == 2 and operation == "mul" and arguments[0] is arguments[1]:
@@ -163,8 +163,9 @@ def _tangent(n: Expression, tangents: Mapping[int, Expression], seeds: Mapping[i
         return divide(turn, _radius_square(n))
     if len(moving) == 2 and operation in ("minimum", "maximum"):
         return select(_chooses_first(n, operation), moving[0][1], moving[1][1])
-    total = zero
-    for position, t in moving:
+    (position, t), *others = moving
+    total = _partial(n, position, t)
+    for position, t in others:
         total = add(total, _partial(n, position, t))
     return total
 

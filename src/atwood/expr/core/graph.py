@@ -106,6 +106,8 @@ class Expression:
         return str(self.payload)
 
     def __add__(self, other: object) -> Expression:
+        if type(other) is Expression and other.graph is self.graph:
+            return algebra.add(self, other)
         b = _operand(self, other)
         return NotImplemented if b is None else algebra.add(self, b)
 
@@ -114,6 +116,8 @@ class Expression:
         return NotImplemented if a is None else algebra.add(a, self)
 
     def __sub__(self, other: object) -> Expression:
+        if type(other) is Expression and other.graph is self.graph:
+            return algebra.subtract(self, other)
         b = _operand(self, other)
         return NotImplemented if b is None else algebra.subtract(self, b)
 
@@ -122,6 +126,8 @@ class Expression:
         return NotImplemented if a is None else algebra.subtract(a, self)
 
     def __mul__(self, other: object) -> Expression:
+        if type(other) is Expression and other.graph is self.graph:
+            return algebra.multiply(self, other)
         b = _operand(self, other)
         return NotImplemented if b is None else algebra.multiply(self, b)
 

@@ -14,8 +14,11 @@ from heapq import heapify, heappop, heappush
 from itertools import combinations
 from typing import TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
 from atwood.expr.core import algebra
-from atwood.expr.core.analysis import count_operations, live, varying
+from atwood.expr.core.analysis import count_nodes, live, varying
 from atwood.expr.core.graph import Expression, Graph
 from atwood.expr.core.operations import UNCOUNTED
 from atwood.expr.simplify.polynomial import (
@@ -53,7 +56,12 @@ def cost(rows: Sequence[Expression], parameters: Collection[Expression]) -> int:
     Additions, subtractions, multiplications and negations count 1, divisions 4, square roots 6, everything else 12;
     what depends on parameters alone counts nothing.
     """
-    return sum(_WEIGHTS.get(kind, _OTHER_WEIGHT) * count for kind, count in count_operations(rows, parameters).items())
+    return cost_of_nodes(live(rows), parameters)
+
+
+def cost_of_nodes(nodes: Sequence[Expression], parameters: Collection[Expression]) -> int:
+    """Return the same for all nodes that rows need, arguments before users."""
+    return sum(_WEIGHTS.get(kind, _OTHER_WEIGHT) * count for kind, count in count_nodes(nodes, parameters).items())
 
 
 def collect(
@@ -104,24 +112,37 @@ def _mix(
     if len(best) * len(found) * lowest > _MIXING_EFFORT:
         return best
     versions = [list(dict.fromkeys(candidate[row] for candidate in found)) for row in range(len(best))]
-    every = live([one for several in versions for one in several])
-    needed = varying(every, parameters)
-    weights = {
-        node.index: _WEIGHTS.get(node.operation, _OTHER_WEIGHT)
-        for node in every
-        if node.index in needed and node.operation not in UNCOUNTED
-    }
-    counted = {
-        one: {node.index for node in live([one]) if node.index in weights} for several in versions for one in several
-    }
+    different = list(dict.fromkeys(one for several in versions for one in several))
+    place = {one: k for k, one in enumerate(different)}
+    weights, has = _weights_of(different, parameters)
     for row, several in enumerate(versions):
-        others = set[int]().union(*(counted[one] for k, one in enumerate(best) if k != row))
-        rest = sum(map(weights.__getitem__, others))
+        others = has[:, [place[one] for k, one in enumerate(best) if k != row]].any(axis=1)
         for version in several:
-            price = rest + sum(map(weights.__getitem__, counted[version] - others))
+            price = int(weights @ (others | has[:, place[version]]))
             if price < lowest:
                 best, lowest = [*best[:row], version, *best[row + 1 :]], price
     return best
+
+
+def _weights_of(
+    values: Sequence[Expression], parameters: Collection[Expression]
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Return what each operation behind values costs, and which values need it, shape (operations, values)."""
+    nodes = live(values)
+    needed = varying(nodes, parameters)
+    users = dict.fromkeys((node.index for node in nodes), 0)  # a bit for each value
+    for k, one in enumerate(values):
+        users[one.index] |= 1 << k
+    weights, found, size = [], [], len(values) // 8 + 1
+    for node in reversed(nodes):
+        own = users[node.index]
+        for argument in node.arguments:
+            users[argument.index] |= own
+        if node.index in needed and node.operation not in UNCOUNTED:
+            weights.append(_WEIGHTS.get(node.operation, _OTHER_WEIGHT))
+            found.append(own.to_bytes(size, "little"))
+    bits = np.frombuffer(b"".join(found), dtype=np.uint8).reshape(len(found), size)
+    return np.array(weights, dtype=np.int64), np.unpackbits(bits, axis=1, bitorder="little").astype(bool)
 
 
 def _candidates(
@@ -133,9 +154,12 @@ def _candidates(
     effort: Effort | None,
 ) -> Iterator[list[Expression]]:
     """Yield the rows written in other ways."""
+    spent = Effort(_BUDGET, effort)
     try:
-        expansion = expand(rows, angles, parameters, limit, Effort(_BUDGET, effort))
+        expansion = expand(rows, angles, parameters, limit, spent)
     except TooLargeError:
+        if spent.left >= 0:
+            return  # it has too many terms, of which coefficients that are taken whole leave no fewer
         try:
             expansion = expand(rows, angles, parameters, limit, Effort(_BUDGET, effort), _LONGEST)
         except TooLargeError:
@@ -151,10 +175,13 @@ def _candidates(
             expansion.spend(_WRITTEN * sum(map(volume, normal_form)))
         except TooLargeError:
             return
+        before, versions = None, list[list[Expression]]()
         for single_angles in (False, True):
             emitter = Emitter(rows[0].graph, expansion, single_angles, written)
             split = [terms_of(emitter, polynomial) for polynomial in normal_form]
-            yield from _written(emitter, split)
+            if split != before:
+                before, versions = split, list(_written(emitter, split))
+            yield from versions
 
 
 def _written(emitter: Emitter, rows: Sequence[Sequence[Term]]) -> Iterator[list[Expression]]:

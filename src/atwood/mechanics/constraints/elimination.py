@@ -211,12 +211,13 @@ def rounds_to_zero(
     if all(one.is_constant for one in expressions):
         return np.array([one.is_zero for one in expressions], dtype=bool)
     where = place if isinstance(place, RoughPlace) else rough_place(place or {})
-    read = [node for node in live(expressions) if node.is_symbol]
+    nodes = live(expressions)
+    read = [node for node in nodes if node.is_symbol]
     own, moving = ([one for one in read if one in known] for known in (parameters, where.rows))
     held = np.array([parameters[one] for one in own])
-    ways = RoughProgram((own, moving), list(expressions))(held, where.near[[where.rows[one] for one in moving]])
+    ways = RoughProgram((own, moving), list(expressions), nodes)(held, where.near[[where.rows[one] for one in moving]])
     known = {**{one: parameters[one] for one in own}, **{one: where.values[one] for one in moving}}
-    numbers = np.abs(evaluate(expressions, known))
+    numbers = np.abs(evaluate(expressions, known, nodes))
     spread = np.maximum(np.ptp(ways, axis=1), ROUGHNESS * numbers)  # not finite next to a place without a value
     return np.array((numbers <= tolerances.CERTAIN * spread) & np.isfinite(spread), dtype=bool)
 

@@ -117,10 +117,10 @@ class Places:
 
     def values(self, mechanism: Mechanism, expressions: Sequence[Expression]) -> FloatArray:
         """Return expressions at the places where all have values, one row each."""
-        found = []
+        found, nodes = [], live(expressions)
         for place in self._places(mechanism):
             try:
-                numbers = evaluate(expressions, {**mechanism.table.values, **place})
+                numbers = evaluate(expressions, {**mechanism.table.values, **place}, nodes)
             except (AtwoodError, ArithmeticError):
                 continue
             if np.all(np.isfinite(numbers)):

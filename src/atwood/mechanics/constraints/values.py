@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from atwood.errors import UnsupportedError
-from atwood.expr import Expression, depends_on, jvp, live
+from atwood.expr import Expression, depends_on, jacobian, jvp, live
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.dynamics.equations import Constraint, ContactRow, Integral, constraint_levels
 from atwood.mechanics.dynamics.forces import (
     PlacedPart,
+    RatesOfSymbols,
     Site,
     in_body,
     in_coordinates,
@@ -97,7 +98,8 @@ def levels(
     mechanism: Mechanism, site: Site, state: Movement, chosen: Values, placed: Sequence[Expression]
 ) -> list[Constraint]:
     """Return holonomic constraints with their time derivatives."""
-    found = []
+    found: list[Constraint] = []
+    moving: dict[str, RatesOfSymbols] = {}
     by_parts = mechanism.space.is_spatial
     symbols = (state.coordinates, state.rates, state.speeds, state.accelerations)
     rates, seconds = constraint_levels([] if by_parts else placed, mechanism.time, *symbols)
@@ -105,8 +107,9 @@ def levels(
         if by_parts:
             part = place_part(site, mechanism.locals_[path], state.kinematics)
             rate = _rate_by_gradients(part, one, mechanism.time)
-            along, _ = rates_of_symbols(part)
-            second = _differentiated(part, jvp([one.value], along)[0])
+            if path not in moving:
+                moving[path] = rates_of_symbols(part)
+            second = _differentiated(part, jvp([one.value], moving[path][0])[0], moving[path])
         else:
             rate, second = rates[number], seconds[number]
         key = (path, one.law.name, one.index)
@@ -166,8 +169,7 @@ def contact_rows(
 
 def _check_affine(path: str, local: LocalPart, one: LocalConstraint) -> None:
     velocities = [s for connector in local.connectors.values() for s in (*connector.velocity, *connector.spin)]
-    gradients = [gradient for velocity in velocities for gradient in jvp([one.value], {velocity: 1.0})]
-    if depends_on(gradients, velocities):
+    if depends_on(jacobian([one.value], velocities).entries, velocities):
         raise UnsupportedError(
             "a velocity constraint must be linear in the velocities",
             where=f"{path}.{one.law.name}",
@@ -193,11 +195,11 @@ def _rate_by_gradients(part: PlacedPart, one: LocalConstraint, time: Expression)
     return total
 
 
-def _differentiated(part: PlacedPart, value: Expression) -> Expression:
+def _differentiated(part: PlacedPart, value: Expression, rates_of: RatesOfSymbols | None = None) -> Expression:
     """Return the time derivative of an expression of local positions, orientations, velocities and states, in place."""
-    along, placed = rates_of_symbols(part)
+    along, placed = rates_of_symbols(part) if rates_of is None else rates_of
     states = part.local.states
     if depends_on(value, [one.symbol for one in states]):
         rates, _ = in_joint_coordinates(part.local, part.kinematics, [one.rate for one in states])
-        along.update((one.symbol, rate) for one, rate in zip(states, rates, strict=True))
+        along = {**along, **dict(zip((one.symbol for one in states), rates, strict=True))}
     return replace(part, mapping={**part.mapping, **placed}).put(jvp([value], along))[0]

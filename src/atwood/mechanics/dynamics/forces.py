@@ -74,6 +74,8 @@ class Site:
         The mechanism.
     node_turns
         How each node is turned from its body.
+    placed
+        What the symbols of parts stand for, by path, as they were last placed: many laws of a part ask for it.
     """
 
     graph: Graph
@@ -81,6 +83,9 @@ class Site:
     bodies: Bodies
     space: Space
     node_turns: Mapping[int, NodeTurn]
+    placed: dict[str, tuple[LocalPart, Kinematics, dict[Expression, Expression]]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     def node(self, path: str, connector: str) -> int:
         """Return the node of a connector."""
@@ -109,6 +114,17 @@ def place_part(
     site: Site, local: LocalPart, kinematics: Kinematics, signals: Mapping[Expression, Expression] | None = None
 ) -> PlacedPart:
     """Return a part in place, with what its linked inputs stand for."""
+    known = site.placed.get(local.part.path)
+    if known is not None and known[0] is local and known[1] is kinematics:
+        found = known[2]
+    else:
+        found = _stand_for(site, local, kinematics)
+        site.placed[local.part.path] = local, kinematics, found
+    return PlacedPart(site, local, kinematics, {**found, **(signals or {})})
+
+
+def _stand_for(site: Site, local: LocalPart, kinematics: Kinematics) -> dict[Expression, Expression]:
+    """Return what the symbols of connectors and joint coordinates of a part stand for."""
     path = local.part.path
     found: dict[Expression, Expression] = {}
     for name, symbols in local.connectors.items():
@@ -133,7 +149,7 @@ def place_part(
             found[symbol] = kinematics.placements.joint_coordinates[symbol]
         if symbol in kinematics.joint_rates:
             found[rate_symbol(symbol)] = kinematics.joint_rates[symbol]
-    return PlacedPart(site, local, kinematics, {**found, **(signals or {})})
+    return found
 
 
 def rate_symbol(coordinate: Expression) -> Expression:
@@ -234,7 +250,10 @@ def _add_lagrangians(part: PlacedPart, forces: Forces) -> None:
             _push_mapped(part, name, gradients, torques, forces)
 
 
-def rates_of_symbols(part: PlacedPart) -> tuple[dict[Expression, Expression | float], dict[Expression, Expression]]:
+RatesOfSymbols = tuple[dict[Expression, Expression | float], dict[Expression, Expression]]
+
+
+def rates_of_symbols(part: PlacedPart) -> RatesOfSymbols:
     """Return the time derivative of each local symbol, with symbols for accelerations, and what these stand for."""
     site, local, kinematics = part.site, part.local, part.kinematics
     graph, path = site.graph, local.part.path

@@ -12,7 +12,7 @@ from atwood.arrays import FloatArray
 from atwood.clock import GRACE, Clock, TimeIsUp
 from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
-from atwood.forms.caches import Key, Shared
+from atwood.forms.caches import Key, Shared, without_collection
 from atwood.forms.loose import has_touched, is_loose, kept_touching
 from atwood.integrators.protocol import Statistics
 from atwood.lazy_dataclasses import replace
@@ -369,7 +369,7 @@ class Walk:
 
     def prepare(self) -> None:
         """Make all that is needed in the present mode, and between two time events, if it is not there."""
-        with stage("preparation"):
+        with stage("preparation"), without_collection():
             self._prepare()
 
     def _prepare(self) -> None:
