@@ -35,13 +35,19 @@ T = TypeVar("T")
 
 @contextmanager
 def without_collection() -> Iterator[None]:
-    """Leave cycles of objects alone: graphs of expressions have none, and to look for them is a sixth of deriving."""
+    """Leave cycles of objects alone: graphs of expressions have none, and to look for them is a sixth of deriving.
+
+    What was made meanwhile counts as old afterwards. Else the next object that is made would begin to look through it.
+    """
     was_enabled = gc.isenabled()
     gc.disable()
     try:
         yield
     finally:
         if was_enabled:
+            if not gc.get_freeze_count():  # what somebody has frozen stays so
+                gc.freeze()
+                gc.unfreeze()
             gc.enable()
 
 
