@@ -163,6 +163,14 @@ def assembly_of(scene: Model | Assembly, name: str | None = None, **asked: str |
     return scene
 
 
+def scene_of(assembly: Assembly, advice: str = "") -> Model:
+    """Return the scene that an assembly was made of; refuse one that was made of leaves alone."""
+    if assembly.source is None or assembly.source.scene is None:
+        message = "it was assembled from leaves, so that its scene is not known"
+        raise UsageError(message, where=assembly.flat.name, advice=advice)
+    return assembly.source.scene
+
+
 def smooth_assembly_of(scene: Model | Assembly, **asked: str | None) -> Assembly:
     """Return the same for what reads equations that hold everywhere; see `refuse_contacts`."""
     assembly = assembly_of(scene, **asked)

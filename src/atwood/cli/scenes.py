@@ -16,7 +16,7 @@ from typing import Any
 
 from atwood.cli.output import warn
 from atwood.errors import AtwoodError, UsageError, near_matches, suggestion
-from atwood.model.compose.composite import Model
+from atwood.model.compose.composite import Model, owner_of
 from atwood.model.compose.scene import Scene
 from atwood.model.compose.serialization import all_libraries, declared_libraries
 from atwood.model.local.flatten import unit_at
@@ -126,9 +126,8 @@ def check_applies(scene: Model, form: str, level: str, orientation: str = "quate
 
 def warn_of_radians(scene: Model, path: str, values: Iterable[object], option: str, typed: str) -> None:
     """Say that an angle without a unit is in radians, where it is beyond a turn, as degrees mostly are."""
-    owner, _, name = path.rpartition(".")
     if option in ("--set", "--vary"):
-        part = scene[owner] if owner else scene
+        part, name = owner_of(scene, path)
         unit = part.parameter_specs()[name].unit if name in part.parameter_specs() else None
     else:
         unit = unit_at(scene, path)

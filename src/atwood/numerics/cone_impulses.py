@@ -64,14 +64,12 @@ class Touches(NamedTuple):
 
     def rates(self, v: FloatArray) -> FloatArray:
         """Return how fast contacts open, and slip, at speeds of all bodies, shape (rows, contacts)."""
-        found: FloatArray = np.einsum("scrk,sck->rc", self.slopes, v[self.bodies])
-        return found
+        return np.asarray(np.einsum("scrk,sck->rc", self.slopes, v[self.bodies]))
 
     @property
     def moves(self) -> FloatArray:
         """The speeds of both bodies by a unit of each impulse, shaped as the slopes."""
-        found: FloatArray = self.slopes @ self.inverse[self.bodies]
-        return found
+        return np.asarray(self.slopes @ self.inverse[self.bodies])
 
     def compliance(self, moves: FloatArray) -> FloatArray:
         """Return how the rates change by a unit of their own impulses, and slips at most, shape (2, contacts)."""
@@ -181,8 +179,7 @@ def _nearer(touches: Touches, moves: FloatArray, free: FloatArray, p: FloatArray
         if found is None:
             break
         now, (gap, ahead) = found
-    projected: FloatArray = _projected(now.T, mu)
-    return projected
+    return np.asarray(_projected(now.T, mu))
 
 
 @once

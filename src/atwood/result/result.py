@@ -227,8 +227,7 @@ class Result(Trajectories):
     @cached_property
     def time(self) -> FloatArray:
         """Output times, s."""
-        times: FloatArray = self._all_time[self._shown]
-        return times
+        return np.asarray(self._all_time[self._shown])
 
     @cached_property
     def _all_time(self) -> FloatArray:

@@ -25,6 +25,8 @@ from atwood.expr import depends_on
 from atwood.forms.assembly import Assembly
 from atwood.integrators.batch import Batch
 from atwood.lazy_dataclasses import dataclass
+from atwood.model.compose.composite import owner_of
+from atwood.pipeline import scene_of
 from atwood.result.result import Result
 from atwood.simulation.events.modes import find_event_functions
 from atwood.simulation.initialization.start import Start, find_start
@@ -99,10 +101,7 @@ def make_plant(
     rtol: float,
 ) -> Plant | WalkedPlant:
     """Compile a scene for actions; what machine code cannot go on with many at a time is walked."""
-    assert assembly.source is not None
-    scene = assembly.source.scene
-    if scene is None:
-        raise UsageError("it was assembled from leaves, so that its scene is not known", where=assembly.flat.name)
+    scene = scene_of(assembly)
     if not actions:
         advice = "Give paths of parameters with the least and the largest value: {'push.value': (-10.0, 10.0)}."
         raise UsageError("it has no actions", where="Environment", advice=advice)
@@ -159,8 +158,7 @@ def _bounds(scene: Any, path: str, given: Any) -> tuple[float, float]:
 
 def _number(scene: Any, path: str) -> float:
     """Return the number that a parameter is; nan if it is none."""
-    owner, _, name = path.rpartition(".")
-    part: Any = scene[owner] if owner else scene
+    part, name = owner_of(scene, path)
     value = part._value(name)
     return float(value) if isinstance(value, (int, float)) else math.nan
 

@@ -20,7 +20,7 @@ from atwood.errors import StartError, UnsupportedError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import find_observables
 from atwood.lazy_dataclasses import dataclass
-from atwood.model.compose.composite import Model
+from atwood.model.compose.composite import Model, owner_of
 from atwood.model.declare.component import Component
 from atwood.model.declare.field_functions import discrete_state, parameter
 from atwood.pipeline import assemble
@@ -75,8 +75,7 @@ def make_walked(assembly: Assembly, scene: Model, own: Mapping[str, float], reas
     """Return a scene whose actions, with their own values, feed inputs; `reason` says why it is walked."""
     scene, names = scene.copy(), []
     for k, (path, value) in enumerate(own.items()):
-        owner, _, name = path.rpartition(".")
-        part: Any = scene[owner] if owner else scene
+        part, name = owner_of(scene, path)
         if name not in part.signal_specs():
             said = f"it is no input of a part, as actions are where {reason}"
             raise UnsupportedError(said, where=path, advice="Let an input act, such as the value of a Force.")

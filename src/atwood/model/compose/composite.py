@@ -377,6 +377,12 @@ class Model(_State, Component):
         return twin
 
 
+def owner_of(model: Model, path: str) -> tuple[Any, str]:
+    """Return the component that a parameter is of, which may be the model itself, and the name of the parameter."""
+    owner, _, name = path.rpartition(".")
+    return (model[owner] if owner else model), name
+
+
 _SHOWN = 30
 """So many parts are listed in a notebook."""
 

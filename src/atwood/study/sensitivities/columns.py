@@ -23,7 +23,9 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.other_values import starting
 from atwood.forms.quantities import observer
 from atwood.lazy_dataclasses import dataclass
+from atwood.model.compose.composite import owner_of
 from atwood.model.declare.component import Component
+from atwood.pipeline import scene_of
 from atwood.simulation.dynamics.scales import scene_length
 from atwood.simulation.initialization.start import Start, find_start, own_state
 from atwood.simulation.initialization.system import sort_targets
@@ -126,12 +128,8 @@ def find_columns(
 
 def value_of(assembly: Assembly, path: str) -> tuple[Any, str]:
     """Return the value of a parameter in SI units, and its unit."""
-    assert assembly.source is not None
-    scene = assembly.source.scene
-    if scene is None:
-        raise UsageError("it was assembled from leaves, so that its scene is not known", where=assembly.flat.name)
-    owner, _, name = path.rpartition(".")
-    part = scene[owner] if owner else scene
+    scene = scene_of(assembly)
+    part, name = owner_of(scene, path)
     try:
         value = part._value(name)
     except (KeyError, AttributeError):

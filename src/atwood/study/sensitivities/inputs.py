@@ -22,7 +22,7 @@ from atwood.model.declare.component import Component
 from atwood.model.declare.field_functions import discrete_state, parameter
 from atwood.model.declare.laws import observable, update
 from atwood.model.values.units import parse_quantity
-from atwood.pipeline import assembly_of
+from atwood.pipeline import assembly_of, scene_of
 from atwood.study.sensitivities.columns import Column
 
 LINEAR, HELD = "linear", "held"
@@ -164,9 +164,7 @@ def with_inputs(
     given = dict(inputs) if isinstance(inputs, Mapping) else dict.fromkeys(inputs)
     if not given:
         return assembly, ()
-    if assembly.source is None or assembly.source.scene is None:
-        raise UsageError("it was assembled from leaves, so that its scene is not known", where=assembly.flat.name)
-    scene = assembly.source.scene.copy()
+    scene = scene_of(assembly).copy()
     found = []
     for number, (path, nodes) in enumerate(given.items()):
         owner, name, unit = _input_at(scene, path)

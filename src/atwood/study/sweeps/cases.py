@@ -14,7 +14,7 @@ from atwood.arguments import show
 from atwood.errors import UsageError
 from atwood.forms.other_values import change_scene
 from atwood.lazy_dataclasses import dataclass
-from atwood.model.compose.composite import Model
+from atwood.model.compose.composite import Model, owner_of
 from atwood.model.compose.scene import Scene
 from atwood.model.local.flatten import flatten
 
@@ -138,8 +138,8 @@ def _parameter_value(trial: Model, path: str, value: Any) -> Any:
     if path in _OWN:
         raise UsageError("this is the same for all runs of a sweep", where=path, advice="Give it to sweep itself.")
     trial.set(path, value)
-    owner, _, name = path.rpartition(".")
-    return (trial[owner] if owner else trial)._value(name)
+    part, name = owner_of(trial, path)
+    return part._value(name)
 
 
 def _start_value(trial: Model, path: str, value: Any) -> float:

@@ -21,6 +21,7 @@ from atwood.errors import UsageError
 from atwood.files import read_checked, write_atomically
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.serialization import to_data
+from atwood.pipeline import scene_of
 from atwood.result.about import versions
 from atwood.study.sweeps.runs import DIED, Records, SweepRequest
 
@@ -112,8 +113,6 @@ def _mapped(file: Path, shape: tuple[int, ...]) -> FloatArray:
 def _identity(request: SweepRequest) -> dict[str, Any]:
     """Return what makes a sweep this one and no other, in the order in which differences are told."""
     assembly, options = request.assembly, request.options
-    assert assembly.source is not None
-    assert assembly.source.scene is not None
     for one in options.conditions:
         if not isinstance(one.given, str):
             advice = "Write the condition as text."
@@ -123,7 +122,7 @@ def _identity(request: SweepRequest) -> dict[str, Any]:
     kinds = {type(part.component) for part in assembly.flat.parts.values()}
     return {
         "version of Atwood": versions()["atwood"],
-        "scene": _digest(json.dumps(to_data(assembly.source.scene)["scene"], sort_keys=True)),
+        "scene": _digest(json.dumps(to_data(scene_of(assembly))["scene"], sort_keys=True)),
         "class of a part": {f"{one.__module__}.{one.__qualname__}": _source(one) for one in sorted(kinds, key=str)},
         "form": f"{assembly.form} {assembly.level}".strip(),
         **{f"list of values of {axis.path}": _axis(request, k) for k, axis in enumerate(request.cases.axes)},

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arguments import BY_PATH, FILE, one_of, optional, takes, whole
-from atwood.errors import AtwoodError, TopologyError, UsageError
+from atwood.errors import AtwoodError, TopologyError
 from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import find_observables
 from atwood.lazy_dataclasses import dataclass, replace
-from atwood.model.compose.composite import Model
+from atwood.model.compose.composite import Model, owner_of
 from atwood.model.declare.connectors import PATHS
-from atwood.pipeline import SCENE, assembly_of
+from atwood.pipeline import SCENE, assembly_of, scene_of
 from atwood.progress import told
 from atwood.ranges import values_of
 from atwood.simulation.problem.arguments import (
@@ -178,9 +178,7 @@ def sweep(
     check_solver(solver)
     refuse_two_accuracies(accuracy, rtol, None, None)
     assembly = assembly_of(scene, name, form=form, level=level)
-    source = assembly.source.scene if assembly.source is not None else None
-    if source is None:
-        raise UsageError("it was assembled from leaves, so that its scene is not known", where=assembly.flat.name)
+    source = scene_of(assembly)
     vary, start, design_of = sampled(vary, start, design, runs, seed)
     cases = make_cases(source, vary, start, "list" if design_of else combine)
     first = _first(assembly, cases)
@@ -325,8 +323,5 @@ def _unit(assembly: Assembly, path: str, is_start: bool) -> str:
     """Return the SI unit of what is varied."""
     if is_start:
         return assembly.start_observables[path].unit
-    assert assembly.source is not None
-    assert assembly.source.scene is not None
-    owner, _, name = path.rpartition(".")
-    part = assembly.source.scene[owner] if owner else assembly.source.scene
+    part, name = owner_of(scene_of(assembly), path)
     return str(part._field(name).unit.text)

@@ -16,11 +16,11 @@ from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.program import state_groups
 from atwood.lazy_dataclasses import dataclass
-from atwood.model.compose.composite import Model
+from atwood.model.compose.composite import Model, owner_of
 from atwood.model.values.units import parse_quantity, parse_unit
 from atwood.numerics.matrices import or_one
 from atwood.numerics.newton import Missing, newton
-from atwood.pipeline import SCENE, smooth_assembly_of
+from atwood.pipeline import SCENE, scene_of, smooth_assembly_of
 from atwood.theory.dynamics.dynamics import Dynamics
 from atwood.theory.dynamics.functions import Function
 from atwood.tolerances import tolerances
@@ -142,9 +142,7 @@ class _Problem:
 
     def begin(self) -> FloatArray:
         """Return the unknowns as the scene has them."""
-        scene = self.first.source.scene if self.first.source is not None else None
-        if scene is None:
-            raise UsageError("it was assembled from leaves, so that its scene is not known", where=self.first.flat.name)
+        scene = scene_of(self.first)
         starts = self._quantities(
             self.first, [path for path, own in zip(self.unknowns, self.is_start, strict=True) if own]
         )
@@ -153,8 +151,7 @@ class _Problem:
             if own:
                 found.append(starts[path])
                 continue
-            owner, _, name = path.rpartition(".")
-            value = getattr(scene[owner] if owner else scene, name, None)
+            value = getattr(*owner_of(scene, path), None)
             if not isinstance(value, (int, float)):
                 raise UsageError(
                     "it is no parameter with a number, and no quantity to start with",

@@ -19,7 +19,7 @@ from atwood.model.local.bound import variation_names
 from atwood.model.local.flatten import FlatScene
 from atwood.numerics.matrices import to_array
 from atwood.numerics.rank import decompose, lost_rank
-from atwood.pipeline import assemble, assemble_flat
+from atwood.pipeline import assemble, assemble_flat, scene_of
 from atwood.result.result import Result
 from atwood.simulation.contacts.chosen import has_contacts, in_set, refuse_border, set_at, state_in_set
 from atwood.simulation.dynamics.balance import balance_of
@@ -122,9 +122,12 @@ def find_operating_point(scene: Model | Assembly, at: At, inputs: Sequence[str])
 
 def plain_assembly(scene: Model | Assembly) -> Assembly:
     """Return a scene in generalized coordinates with quaternions."""
-    if isinstance(scene, Assembly) and scene.orientation.kind == "quaternion":
-        return scene if scene.form == "reduced" else assemble(_scene_of(scene), name=scene.flat.name)
-    return assemble(_scene_of(scene) if isinstance(scene, Assembly) else scene)
+    if not isinstance(scene, Assembly):
+        return assemble(scene)
+    is_plain = scene.orientation.kind == "quaternion"
+    if is_plain and scene.form == "reduced":
+        return scene
+    return assemble(scene_of(scene, "Give the scene itself."), name=scene.flat.name if is_plain else None)
 
 
 def _in_set(
@@ -200,16 +203,6 @@ def _at_time(base: Assembly, result: Result, time: float, inputs: tuple[InputPat
 def moved_to(point: OperatingPoint, q: FloatArray, u: FloatArray) -> OperatingPoint:
     """Return another state of the same scene."""
     return replace(point, q=q, u=u, finding=point.scene.rank(point.t, q))
-
-
-def _scene_of(assembly: Assembly) -> Model:
-    if assembly.source is None or assembly.source.scene is None:
-        raise UsageError(
-            "it was assembled from leaves, so that its scene is not known",
-            where=assembly.flat.name,
-            advice="Give the scene itself.",
-        )
-    return assembly.source.scene
 
 
 def _linear_scene(assembly: Assembly, inputs: Sequence[InputPath]) -> LinearScene:
