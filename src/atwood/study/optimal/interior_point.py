@@ -139,11 +139,13 @@ class _Search:
             shift = max(8.0 * shift, 1e-4 * size)
         return None
 
-    def farthest(self, values: FloatArray, step: FloatArray) -> float:
-        """Return the share of a step that keeps values above zero."""
-        falls = step < 0.0
-        share = max(_FRACTION, 1.0 - self.barrier)
-        return float(min(1.0, np.min(-share * values[falls] / step[falls], initial=1.0)))
+    def farthest(self, values: tuple[FloatArray, FloatArray], steps: tuple[FloatArray, FloatArray]) -> float:
+        """Return the share of steps that keeps values above zero: those at lower bounds, and those at upper ones."""
+        share, found = max(_FRACTION, 1.0 - self.barrier), 1.0
+        for value, step, has in zip(values, steps, (self.below, self.above), strict=True):
+            falls = has & (step < 0.0)
+            found = min(found, float(np.min(-share * value[falls] / step[falls], initial=1.0)))
+        return found
 
     def take(self, gradient: FloatArray, jacobian: Any) -> bool:
         """Take a step; False where none leads on."""
@@ -152,9 +154,7 @@ class _Search:
             return False
         step, multipliers, factors = made
         low, high = self._gap(self.x)
-        longest = min(
-            self.farthest(low[self.below], step[self.below]), self.farthest(high[self.above], -step[self.above])
-        )
+        longest = self.farthest((low, high), (step, -step))
         slope = float((gradient - self.barrier * (self.below / low - self.above / high)) @ step)
         duals = (
             np.where(self.below, (self.barrier - self.duals[0] * step) / low, 0.0) - self.duals[0],
@@ -178,10 +178,7 @@ class _Search:
             _, c = self.problem.values(self.x + share * step)
             if np.all(np.isfinite(c)):
                 more = factors.solve(-np.concatenate([np.zeros(len(self.x)), c]))[: len(self.x)]
-                low, high = self._gap(self.x + share * step)
-                reach = min(
-                    self.farthest(low[self.below], more[self.below]), self.farthest(high[self.above], -more[self.above])
-                )
+                reach = self.farthest(self._gap(self.x + share * step), (more, -more))
                 yield self.x + share * step + reach * more
 
     def _is_better(self, theta: float, cost: float, slope: float, share: float, miss: float, trial: float) -> bool:
@@ -208,10 +205,7 @@ class _Search:
         if not self.cost(x, f) <= cost - 1e-8 * theta:
             self.filter.append((theta, cost))
         self.multipliers = self.multipliers + share * (multipliers - self.multipliers)
-        reach = min(
-            self.farthest(one[has], d[has])
-            for one, d, has in zip(self.duals, duals, (self.below, self.above), strict=True)
-        )
+        reach = self.farthest(self.duals, duals)
         self.x, self.f, self.c = x, f, c
         gaps = self._gap(x)
         found = []

@@ -7,6 +7,8 @@ cost depends on the number of sums, not on the number of parameters.
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 
 from atwood.arrays import FloatArray, IndexArray
@@ -79,6 +81,16 @@ class Adjoint(Passage):
             if len(one.times):
                 values.append(self._read(one, np.zeros((len(self.paths), len(one.times))))[0])
         return np.concatenate(values, axis=1)
+
+    def go(self) -> tuple[FloatArray, FloatArray]:
+        """Return values and derivatives of the quantities, by a way back for each quantity and output time."""
+        values = self.make()
+        found = np.empty((len(self.paths), len(self.columns), values.shape[1]))
+        for i, k in product(range(len(self.paths)), range(values.shape[1])):
+            weights = np.zeros(values.shape)
+            weights[i, k] = 1.0
+            found[i, :, k] = self.gradient(weights)
+        return values, found
 
     def gradient(self, weights: FloatArray) -> FloatArray:
         """Return the derivatives of a weighted sum of the quantities by the columns, times their scales.

@@ -22,7 +22,7 @@ from atwood.result.result import Result
 from atwood.simulation.events.sampling import refuse_updates
 from atwood.simulation.problem.arguments import FORM, OUTPUTS, RTOL, T_END
 from atwood.study.sensitivities.adjoint import Adjoint
-from atwood.study.sensitivities.columns import Column, find_columns
+from atwood.study.sensitivities.columns import find_columns
 from atwood.study.sensitivities.inputs import HELD, INPUTS, LINEAR, Driven, with_inputs
 from atwood.study.sensitivities.passage import Passage
 from atwood.table import Shown, Table, table
@@ -210,11 +210,11 @@ def derivatives_of(
     goes_back = mode == "adjoint" or (mode == "auto" and _DEARER * len(paths) * len(result.time) < len(columns))
     about = result, columns, paths, rtol, max_steps
     try:
-        values, found = (_gone_back if goes_back else _gone)(*about)
+        values, found = (Adjoint if goes_back else Passage)(*about).go()
     except UnsupportedError:
         if mode != "auto" or not goes_back:
             raise
-        values, found = _gone(*about)
+        values, found = Passage(*about).go()
     scales = np.array([one.scale for one in columns])
     units = {one.path: one.unit for one in find_observables(assembly, paths)}
     return Sensitivities(
@@ -231,23 +231,3 @@ def derivatives_of(
 
 _DEARER = 2
 """A way back costs as much as so many columns."""
-
-
-def _gone(
-    result: Result, columns: tuple[Column, ...], paths: tuple[str, ...], rtol: float, max_steps: int | None
-) -> tuple[FloatArray, FloatArray]:
-    return Passage(result, columns, paths, rtol, max_steps).go()
-
-
-def _gone_back(
-    result: Result, columns: tuple[Column, ...], paths: tuple[str, ...], rtol: float, max_steps: int | None
-) -> tuple[FloatArray, FloatArray]:
-    """Return values and derivatives, by a way back for each quantity and output time."""
-    adjoint = Adjoint(result, columns, paths, rtol, max_steps)
-    values = adjoint.make()
-    found = np.empty((len(paths), len(columns), values.shape[1]))
-    for i, k in product(range(len(paths)), range(values.shape[1])):
-        weights = np.zeros(values.shape)
-        weights[i, k] = 1.0
-        found[i, :, k] = adjoint.gradient(weights)
-    return values, found
