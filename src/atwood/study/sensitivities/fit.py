@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from atwood.arguments import ANYTHING, BY_PATH, PATHS, Kind, Refused, number, one_of, optional, takes, whole
 from atwood.arrays import FloatArray
+from atwood.display import data_of
 from atwood.errors import AtwoodError, SolveError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
@@ -136,17 +137,9 @@ class Fit(Shown):
 
     def to_data(self) -> dict[str, Any]:
         """Return it as plain data, for JSON; infinite errors are None."""
-        return {
-            "scene": self.scene,
-            "values": dict(self.values),
-            "errors": {path: one if np.isfinite(one) else None for path, one in self.errors.items()},
-            "units": dict(self.units),
-            "covariance": self.covariance.tolist(),
-            "undetermined": [dict(one) for one in self.undetermined],
-            "deviation": self.deviation,
-            "evaluations": self.evaluations,
-            "message": self.message,
-        }
+        errors = {path: one if np.isfinite(one) else None for path, one in self.errors.items()}
+        told = data_of(self, "units", "covariance", "undetermined", "deviation", "evaluations", "message")
+        return {**data_of(self, "scene", "values"), "errors": errors, **told}
 
 
 def _bounds(value: Any) -> dict[str, Any]:

@@ -183,20 +183,8 @@ class LinearModel(Shown):
 
     def to_data(self) -> dict[str, Any]:
         """Return it as plain data, for JSON."""
-        names = (
-            "scene",
-            "form",
-            "about",
-            "contacts",
-            "values",
-            "states",
-            "inputs",
-            "outputs",
-            "units",
-            *"ABCD",
-            "eigenvalues",
-        )
-        return data_of(self, *names)
+        about = data_of(self, "scene", "form", "about", "contacts", "values", "states", "inputs", "outputs", "units")
+        return {**about, **data_of(self, *"ABCD", "eigenvalues")}
 
     def tables(self) -> tuple[Table, ...]:
         """Return states, inputs, outputs and eigenvalues, and the matrices where there are few states."""

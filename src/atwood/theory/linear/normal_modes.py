@@ -258,20 +258,11 @@ def modes_of(point: OperatingPoint, is_steady: bool = False) -> NormalModes:
             raise not_steady(point, flow, steady)
         steady = still(flow)  # it keeps still in a scene that changes, as a load that is hoisted
     space = find_state_space(point.scene, flow, steady, point.kept)
-    found = find_modes(flow, space)
+    values, displacements = find_modes(flow, space)
     names = point.scene.tangents.names
-    shapes = tuple(dict(zip(names, map(complex, column), strict=True)) for column in found.shapes.T)
-    return NormalModes(
-        found.angular_frequencies,
-        found.growth_rates,
-        found.eigenvalues,
-        shapes,
-        found.spaces,
-        values_at(point),
-        point.assembly.flat.name,
-        point,
-        found.shapes,
-    )
+    shapes = tuple(dict(zip(names, map(complex, column), strict=True)) for column in displacements.T)
+    about = values_at(point), point.assembly.flat.name, point, displacements
+    return NormalModes(values.imag, values.real, values, shapes, _spaces(values), *about)
 
 
 _NO_VELOCITY = 1e-11
@@ -281,32 +272,12 @@ _LIKE = 1e-9
 """Relative: eigenvalues that differ by less belong to one space of shapes."""
 
 
-@dataclass(frozen=True, eq=False)
-class ModeValues:
-    """Modes of a linear model.
-
-    Attributes
-    ----------
-    angular_frequencies
-        rad/s, ascending; zero for those that do not oscillate.
-    growth_rates
-        Real parts of the eigenvalues, 1/s.
-    eigenvalues
-        Of each mode, that with the positive imaginary part.
-    shapes
-        Displacements of all coordinates, shape (displacements, modes); complex where velocity terms shift phases.
-    spaces
-        Numbers of modes that belong together, since their eigenvalues are equal: any combination is a mode as well.
-    """
-
-    angular_frequencies: FloatArray
-    growth_rates: FloatArray
-    eigenvalues: ComplexArray
-    shapes: ComplexArray
-    spaces: tuple[tuple[int, ...], ...]
+Modes = tuple[ComplexArray, ComplexArray]
+"""Of each mode the eigenvalue with the positive imaginary part, in the order of these; and the displacements of all
+coordinates, shape (displacements, modes), complex where velocity terms shift phases."""
 
 
-def find_modes(flow: Flow, space: StateSpace) -> ModeValues:
+def find_modes(flow: Flow, space: StateSpace) -> Modes:
     """Return the modes about a state."""
     minimal = space.minimal
     n, m = len(minimal.displacements), len(minimal.speeds)
@@ -323,7 +294,7 @@ def find_modes(flow: Flow, space: StateSpace) -> ModeValues:
     return _damped(space, n)
 
 
-def _undamped(flow: Flow, space: StateSpace) -> ModeValues | None:
+def _undamped(flow: Flow, space: StateSpace) -> Modes | None:
     """Return modes of a symmetric stiffness; None if it is not symmetric, as with follower forces."""
     minimal = space.minimal
     n = len(minimal.displacements)
@@ -345,13 +316,10 @@ def _undamped(flow: Flow, space: StateSpace) -> ModeValues | None:
     growth = np.sqrt(np.maximum(-squares, 0.0))
     order = np.argsort(frequencies, kind="stable")
     shapes = (minimal.shift[:, :n] @ vectors)[:, order]
-    frequencies, growth = frequencies[order], growth[order]
-    return ModeValues(
-        frequencies, growth, growth + 1j * frequencies, _scaled(shapes), _spaces(growth + 1j * frequencies)
-    )
+    return growth[order] + 1j * frequencies[order], _scaled(shapes)
 
 
-def _damped(space: StateSpace, n: int) -> ModeValues:
+def _damped(space: StateSpace, n: int) -> Modes:
     minimal = space.minimal
     matrix, error = space.matrix[:, : minimal.states], space.error[:, : minimal.states]
     spectrum = find_spectrum(matrix, error, space.sizes)
@@ -370,8 +338,7 @@ def _damped(space: StateSpace, n: int) -> ModeValues:
     values = np.concatenate([np.zeros(zeros, dtype=complex), values])
     shapes = np.hstack([free, shapes])
     order = np.lexsort((-values.real, np.round(values.imag, 12)))
-    values = values[order]
-    return ModeValues(values.imag, values.real, values, _scaled(shapes[:, order]), _spaces(values))
+    return values[order], _scaled(shapes[:, order])
 
 
 def _scaled(shapes: FloatArray | ComplexArray) -> ComplexArray:
