@@ -1,4 +1,4 @@
-"""What `atwood run` shows: how the run went, how accurate it is, and where it ends."""
+"""What `atwood run` shows: how the run went, how accurate it is, where it ends, and the energy of each component."""
 
 from __future__ import annotations
 
@@ -8,18 +8,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.cli.command import Request
-from atwood.cli.output import writer
+from atwood.cli.output import Writer, writer
 from atwood.cli.running import degrees_of_freedom, multiplier_labels
 from atwood.display import count_of, duration
 from atwood.forms.assembly import Assembly
 from atwood.result.about import solver_name
+from atwood.result.part_energy import PartEnergies, PartEnergy
 from atwood.result.result import Result
 from atwood.stages import STAGES
 from atwood.table import facts, table
 
 _ROWS = 16
+_MOST = 40  # components in the table of energies
 _NARROWEST, _WIDEST = 9, 32  # of a small picture of a curve
 _BARS = "▁▂▃▄▅▆▇█"
+
+_NOTHING = 1e-7
+"""Of the energy that is exchanged: by less nothing has come in, nor by less than what does not balance."""
 
 
 def print_summary(result: Result, request: Request) -> None:
@@ -33,14 +38,41 @@ def print_summary(result: Result, request: Request) -> None:
     notes = [f"{more}: --json or --save FILE shows all"] if hidden else []
     out.show(table(*_quantities(result, paths[:_ROWS], out.width), notes=notes))
     if request.energy == "parts":
-        from atwood.cli.energies import print_energies
-
-        print_energies(result.energy.parts, out)
+        _print_energies(result.energy.parts, out)
     if request.timings:
         out.line()
         rows = [[name, f"{1e3 * spent:.3g}", STAGES[name]] for name, spent in result.timings.items()]
         out.show(table(("stage", "ms>", "what it makes"), rows))
     out.files(saved=request.save, plotted=request.plot, drawn=request.draw)
+
+
+def _print_energies(parts: PartEnergies, out: Writer) -> None:
+    """Show what each component gained from start to end, and where it came from."""
+    shown = {path: parts[path] for path in (*parts, *parts.models)}
+    nothing = max(_NOTHING, 3.0 * parts.max_error) * parts.exchanged
+    found = {path: cells for path, one in shown.items() if (cells := _cells(one, nothing))}
+    heads = ["", "gained>", "supplied>", "dissipated>", "constraints>", "impacts>", "came in through"]
+    lines = [[path + ("" if shown[path].is_unique else " *"), *cells] for path, cells in list(found.items())[:_MOST]]
+    used = [i for i in range(len(heads)) if i < 2 or any(row[i] for row in lines)]
+    hidden = len(shown) - len(lines)
+    notes = [f"{count_of(hidden, 'more component')}: --json or --save FILE shows all"] if hidden else []
+    notes += [*["* not unique"] * bool(parts.undetermined), *parts.describe().split("\n")]
+    rows = [[row[i] for i in used] for row in lines]
+    out.line()
+    out.show(table([heads[i] for i in used] if lines else (), rows, "energy from start to end, J", notes))
+
+
+def _cells(one: PartEnergy, nothing: float) -> list[str]:
+    """Return the row of a component; nothing where it takes no part."""
+
+    def written(value: float) -> str:
+        return f"{value:.4g}" if abs(value) > nothing else ""
+
+    sums = (one.gained, one.supplied, one.dissipated, one.constraints, one.impacts)
+    cells = [written(float(values[-1])) for values in sums]
+    through = ", ".join(f"{name} {text}" for name, x in one.work.items() if (text := written(float(x[-1]))))
+    largest = max(float(np.max(np.abs(values), initial=0.0)) for values in (*sums, *one.work.values()))
+    return [cells[0] or "0", *cells[1:], through] if largest > nothing else []
 
 
 def _quantities(result: Result, paths: list[str], width: int) -> tuple[list[str], list[list[str]]]:

@@ -170,11 +170,7 @@ class Environment(_Env):  # type: ignore[misc]
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return a picture of the scene as it is now, shape (height, width, 3)."""
-        if self.render_mode is None:
-            return None
-        from atwood.exchange.environments.picture import picture_of
-
-        return picture_of(self._motions, 0)
+        return None if self.render_mode is None else _picture_of(self._motions, 0)
 
 
 class VectorEnvironment(_VectorEnv):  # type: ignore[misc]
@@ -231,9 +227,19 @@ class VectorEnvironment(_VectorEnv):  # type: ignore[misc]
         """Return a picture of each."""
         if self.render_mode is None:
             return None
-        from atwood.exchange.environments.picture import picture_of
+        return tuple(_picture_of(self._motions, k) for k in range(self.num_envs))
 
-        return tuple(picture_of(self._motions, k) for k in range(self.num_envs))
+
+def _picture_of(motions: Motions | Walks, which: int) -> NDArray[np.uint8]:
+    """Return a picture of a motion as it is now, shape (height, width, 3)."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    from atwood.plotting.drawing import plot_mechanism
+
+    result, t = motions.picture_run(which), float(motions.time[which])
+    canvas: Any = FigureCanvasAgg(plot_mechanism(result, times=[t]))
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
 
 
 def _given(plant: Plant | WalkedPlant, options: Mapping[str, Any] | None) -> dict[str, float]:

@@ -16,15 +16,18 @@ from typing import Any
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.errors import UnsupportedError
-from atwood.expr import Expression
+from atwood.errors import AtwoodError, UnsupportedError
+from atwood.expr import Expression, substitute
 from atwood.forms.assembly import Assembly
+from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.outputs.event_functions import CONTACT, RUNS, UPDATE
+from atwood.model.declare.laws import numbers_in
 from atwood.simulation.contacts.changes import resolve
 from atwood.simulation.events.impacts_in_time import jumped
 from atwood.simulation.events.mode_change import enter_mode
 from atwood.simulation.events.modes import EventProbe, EventRecord
+from atwood.simulation.events.sampling import Sampler, in_order, update_inputs_of, with_states
 from atwood.simulation.events.sides import SIDE
 from atwood.simulation.problem.explicit_scene import nearest_state
 from atwood.simulation.problem.problem import SceneProblem
@@ -33,11 +36,13 @@ from atwood.simulation.run.run import Walk
 from atwood.simulation.run.run_record import Outcome
 from atwood.simulation.run.session import KeptSession
 from atwood.study.sensitivities.inputs import is_nodes
-from atwood.study.sensitivities.updated import updated
 
 State = tuple[float, FloatArray, FloatArray]
 Beside = Callable[[Assembly], Assembly]
 """Gives a scene with a value moved a little, in the same mode and piece of the run."""
+
+
+_UPDATED: Key[tuple[Expression, ...] | None] = Key("states behind updates")
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +145,7 @@ class WatchedWalk(Walk):
 
         assembly = before
         if chosen:
-            self.changes.append(Change(assembly, apply, updated=updated(assembly, sampler, chosen)))
+            self.changes.append(Change(assembly, apply, updated=_updated(assembly, sampler, chosen)))
         super()._update(due)
 
     def _jump(self, before: Assembly, show_both: bool = False) -> None:
@@ -215,3 +220,44 @@ class WatchedWalk(Walk):
             where=event.part,
             advice="Ask with orientation='quaternion'.",
         )
+
+
+def _updated(assembly: Assembly, sampler: Sampler, chosen: Sequence[int]) -> tuple[Expression, ...] | None:
+    """Return discrete states and coordinates behind updates, in terms of those before.
+
+    None where a law asks what a number is, as for a sign or a place in a list.
+    """
+
+    def make() -> tuple[Expression, ...] | None:
+        try:
+            return _called(assembly, sampler, chosen)
+        except (AtwoodError, TypeError, ValueError, ArithmeticError, AttributeError, IndexError, KeyError):
+            return None
+
+    return assembly.shared.get(_UPDATED, make, tuple(chosen))
+
+
+def _called(assembly: Assembly, sampler: Sampler, chosen: Sequence[int]) -> tuple[Expression, ...]:
+    reading, graph = update_inputs_of(assembly), assembly.own_equations.graph
+    (time,), q, _, held = (one.symbols for one in reading.program.inputs)
+    before = (*held, *q)
+    places = {path: len(held) + k for path, k in reading.states.items()} | dict(reading.held)
+    now = list(before)
+    for one in in_order([sampler.updates[i] for i in chosen], reading):
+        part, local = assembly.flat.parts[one.path], assembly.mechanism.locals_[one.path]
+        known = {name: _symbolic(local.binding.values.get(name), value) for name, value in part.values.items()}
+        inputs = substitute(list(reading.program.results), dict(zip(before, now, strict=True)))
+        known |= {name: value for (path, name), value in zip(reading.inputs, inputs, strict=True) if path == one.path}
+        states = {path: now[k] for path, k in places.items()}
+        bound = with_states(assembly, one.path, time, known, states.__getitem__)
+        given = list(numbers_in(getattr(bound, one.law.name)()))
+        for path, value in zip(one.sets, given, strict=True):
+            now[places[path]] = graph.convert(value)
+    return tuple(now)
+
+
+def _symbolic(symbolic: Any, known: Any) -> Any:
+    """Return a parameter with symbols for the numbers that are no part of the structure."""
+    if isinstance(symbolic, (tuple, list)):
+        return tuple(_symbolic(*pair) for pair in zip(symbolic, known, strict=True))
+    return symbolic if isinstance(symbolic, Expression) else known
