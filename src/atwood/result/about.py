@@ -8,9 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from atwood.display import data_of
 from atwood.errors import AtwoodError
 from atwood.result.result import Result
 from atwood.simulation.events.modes import EventRecord
+
+_LIMITS = ("max_steps", "max_seconds", "max_step", "first_step")
 
 
 def versions() -> dict[str, str]:
@@ -47,11 +50,7 @@ def describe_run(result: Result) -> dict[str, Any]:
     outputs = options.outputs
     return {
         "scene": flat.name,
-        "form": result.form,
-        "level": result.level,
-        "method": result.method,
-        "status": result.status,
-        "message": result.message,
+        **data_of(result, "form", "level", "method", "status", "message"),
         "t_start": float(result.start.time),
         "t_end": float(result.time[-1]),
         "happenings": [_describe_event(one) for one in result.events],
@@ -68,18 +67,14 @@ def describe_run(result: Result) -> dict[str, Any]:
                 {"from": one.time, "solver": one.solver, "name": one.name, "reason": one.reason}
                 for one in result.run.choices
             ],
-            "steps": statistics.steps,
-            "residual_evaluations": statistics.residual_evaluations,
-            "jacobian_evaluations": statistics.jacobian_evaluations,
+            **data_of(statistics, "steps", "residual_evaluations", "jacobian_evaluations"),
             "wall_s": statistics.seconds,
         },
         "energy": {
             "start": float(ledger.total[0]),
             "end": float(ledger.total[-1]),
             "work": float(ledger.work[-1] - ledger.work[0]),
-            "max_drift": ledger.max_drift,
-            "exchanged": ledger.exchanged,
-            "uncertainty": ledger.uncertainty,
+            **data_of(ledger, "max_drift", "exchanged", "uncertainty"),
         },
         **({} if result.conserved is None else {"conserved": result.conserved.to_dict()}),
         "constraint_max": max(missed["position"], missed["velocity"]),
@@ -89,13 +84,8 @@ def describe_run(result: Result) -> dict[str, Any]:
             "rtol": options.relative_tolerance,
             "atol": options.absolute_tolerance,
             "outputs": int(outputs) if isinstance(outputs, (int, np.integer)) else len(outputs),
-            "max_steps": options.max_steps,
-            "max_seconds": options.max_seconds,
-            "max_step": options.max_step,
-            "first_step": options.first_step,
-            "nominal": dict(options.nominal),
-            "start": dict(flat.start),
-            "guess": dict(flat.guess),
+            **data_of(options, *_LIMITS, "nominal"),
+            **data_of(flat, "start", "guess"),
         },
         "versions": versions(),
     }
@@ -138,15 +128,7 @@ def _arguments(result: Result) -> dict[str, Any]:
         "orientation": assembly.orientation.kind,
         "t_end": options.t_end,
         "outputs": int(outputs) if isinstance(outputs, (int, np.integer)) else np.asarray(outputs).tolist(),
-        "max_steps": options.max_steps,
-        "max_seconds": options.max_seconds,
-        "max_step": options.max_step,
-        "first_step": options.first_step,
-        "solver": options.solver,
-        "order": options.order,
-        "step": options.step,
-        "samples": options.samples,
-        "structure": options.structure,
+        **data_of(options, *_LIMITS, "solver", "order", "step", "samples", "structure"),
         "nominal": dict(options.nominal) or None,
     }
     if options.accuracy is None:

@@ -253,7 +253,7 @@ def compare_long(
                     )
                 rows.append(_row(row, result, begin, (length, exchanged), marks))
             except AtwoodError as error:
-                rows.append(LongRow(form, solver, rtol, reason=error.message))
+                rows.append(replace(row, reason=error.message))
     others = tuple(one.name for one in monitor if one.unit != "J")
     return LongComparison(assembly.flat.name, length, marks, others, tuple(rows), environment())
 
@@ -274,16 +274,14 @@ def _row(row: LongRow, result: Result, begin: float, sizes: tuple[float, float],
     energy = tuple(at(drifts[""], mark) for mark in marks)
     rest = [values for name, values in drifts.items() if name]
     worst = np.max(rest, axis=0) if rest else None
-    return LongRow(
-        row.form,
-        row.solver,
-        row.rtol,
-        tuple(marks),
-        float(result.run.segments[-1].time[-1] - begin) / sizes[0],
-        result.statistics.steps,
-        result.statistics.seconds,
-        energy,
-        () if worst is None else tuple(at(worst, mark) for mark in marks),
+    return replace(
+        row,
+        marks=tuple(marks),
+        reached=float(result.run.segments[-1].time[-1] - begin) / sizes[0],
+        steps=result.statistics.steps,
+        wall_s=result.statistics.seconds,
+        energy=energy,
+        invariants=() if worst is None else tuple(at(worst, mark) for mark in marks),
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +16,12 @@ from atwood.forms.other_values import Slot, decisions_of, find_slots, starting
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.kinematics.mechanism import extent, sizing_parameters
+from atwood.model.compose.composite import Model
 from atwood.model.declare.component import Component
 from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.local.flatten import flatten
 from atwood.numerics.matrices import or_one
+from atwood.pipeline import scene_of
 from atwood.simulation.dynamics.scales import motion_scales, origin_part
 from atwood.simulation.initialization.many import meet_positions, meet_speeds
 from atwood.simulation.initialization.start import find_start
@@ -46,9 +48,8 @@ class ParameterRows:
         self._lock = threading.Lock()
         if not self.varies:
             return
+        self._scene = scene_of(assembly).copy()
         assert assembly.source is not None
-        assert assembly.source.scene is not None
-        self._scene = assembly.source.scene.copy()
         self._source = assembly.source
         numbers = {symbol.name: i for i, symbol in enumerate(assembly.parameters)}
         slots = [(slot, numbers.get(name)) for name, slot in find_slots(assembly.flat) if slot.part]
@@ -79,15 +80,7 @@ class ParameterRows:
 
     def _builds(self) -> bool:
         """Return whether some model makes its parts from its parameters."""
-        if not self._through:
-            return False
-        stack = [self._scene]
-        while stack:
-            one = stack.pop()
-            if getattr(one, "_builds", lambda: False)():
-                return True
-            stack.extend(one._children().values())  # type: ignore[arg-type]
-        return False
+        return bool(self._through) and any(getattr(one, "_builds", lambda: False)() for one in _within(self._scene))
 
     def read(self, runs: NDArray[np.intp]) -> tuple[FloatArray | None, NDArray[np.bool_]]:
         """Return the parameters of runs, a row each (None if all are equal), and which runs keep the structure."""
@@ -161,6 +154,13 @@ class ParameterRows:
         return found if found is not None else self._request.assembly
 
 
+def _within(component: Component) -> Iterator[Component]:
+    """Yield a component and all that are in it."""
+    yield component
+    for one in component._children().values():
+        yield from _within(one)
+
+
 def _is_bound(scene: object, slot: Slot) -> bool:
     """Return whether a number follows from parameters of a model around its part."""
     part = scene[slot.part]  # type: ignore[index]
@@ -229,18 +229,11 @@ class StartRows:
 
     def _start_is_bound(self) -> bool:
         """Return whether a start value follows from a parameter that is varied."""
-        source = self._request.assembly.source
-        assert source is not None
         if all(axis.is_start for axis in self._request.cases.axes):
             return False
-        stack: list[object] = [source.scene]
-        while stack:
-            one = stack.pop()
-            starts = one._start_values() if hasattr(one, "_start_values") else {}
-            if any(isinstance(value, ParameterExpression) for values in starts.values() for value in values.values()):
-                return True
-            stack.extend(one._children().values())  # type: ignore[attr-defined]
-        return False
+        models = [one for one in _within(scene_of(self._request.assembly)) if isinstance(one, Model)]
+        values = [value for one in models for own in one._start_values().values() for value in own.values()]
+        return any(isinstance(value, ParameterExpression) for value in values)
 
     def read(
         self, runs: NDArray[np.intp], parameters: FloatArray | None

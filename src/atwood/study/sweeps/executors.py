@@ -112,19 +112,11 @@ def _lacking(scene: str, error: Exception) -> UsageError:
     return UsageError(said, where=scene, advice="Install the same packages, and the modules of its parts, there.")
 
 
-@dataclass(frozen=True, eq=False)
-class _Out:
-    """A piece that was handed out: its runs, and when."""
-
-    runs: NDArray[np.intp]
-    since: float
-
-
 def _share_out(job: _Job, left: NDArray[np.intp], executor: Any, lost: list[NDArray[np.intp]]) -> NDArray[np.intp]:
     """Hand out pieces and take what comes back; return the runs that are left where the executor broke."""
     sizes, room, is_broken = PieceSizes(_SECONDS), _AT_ONCE, False
     back: SimpleQueue[Any] = SimpleQueue()
-    out: dict[Any, _Out] = {}
+    out: dict[Any, tuple[NDArray[np.intp], float]] = {}  # by future, which runs were handed out, and when
     try:
         while out or (len(left) and not is_broken):
             while len(left) and len(out) < room and not is_broken:
@@ -134,21 +126,21 @@ def _share_out(job: _Job, left: NDArray[np.intp], executor: Any, lost: list[NDAr
                 except BrokenExecutor:
                     is_broken = True
                     break
-                out[future], left = _Out(left[:count], time.perf_counter()), left[count:]
+                out[future], left = (left[:count], time.perf_counter()), left[count:]
                 future.add_done_callback(back.put)
             if not out:
                 break
             future = back.get()
-            piece, found = out.pop(future), job.outcome(future)
+            (runs, since), found = out.pop(future), job.outcome(future)
             if isinstance(found, Exception):
-                lost.append(piece.runs)
+                lost.append(runs)
                 is_broken |= isinstance(found, BrokenExecutor)
                 continue
             records, seconds = found
-            sizes.learn(len(piece.runs), seconds)
-            if time.perf_counter() - piece.since < 1.5 * seconds:
+            sizes.learn(len(runs), seconds)
+            if time.perf_counter() - since < 1.5 * seconds:
                 room += 1  # it did not wait for a worker: there are more of them
-            job.take(piece.runs, records)
+            job.take(runs, records)
     finally:
         for future in out:
             future.cancel()
@@ -185,10 +177,7 @@ def _again(job: _Job, lost: list[NDArray[np.intp]], executor: Any, pools: ExitSt
                 continue
         part = Records.empty(replace(job.request, cases=job.request.cases.part(runs)))
         for k in range(len(runs)):
-            part.status[k], part.messages[k] = (
-                "failed",
-                f"{DIED}, again when it was alone ({said})",
-            )
+            part.status[k], part.messages[k] = "failed", f"{DIED}, again when it was alone ({said})"
         job.take(runs, part)
 
 

@@ -175,10 +175,8 @@ class Sweep(Shown):
         if len(self.shape) == 1:
             return varied[path]
         position = list(varied).index(path)
-        found: NDArray[Any] = np.moveaxis(varied[path].reshape(self.shape), position, 0).reshape(
-            self.shape[position], -1
-        )[:, 0]
-        return found
+        found: NDArray[Any] = np.moveaxis(varied[path].reshape(self.shape), position, 0)
+        return found.reshape(self.shape[position], -1)[:, 0]
 
     def sobol_indices(self, path: str, samples: int = 200) -> SobolIndices:
         """Return how much of the variance of a quantity at the end comes from each thing that was varied.
@@ -341,15 +339,8 @@ def about_sweep(sweep: Sweep) -> dict[str, Any]:
     """Return all of a sweep that is no array, as plain data."""
     words = {path for path, values in sweep.varied.items() if values.dtype.kind != "f"}
     kinds = [[path, label, path in sweep.start, path in words] for path, label in labels(sweep).items()]
-    whole = sweep.to_dict()
-    return {
-        **{
-            name: whole[name]
-            for name in ("scene", "form", "level", "rtol", "shape", "design", "messages", "statistics")
-        },
-        "varied": kinds,
-        "paths": list(sweep.paths),
-    }
+    told = data_of(sweep, "scene", "form", "level", "rtol", "shape", "design", "messages", "statistics")
+    return {**told, "varied": kinds, "paths": list(sweep.paths)}
 
 
 def from_dataset(data: Dataset) -> Sweep:
@@ -402,10 +393,7 @@ def from_parts(
     known = {one.name for one in fields(SweepStatistics)}
     kinds = [(path, label, is_start) for path, label, is_start, *_ in about["varied"]]
     return Sweep(
-        scene=about["scene"],
-        form=about["form"],
-        level=about["level"],
-        rtol=about["rtol"],
+        **{name: about[name] for name in ("scene", "form", "level", "rtol")},
         time=time,
         end_time=end_time,
         parameters={path: varied[label] for path, label, is_start in kinds if not is_start},

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from atwood.arrays import BoolArray
-from atwood.display import count_of
+from atwood.display import count_of, data_of
 from atwood.errors import UnsupportedError
 from atwood.expr import dependencies, substitute
 from atwood.forms.assembly import Assembly
@@ -231,13 +231,8 @@ class Structure:
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
-        return {
-            "coordinates": self.coordinates,
-            "speeds": self.speeds,
-            "constraints": self.constraints,
-            "operations": self.operations,
-            "entries": [[int(i), int(j)] for i, j in np.argwhere(self.pattern)],
-        }
+        counts = data_of(self, "coordinates", "speeds", "constraints", "operations")
+        return {**counts, "entries": np.argwhere(self.pattern).tolist()}
 
 
 def _coarse(pattern: BoolArray, most: int) -> BoolArray:

@@ -87,9 +87,9 @@ class FormulaSheet(Paged, Mapping[str, Sympy]):
         return name in [one.name for one in self.statements]
 
     def __getitem__(self, name: str) -> Sympy:
-        for one in self.statements:
-            if one.name == name:
-                return one.value
+        named = {one.name: one.value for one in self.statements}
+        if name in named:
+            return named[name]
         advice = suggestion(name, list(self)) or f"There are {', '.join(self)}."
         raise UsageError("there is no such formula", where=f"{self.title}: {name}", advice=advice)
 
