@@ -25,11 +25,13 @@ FIELDS: dict[str, Kind] = {
     **dict.fromkeys(
         ("interpolate", "session", "events", "data", "y", "yp", "shifted", "turns", "rows", "kept"), ADDRESS
     ),
-    **dict.fromkeys(("moment", "start", "end", "here", "fired_at", "root", "before", "after", "dip", "change"), NUMBER),
+    **dict.fromkeys(("moment", "start", "end", "here", "fired_at", "root", "before", "after", "dip"), NUMBER),
+    **dict.fromkeys(("change", "told"), NUMBER),
     **dict.fromkeys(("size", "count", "settling", "evaluations", "is_first", "bad"), INTEGER),
 }
 """The memory of a search. `here` is the time that was read, `root` the last that was tried, `bad` what has no value,
-`kept` what the rows were before the last search, `change` when parameters change next, if that is known beforehand."""
+`kept` what the rows were before the last search, `change` when parameters change next, if that is known beforehand,
+`told` the time of the last state that the steps handed out."""
 
 ROWS = {
     name: k
@@ -115,7 +117,7 @@ class CompiledLocator(EventLocator):
         """Begin another run, as a new locator would."""
         self._given = self._own if signs is None else signs
         self._row("sign")[:] = self._row("fired")[:] = 0.0
-        self._set(moment=100 * ROUNDING * horizon, fired_at=nan, settling=1, evaluations=0, change=inf)
+        self._set(moment=100 * ROUNDING * horizon, fired_at=nan, settling=1, evaluations=0, change=inf, told=-inf)
 
     def change_at(self, t: float) -> None:
         """Know when parameters change next."""

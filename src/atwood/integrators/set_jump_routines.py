@@ -202,6 +202,8 @@ def _jump() -> Routine:
         r.call("take_relations", place)
     with r.otherwise():
         r.call("sharpen", place, locator)
+    with r.when(search.told > m.now):  # a state behind the event was read from the step before
+        _back(r, m, search, changes)
     with r.count(size) as j:
         y[j], m.before[j] = search.y[j] - m.late * search.yp[j], search.y[j] - (t - m.now) * search.yp[j]
     sets.ahead, sets.rough, sets.later = m.ahead, m.rough, m.later

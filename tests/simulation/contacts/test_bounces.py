@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
 from tests.helpers.contact_scenes import box_of_walls
 
 import atwood as aw
-from atwood import Component, Point, Scalar, Scene, connector, cos, parameter, simulate, unilateral
+from atwood import Component, Point, Scalar, Scene, connector, cos, dry_friction, parameter, simulate, unilateral
 from atwood.simulation.contacts import changes, compiled
 from atwood.simulation.events.modes import EventProbe
 from atwood.simulation.initialization.start import find_start
@@ -141,6 +141,39 @@ def test_an_impact_of_what_began_at_zero_has_no_margin(monkeypatch: pytest.Monke
     quick = impacts()
     monkeypatch.setattr(session, "_MANY_IMPACTS", math.inf)
     assert quick == pytest.approx(impacts(), abs=1e-9)
+
+
+class RoughFalling(Falling):
+    """The same floor, and it rubs."""
+
+    @dry_friction(at="gap", reaction="friction", unit="N", limit="most", doc="Friction of the floor.")
+    def slip(self) -> Scalar:
+        """Speed along the floor."""
+        return self.p.velocity.x
+
+    def most(self) -> Scalar:
+        """Limit of friction."""
+        return 0.1 * self.reaction("force")
+
+
+@pytest.mark.parametrize("floor", [Falling, RoughFalling])
+@pytest.mark.parametrize(
+    ("form", "solver"), [("reduced", "explicit"), ("dae", "explicit"), ("reduced", "taylor"), ("dae", "ida")]
+)
+def test_samples_just_behind_an_impact_are_those_after_it(form: str, solver: str, floor: type[Falling]) -> None:
+    """Its event has a margin, and is seen late: until then nothing says that a sample is one of the step before."""
+    scene = Scene()
+    scene.connect(scene.add("m", PointMass(mass=1.0)).point, scene.add("floor", floor()).p)
+    scene.start.update({"m.position.x": 0.0, "m.position.z": 0.0, "m.velocity.x": 1.0, "m.velocity.z": 0.0})
+
+    def ran(outputs: Sequence[float]) -> aw.Result:
+        return simulate(scene, form=form, solver=solver, t_end=0.3, rtol=1e-6, outputs=outputs)
+
+    impact = ran([0.0, 0.3]).impacts[0]
+    behind = ran([0.0, *(impact.time + np.array([1e-7, 1e-6, 4e-6])), 0.3])
+    at = [int(np.searchsorted(behind.time, impact.time + late - 1e-9)) for late in (1e-7, 1e-6, 4e-6)]
+    assert behind.impacts[0].time == pytest.approx(impact.time, abs=1e-12)
+    assert behind["floor.gap"][at] == pytest.approx(impact.after * (behind.time[at] - impact.time), rel=1e-3)
 
 
 @pytest.mark.parametrize("form", ["reduced", "dae"])

@@ -9,7 +9,16 @@ import pytest
 
 import atwood as aw
 from atwood import Scene, simulate
-from atwood_library import BallContact, EllipsoidContact, Ground, RigidBody, RollingEllipsoid, RotaryDrive, Sphere
+from atwood_library import (
+    BallContact,
+    EllipsoidContact,
+    Ground,
+    RigidBody,
+    RollingEllipsoid,
+    RotaryDrive,
+    Sphere,
+    VertexContact,
+)
 
 G = 9.81
 FORMS = pytest.mark.parametrize("form", ["reduced", "dae"])
@@ -98,3 +107,26 @@ def test_an_ellipsoid_that_does_not_slip_moves_as_the_joint_that_rolls() -> None
     assert found(EllipsoidContact(semi_axes=sizes, friction=3.0)) == pytest.approx(
         found(RollingEllipsoid(semi_axes=sizes)), abs=1e-8
     )
+
+
+@FORMS
+@pytest.mark.parametrize("friction", [0.0, 0.1, 0.25])
+def test_what_tips_about_one_place_rubs_there_against_its_slip(form: str, friction: float) -> None:
+    """The other place opens at once, and what would rub there has no say."""
+    scene = Scene(space="space")
+    body, arms = scene.add("b", RigidBody(mass=1.0, moments=(0.02, 0.03, 0.04))), ((0.1, 0.02, -0.3), (0.4, 0.05, -0.3))
+    ground = scene.add("ground", Ground(position=(0.0, 0.0, -0.3)))
+    for name, arm in zip(("near", "far"), arms, strict=True):
+        place = scene.add(name, VertexContact(place=arm, friction=friction))
+        scene.connect(body.frame, place.body)
+        scene.connect(ground.frame, place.plane)
+    begin(scene, position=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0), angular_velocity=(0.0, 0.0, 0.0))
+    result = simulate(scene, form=form, t_end=0.01, rtol=1e-10, outputs=5)
+    force = np.array([result[f"near.force.{axis}"][0] for axis in "xyz"])
+    turned = np.cross(arms[0], force) / (0.02, 0.03, 0.04)
+    near, far = (force - G * UP + np.cross(turned, arm) for arm in arms)  # accelerations
+    assert far[2] > 1.0
+    assert (near[2], result["far.normal_force"][0]) == pytest.approx((0.0, 0.0), abs=1e-9)
+    slips = near[:2] / np.linalg.norm(near[:2])
+    assert force[:2] == pytest.approx(-friction * force[2] * slips, abs=1e-6)
+    assert np.all(np.diff(result.energy.total) < 1e-9)

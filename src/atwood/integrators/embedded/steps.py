@@ -349,15 +349,19 @@ def _attempt(pair: Tableau) -> Routine:
 def _run(pair: Tableau) -> Routine:
     """Take steps until one ends at or after the time to stop at."""
     r, m, () = open_routine(pair, "run", exported=True)
+    own, locates = Record(m.locator, LOCATOR), ~r.is_null(m.jump)
     with r.forever() as steps:
         with r.when(m.waits != 0):
-            with r.when((m.waits == 1) & (m.stop < Record(m.locator, LOCATOR).root)):
+            with r.when((m.waits == 1) & (m.stop < own.root)):
+                own.told = m.stop
                 r.give(_REACHED)
             with r.when(r.call("leap", m.session) != 0):
                 r.give(_NOTICED)
             r.repeat(steps)
         t = m.t
         with r.when(t >= m.stop):
+            with r.when(locates):
+                own.told = m.stop
             r.give(_REACHED)
         with r.when(m.steps >= m.limit):
             r.give(_USED_UP)
@@ -375,7 +379,6 @@ def _run(pair: Tableau) -> Routine:
         t_new = m.t
         is_seen = r.call("watched", m.session, t_new) != 0
         happens = r.call("look", m.session, t_new) != 0
-        locates = ~r.is_null(m.jump)
         with r.when(locates & (happens | (r.call("settles", m.session) != 0))):
             r.call("seek", m.session)
         with r.when((happens & ~locates) | stiffens | is_seen | (m.waits == 2)):

@@ -568,9 +568,11 @@ class _Moment:
         return True
 
     def _on_every(self, chosen: list[int], found: Found) -> list[State]:
-        """Return the states of all units."""
+        """Return the states of all units; a slip at a gap that is open is open, too."""
         known = dict(zip(chosen, found.states, strict=True))
-        return [known.get(k, (OPEN, (0.0,) * len(rows))) for k, rows in enumerate(self.units)]
+        every = [known.get(k, (OPEN, (0.0,) * len(rows))) for k, rows in enumerate(self.units)]
+        is_loose = [at >= 0 and every[at][0] == OPEN for at in self.values.gap_of]
+        return [(OPEN, (0.0,) * len(one[1])) if off else one for one, off in zip(every, is_loose, strict=True)]
 
     def _without(self, states: list[State], let_go: Sequence[int]) -> list[State]:
         gone = {*let_go, *(k for k, gap in enumerate(self.values.gap_of) if gap in let_go)}
@@ -661,13 +663,13 @@ class _Moment:
 
     def _jammed(self, chosen: list[int]) -> Found:
         """Where no accelerations contradict nothing an impulse acts (Painleve's paradox); then states are found."""
-        values = self.values
+        values, rates = self.values, self.rates()
         limits = of_impulses(values.limits_at(np.zeros(len(self.contacts))))
-        every = all_states(values.chosen(chosen, self.rates(), {}, limits))
+        every = all_states(values.chosen(chosen, rates, {}, limits))
         best = max(every, key=lambda one: float(np.sum(np.abs(one.forces))), default=None)
-        if best is None or not float(np.sum(np.abs(best.forces))) > 0.0:
-            raise self._contradiction("no accelerations and no impulses satisfy contact and friction", chosen)
-        push = self._on_all(chosen, best)
+        push = np.zeros(len(rates)) if best is None else self._on_all(chosen, best)
+        if not np.max(np.abs(values.response @ push)) > _SHARED * SLACK * np.max(np.abs(rates)):
+            raise self._contradiction("no accelerations and no impulses are found that satisfy friction", chosen)
         self.u = self.u + values.speeds_by(push)
         self.values = self.values.with_speeds(self.u)
         pressed = [k for k in chosen if not self.first[k].is_slip and push[self.units[k][0]] > 0.0]
