@@ -11,10 +11,11 @@ from __future__ import annotations
 import itertools
 import math
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linprog
+from scipy.optimize import least_squares, linprog
 
 import atwood as aw
 from atwood import Scene, simulate
@@ -408,6 +409,56 @@ def _choices(oracle: Oracle, rates: np.ndarray, fast: float) -> list[list[tuple[
     return choices
 
 
+def every_set_in_space(oracle: Oracle, speeds: np.ndarray) -> list[np.ndarray]:
+    """Return the same in space, of forces that are determined: directions of what begins to slip are roots."""
+    rates = oracle.rates(speeds)
+    fast, random, found = _size(speeds), np.random.default_rng(0), list[np.ndarray]()
+    free = oracle.accelerations(speeds, np.zeros_like(rates)).ravel()
+    choices: list[list[str]] = []
+    for one, rate in zip(oracle.draft.touches, rates, strict=True):
+        moves = bool(np.linalg.norm(rate[1:]) > SMALL * fast)
+        rubs = ["moves"] if moves else ["sticks", "begins"] if one.most else ["begins"]
+        choices.append(["open"] if rate[0] > SMALL * fast else ["open", *rubs])
+    for states in itertools.product(*choices):
+        begin = [k for k, state in enumerate(states) if state == "begins"]
+
+        def forces(angles: np.ndarray, states: tuple[str, ...] = states, begin: list[int] = begin) -> np.ndarray:
+            ways = np.array([rate[1:] / (np.linalg.norm(rate[1:]) or 1.0) for rate in rates])
+            ways[begin] = np.array([np.cos(angles), np.sin(angles)]).T
+            return _forces_in_space(oracle, states, ways, free)
+
+        def turned(angles: np.ndarray, forces: Callable = forces, begin: list[int] = begin) -> np.ndarray:
+            across = (free + oracle.response @ forces(angles)).reshape(-1, 3)[begin, 1:]
+            turn = across[:, 1] * np.cos(angles) - across[:, 0] * np.sin(angles)
+            return turn / (np.linalg.norm(across, axis=1) + 1e-12)
+
+        for _ in range(4 * 6 ** len(begin) if begin else 1):
+            angles = random.uniform(0.0, 2.0 * math.pi, len(begin))
+            angles = least_squares(turned, angles, xtol=1e-14, ftol=1e-14, gtol=1e-14).x if begin else angles
+            pushes = forces(angles).reshape(-1, 3)
+            fall = oracle.accelerations(speeds, pushes).ravel()
+            is_new = not any(np.max(np.abs(fall - other)) <= 1e-5 * _size(free, G) for other in found)
+            if is_new and force_missed(oracle, speeds, pushes)[0] <= SMALL:
+                found.append(fall)
+    return found
+
+
+def _forces_in_space(oracle: Oracle, states: tuple[str, ...], ways: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """Return the forces of a set of states, the least where some are not determined; `ways` are directions of slips."""
+    held, columns = [], []
+    for k, state in enumerate(states):
+        push = np.zeros(len(free))
+        push[3 * k] = 1.0
+        if state in ("moves", "begins"):
+            push[3 * k + 1 : 3 * k + 3] = -oracle.draft.touches[k].friction * ways[k]
+        rows = {"open": 0, "sticks": 3}.get(state, 1)
+        columns += [push, *np.eye(len(free))[3 * k + 1 : 3 * k + 3]][:rows]
+        held += range(3 * k, 3 * k + rows)
+    by = np.array(columns).reshape(-1, len(free)).T
+    solved: np.ndarray = by @ np.linalg.lstsq((oracle.response @ by)[held], -free[held], rcond=1e-11)[0]
+    return solved
+
+
 def every_impact(oracle: Oracle, speeds: np.ndarray) -> list[np.ndarray]:
     """Return the speeds after each impact that meets the laws, in a plane."""
     rates = oracle.rates(speeds)
@@ -553,9 +604,11 @@ def _refused(oracle: Oracle, before: np.ndarray, error: AtwoodError, form: str) 
             return [f"refused: {words}"], []
     if " at t = 0 " not in f" {said}" and "t = 0 " not in said:
         return ["refused later"], [Finding("refused", f"later: {type(error).__name__}", said)]
-    if oracle.draft.space == "space":
-        return ["refused in space"], [Finding("refused", f"{type(error).__name__} in space", said)]
     is_impact = np.min(oracle.rates(before)[:, 0]) < -SMALL * _size(before)
+    if oracle.draft.space == "space":
+        if not is_impact and not every_set_in_space(oracle, before):
+            return ["refused in space: no set"], []
+        return ["refused in space"], [Finding("refused", f"{type(error).__name__} in space", said)]
     every = every_impact(oracle, before) if is_impact else every_set(oracle, before)
     if not every:
         return ["refused: no impact" if is_impact else "refused: no set"], []

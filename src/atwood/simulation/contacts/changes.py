@@ -60,7 +60,7 @@ from atwood.numerics.matrices import least_norm
 from atwood.numerics.rank import rank
 from atwood.simulation.contacts.event_records import in_own_words, told_changes, told_impact, told_rest
 from atwood.simulation.contacts.forces import MOST_TURNS, forces_in, is_same, of_impulses, rows_that_hold
-from atwood.simulation.contacts.states import states_of, values_of_states
+from atwood.simulation.contacts.states import states_of, values_of_states, without_loose
 from atwood.simulation.contacts.values import ContactValues
 from atwood.simulation.dynamics.orientation_coordinates import to_regular
 from atwood.simulation.dynamics.scales import Scales
@@ -568,11 +568,10 @@ class _Moment:
         return True
 
     def _on_every(self, chosen: list[int], found: Found) -> list[State]:
-        """Return the states of all units; a slip at a gap that is open is open, too."""
+        """Return the states of all units."""
         known = dict(zip(chosen, found.states, strict=True))
         every = [known.get(k, (OPEN, (0.0,) * len(rows))) for k, rows in enumerate(self.units)]
-        is_loose = [at >= 0 and every[at][0] == OPEN for at in self.values.gap_of]
-        return [(OPEN, (0.0,) * len(one[1])) if off else one for one, off in zip(every, is_loose, strict=True)]
+        return without_loose(self.layout, every)
 
     def _without(self, states: list[State], let_go: Sequence[int]) -> list[State]:
         gone = {*let_go, *(k for k, gap in enumerate(self.values.gap_of) if gap in let_go)}

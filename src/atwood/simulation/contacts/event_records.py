@@ -36,10 +36,7 @@ def told_change(t: float, first: ContactRow, before: State, after: State) -> Eve
 
 def told_changes(t: float, layout: Layout, before: Sequence[State], states: Sequence[State]) -> list[EventRecord]:
     """Return what is told of units whose states change."""
-    found = (
-        told_change(t, one, was, (OPEN, now[1]) if one.is_slip and at >= 0 and states[at][0] == OPEN else now)
-        for one, at, was, now in zip(layout.first, layout.gap_of, before, states, strict=True)
-    )
+    found = (told_change(t, one, was, now) for one, was, now in zip(layout.first, before, states, strict=True))
     return [each for each in found if each is not None]
 
 

@@ -17,12 +17,16 @@ def states_of(layout: Layout, held: Sequence[float]) -> list[State]:
     return found
 
 
+def without_loose(layout: Layout, states: Sequence[State]) -> list[State]:
+    """Return states of all units in which a slip at a gap that is open is open, too: it neither holds nor rubs."""
+    is_loose = [at >= 0 and states[at][0] == OPEN for at in layout.gap_of]
+    return [(OPEN, (0.0,) * len(one[1])) if off else one for one, off in zip(states, is_loose, strict=True)]
+
+
 def values_of_states(layout: Layout, held: Sequence[float], states: Sequence[State]) -> list[float]:
-    """Return discrete states with those of all units; a slip at a gap that is open is open, too."""
+    """Return discrete states with those of all units."""
     found = list(held)
-    for one, at, places, (state, way) in zip(layout.first, layout.gap_of, layout.places, states, strict=True):
-        if one.is_slip and at >= 0 and states[at][0] == OPEN:
-            state, way = OPEN, (0.0,) * len(way)
+    for one, places, (state, way) in zip(layout.first, layout.places, states, strict=True):
         for place, value in zip(
             places, (float(state), *way) if one.is_slip else (float(state == STICKS),), strict=True
         ):

@@ -23,7 +23,7 @@ from atwood.simulation.contacts.changes import CONTRADICT
 from atwood.simulation.contacts.crowd import crowd_of
 from atwood.simulation.contacts.event_records import told_changes, told_impact
 from atwood.simulation.contacts.forces import MOST_TURNS, is_same
-from atwood.simulation.contacts.states import states_of, values_of_states
+from atwood.simulation.contacts.states import states_of, values_of_states, without_loose
 from atwood.simulation.contacts.values import ContactValues, layout_of
 from atwood.simulation.dynamics.orientation_coordinates import to_regular
 from atwood.simulation.dynamics.scales import Scales
@@ -162,6 +162,7 @@ class _InStep:
         impulses, states = self._solved(wanted)
         for k in bounces:
             states[k] = (OPEN, (0.0,))
+        states = without_loose(values.layout, states)
         after = rates + values.response @ impulses
         work = 0.5 * impulses * (start + after)
         change = values.speeds_by(impulses)
