@@ -23,7 +23,7 @@ from atwood.forms.constrained import ConstrainedProgram, constrained_program, im
 from atwood.forms.loose import has_touched, is_loose, loose_equations
 from atwood.forms.quantities import to_maximal
 from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
-from atwood.integrators.protocol import MET, RATES, STEPS, CompiledRates, ExplicitProblem, Values
+from atwood.integrators.protocol import MET, PROJECTION, RATES, STEPS, CompiledRates, ExplicitProblem, Values
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.topology.graph import connected_groups
 
@@ -217,6 +217,15 @@ def nearest_state(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) ->
     nearer = plan.assembly.compiled(program_on_constraints(plan, t, y).projection).bind(values)
     found = _projected(nearer, t, y, len(q))
     return found[: len(q)], found[len(q) :]
+
+
+def project_quickly(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    """Return the same by machine code; None where there is none yet, or it does not come to such a state."""
+    y = np.concatenate([q, u])
+    rates = compiled_on_constraints(plan, t, y) if plan.has_rates else None
+    if rates is None or not rates.project or PROJECTION(rates.project)(t, y.ctypes.data, rates.project_data):
+        return None
+    return (y[: len(q)], y[len(q) :]) if np.isfinite(y).all() else None
 
 
 def rates_on_constraints(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> FloatArray:

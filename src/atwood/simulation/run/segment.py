@@ -34,6 +34,7 @@ from atwood.simulation.dynamics.redundancy import RankFinding
 from atwood.simulation.events.modes import EventProbe, EventRecord, ToldLater, seen_late, without_margin
 from atwood.simulation.events.sides import SIDE
 from atwood.simulation.events.time_events import MOMENT, Schedule
+from atwood.simulation.problem.explicit_scene import project_quickly
 from atwood.simulation.problem.preparation import pack_state
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.projection import project_safely
@@ -620,7 +621,7 @@ class _Runner:
             return done, StepResult(*root.state, Status.EVENT, root.events)
         if done < len(times):
             q, u, _ = (one[:, 0] for one in path.at(np.array([path.end])))
-            q, u = project_safely(plan, path.end, q, u)
+            q, u = project_quickly(plan, path.end, q, u) or project_safely(plan, path.end, q, u)
             plan.review_partitioning(path.end, q)
             session.reinitialize(path.end, *self._packed(path.end, q, u))
             assert self.monitor is not None

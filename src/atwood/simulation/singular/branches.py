@@ -15,6 +15,7 @@ from atwood.errors import AtwoodError, SolveError
 from atwood.forms.caches import Key
 from atwood.integrators.protocol import StepMonitor
 from atwood.lazy_dataclasses import dataclass
+from atwood.simulation.problem.explicit_scene import project_quickly
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.projection import project_safely, project_states
 from atwood.simulation.singular.collocation import Arc, Path, find_arc, follow
@@ -333,6 +334,9 @@ class Branches:
     def _state(self, one: Sample) -> tuple[float, FloatArray, FloatArray] | None:
         """Return a state that fulfils the constraints; None if there is none."""
         q, u = one.y[: self._n], one.y[self._n : self._n + self._m]
+        found = project_quickly(self.plan, one.t, q, u)
+        if found is not None:
+            return one.t, *found
         made = project_states(self.plan, np.array([one.t]), q[:, None], u[:, None])
         if not made.doubtful[0]:
             return one.t, made.coordinates[:, 0], made.speeds[:, 0]

@@ -315,7 +315,7 @@ def _root(series: FloatArray, below: float, above: float) -> float:
     falsi method*, BIT 11, 1971).
     """
     coefficients = series.tolist()
-    low, high = legendre.legval([below, above], series).tolist()
+    low, high = (_clenshaw(coefficients, one) for one in (below, above))
     x, last = below, 0.0
     for _ in range(_ROOT_STEPS):
         if not above - below > _ROOTED:

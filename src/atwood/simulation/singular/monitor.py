@@ -235,11 +235,9 @@ class SingularityMonitor(Branches):
         if self._about is None:
             self._measure()
             return self._coming(self._start.t)
-        kept = self.plan.assembly.kept
-        found, self._away = kept.get(_LOOKED_AHEAD, self._first_ahead, *self._about)
+        about = *self._about, self.tolerance
+        found, self._away = self.plan.assembly.kept.get(_LOOKED_AHEAD, self._first_ahead, *about)
         self._largest = max(self._largest, self._away[0]) if np.isfinite(self._away[0]) else self._largest
-        if found is not None:
-            kept.take(_LOOKED_AHEAD)
         return found
 
     def _first_ahead(self) -> tuple[SingularCrossing | None, list[float]]:
