@@ -456,11 +456,15 @@ class Walk:
 
     def _check_told(self, assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> None:
         """Refuse places whose forces formulas do not give, once for each set that holds."""
-        if self.held not in self._told:
+        if self.held in self._told:
+            return
+        self._told.add(self.held)
+        about = assembly.shared, assembly.relation_values, self.held, t, q.tobytes(), u.tobytes()
+        if about not in self._kept.told:
             from atwood.simulation.contacts.told_forces import check_told_forces
 
-            self._told.add(self.held)
             check_told_forces(assembly, (t, q, u), self.start.length)
+            self._kept.told.add(about)
 
     def _becomes(
         self,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from operator import is_
 from typing import TYPE_CHECKING
 
@@ -248,6 +248,11 @@ _SESSIONS_KEPT = 4
 
 _SESSIONS: Key[list[Opened]] = Key("sessions of explicit methods")
 
+_TOLD: Key[set[Hashable]] = Key("states at which forces by formulas have been compared")
+
+_TOLD_KEPT = 1_000
+"""So many are remembered."""
+
 
 @dataclass(frozen=True, eq=False)
 class Opened:
@@ -285,6 +290,8 @@ class KeptSession:
     ----------
     kept
         The sessions.
+    told
+        States at which forces by formulas have been compared, in this run and those before it.
     impacts
         Times and parts of the impacts so far, to which steps may add; None where each is looked at.
     is_undisturbed
@@ -300,9 +307,12 @@ class KeptSession:
         self._assembly = assembly
         self._solvers: list[tuple[tuple[object, ...], SetSolver]] = []
         self.kept: list[Opened] = (None if assembly is None else assembly.kept.take(_SESSIONS)) or []
+        self.told: set[Hashable] = set() if assembly is None else assembly.kept.get(_TOLD, set)
 
     def hand_back(self) -> None:
         """Leave the sessions to the next run; logs of their jumps have been copied."""
+        if len(self.told) > _TOLD_KEPT:
+            self.told.clear()
         if self._assembly is not None and self.kept:
             self._assembly.kept.get(_SESSIONS, lambda: self.kept)
 
