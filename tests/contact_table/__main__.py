@@ -38,7 +38,7 @@ def main(rows: tuple[str, ...], views: tuple[str, ...], forms: tuple[str, ...]) 
             line = f"{row:17}{form:7}"
             for view in views:
                 worst, what = worst_of(row, view, form)
-                is_off = not worst <= ROWS[row].allowed(VIEWS[view])
+                is_off = not worst <= ROWS[row].off
                 missed += is_off
                 line += f"{worst:10.1e}{'*' if is_off else ' '}"
                 said += [f"    {view}: {what}"] if is_off else []

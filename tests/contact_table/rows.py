@@ -48,15 +48,10 @@ Pairs = list[tuple[str, float, float]]
 
 @dataclass(frozen=True)
 class Row:
-    """A scene of the table, with the error that it may have; far away rounding of places may be more."""
+    """A scene of the table, with the error that it may have."""
 
     check: Callable[[View, str], Pairs]
     off: float = 1e-9
-    off_moved: float = 0.0
-
-    def allowed(self, view: View) -> float:
-        """Return the error that it may have in a view."""
-        return max(self.off, self.off_moved if view.move else 0.0)
 
 
 class Run:
@@ -497,7 +492,7 @@ ROWS: Mapping[str, Row] = {
     "bead": Row(bead),
     "stick": Row(stick),
     "capstan": Row(capstan),
-    "housner": Row(housner, off_moved=3e-8),
+    "housner": Row(housner),
     "cradle": Row(cradle),
     "engine": Row(engine),
     "play": Row(play),

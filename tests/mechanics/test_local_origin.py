@@ -7,8 +7,23 @@ import math
 import numpy as np
 import pytest
 
-from atwood import Component, Frame, Scalar, Scene, assemble, connector, conserved, cos, parameter, potential, simulate
-from atwood_library import Ground, Link, Pivot, PointMass, Rod, Rope, Weld
+from atwood import (
+    Component,
+    Frame,
+    Scalar,
+    Scene,
+    Vector,
+    assemble,
+    connector,
+    conserved,
+    cos,
+    parameter,
+    potential,
+    simulate,
+    unilateral,
+)
+from atwood.expr import depends_on
+from atwood_library import Box, Ground, Link, Pivot, PointMass, Rod, Rope, Weld
 
 PLACE = (3.0e5, -1.0e5, 2.0e5)
 FORMS = ("reduced", "dae")
@@ -125,3 +140,44 @@ def test_conserved_momenta_are_about_the_worlds_origin() -> None:
     scene.start.update({"rod.angle": 0.3, "rod.angular_velocity": 1.5})
     told = str(conserved(scene))
     assert "300000" in told, told
+
+
+class Floor(Component):
+    """A floor whose gap is written in one of several orders."""
+
+    order: int = parameter(0, integer=True, minimum=0, maximum=8, doc="Which.")
+    radius: float = parameter(0.1, unit="m", doc="Of the ball at the end of the arm.")
+    body: Frame = connector(Frame, "What cannot pass.")
+    plane: Frame = connector(Frame, "The floor.")
+
+    @unilateral(reaction="normal_force", unit="N", doc="Force on the ball.")
+    def gap(self) -> Scalar:
+        """Distance of the ball."""
+        p, o, r = self.body.position.z, self.plane.position.z, self.radius
+        arm = self.body.to_world(Vector(0.3, 0.0, 0.2)).z
+        written = (
+            p + arm - r - o,
+            p - r + arm - o,
+            p - r - o + arm,
+            -(o - p - arm + r),
+            arm + p - (o + r),
+            p - (o - arm) - r,
+            arm - r + p - o,
+            (p + 0.5 * arm) + (0.5 * arm - r) - o,
+            p - (r - arm) - o,
+        )
+        return written[self.order]
+
+
+@pytest.mark.parametrize("order", range(9))
+def test_the_difference_of_two_places_far_away_is_without_what_both_have(order: int) -> None:
+    scene = Scene()
+    ground, box = scene.add("ground", Ground(position=PLACE)), scene.add("box", Box(mass=1.0))
+    floor = scene.add("floor", Floor(order=order))
+    scene.connect(ground.frame, floor.plane)
+    scene.connect(box.frame, floor.body)
+    scene.start.update({"box.position.x": PLACE[0], "box.position.z": PLACE[2] + 2.0, "box.angle": 0.3})
+    assembly = assemble(scene)
+    gap = assembly.maximal.contacts[0].row.value
+    assert assembly.mechanism.origin is not None
+    assert not depends_on(gap, list(assembly.mechanism.table.origin))

@@ -62,6 +62,7 @@ def read_mechanism(
     at = find_origin(mechanism) if origin == "near" else origin
     if at is not None:  # laws are read once more, since they read positions in the world
         table = replace(table, origin=origin_at(mechanism, at))
+        table.graph.origin = table.origin
         found = _read_laws(flat, modes, table, line_signs, carried)
         mechanism = Mechanism(table, gravity, *found, flat.links, told, t_start=flat.t_start, origin=at)
     mechanism = decided_near(mechanism)

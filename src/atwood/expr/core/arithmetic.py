@@ -41,7 +41,7 @@ def add(a: Expression, b: Expression) -> Expression:
         return a.arguments[0]
     if b.operation == "sub" and b.arguments[1] is a:
         return b.arguments[0]
-    return graph.node("add", _in_order(a, b))
+    return graph.node("add", _in_order(a, b)) if graph.origin is None else _from_origin(a, b)
 
 
 def subtract(a: Expression, b: Expression) -> Expression:
@@ -72,6 +72,8 @@ def subtract(a: Expression, b: Expression) -> Expression:
     if left is not None:
         return negate(left)
     met = _known_together(a, b)
+    if met is None and graph.origin is not None:
+        met = _apart_from_origin(a, b)
     return graph.node("sub", (a, b)) if met is None else met
 
 
@@ -88,6 +90,40 @@ def _known_together(a: Expression, b: Expression) -> Expression | None:
     if known_b is not None and a.is_parametric:
         return subtract(subtract(a, known_b), _other(b, known_b))
     return None
+
+
+def _origin_term(total: Expression) -> Expression | None:
+    """Return the term of a sum that is where positions are counted from."""
+    known = _known_term(total)
+    return known if known is not None and any(known is one for one in total.graph.origin or ()) else None
+
+
+def _from_origin(a: Expression, b: Expression) -> Expression:
+    """Return ``a + b`` with the origin outside, as o + (p + arm), or (p + arm) - (r - o).
+
+    So the difference of two positions is without it.
+    """
+    for one, other in ((a, b), (b, a)):
+        term = _origin_term(one)
+        if term is not None and not other.is_parametric:
+            return a.graph.node("add", (term, add(_other(one, term), other)))
+        if one.operation == "sub" and one.arguments[1].is_parametric and not other.is_parametric:
+            return a.graph.node("sub", (add(one.arguments[0], other), one.arguments[1]))
+    return a.graph.node("add", _in_order(a, b))
+
+
+def _apart_from_origin(a: Expression, b: Expression) -> Expression | None:
+    """Return ``a - b`` with the origin outside, or taken from what is known, as for o + (p - arm), p - (r - o) - o."""
+    term = _origin_term(a)
+    if term is not None and _known_term(b) is None:
+        return a.graph.node("add", (term, subtract(_other(a, term), b)))
+    if a.operation != "sub" or not a.arguments[1].is_parametric:
+        return None
+    place, known = a.arguments
+    if b.is_parametric:
+        return subtract(place, add(known, b))
+    term = _origin_term(b)
+    return None if term is None else subtract(subtract(place, _other(b, term)), add(known, term))
 
 
 def _known_term(total: Expression) -> Expression | None:

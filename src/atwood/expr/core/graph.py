@@ -262,11 +262,14 @@ class Graph:
     ----------
     relations
         Takes up relations of functions of time alone while laws are read; None where there is no time.
+    origin
+        Where positions are counted from, if that is far from the world's origin: sums keep it outside.
     """
 
-    __slots__ = ("_table", "nodes", "one", "relations", "zero")
+    __slots__ = ("_table", "nodes", "one", "origin", "relations", "zero")
 
     def __init__(self) -> None:
+        self.origin: tuple[Expression, ...] | None = None
         self.relations: TimeRelations | None = None
         self.nodes: list[Expression] = []
         self._table: defaultdict[str, dict[Any, Expression]] = defaultdict(dict)  # by operation, then by `_key`
