@@ -261,6 +261,19 @@ def test_a_force_that_formulas_do_not_give_is_refused(size: float, angle: float)
     assert result["place.normal_force"][-1] == pytest.approx(0.5e5 * G, rel=1e-5)
 
 
+@pytest.mark.parametrize("lever", [1e-7, 1e-9, 1e-12])
+def test_a_place_ever_nearer_to_a_hinge_is_right_or_refused(lever: float) -> None:
+    """In maximal coordinates it counted as held by the hinge, or fell through the floor, in silence."""
+    known = 0.5 * G / lever
+    assert simulate(hinged(lever), t_end=0.01)["place.normal_force"][-1] == pytest.approx(known, rel=1e-3)
+    for size in (1e-3, 1.0, 1e3):
+        for friction in (0.0, 0.1):
+            with pytest.raises((UnsupportedError, SolveError), match=r"^place"):
+                simulate(hinged(lever, size, friction), form="dae", t_end=0.01)
+    with pytest.raises(UnsupportedError, match="it is pressed, and opens"):
+        simulate(hinged(1e-9, 1e3, 0.1), t_end=0.01)
+
+
 def test_a_share_that_only_rows_nearly_alike_hold_is_none() -> None:
     """Two floors that differ by 1e-4 held a crank with 8,700 N, which nothing asks for, and forces were off by .8 %."""
     assert run_trial("sets", 990300129)[0].findings == ()

@@ -6,6 +6,8 @@ a place with next to no lever about a joint comes out too small, and the motion 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from atwood.arrays import FloatArray
@@ -15,11 +17,14 @@ from atwood.expr import Program
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.quantities import coordinate_program
-from atwood.numerics.contact_sets import NOTHING
-from atwood.numerics.matrices import or_one
-from atwood.simulation.contacts.forces import forces_in, rows_that_hold
+from atwood.numerics.contact_sets import GOES_ON, State, is_back
+from atwood.numerics.matrices import least_norm, or_one
+from atwood.numerics.rank import decompose
+from atwood.simulation.contacts.forces import rows_that_hold
 from atwood.simulation.contacts.states import states_of
 from atwood.simulation.contacts.values import ContactValues, layout_of
+from atwood.simulation.dynamics.scales import coordinate_scales
+from atwood.tolerances import tolerances
 
 _TOLD: Key[Program] = Key("forces of gaps and slips by formulas")
 
@@ -28,9 +33,11 @@ _ALIKE: Key[bool] = Key("that numbers give the same forces, at the state that wa
 _OFF = 1e-3
 """Of the largest force: what is off by more is refused. Forces are in units in which each moves its own row alike."""
 
-_NEXT_TO_NONE = 1e-8
-"""Of how rows move with nothing else held: formulas are looked at where joints and other places leave less in some
-direction, which is more than rounding."""
+_NEXT_TO_NONE = 1e-4
+"""Of the slopes of rows: formulas are looked at where joints and other places leave less in some direction."""
+
+_ROUNDED = 1e-13
+"""The same: what is left of less is rounding, and held by joints and other places; far away so many times more."""
 
 
 def check_told_forces(assembly: Assembly, state: tuple[float, FloatArray, FloatArray], length: float) -> None:
@@ -48,7 +55,7 @@ def check_told_forces(assembly: Assembly, state: tuple[float, FloatArray, FloatA
     Raises
     ------
     UnsupportedError
-        If a force is off by more than a thousandth of the largest.
+        If a force is off by more than a thousandth of the largest, or what is pressed opens.
     """
     t, q, u = state
     assembly.kept.get(_ALIKE, lambda: _are_alike(assembly, state, length), t, q.tobytes(), u.tobytes(), length)
@@ -61,27 +68,64 @@ def _are_alike(assembly: Assembly, state: tuple[float, FloatArray, FloatArray], 
     if len(told) < len(contacts) or (len(contacts) == 1 and not assembly.maximal.constraints):
         return True
     values = ContactValues(assembly, *state, length)
-    rows = rows_that_hold(values.units, states_of(values.layout, assembly.held_now))
-    sizes = np.sqrt(or_one(values.alone[rows]))
-    moved, ways = np.linalg.eigh(values.response[np.ix_(rows, rows)] / sizes / sizes[:, None])
-    if not np.any((moved > NOTHING) & (moved < _NEXT_TO_NONE)):
+    states = states_of(values.layout, assembly.held_now)
+    rows = rows_that_hold(values.units, states)
+    loose, sizes = [i for i in _at_rest(values) if i not in rows], np.sqrt(or_one(values.alone))
+    near, response = [*rows, *loose], values.response / sizes / sizes[:, None]
+    if not np.any(np.linalg.eigvalsh(response[np.ix_(near, near)]) < _NEXT_TO_NONE**2):
+        return True
+    along, still = values.by_free_ways()
+    rounded = _ROUNDED * float(max(1.0, *np.abs(state[1] / coordinate_scales(equations, length))))
+    parts, each = decompose(along[rows] / sizes[rows, None], rounded, is_whole=False), np.linalg.norm(along, axis=1)
+    left = parts.values[: parts.rank]
+    loose = [i for i in loose if rounded < each[i] / sizes[i] < _NEXT_TO_NONE]
+    if not loose and not np.any(left < _NEXT_TO_NONE):
         return True
     program = assembly.shared.get(_TOLD, lambda: coordinate_program(assembly, _TOLD.name, equations, told))
-    (given,) = assembly.kernel(program)([state[0]], *state[1:])
-    found = forces_in(values, states_of(values.layout, assembly.held_now))
-    there = ways[:, moved > NOTHING]
-    off = np.abs(there @ (there.T @ (sizes * (np.array(given)[rows] - found[rows]))))
-    most = float(np.max(np.abs(sizes * found[rows])))
-    worst = rows[int(np.argmax(off))] if rows else 0
-    others = dict.fromkeys(contacts[rows[i]].row.key[0] for i in np.flatnonzero(off > _OFF * most).tolist())
-    if others:
-        where = contacts[worst].row.key[0]
-        also, unit = listed(one for one in others if one != where), contacts[worst].law.options.unit
-        raise UnsupportedError(
-            f"its force is {found[worst]:.4g} {unit}, and formulas give {given[worst]:.4g}: "
-            "joints and other places hold all but next to nothing of what it holds",
-            where=where,
-            advice="Move it away from the joint or the place next to it, or leave it out"
-            + (f"; the same is so of {also}." if also else "."),
-        )
+    given = np.array(assembly.kernel(program)([state[0]], *state[1:])[0])
+    given, follows = _with_rubbing(values, states, given)
+    moving, least = (still + along @ (along.T @ given)) / sizes, -rounded * float(np.max(np.abs(still / sizes)))
+    for i in (i for i in loose if moving[i] < least):
+        raise _refused(values, i, "it is pressed, and opens", [])
+    if not np.any(left < _NEXT_TO_NONE):
+        return True
+    by_force = parts.right[: parts.rank] @ along.T @ follows[:, rows] / sizes[rows]
+    each = or_one(np.linalg.norm(by_force, axis=1))
+    off = least_norm(by_force / each[:, None], parts.range.T @ moving[rows] / left / each)
+    found = given[rows] - off / sizes[rows]
+    most, off = float(np.max(np.abs(sizes[rows] * found))), np.abs(off)
+    if np.any(off > _OFF * most):
+        worst = int(np.argmax(off))
+        unit = contacts[rows[worst]].law.options.unit
+        said = f"its force is {found[worst]:.4g} {unit}, and formulas give {given[rows[worst]]:.4g}"
+        raise _refused(values, rows[worst], said, [rows[i] for i in np.flatnonzero(off > _OFF * most).tolist()])
     return True
+
+
+def _with_rubbing(values: ContactValues, states: Sequence[State], given: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return forces with those of what slips, which formulas have as loads, and how they follow those given."""
+    forces, follows, limits = given.copy(), np.eye(len(given)), values.limits_at(given)
+    for k, (rows, (state, way)) in enumerate(zip(values.units, states, strict=True)):
+        if state == GOES_ON:
+            side = limits[is_back(way)]
+            follows[list(rows)] = -np.outer(way, side.shares[k])
+            forces[list(rows)] = -np.array(way) * side.free[k] + follows[list(rows)] @ given
+    return forces, follows
+
+
+def _at_rest(values: ContactValues) -> list[int]:
+    """Return the rows of gaps that are at zero and do not open but by rounding."""
+    touching, rates = values.touching(tolerances.CLOSED), np.abs(values.slopes) @ np.abs(values.u)
+    is_gap = {one[0] for one, is_slip in zip(values.units, values.layout.is_slip, strict=True) if not is_slip}
+    return [i for i in is_gap if touching[i] and values.rates[i] <= _ROUNDED * rates[i]]
+
+
+def _refused(values: ContactValues, worst: int, said: str, others: Sequence[int]) -> UnsupportedError:
+    names = [values.contacts[i].row.key[0] for i in (worst, *others)]
+    also = listed(dict.fromkeys(one for one in names if one != names[0]))
+    return UnsupportedError(
+        f"{said}: joints and other places hold all but next to nothing of what it holds",
+        where=names[0],
+        advice="Move it away from the joint or the place next to it, or leave it out"
+        + (f"; the same is so of {also}." if also else "."),
+    )

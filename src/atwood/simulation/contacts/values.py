@@ -25,6 +25,7 @@ from atwood.mechanics.dynamics.equations import ContactRow
 from atwood.model.values.units import ALONG
 from atwood.numerics.contact_sets import Contacts, Limits, Unit, sizes_of
 from atwood.numerics.matrices import least_norm, or_one, to_array
+from atwood.numerics.rank import null_space
 from atwood.simulation.dynamics.balance import LIGHT, BalanceValues, balance_of, even_balance
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.scales import Scales, motion_scales
@@ -286,6 +287,23 @@ class ContactValues:
         """A: how the rows move by a unit of each force."""
         found: FloatArray = self.slopes @ self._by_each[: len(self.u)]
         return found
+
+    def by_free_ways(self) -> tuple[FloatArray, FloatArray]:
+        """Return how rows move along what joints leave free, each way with a unit of inertia, and without forces.
+
+        These are B and b of ``b + B B^T f``. What joints leave of a row is known in B to rounding of the row, and in A
+        to rounding alone of its square.
+        """
+        now, sizes = self._now, self._sizes_by_mass
+        mass, jacobian = sizes[:, None] * to_array(now.mass) * sizes, to_array(now.jacobian) * sizes
+        each = or_one(np.max(np.abs(jacobian), axis=1, initial=0.0))
+        held, free = least_norm(jacobian / each[:, None], -now.gamma / each), null_space(jacobian / each[:, None])
+        inertia, turns = np.linalg.eigh(free.T @ mass @ free)
+        has_mass = inertia > LIGHT * np.max(inertia, initial=0.0)
+        ways = free @ turns[:, has_mass] / np.sqrt(inertia[has_mass])
+        along = (self.slopes * sizes) @ ways
+        pushed = ways.T @ (sizes * now.bias + mass @ held)
+        return along, self.slopes @ (sizes * held) + self.seconds - along @ pushed
 
     @cached_property
     def sharing(self) -> tuple[FloatArray, FloatArray]:
