@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar
@@ -10,6 +11,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.clock import GRACE, Clock, TimeIsUp
+from atwood.display import listed
 from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key, Shared, without_collection
@@ -68,6 +70,9 @@ _SURELY = 1e-3
 
 _CHATTER, _MOST_CONTACTS = 50, 2000
 """So many changes of mode without time passing end a run, and so many of gaps and slips."""
+
+_MANY_IMPACTS = 50
+"""So many impacts one after the other, while no time passes, are why a run ends."""
 
 
 def run(
@@ -229,12 +234,23 @@ class Walk:
             if target == "stop":
                 return self._finished_run("stopped", outcome.event.describe(), outcome)
             if chatter > (_MOST_CONTACTS if target in CONTACT else _CHATTER) and target != SIDE:
-                endless = f"{outcome.event.part} changes its mode endlessly at t = {self.t:.9g}"
-                return self._finished_run("failed", endless, outcome)
+                return self._finished_run("failed", self._endless(outcome.event, recorder.plan), outcome)
             is_switch = target == COORDINATE_SWITCH
             self._switch_coordinates(outcome.event, recorder) if is_switch else self._enter(outcome, recorder)
             if self.t >= self.options.t_end and target != UPDATE:
                 return self._finished_run("finished", "", outcome)
+
+    def _endless(self, event: EventRecord, plan: SceneProblem) -> str:
+        """Return the sentence about changes that do not end: squeezed between surfaces that close, impacts never do."""
+        last = self._impacts[-_MANY_IMPACTS:]
+        lasted = self.t - last[0][0] if len(last) == _MANY_IMPACTS else math.inf
+        if event.target not in CONTACT or lasted > len(last) * shortest_mode(plan, self.options, self.start.time):
+            return f"{event.part} changes its mode endlessly at t = {self.t:.9g}"
+        parts = listed(sorted({part for _, part in last}))
+        return (
+            f"impacts of {parts} follow each other ever faster at t = {self.t:.9g}, the last {_MANY_IMPACTS} of them "
+            f"within {lasted:.3g} s: what they close on has no room left, and does not come to rest"
+        )
 
     def _arrive(self, schedule: Schedule) -> bool:
         """Pass time events and updates that are due, and make ready what comes; return whether there were any."""
