@@ -186,6 +186,8 @@ def observe(
 class Observables(Mapping[str, Observable]):
     """Every observable of a scene by path; those of a component are made when one of them is first asked for.
 
+    Energies of a component are made by themselves, since starts and coordinates read all else.
+
     Parameters
     ----------
     mechanism, equations, reactions, lock, momenta
@@ -203,6 +205,7 @@ class Observables(Mapping[str, Observable]):
         self._mechanism, self._lock, self._momenta = mechanism, lock, momenta
         self._reader = Reader(mechanism, equations, reactions)
         self._reactions = {one.path: one for one in reactions}
+        self._of_laws: dict[str, dict[str, Observable]] = {}
         self._made: dict[str, dict[str, Observable]] = {}
         self._wholes: dict[str, Mapping[str, Observable]] = {}
         self._all: dict[str, Observable] | None = None
@@ -219,18 +222,28 @@ class Observables(Mapping[str, Observable]):
             return Observable(one.path, one.unit, one.doc, False, one.symbol)
         if path.startswith(MOMENTUM) and self._momenta is not None:
             return self._momenta()[path]
-        part = path.rpartition(".")[0]
-        while part:
-            if part in self._mechanism.locals_:
-                return self._of(part)[path]
-            part = part.rpartition(".")[0]
-        return self._whole(path)[path]
+        part = self._part_of(path)
+        if part is None:
+            return self._whole(path)[path]
+        found = self._by_laws(part)
+        return found[path] if path in found and not path.endswith(_ENERGY) else self._of(part)[path]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._everything())
 
     def __len__(self) -> int:
         return len(self._everything())
+
+    def beside(self, path: str) -> Mapping[str, Observable]:
+        """Return what laws say of the part that a path is of, without its energies; nothing where it is of none."""
+        part = self._part_of(path)
+        return {} if part is None else self._by_laws(part)
+
+    def _part_of(self, path: str) -> str | None:
+        part = path.rpartition(".")[0]
+        while part and part not in self._mechanism.locals_:
+            part = part.rpartition(".")[0]
+        return part or None
 
     def _whole(self, path: str) -> Mapping[str, Observable]:
         """Return the quantities of the model, or the scene, that a path may be one of; they are not listed."""
@@ -253,13 +266,42 @@ class Observables(Mapping[str, Observable]):
 
     def _of(self, part: str) -> dict[str, Observable]:
         if part not in self._made:
+            laws = self._by_laws(part)
             with self._lock:
-                self._made[part] = _observe_part(self._mechanism, self._reader, part)
+                self._made[part] = {**laws, **_energies_of(self._mechanism, self._reader, part)}
         return self._made[part]
+
+    def _by_laws(self, part: str) -> dict[str, Observable]:
+        if part not in self._of_laws:
+            with self._lock:
+                self._of_laws[part] = _observe_part(self._mechanism, self._reader, part)
+        return self._of_laws[part]
+
+
+def beside(observables: Mapping[str, Observable], path: str) -> Mapping[str, Observable]:
+    """Return those of the observables of a scene that are of the same part as a path, without its energies."""
+    return observables.beside(path) if isinstance(observables, Observables) else observables
+
+
+_ENERGY = "_energy"
+"""What the paths of energies end with."""
+
+
+def _energies_of(mechanism: Mechanism, reader: Reader, path: str) -> dict[str, Observable]:
+    """Return the energies of one component; none where nothing of it has any."""
+    found: dict[str, Observable] = {}
+    local = mechanism.locals_[path]
+    has_inertia = any(local.part.component.laws(kind) for kind in ("inertia", "lagrangian"))
+    if has_inertia or local.potentials:
+        kinetic, potential = reader.energies(path)
+        if has_inertia:
+            take(mechanism, found, f"{path}.kinetic_energy", kinetic, "J", "Kinetic energy.", False)
+        take(mechanism, found, f"{path}.potential_energy", potential, "J", "Potential energy.", False)
+    return found
 
 
 def _observe_part(mechanism: Mechanism, reader: Reader, path: str) -> dict[str, Observable]:
-    """Return every observable of one component, without its reactions."""
+    """Return every observable of one component that laws say, without its reactions and energies."""
     found: dict[str, Observable] = {}
     local = mechanism.locals_[path]
     bound = bind(local.part.component, reader.binding(local, with_energies=True))
@@ -286,12 +328,6 @@ def _observe_part(mechanism: Mechanism, reader: Reader, path: str) -> dict[str, 
         options = law.options
         rate = f"{path}.{options.rate}" if options.rate else ""
         take(mechanism, found, f"{path}.{law.name}", value, options.unit, options.doc, options.periodic, rate)
-    has_inertia = any(local.part.component.laws(kind) for kind in ("inertia", "lagrangian"))
-    if has_inertia or local.potentials:
-        kinetic, potential = reader.energies(path)
-        if has_inertia:
-            take(mechanism, found, f"{path}.kinetic_energy", kinetic, "J", "Kinetic energy.", False)
-        take(mechanism, found, f"{path}.potential_energy", potential, "J", "Potential energy.", False)
     # A rate that has no value tells no turns.
     found = {name: one if one.rate in found else replace(one, rate="") for name, one in found.items()}
     sharing: dict[str, list[str]] = {}

@@ -17,6 +17,7 @@ from atwood.forms.caches import Key
 from atwood.forms.quantities import to_maximal
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
+from atwood.mechanics.outputs.observables import Observable, beside
 from atwood.model.local.parts import declared_starts
 from atwood.numerics.matrices import Matrix, least_norm, or_one, scaled
 from atwood.numerics.rank import certain, row_scales, row_sizes
@@ -290,7 +291,8 @@ def _speeds_alone(
     assembly: Assembly, equations: Equations, level: Level
 ) -> tuple[FloatArray, tuple[str, ...], tuple[str, ...]] | None:
     """Return what `solve_speeds` does where all that is said is of speeds themselves, and nothing twice; else None."""
-    places = assembly.shared.get(_PLACES, lambda: _speeds_by_path(assembly, equations))
+    paths = tuple(one.path for one in (*level.fixed, *level.guessed))
+    places = assembly.shared.get(_PLACES, lambda: _speeds_by_path(assembly, equations, paths), paths)
     fixed = {places[one.path] for one in level.fixed if one.path in places}
     if len(fixed) < len(level.fixed) or not all(one.path in places for one in level.guessed):
         return None
@@ -303,9 +305,14 @@ def _speeds_alone(
 _PLACES: Key[dict[str, int]] = Key("speeds by path")
 
 
-def _speeds_by_path(assembly: Assembly, equations: Equations) -> dict[str, int]:
-    """Return the numbers of speeds by the paths of quantities that are these speeds, or rates of their coordinates."""
-    observables = assembly.start_observables
+def _speeds_by_path(assembly: Assembly, equations: Equations, paths: Sequence[str]) -> dict[str, int]:
+    """Return the numbers of speeds by the paths of quantities that are these speeds, or rates of their coordinates.
+
+    Among these are all such of the parts that paths are of.
+    """
+    observables: dict[str, Observable] = {}
+    for path in paths:
+        observables.update(beside(assembly.start_observables, path))
     speeds = {symbol: i for i, symbol in enumerate(equations.speeds)}
     found = {path: speeds[one.value] for path, one in observables.items() if one.value in speeds}
     if kinematic_map_of(assembly, "regular").is_plain:
