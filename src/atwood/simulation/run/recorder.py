@@ -301,7 +301,7 @@ class Recorder:
         """Record a singular crossing, in place of all samples since its start; its states are not to be projected."""
         assert crossing.path is not None
         self.rewind(crossing.path.start)
-        self.settle()
+        self._settle(None)
         self.singular_crossings.append(crossing)
         if len(t):
             q, u, _ = crossing.path.at(t)
