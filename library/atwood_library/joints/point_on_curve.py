@@ -51,7 +51,9 @@ class PointOnCurve(Component):
     curve: Any = parameter(
         ("p", 0.0, 0.0), size=3, function_of={"p": "rad"}, doc="The curve in the axes of frame a, in units of scale."
     )
-    scale: Number = parameter(1.0, unit="m", above=0.0, doc="Length for a unit of the curve's functions.", symbol="a")
+    scale: Number = parameter(
+        1.0, unit="m", above=0.0, unit_length=True, doc="Length for a unit of the curve's functions.", symbol="a"
+    )
     offset: Number = parameter(
         0.0,
         unit="m",

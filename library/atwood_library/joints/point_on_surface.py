@@ -44,7 +44,9 @@ class PointOnSurface(Component):
         function_of=_PARAMETERS,
         doc="The surface in the axes of frame a, in units of scale.",
     )
-    scale: Number = parameter(1.0, unit="m", above=0.0, doc="Length for a unit of the surface's functions.", symbol="a")
+    scale: Number = parameter(
+        1.0, unit="m", above=0.0, unit_length=True, doc="Length for a unit of the surface's functions.", symbol="a"
+    )
     edge: Any = parameter(
         1.0, function_of=_PARAMETERS, doc="A function that is positive within the surface and zero at its edge."
     )

@@ -314,11 +314,14 @@ def _solve(size: int, entries: Sequence[float], right: Sequence[float]) -> Seque
 
 def _solve_samples(size: int, entries: Sequence[Any], right: Sequence[Any]) -> Sequence[Any]:
     """Solve one linear system for each sample; all nan for a sample with a singular matrix."""
-    shape = np.broadcast_shapes(*{np.shape(one) for one in (*entries, *right)})
+    shapes = [getattr(one, "shape", ()) for one in (*entries, *right)]
+    shape = np.broadcast_shapes(*{*shapes})
     matrices, sides = (np.empty((*shape, len(some))) for some in (entries, right))
-    for whole, some in ((matrices, entries), (sides, right)):
+    for whole, some, own in ((matrices, entries, shapes), (sides, right, shapes[len(entries) :])):
+        whole[...] = [0.0 if many else one for one, many in zip(some, own, strict=False)]  # most are zeros of a pattern
         for i, one in enumerate(some):
-            whole[..., i] = one
+            if own[i]:
+                whole[..., i] = one
     matrices, sides = matrices.reshape(*shape, size, size), sides[..., None]
     try:
         solution = np.linalg.solve(matrices, sides)
