@@ -193,15 +193,13 @@ def _candidates(module: ModuleType) -> Mapping[str, Any]:
     }
 
 
-def _functions(module: ModuleType) -> list[str]:
-    """Return the functions that a module itself defines and that can be called without arguments."""
-    found = []
+def _functions(module: ModuleType) -> Iterator[str]:
+    """Yield the functions that a module itself defines and that can be called without arguments."""
     for name, value in vars(module).items():
         if inspect.isfunction(value) and value.__module__ == module.__name__ and not name.startswith("_"):
             needed = inspect.signature(value).parameters.values()
             if all(one.default is not one.empty or "VAR" in one.kind.name for one in needed):
-                found.append(name)
-    return found
+                yield name
 
 
 def _as_scene(value: Any, file: Path, where: str) -> Model:

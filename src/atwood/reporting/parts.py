@@ -157,10 +157,9 @@ def list_ties(assembly: Assembly) -> tuple[str, ...]:
     )
 
 
-def list_merged(assembly: Assembly) -> tuple[MergedPart, ...]:
-    """Return the parts that are one body with another part, or with the world."""
+def list_merged(assembly: Assembly) -> Iterator[MergedPart]:
+    """Yield the parts that are one body with another part, or with the world."""
     mechanism = assembly.mechanism
-    found = []
     for path, local in mechanism.locals_.items():
         body = _own_body(mechanism, path)
         if body is None or _is_anchor(mechanism, path):
@@ -168,8 +167,7 @@ def list_merged(assembly: Assembly) -> tuple[MergedPart, ...]:
         name = mechanism.bodies.bodies[body].name
         is_solid = bool(local.point_inertias or local.body_inertias) or any(j.law.options.rigid for j in local.joints)
         if is_solid and path != name and len(_solids(mechanism, body)) > 1:
-            found.append(MergedPart(path, name))
-    return tuple(found)
+            yield MergedPart(path, name)
 
 
 def _own_body(mechanism: Mechanism, path: str) -> int | None:
@@ -194,18 +192,16 @@ def _solids(mechanism: Mechanism, body: int) -> list[str]:
     ]
 
 
-def list_dropped(assembly: Assembly) -> tuple[DroppedPart, ...]:
-    """Return the parts that leave nothing in the equations."""
+def list_dropped(assembly: Assembly) -> Iterator[DroppedPart]:
+    """Yield the parts that leave nothing in the equations."""
     mechanism = assembly.mechanism
     feeding = {source for source, _ in assembly.flat.links.values()}
-    found = []
     for path, local in mechanism.locals_.items():
         if path in feeding or local.joints or any(not one.value.is_zero for one in local.constraints):
             continue
         why = _why_nothing(mechanism, local)
         if why:
-            found.append(DroppedPart(path, why))
-    return tuple(found)
+            yield DroppedPart(path, why)
 
 
 def _why_nothing(mechanism: Mechanism, local: LocalPart) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from atwood.expr import Expression, Scalar, depends_on, is_zero
 from atwood.lazy_dataclasses import dataclass
@@ -193,13 +193,11 @@ def _measured(local: LocalPart) -> list[str]:
     return [name for name, symbols in local.connectors.items() if symbols.axes is not None]
 
 
-def _angles_read(local: LocalPart, values: list[Scalar]) -> list[str]:
-    found = []
+def _angles_read(local: LocalPart, values: list[Scalar]) -> Iterator[str]:
     for name, symbols in local.connectors.items():
         wanted = [*symbols.orientation, *symbols.spin]
         if wanted and any(isinstance(value, Expression) and depends_on(value, wanted) for value in values):
-            found.append(name)
-    return found
+            yield name
 
 
 def reads_position(local: LocalPart, constraint: LocalConstraint) -> bool:

@@ -7,7 +7,7 @@ signs are discrete states, so that equations are derived once for all of them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from atwood.errors import DeclarationError, UnsupportedError, suggestion
@@ -176,7 +176,7 @@ def _stiffness(part: Part, law: Law, bound: Any, graph: Graph) -> Expression | N
     return graph.convert(getattr(bound, name)) if name and getattr(bound, name) is not None else None
 
 
-def _slip(part: Part, law: Law, bound: Any, graph: Graph, stiffness: Expression | None) -> list[LocalContact]:
+def _slip(part: Part, law: Law, bound: Any, graph: Graph, stiffness: Expression | None) -> Iterator[LocalContact]:
     options: FrictionOptions = law.options
     names = options.reactions
     values = call_law(part.path, law, lambda: [one_scalar(graph, one) for one in scalars(getattr(bound, law.name)())])
@@ -195,14 +195,12 @@ def _slip(part: Part, law: Law, bound: Any, graph: Graph, stiffness: Expression 
     state = graph.convert(getattr(bound, f"{law.name}_state"))
     held = [graph.convert(getattr(bound, f"{one}_direction")) for one in value_names(law)]
     mask = 0.5 * state * (state - 1.0)  # 1 for the state 2, in which it sticks
-    found = []
     for i, (name, value, way) in enumerate(zip(names, values, _ways(values, held), strict=True)):
         multiplier, read, stand_in = _symbols(part, law, graph, i)
         force = mask * multiplier - way * limit
         read = force if mask.is_constant else read
         row = LocalConstraint(law, i, value, name, 1.0, stiffness=stiffness)
-        found.append(LocalContact(row, multiplier, read, mask, force, value, stand_in, held[i], limit, static))
-    return found
+        yield LocalContact(row, multiplier, read, mask, force, value, stand_in, held[i], limit, static)
 
 
 _TINY = 1e-150

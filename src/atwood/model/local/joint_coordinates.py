@@ -6,7 +6,7 @@ joint's frames; where the coordinate is one of the mechanism's own, it takes its
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 from atwood.errors import ConnectError, DeclarationError, UnsupportedError, suggestion
@@ -94,13 +94,12 @@ def turns_read(part: Part, formulas: Formulas, functions: Sequence[Expression]) 
 
 def counting_constraints(
     part: Part, counted: Collection[str], formulas: Formulas, graph: Graph
-) -> list[LocalConstraint]:
-    """Return constraints that tie joint coordinates, which count turns, to orientations, which do not.
+) -> Iterator[LocalConstraint]:
+    """Yield constraints that tie joint coordinates, which count turns, to orientations, which do not.
 
     They hold where nothing hangs on the joint. ``2 tan((phi - formula)/2)`` has slope one at each of its zeros, which
     are whole turns apart, and no jump where the formula has one.
     """
-    found = []
     for law in part.component.laws("observable"):
         symbol = graph.symbol(f"{part.path}.{law.name}") if law.name in counted else None
         if symbol is None or symbol not in formulas or not law.options.periodic:
@@ -109,8 +108,7 @@ def counting_constraints(
         options = ConstraintOptions((law.name,), "N*m", 1.0, doc, (), ("space",))
         value = 2.0 * tan(0.5 * (symbol - formulas[symbol][0]))
         counting = Law("constraint", f"count_{law.name}", options)
-        found.append(LocalConstraint(counting, 0, graph.convert(value), law.name, 1.0, symbol))
-    return found
+        yield LocalConstraint(counting, 0, graph.convert(value), law.name, 1.0, symbol)
 
 
 @dataclass(frozen=True)

@@ -316,13 +316,12 @@ def run_data(label: str, result: Result, stage: Stage, is_whole: bool) -> dict[s
         },
         "events": [{"time": one.time, "part": one.part, "message": one.message} for one in result.events],
         "energy": {name: getattr(ledger, name)[shown] for name in ("kinetic", "potential", "work")},
-        "parts": _parts(result.assembly),
+        "parts": list(_parts(result.assembly)),
     }
 
 
-def _parts(assembly: Assembly) -> list[dict[str, Any]]:
-    """Return what the parts are, with their parameters and connectors."""
-    found = []
+def _parts(assembly: Assembly) -> Iterator[dict[str, Any]]:
+    """Yield what the parts are, with their parameters and connectors."""
     for path, part in assembly.flat.parts.items():
         component: Component = part.component
         doc = (inspect.getdoc(type(component)) or "").partition("\n")[0]
@@ -334,8 +333,7 @@ def _parts(assembly: Assembly) -> list[dict[str, Any]]:
         ]
         names = list(component.connectors())
         kind = type(component).__name__
-        found.append({"path": path, "kind": kind, "doc": doc, "connectors": names, "parameters": parameters})
-    return found
+        yield {"path": path, "kind": kind, "doc": doc, "connectors": names, "parameters": parameters}
 
 
 def _shown(value: Any) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -51,8 +51,8 @@ class Window:
 
 def curves_through(
     field: Field, points: FloatArray, window: Window, rest: FloatArray, both_ways: bool = True
-) -> list[FloatArray]:
-    """Return curves of a field through points, each until it leaves the window, closes, or comes to rest.
+) -> Iterator[FloatArray]:
+    """Yield curves of a field through points, each until it leaves the window, closes, or comes to rest.
 
     They are followed by their length, by the classical Runge-Kutta method (Hairer, Norsett and Wanner, Solving ODEs I,
     section II.1).
@@ -94,28 +94,25 @@ def curves_through(
         if not len(alive):
             break
     found = [path[np.all(np.isfinite(path), axis=1)] for path in np.swapaxes(paths, 0, 1)]
-    joined = []
     for k in range(count):
         ahead = found[k]
         if closed[k]:
             ahead = np.concatenate([ahead, ahead[:1]])
         elif both_ways:
             ahead = np.concatenate([found[count + k][:0:-1], ahead])
-        joined.append(corner + ahead * size)
-    return joined
+        yield corner + ahead * size
 
 
 def spaced_curves(
     field: Field, window: Window, rest: FloatArray, known: Sequence[FloatArray], spacing: float = 0.055
-) -> list[FloatArray]:
-    """Return curves that fill a window evenly.
+) -> Iterator[FloatArray]:
+    """Yield curves that fill a window evenly.
 
     Each begins away from all others (in the manner of Jobard and Lefer, Visualization in Scientific Computing, 1997).
     """
     size, corner = window.size, window.corner
     candidates = qmc.Halton(2, scramble=False).random(_CANDIDATES + 1)[1:]
     taken = [(one - corner) / size for one in known] + [(rest.reshape(-1, 2) - corner) / size]
-    found: list[FloatArray] = []
     for _ in range(_ROUNDS):
         candidates = candidates[_distance(candidates, np.concatenate(taken)) > spacing]
         chosen: list[FloatArray] = []
@@ -128,9 +125,8 @@ def spaced_curves(
             own = (curve - corner) / size
             crowded = np.mean(_distance(own[::5], np.concatenate(taken)) < 0.5 * spacing)
             if len(own) > 5 and crowded < 0.3:
-                found.append(curve)
+                yield curve
                 taken.append(own)
-    return found
 
 
 def separatrices(

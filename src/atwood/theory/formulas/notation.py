@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from atwood.arguments import optional
@@ -287,22 +287,18 @@ def _worked_out(
     return found, [more[symbol] for symbol in read_by(found.values(), more)]
 
 
-def _coordinates(found: Lagrangian) -> list[_Wanted]:
-    made = []
+def _coordinates(found: Lagrangian) -> Iterator[_Wanted]:
     for q, name in zip(found.coordinates, found.names, strict=True):
         stem, part = _stem(name.name)
-        made.append(_Wanted(q, stem, name.name, part, name.unit, "", None, "coordinate"))
-    return made
+        yield _Wanted(q, stem, name.name, part, name.unit, "", None, "coordinate")
 
 
-def _spins(found: Lagrangian) -> list[_Wanted]:
-    made = []
+def _spins(found: Lagrangian) -> Iterator[_Wanted]:
     for u, name, place in zip(found.velocities, found.velocity_names, found.moves, strict=True):
         if place is None:
             stem, part = _stem(name.name)
             meaning = "Angular velocity in the axes of the body."
-            made.append(_Wanted(u, stem, name.name, part, name.unit, meaning, None, "angular velocity"))
-    return made
+            yield _Wanted(u, stem, name.name, part, name.unit, meaning, None, "angular velocity")
 
 
 def _stem(path: str) -> tuple[tuple[str, ...], str]:
@@ -315,34 +311,28 @@ def _stem(path: str) -> tuple[tuple[str, ...], str]:
     return _word(pieces[-1]), ".".join(pieces[:-1])
 
 
-def _multipliers(found: Lagrangian) -> list[_Wanted]:
+def _multipliers(found: Lagrangian) -> Iterator[_Wanted]:
     several = len(found.constraints) > 1
-    made = []
     for number, one in enumerate(found.constraints):
         stem = ("lambda", str(number + 1)) if several else ("lambda",)
         meaning = f"{one.key[0]}.{one.reaction} is {'-' if one.sign < 0 else ''}it."
-        made.append(_Wanted(one.multiplier, stem, one.label, one.key[0], "", meaning, None, "multiplier"))
-    return made
+        yield _Wanted(one.multiplier, stem, one.label, one.key[0], "", meaning, None, "multiplier")
 
 
-def _parameters(assembly: Assembly) -> list[_Wanted]:
-    made = []
+def _parameters(assembly: Assembly) -> Iterator[_Wanted]:
     for symbol, value in assembly.mechanism.table.values.items():
         path = symbol.name
         part, name, axis = _place(assembly, path)
         unit, meaning = _said(assembly, part, name)
-        made.append(_Wanted(symbol, _parameter_stem(name, axis), path, part, unit, meaning, value, "parameter"))
-    return made
+        yield _Wanted(symbol, _parameter_stem(name, axis), path, part, unit, meaning, value, "parameter")
 
 
-def _sampled_values(assembly: Assembly) -> list[_Wanted]:
-    made = []
+def _sampled_values(assembly: Assembly) -> Iterator[_Wanted]:
     for one in assembly.discrete_states:
         part, _, name = one.path.rpartition(".")
         spec = assembly.mechanism.locals_[part].part.component.state_specs()[name.partition("[")[0]]
         unit = spec.unit.text.replace("any", "")
-        made.append(_Wanted(one.symbol, _word(name), one.path, part, unit, spec.doc, None, "sampled value"))
-    return made
+        yield _Wanted(one.symbol, _word(name), one.path, part, unit, spec.doc, None, "sampled value")
 
 
 def _place(assembly: Assembly, path: str) -> tuple[str, str, str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import unicodedata
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
 from html import escape
 from typing import Any
@@ -234,18 +234,16 @@ def _latex_matrix(matrix: Matrix) -> list[str]:
     return [row for line in _single(matrix) for row in _latex_rows(line)]
 
 
-def _single(matrix: Matrix) -> list[Line]:
-    """Return the entries of a matrix that are not zero as lines; of a symmetric one those from the diagonal on."""
+def _single(matrix: Matrix) -> Iterator[Line]:
+    """Yield the entries of a matrix that are not zero as lines; of a symmetric one those from the diagonal on."""
     rows = matrix.entries
     symmetric = len(rows) == len(rows[0]) and all(rows[i][j] == rows[j][i] for i in range(len(rows)) for j in range(i))
-    found = []
     for i, row in enumerate(rows):
         for j, one in enumerate(row):
             if one.terms and not (symmetric and j < i):
                 place = f"{i + 1}{j + 1}" if max(len(rows), len(row)) < 10 else f"{i + 1},{j + 1}"
                 both = rf" = {matrix.left[0]}_{{{place[::-1]}}}" if symmetric and i != j and len(place) == 2 else ""
-                found.append(Line((f"{matrix.left[0]}_{{{place}}}{both}", f"{matrix.left[1]}[{i + 1},{j + 1}]"), one))
-    return found
+                yield Line((f"{matrix.left[0]}_{{{place}}}{both}", f"{matrix.left[1]}[{i + 1},{j + 1}]"), one)
 
 
 def as_latex(lines: Sequence[Line | Matrix], by_part: bool = False) -> str:

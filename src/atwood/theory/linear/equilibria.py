@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 from typing import Any, Literal, NamedTuple, overload
 
@@ -383,14 +383,13 @@ _LATER = (0.3819660112501051, 1.2360679774997896)
 """Times after the start, s, at which a state must be one of rest too."""
 
 
-def _places(point: OperatingPoint, bounds: FloatArray, count: int) -> list[FloatArray]:
+def _places(point: OperatingPoint, bounds: FloatArray, count: int) -> Iterator[FloatArray]:
     scene = point.scene
     size = len(bounds)
     if not size:
-        return []
+        return
     # Each kind of start has a sequence of its own: every so many of one lie in one part of the region.
     wide, close = (scipy.stats.qmc.Halton(size, seed=seed).random(count) for seed in (7, 8))
-    made = []
     for number in range(count):
         is_near, turn = number % _NEARBY == _NEARBY - 1, number // _NEARBY
         row, near = (close[turn], 10.0 ** -(1 + turn % 3)) if is_near else (wide[number - turn], 1.0)
@@ -401,8 +400,7 @@ def _places(point: OperatingPoint, bounds: FloatArray, count: int) -> list[Float
         moved = np.zeros(size)
         for _, numbers in scene.tangents.orientation_coordinates:
             moved[list(numbers)] = values[list(numbers)]
-        made.append(scene.tangents.moved(q, moved))
-    return made
+        yield scene.tangents.moved(q, moved)
 
 
 def _wrapped(point: OperatingPoint, rest: Rest, bounds: FloatArray) -> dict[int, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 from typing import Any
 
@@ -107,7 +107,7 @@ class OperatingPoint:
 def find_operating_point(scene: Model | Assembly, at: At, inputs: Sequence[str]) -> OperatingPoint:
     """Find the state about which to look at a scene."""
     base = plain_assembly(scene)
-    found = input_paths(base.flat, inputs)
+    found = tuple(input_paths(base.flat, inputs))
     if isinstance(at, tuple):
         return _at_time(base, *at, found)
     assembly = _varied(base, found)
@@ -239,13 +239,12 @@ def _refuse_singular(linear: LinearScene, finding: RankFinding, t: float, q: Flo
 # -- inputs ----------------------------------------------------------------------------------------------------------
 
 
-def input_paths(flat: FlatScene, paths: Sequence[str]) -> tuple[InputPath, ...]:
-    """Return what is meant by the paths of inputs: an input of a part, or the output of a source that feeds some."""
+def input_paths(flat: FlatScene, paths: Sequence[str]) -> Iterator[InputPath]:
+    """Yield what is meant by the paths of inputs: an input of a part, or the output of a source that feeds some."""
     own = {f"{path}.{name}": (path, name) for path, part in flat.parts.items() for name in part.signals}
     fed: dict[str, list[tuple[str, str]]] = {}
     for key, (source, name) in flat.links.items():
         fed.setdefault(f"{source}.{name}", []).append(key)
-    found = []
     for path in paths:
         keys = [own[path]] if path in own else fed.get(path)
         if keys is None:
@@ -257,8 +256,7 @@ def input_paths(flat: FlatScene, paths: Sequence[str]) -> tuple[InputPath, ...]:
             )
         part, name = keys[0]
         unit = flat.parts[part].component.signal_specs()[name].unit.text
-        found.append(InputPath(path, unit, tuple(keys)))
-    return tuple(found)
+        yield InputPath(path, unit, tuple(keys))
 
 
 _VARIED: Key[Assembly] = Key("the scene with variations of inputs")

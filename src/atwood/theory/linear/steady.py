@@ -9,7 +9,7 @@ Mechanics and Symmetry, section 4.1: relative equilibria).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import field
 
 import numpy as np
@@ -202,20 +202,18 @@ def _time_shift(scene: LinearScene) -> _Field:
     return _constant(np.zeros(len(scene.tangents) + len(scene.sizes)), is_time=True)
 
 
-def _shifts(scene: LinearScene) -> list[_Field]:
-    """Return the shift of each coordinate that is displaced by itself."""
+def _shifts(scene: LinearScene) -> Iterator[_Field]:
+    """Yield the shift of each coordinate that is displaced by itself."""
     size = len(scene.tangents) + len(scene.sizes)
-    found: list[_Field] = []
     for _, k in scene.tangents.plain:
         value = np.zeros(size)
         value[k] = 1.0
-        found.append(_constant(value))
+        yield _constant(value)
     for orientation, numbers in scene.tangents.orientation_coordinates:
         if orientation.kind == "direction":
             value = np.zeros(size)
             value[numbers[0]] = 1.0
-            found.append(_constant(value))
-    return found
+            yield _constant(value)
 
 
 def _rotations(scene: LinearScene) -> list[_Field]:
@@ -290,9 +288,8 @@ def _in_body(quaternion: FloatArray, axis: FloatArray) -> FloatArray:
     return np.asarray(found / (quaternion @ quaternion))
 
 
-def _own_rotations(scene: LinearScene) -> list[_Field]:
-    """Return rotations of bodies about axes of their own, of which only the body's own velocities know."""
-    found: list[_Field] = []
+def _own_rotations(scene: LinearScene) -> Iterator[_Field]:
+    """Yield rotations of bodies about axes of their own, of which only the body's own velocities know."""
     size, count = len(scene.tangents) + len(scene.sizes), len(scene.tangents)
     for orientation, numbers in scene.tangents.orientation_coordinates:
         if orientation.kind != "quaternion":
@@ -304,8 +301,7 @@ def _own_rotations(scene: LinearScene) -> list[_Field]:
             matrix[np.ix_(numbers, numbers)] = crossed
             if len(spins) == 3:
                 matrix[np.ix_(spins, spins)] = crossed
-            found.append(_own_rotation(matrix, numbers, axis, spins, count))
-    return found
+            yield _own_rotation(matrix, numbers, axis, spins, count)
 
 
 def _own_rotation(

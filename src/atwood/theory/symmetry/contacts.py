@@ -8,7 +8,7 @@ closed does no work, an impact none where restitution is one, and friction takes
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -88,14 +88,12 @@ class Pushes:
         found = np.asarray(self._kernel([state.t], state.q, state.u)[0], dtype=float)
         return found.reshape(len(self.pushes), -1)
 
-    def on(self, states: Sequence[State]) -> list[State]:
-        """Return, for each state and each row, the rates of quantities by a unit of its force."""
-        found = []
+    def on(self, states: Sequence[State]) -> Iterator[State]:
+        """Yield, for each state and each row, the rates of quantities by a unit of its force."""
         for one in states:
             for row in self.at(one):
                 terms = np.abs(one.generators) @ np.abs(row)
-                found.append(replace(one, rates=one.generators @ row, terms=terms))
-        return found
+                yield replace(one, rates=one.generators @ row, terms=terms)
 
     def changed(self, states: Sequence[State], number: int) -> str:
         """Return what changes a quantity: the path of a gap or slip, empty where none does."""
