@@ -5,7 +5,7 @@ from __future__ import annotations
 from atwood.arguments import FLAG
 from atwood.cli.command import Request, command
 from atwood.cli.output import print_json, writer
-from atwood.cli.parts import list_parts
+from atwood.cli.parts import list_parts, said
 from atwood.cli.scenes import bundled_scenes
 from atwood.table import facts
 
@@ -15,7 +15,7 @@ def list_scenes(request: Request) -> None:
     if request.parts:
         list_parts(request.as_json)
         return
-    scenes = {name: _summary(kind) for name, kind in bundled_scenes().items()}
+    scenes = {name: said(kind)[0] for name, kind in bundled_scenes().items()}
     if request.as_json:
         print_json({"scenes": [{"name": name, "summary": summary} for name, summary in scenes.items()]})
         return
@@ -23,11 +23,6 @@ def list_scenes(request: Request) -> None:
         writer().line(("No component library is installed.", ""))
         return
     writer().show(facts(scenes.items()))
-
-
-def _summary(kind: type) -> str:
-    """Return the first line of what a class says about itself."""
-    return (vars(kind)["__doc__"] or "").strip().split("\n")[0]
 
 
 COMMAND = command("list", list_scenes, argument="", more={"parts": (FLAG, False)})

@@ -86,8 +86,8 @@ def _plain(name: str) -> str:
 def mentioning(word: str) -> list[tuple[str, str, str]]:
     """Return parts and scenes in whose names, synonyms or first lines a word occurs: what it is, its name, the line."""
     asked = _plain(word)
-    parts = [("part", name, _said(kind)[0], _synonyms(kind)) for name, kind in library_parts().items()]
-    scenes = [("scene", name, _said(kind)[0], ()) for name, kind in bundled_scenes().items()]
+    parts = [("part", name, said(kind)[0], _synonyms(kind)) for name, kind in library_parts().items()]
+    scenes = [("scene", name, said(kind)[0], ()) for name, kind in bundled_scenes().items()]
     return [
         (what, name, line)
         for what, name, line, more in (*parts, *scenes)
@@ -99,13 +99,13 @@ def list_parts(as_json: bool) -> None:
     """Show the parts of the installed libraries, with one line each."""
     parts = library_parts()
     if as_json:
-        rows = ((name, _said(kind)[0], list(_synonyms(kind))) for name, kind in parts.items())
+        rows = ((name, said(kind)[0], list(_synonyms(kind))) for name, kind in parts.items())
         print_json({"parts": [dict(zip(("name", "summary", "synonyms"), row, strict=True)) for row in rows]})
         return
     listed, before = [], ""
     for name, kind in parts.items():
         group = kind.__module__.split(".")[-2]
-        listed.append(("" if group == before else group, name, _said(kind)[0]))
+        listed.append(("" if group == before else group, name, said(kind)[0]))
         before = group
     writer().show(table(("", "", "~"), listed))
 
@@ -125,7 +125,7 @@ def show_part(name: str, as_json: bool, changed: bool = False) -> None:
                 "part": own,
                 "synonyms": list(_synonyms(kind)),
                 "spaces": kind.spaces,
-                "text": " ".join(_said(kind)),
+                "text": " ".join(said(kind)),
                 **{heading: rows for heading, rows in _tables(kind) if rows},
             }
             for own, kind in found.items()
@@ -139,7 +139,7 @@ def show_part(name: str, as_json: bool, changed: bool = False) -> None:
 def _print_part(name: str, kind: type[Component]) -> None:
     out, tables = writer(), {heading: rows for heading, rows in _tables(kind) if rows}
     out.line((name, "bold"), (_only_in(kind.spaces), ""))
-    out.line(("\n".join(_said(kind)), ""))
+    out.line(("\n".join(said(kind)), ""))
     if _synonyms(kind):
         out.line((f"Also called: {', '.join(_synonyms(kind))}.", ""))
     for heading, rows in tables.items():
@@ -189,7 +189,7 @@ def _own_parts(kind: type[Component]) -> Iterator[dict[str, str]]:
     """Yield the parts of a part that is made of others; their quantities are read as ``part.quantity``."""
     if issubclass(kind, Model):
         for name, part in kind().parts.items():
-            yield {"name": name, "kind": type(part).__name__, "meaning": _said(type(part))[0]}
+            yield {"name": name, "kind": type(part).__name__, "meaning": said(type(part))[0]}
 
 
 def _quantities(kind: type[Component]) -> Iterator[dict[str, str]]:
@@ -242,7 +242,7 @@ def _only_with(connector: Any) -> str:
     return f" (with {', '.join(told)})" if told else ""
 
 
-def _said(kind: type) -> list[str]:
+def said(kind: type) -> list[str]:
     """Return what a class says about itself, line by line."""
     lines = (kind.__doc__ or "").strip().split("\n")
     return [line.strip() for line in lines]

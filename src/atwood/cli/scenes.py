@@ -44,11 +44,9 @@ def _modules_of(libraries: Iterable[str], module: str) -> Iterator[ModuleType]:
         name = f"{library}.{module}"
         try:
             yield importlib.import_module(name)
-        except ModuleNotFoundError as error:
-            if error.name == name:
-                continue  # a library without it
-            raise UsageError(f"the library cannot be loaded ({error})", where=library) from error
         except ImportError as error:
+            if isinstance(error, ModuleNotFoundError) and error.name == name:
+                continue  # a library without it
             raise UsageError(f"the library cannot be loaded ({error})", where=library) from error
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from atwood.expr import Expression, Scalar
+from atwood.expr import Scalar, is_zero
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.kinematics.mechanism import Mechanism
@@ -213,7 +213,7 @@ def _why_nothing(mechanism: Mechanism, local: LocalPart) -> str:
     acts = any(local.part.component.laws(kind) for kind in ("potential", "dissipation", "force"))
     if not inertias and not forces and not acts:
         return "it only measures"
-    if all(_is_nothing(value) for value in (*inertias, *forces)):
+    if all(is_zero(value) for value in (*inertias, *forces)):
         return "it has no mass" if inertias else "its force is zero"
     fixed = {
         mechanism.bodies.bodies[mechanism.bodies.body_of[mechanism.graph.node_of[local.part.path, name]]].is_fixed
@@ -222,10 +222,6 @@ def _why_nothing(mechanism: Mechanism, local: LocalPart) -> str:
     if fixed == {True}:
         return "it is fixed in the world" if inertias else "everything it joins is fixed in the world"
     return ""
-
-
-def _is_nothing(value: Scalar) -> bool:
-    return value.is_zero if isinstance(value, Expression) else value == 0.0
 
 
 def list_parameters(assembly: Assembly, scene: Model | None = None) -> tuple[ParameterEntry, ...]:

@@ -21,7 +21,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import field
 from importlib import import_module
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
@@ -284,20 +284,14 @@ def _from_dataset(data: Dataset, checksum: str | None) -> SavedResult:
     return _verified(saved, checksum)
 
 
-def _write_netcdf(saved: SavedResult, file: Path) -> None:
-    write_netcdf(saved.as_dataset(), file, _checksum(saved))
-
-
-def _read_netcdf(file: Path) -> SavedResult:
-    return _from_dataset(*read_netcdf(file))
-
-
-def _write_matlab(saved: SavedResult, file: Path) -> None:
-    write_matlab(saved.as_dataset(), file, _checksum(saved))
-
-
-def _read_matlab(file: Path) -> SavedResult:
-    return _from_dataset(*read_matlab(file))
+def _through_dataset(
+    write: Callable[[Dataset, Path, str], None], read: Callable[[Path], tuple[Dataset, str | None]]
+) -> tuple[_Write, _Read]:
+    """Return how a result is written and read by what writes and reads data sets."""
+    return (
+        lambda saved, file: write(saved.as_dataset(), file, _checksum(saved)),
+        lambda file: _from_dataset(*read(file)),
+    )
 
 
 # -- NPZ ---------------------------------------------------------------------------------------------------------------
@@ -314,11 +308,7 @@ def _write_npz(saved: SavedResult, file: Path) -> None:
     }
     arrays: dict[str, Any] = {"time": saved.time, **saved.quantities, _ABOUT: np.array(json_text(about))}
     with file.open("wb") as stream:
-        _savez(stream, arrays)
-
-
-def _savez(stream: BinaryIO, arrays: Mapping[str, Any]) -> None:
-    np.savez_compressed(stream, allow_pickle=False, **arrays)
+        np.savez_compressed(stream, allow_pickle=False, **arrays)
 
 
 def _read_npz(file: Path) -> SavedResult:
@@ -378,10 +368,10 @@ def _read_csv(file: Path) -> SavedResult:
 _Write = Callable[[SavedResult, Path], None]
 _Read = Callable[[Path], SavedResult]
 _FORMATS: dict[str, tuple[_Write, _Read]] = {
-    ".nc": (_write_netcdf, _read_netcdf),
+    ".nc": _through_dataset(write_netcdf, read_netcdf),
     ".npz": (_write_npz, _read_npz),
     ".csv": (_write_csv, _read_csv),
-    ".mat": (_write_matlab, _read_matlab),
+    ".mat": _through_dataset(write_matlab, read_matlab),
 }
 
 

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
-from atwood.clock import Clock, TimeIsUp, check_time
 from atwood.expr import Program
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
@@ -18,7 +17,7 @@ from atwood.mechanics.outputs.part_power import Flow, PartPowers, part_energy_pr
 from atwood.numerics.matrices import least_norm, to_array
 from atwood.result.part_connectors import Connectors, Ends
 from atwood.result.part_energy import PartEnergies, PartEnergy
-from atwood.result.work import integral_in_steps, integral_of_samples, nodes_in_steps, samples_in_steps
+from atwood.result.work import in_its_time, integral_in_steps, integral_of_samples, nodes_in_steps, samples_in_steps
 from atwood.simulation.contacts.values import ContactValues
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.reactions import ReactionSolver, maximal_state
@@ -169,13 +168,8 @@ def _within(run: Run, connectors: Sequence[Connectors]) -> tuple[list[_Done], fl
     Powers are integrated within the steps of the solver, for which the run is made again; where it cannot be, or not in
     its limit of time, through its samples.
     """
-    samples, limit = None, run.options.max_seconds
-    try:
-        with Clock(None if limit is None else limit - sum(run.timings.values())).kept():
-            check_time()
-            samples = samples_in_steps(run, [one.time for one in run.segments], nodes_in_steps(run))
-    except TimeIsUp:
-        pass
+    times = [one.time for one in run.segments]
+    samples = in_its_time(run, lambda: samples_in_steps(run, times, nodes_in_steps(run)))
     found, unsure = [], 0.0
     for i, (segment, meeting) in enumerate(zip(run.segments, connectors, strict=True)):
         if samples is None:
@@ -204,9 +198,7 @@ class _Powers:
         assembly = self._assembly = segment.assembly
         self._segment = segment
         self._solver = ReactionSolver(assembly, float(segment.time[0]), segment.coordinates[:, 0], segment.speeds[:, 0])
-        self._program = assembly.shared.get(
-            _POWERS, lambda: part_powers(assembly.mechanism, assembly.maximal, assembly.parameters)
-        )
+        self._program = _powers_of(assembly)
         self._holders = list(dict.fromkeys(one.key[0] for one in assembly.maximal.constraints))
         self._sums = np.array(
             [[one.key[0] == path for one in assembly.maximal.constraints] for path in self._holders], dtype=float
@@ -229,6 +221,10 @@ class _Powers:
             for row in values if not clear.all() else ():
                 row[~clear] = np.interp(t[~clear], t[clear], row[clear])
         return values
+
+
+def _powers_of(assembly: Assembly) -> PartPowers:
+    return assembly.shared.get(_POWERS, lambda: part_powers(assembly.mechanism, assembly.maximal, assembly.parameters))
 
 
 def _in_steps(
@@ -330,9 +326,7 @@ def _undetermined(segment: SegmentRecord, connectors: Connectors) -> set[str]:
     start = float(segment.time[0]), segment.coordinates[:, 0], segment.speeds[:, 0]
     if not ReactionSolver(assembly, *start).finding.redundant:
         return set()
-    program = assembly.shared.get(
-        _POWERS, lambda: part_powers(assembly.mechanism, assembly.maximal, assembly.parameters)
-    )
+    program = _powers_of(assembly)
     random, found = np.random.default_rng(0), set[str]()
     sizes = motion_scales(assembly.maximal, scene_length(assembly))[:, None]
     weights = multiplier_sizes(assembly, "dae")

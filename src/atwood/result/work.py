@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,8 @@ from atwood.simulation.run.run_record import Run, run_again, times_of_steps
 if TYPE_CHECKING:
     from atwood.result.part_energy import PartEnergies
 
+
+_T = TypeVar("_T")
 
 _CLEAR, _PART = 0.01, 0.1
 """Of the tolerance, and of the drift: an error of the work that is smaller than either of them hides nothing."""
@@ -123,17 +126,20 @@ def _balanced(run: Run, pieces: Sequence[Piece], shown: NDArray[np.bool_]) -> En
     few = run.statistics.steps > min(one.steps_seen for one in methods) * sum(len(one.time) for one in pieces)
     if not (hidden or (few and ledger.max_drift > _SUSPECT * rtol)):
         return ledger
-    limit = run.options.max_seconds
-    try:
-        with Clock(None if limit is None else limit - sum(run.timings.values())).kept():
-            check_time()
-            found = _work_in_steps(run, pieces, nodes_in_steps(run))
-    except TimeIsUp:
-        return ledger
+    found = in_its_time(run, lambda: _work_in_steps(run, pieces, nodes_in_steps(run)))
     if found is None:
         return ledger
     work, unsure, swing = found
     return make_ledger(pieces, work, unsure, shown, swing)
+
+
+def in_its_time(run: Run, look: Callable[[], _T | None]) -> _T | None:
+    """Return what is found along a run in what is left of its limit of time; None where that does not do."""
+    limit = run.options.max_seconds
+    with suppress(TimeIsUp), Clock(None if limit is None else limit - sum(run.timings.values())).kept():
+        check_time()
+        return look()
+    return None
 
 
 def _work_in_steps(run: Run, pieces: Sequence[Piece], count: int) -> tuple[list[FloatArray], float, float] | None:

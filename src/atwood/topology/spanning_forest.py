@@ -378,7 +378,7 @@ class _Grower:
         oriented = self.bodies.oriented
         if use_locks:
             spread(oriented)
-        for index in self._order_of_angles():
+        for index in [one.body for one in self.attachments]:
             if index in oriented and index not in known:
                 number, _ = self._coordinate(f"{self.bodies.bodies[index].name}.angle", "rad")
                 self.orientations.append(OrientationStep(index, number))
@@ -408,6 +408,3 @@ class _Grower:
                 else:
                     counted[one.counts] = self._coordinate(one.counts.name, unit_of(local, one.counts.name))
         return counted
-
-    def _order_of_angles(self) -> list[int]:
-        return [one.body for one in self.attachments]

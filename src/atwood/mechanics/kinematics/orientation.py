@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, TypeAlias
 
-from atwood.expr import Expression, Scalar, cos, sin
+from atwood.expr import Expression, Scalar, cos, is_zero, sin
 from atwood.model.values.rotation import IDENTITY, Axes, Rotation, Turn, as_rotation, compose, from_axes, to_axes
 from atwood.model.values.space import Space, Vector, cross, planar_axes
 from atwood.topology.bodies import Body, RigidStep
@@ -57,7 +57,7 @@ def rotate(vector: Vector, turn: NodeTurn) -> Vector:
     """Return, in the axes of a body, a vector that is given in those of a node."""
     if isinstance(turn, tuple):
         return from_axes(turn, vector)
-    if turn.is_zero if isinstance(turn, Expression) else turn == 0.0:
+    if is_zero(turn):
         return vector
     return from_axes(planar_axes(turn), vector)
 
@@ -97,7 +97,7 @@ def inertial_torque(moment: Scalar | Axes, spin: Sequence[Expression], spin_rate
 def _gyroscopic(tensor: Axes, omega: Vector) -> Vector:
     """Return ``omega x J omega``; about principal axes with one difference of moments for each component."""
     off = (tensor[0].y, tensor[0].z, tensor[1].z)
-    if all(_is_zero(entry) for entry in off):
+    if all(is_zero(entry) for entry in off):
         a, b, c = tensor[0].x, tensor[1].y, tensor[2].z
         return Vector(
             omega.y * omega.z * (c - b),
@@ -105,10 +105,6 @@ def _gyroscopic(tensor: Axes, omega: Vector) -> Vector:
             omega.x * omega.y * (b - a),
         )
     return cross(omega, from_axes(tensor, omega))
-
-
-def _is_zero(value: Scalar) -> bool:
-    return bool(value.is_zero) if isinstance(value, Expression) else bool(value == 0.0)
 
 
 def quaternion_axes(quaternion: Sequence[Scalar]) -> Axes:

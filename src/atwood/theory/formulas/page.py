@@ -182,17 +182,19 @@ def rows_of(line: Line, by_part: bool = False) -> list[list[Term]]:
     return rows
 
 
-def _pieces(line: Line, write: Callable[[Sum], str], by_part: bool = False) -> list[str]:
-    """Return a formula in pieces that fit a line each, signs first."""
+def _pieces(line: Line, write: Callable[[Sum], str], by_part: bool) -> tuple[list[str], list[str]]:
+    """Return a formula in pieces that fit a line each, signs first, and the parts that they come from, if asked."""
+    owners = _owners_of(line) if by_part else []
     written = []
-    for i, terms in enumerate(rows_of(line, by_part)):
+    for i, terms in enumerate(rows_of(line, bool(owners))):
         body = write(Sum(tuple(terms)))
         if i and terms[0].number > 0:
             body = f"+ {body}"
         elif i and body.startswith("-"):
             body = f"- {body[1:].lstrip()}"
         written.append(body)
-    return written
+    written[-1] += f" {line.right}" if line.right else ""
+    return written, owners
 
 
 def _owners_of(line: Line) -> list[str]:
@@ -217,9 +219,7 @@ def _latex_rows(line: Line | Matrix, by_part: bool = False) -> list[str]:
     """Return the rows of an aligned block."""
     if isinstance(line, Matrix):
         return _latex_matrix(line)
-    owners = _owners_of(line) if by_part else []
-    pieces = _pieces(line, latex.formula, bool(owners))
-    pieces[-1] += f" {line.right}" if line.right else ""
+    pieces, owners = _pieces(line, latex.formula, by_part)
     for i, one in enumerate(owners):
         pieces[i] += rf" && \text{{{one}}}".replace("_", r"\_")
     head = f"{line.left[0]} &= " if line.left[0] else "& "
@@ -281,9 +281,7 @@ def as_text(sections: Sequence[Section], by_part: bool = False) -> str:
 def _text_rows(line: Line | Matrix, by_part: bool = False) -> list[str]:
     if isinstance(line, Matrix):
         return [row for one in _single(line) for row in _text_rows(one)]
-    owners = _owners_of(line) if by_part else []
-    pieces = _pieces(line, text.formula, bool(owners))
-    pieces[-1] += f" {line.right}" if line.right else ""
+    pieces, owners = _pieces(line, text.formula, by_part)
     head = f"{line.left[1]} = " if line.left[1] else ""
     rows = [head + pieces[0], *(f"{' ' * 6}{piece}" for piece in pieces[1:])]
     size = max(map(width, rows))

@@ -102,7 +102,7 @@ class Flow(Shown):
         g = self.space.read(EXPRESSION.read(function))
         if self.order is not None:
             return self.space.shown(_series(self.function, g, self.space, self.parameter, self.order))
-        return self.space.shown(short(g.xreplace(dict(zip(self._own, self.values, strict=True)))))
+        return self.space.shown(short(g.xreplace(dict(zip(self.space.own, self.values, strict=True)))))
 
     def transformation(self, coordinates: Sequence[Any], momenta: Sequence[Any]) -> CanonicalTransformation:
         """Return it as a canonical transformation to new symbols, with its inverse, the flow by -s.
@@ -120,10 +120,10 @@ class Flow(Shown):
         if self.order is not None:
             raise UsageError(f"a series to order {self.order} is canonical to that order alone", where="flow_of")
         new = (*SYMBOLS.read(coordinates), *SYMBOLS.read(momenta))
-        if len(new) != len(self._own):
-            raise UsageError(f"{len(self._own)} new symbols are needed", where="flow_of")
-        back = {self.parameter: -self.parameter, **dict(zip(self._own, new, strict=True))}
-        solved = {old: one.xreplace(back) for old, one in zip(self._own, self.values, strict=True)}
+        if len(new) != len(self.space.own):
+            raise UsageError(f"{len(self.space.own)} new symbols are needed", where="flow_of")
+        back = {self.parameter: -self.parameter, **dict(zip(self.space.own, new, strict=True))}
+        solved = {old: one.xreplace(back) for old, one in zip(self.space.own, self.values, strict=True)}
         n, zero = len(self.coordinates), sympy.Integer(0)
         return CanonicalTransformation(self.space, new[:n], new[n:], self.coordinates, self.momenta, solved, None, zero)
 
@@ -145,24 +145,20 @@ class Flow(Shown):
             If the flow ends before s.
         """
         given = {self.space.read(sympy.sympify(one)): float(value) for one, value in start.items()}
-        missing = [one for one in {*self._own, *self.function.free_symbols} if one not in given]
+        missing = [one for one in {*self.space.own, *self.function.free_symbols} if one not in given]
         if missing:
             raise UsageError(f"{sorted(map(str, missing))[0]} has no number", where="Flow.integrated")
-        fixed = {one: value for one, value in given.items() if one not in self._own}
-        rates = sympy.lambdify(self._own, [one.xreplace(fixed) for one in self._rates], "numpy")
-        begun = [given[one] for one in self._own]
+        fixed = {one: value for one, value in given.items() if one not in self.space.own}
+        rates = sympy.lambdify(self.space.own, [one.xreplace(fixed) for one in self._rates], "numpy")
+        begun = [given[one] for one in self.space.own]
         found = solve_ivp(lambda _, y: rates(*y), (0.0, s), begun, "DOP853", rtol=1e-12, atol=1e-13)
         if not found.success or not np.all(np.isfinite(found.y[:, -1])):
             raise SolveError(f"the flow ends at {found.t[-1]:.6g}", where="Flow.integrated")
-        return {self.space.shown(one): float(value) for one, value in zip(self._own, found.y[:, -1], strict=True)}
+        return {self.space.shown(one): float(value) for one, value in zip(self.space.own, found.y[:, -1], strict=True)}
 
     @cached_property
     def _rates(self) -> list[Sympy]:
-        return [-bracket(self.function, one, self.space) for one in self._own]
-
-    @property
-    def _own(self) -> tuple[Sympy, ...]:
-        return (*self.space.coordinates, *self.space.momenta)
+        return [-bracket(self.function, one, self.space) for one in self.space.own]
 
     def __repr__(self) -> str:
         told = "exact" if self.order is None else f"to order {self.order}"
@@ -204,11 +200,10 @@ def flow_of(f: Any, space: Space, s: Any, order: int | None = None, *, constants
     """
     found = phase_space_of(space)
     read = found.declared(f, (*constants, *s.free_symbols))
-    own = (*found.coordinates, *found.momenta)
-    if s.has(*own):
+    if s.has(*found.own):
         raise UsageError(f"{s} depends on coordinates or momenta", where="flow_of", advice="Give a symbol, such as s.")
     if order is not None:
-        values = tuple(_series(read, one, found, s, order) for one in own)
+        values = tuple(_series(read, one, found, s, order) for one in found.own)
     else:
         values = _closed(read, found, s)
     return Flow(found, read, s, order, values)
@@ -225,7 +220,7 @@ def _series(f: Sympy, g: Sympy, space: PhaseSpace, s: Sympy, order: int) -> Symp
 
 def _closed(f: Sympy, space: PhaseSpace, s: Sympy) -> tuple[Sympy, ...]:
     """Return where a flow leads all coordinates and momenta, as linear equations among finitely many functions."""
-    own = (*space.coordinates, *space.momenta)
+    own = space.own
     if f.xreplace({one: sympy.Dummy(real=True) for one in f.free_symbols}).has(sympy.Abs, sympy.sign):
         raise UnsupportedError(
             f"{space.shown(f)} has a magnitude, so that its flow is another formula on each side",
@@ -442,7 +437,7 @@ def _conserved(h: Hamiltonian) -> tuple[list[Sympy], list[Sympy]]:
 
 def _multiple(value: Sympy, basis: Mapping[Sympy, Sympy], space: PhaseSpace) -> Sympy | None:
     """Return a value as a multiple of one function, by its name; None if it is none."""
-    own = (*space.coordinates, *space.momenta)
+    own = space.own
     others = sorted(value.free_symbols.union(*(one.free_symbols for one in basis.values())) - set(own), key=str)
     numbers = {x: sympy.Rational(5 + 2 * k, 3 + k) for k, x in enumerate(others)}
     points = [{x: sympy.Rational(n + 3 * k * k + 5, 7 + 2 * k + 3 * n) for k, x in enumerate(own)} for n in range(3)]
@@ -464,7 +459,7 @@ def _multiple(value: Sympy, basis: Mapping[Sympy, Sympy], space: PhaseSpace) -> 
 
 def _combination(value: Sympy, basis: Mapping[Sympy, Sympy], space: PhaseSpace) -> Sympy | None:
     """Return a value as a sum of functions with coefficients of parameters, by their names; None if it is none."""
-    own = (*space.coordinates, *space.momenta)
+    own = space.own
     weights = [sympy.Dummy(f"w{k}") for k in range(len(basis))]
     equations: dict[Sympy, Sympy] = {}
     whole = value - sum(w * one for w, one in zip(weights, basis.values(), strict=True))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from atwood.arguments import Kind, Refused, each, instance, optional
@@ -48,8 +48,8 @@ class PhaseSpace:
 
     def read(self, value: Sympy, new: Sequence[Sympy] = ()) -> Sympy:
         """Return an expression on the plain symbols; a symbol with the name of one of the given stands for it."""
-        found = value.xreplace(dict(zip(self.given, self._own, strict=True)))
-        named = {sympy.Symbol(_plain(given)): own for given, own in zip(self.given, self._own, strict=True)}
+        found = value.xreplace(dict(zip(self.given, self.own, strict=True)))
+        named = {sympy.Symbol(_plain(given)): own for given, own in zip(self.given, self.own, strict=True)}
         found = spelled(found, (*named, *(self.parameters or ())), new)
         found = found.xreplace({name: own for name, own in named.items() if name not in new})
         stray = found.atoms(sympy.Derivative) | found.atoms(sympy.core.function.AppliedUndef)
@@ -67,7 +67,7 @@ class PhaseSpace:
         found = self.read(value)
         if self.parameters is None:
             return found
-        known = {*self._own, *self.parameters, *constants, sympy.Symbol("t")}
+        known = {*self.own, *self.parameters, *constants, sympy.Symbol("t")}
         for name in sorted(map(str, found.free_symbols - known)):
             near = suggestion(name, [_plain(one) for one in (*self.given, *self.parameters)])
             raise UsageError(
@@ -79,10 +79,11 @@ class PhaseSpace:
 
     def shown(self, value: Sympy) -> Sympy:
         """Return an expression in what coordinates and momenta were."""
-        return value.xreplace(dict(zip(self._own, self.given, strict=True)))
+        return value.xreplace(dict(zip(self.own, self.given, strict=True)))
 
     @property
-    def _own(self) -> tuple[Sympy, ...]:
+    def own(self) -> tuple[Sympy, ...]:
+        """Coordinates, then momenta."""
         return (*self.coordinates, *self.momenta)
 
 
@@ -380,10 +381,13 @@ def as_symbol(value: Any) -> Any:
     return value
 
 
-def _by_symbol(value: Any) -> dict[Any, Any]:
-    if not isinstance(value, Mapping):
-        raise Refused
-    return {as_symbol(key): as_expression(one) for key, one in value.items()}
+def _expressions_by(key: Callable[[Any], Any]) -> Callable[[Any], dict[Any, Any]]:
+    def read(value: Any) -> dict[Any, Any]:
+        if not isinstance(value, Mapping):
+            raise Refused
+        return {key(name): as_expression(one) for name, one in value.items()}
+
+    return read
 
 
 def spelled(value: Sympy, known: Iterable[Sympy], new: Sequence[Sympy] = ()) -> Sympy:
@@ -393,12 +397,6 @@ def spelled(value: Sympy, known: Iterable[Sympy], new: Sequence[Sympy] = ()) -> 
     figures = re.compile(r"(?<=[A-Za-z])(?=\d)")
     meant = {one: names.get(figures.sub("_", str(one)), one) for one in stray}
     return value.xreplace(meant)
-
-
-def _inverse(value: Any) -> dict[Any, Any]:
-    if not isinstance(value, Mapping):
-        raise Refused
-    return {as_expression(key): as_expression(one) for key, one in value.items()}
 
 
 def _in_order(kind: Kind, what: str) -> Kind:
@@ -424,11 +422,13 @@ def _phase_space(value: Any) -> Any:
 EXPRESSION = Kind("an expression of sympy, a number, or text such as 'p**2/2'", as_expression, "EXPRESSION")
 EXPRESSIONS = _in_order(EXPRESSION, "a list of expressions of sympy")
 SYMBOLS = _in_order(Kind("a symbol", as_symbol, "SYMBOL"), "a list of symbols of sympy, or of their names")
-BY_SYMBOL = Kind("a dictionary by symbol, of expressions of sympy", _by_symbol, "SYMBOL=EXPRESSION", is_many=True)
+BY_SYMBOL = Kind(
+    "a dictionary by symbol, of expressions of sympy", _expressions_by(as_symbol), "SYMBOL=EXPRESSION", is_many=True
+)
 INVERSE = optional(
     Kind(
         "a dictionary of expressions of sympy by old coordinate and momentum",
-        _inverse,
+        _expressions_by(as_expression),
         "SYMBOL=EXPRESSION",
         is_many=True,
     )

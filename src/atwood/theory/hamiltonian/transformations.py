@@ -83,7 +83,7 @@ class CanonicalTransformation(Described):
             If the old coordinates and momenta are not known in terms of the new ones.
         """
         self._refuse_without_inverse()
-        n, own = len(self.coordinates), (*self.space.coordinates, *self.space.momenta)
+        n, own = len(self.coordinates), self.space.own
         names = {one: sympy.Symbol(one.name) for one in own}
         values = [self.solved[one].xreplace(names) for one in own]
         new = [self.space.read(one).xreplace(names) for one in (*self.new_coordinates, *self.new_momenta)]
@@ -110,7 +110,7 @@ class CanonicalTransformation(Described):
             If the other does not begin where this ends.
         """
         names = tuple(map(str, (*self.coordinates, *self.momenta)))
-        begun = (*other.space.coordinates, *other.space.momenta)
+        begun = other.space.own
         if tuple(map(str, begun)) != names:
             raise UsageError(
                 f"the second transformation begins with {', '.join(map(str, begun))}",
@@ -152,7 +152,7 @@ class CanonicalTransformation(Described):
     def matrix(self) -> Sympy:
         """J: derivatives of new coordinates and momenta by the old, shape (2n, 2n)."""
         new = [self.space.read(one) for one in (*self.new_coordinates, *self.new_momenta)]
-        old = (*self.space.coordinates, *self.space.momenta)
+        old = self.space.own
         return sympy.ImmutableMatrix([[self.space.shown(one.diff(x)) for x in old] for one in new])
 
     @cached_property
@@ -238,7 +238,7 @@ def canonical_transformation(
     if len(coordinates) != n or len(momenta) != n or len(set(new)) != 2 * n:
         raise _not_as_many(n, coordinates, momenta)
     values = [space.read(one) for one in (*coordinates.values(), *momenta.values())]
-    old = [*space.coordinates, *space.momenta]
+    old = list(space.own)
     if inverse is not None:
         by = {space.read(key): value for key, value in inverse.items()}
         if set(by) != set(old):
@@ -303,7 +303,7 @@ def generated_transformation(
     new = [*new_q, *new_p]
     given = [
         {
-            y: _without_arcs(sign * f.diff(x), (*space.coordinates, *space.momenta, *new))
+            y: _without_arcs(sign * f.diff(x), (*space.own, *new))
             for x, y in zip(variables[by], variables[name], strict=True)
         }
         for by, name, sign in ((used[0], *first), (used[1], *second))

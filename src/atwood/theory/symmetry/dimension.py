@@ -117,9 +117,9 @@ def _candidates(scene: LooseScene, space: str) -> Iterator[Symmetry]:
     if space == "line":
         if np.max(np.abs(turns), initial=0.0) > tolerances.MET:
             return
-        tried = _directions(shifts)[:1]
+        tried = [_longest(shifts)]
     elif np.max(np.abs(turns), initial=0.0) > tolerances.MET:
-        tried = _directions(turns)[:1]
+        tried = [_longest(turns)]
     else:
         found = decompose(shifts, np.full(len(shifts), tolerances.MET))
         apart = (now.places - now.places[:1]) / length
@@ -143,9 +143,8 @@ def _pace(scene: LooseScene, now: Bodies, later: Bodies) -> float:
     return fastest if fastest > 1e-6 * weight else 0.0
 
 
-def _directions(vectors: FloatArray) -> list[FloatArray]:
-    sizes = np.linalg.norm(vectors, axis=1)
-    return [vectors[int(np.argmax(sizes))]]
+def _longest(vectors: FloatArray) -> FloatArray:
+    return np.asarray(vectors[int(np.argmax(np.linalg.norm(vectors, axis=1)))])
 
 
 def _rounded(direction: FloatArray) -> FloatArray:

@@ -18,7 +18,7 @@ from atwood.theory.equations.stated import FUNCTION, ExpressionReader
 from atwood.theory.formulas.printers import text
 from atwood.theory.symmetry.find import Finding
 from atwood.theory.symmetry.proof import Prover
-from atwood.theory.symmetry.quantities import Quantities
+from atwood.theory.symmetry.quantities import Quantities, is_constant
 from atwood.theory.symmetry.states import KEPT, RandomStates, State
 
 _STATES = 16
@@ -84,7 +84,8 @@ def check_symmetry(symmetry: Symmetry, quantities: Quantities, prover: Prover, f
     """Return what a stated symmetry conserves."""
     found, scene = quantities.found, quantities.assembly.flat.name
     reader = ExpressionReader(formulas)
-    paths = [one.name if place is None else found.names[place].name for one, place in _named(quantities)]
+    named = zip(found.velocity_names, found.moves, strict=True)
+    paths = [one.name if place is None else found.names[place].name for one, place in named]
     generator: dict[int, Expression] = {}
     for path, value in symmetry.generator.items():
         if path not in paths:
@@ -113,20 +114,10 @@ def check_symmetry(symmetry: Symmetry, quantities: Quantities, prover: Prover, f
         )
     proven = prover.along(value, generator)
     meaning = "p . delta q - f of a symmetry that was stated"
-    if is_constant_at(states):
+    if is_constant(np.array([one.values[0] for one in states])):
         meaning += "; it has one value at all states"
     evidence = prover.evidence(proven, len(states))
     return Finding(symmetry.name, "stated symmetry", symmetry.unit, meaning, value, bool(proven), evidence, (), ())
-
-
-def is_constant_at(states: list[State]) -> bool:
-    """Return whether the first quantity has one value at all states."""
-    values = np.array([one.values[0] for one in states])
-    return float(np.ptp(values)) <= KEPT * float(np.max(np.abs(values)))
-
-
-def _named(quantities: Quantities) -> list[tuple[Any, int | None]]:
-    return list(zip(quantities.found.velocity_names, quantities.found.moves, strict=True))
 
 
 def _list(paths: list[str]) -> str:
