@@ -117,6 +117,14 @@ def eliminate_linear(
     return solution
 
 
+def solved_with(
+    solved: dict[Expression, Expression], row: Expression, symbol: Expression, slope: Expression
+) -> dict[Expression, Expression]:
+    """Return what is solved with a symbol more: that in which a row, which stays zero, is linear with a slope."""
+    value = -substitute([row], {symbol: row.graph.zero})[0] / slope
+    return {**dict(zip(solved, substitute(list(solved.values()), {symbol: value}), strict=True)), symbol: value}
+
+
 def _pivot(coefficients: list[Expression], light: list[bool], mechanism: Mechanism) -> int | None:
     """Return which coordinate to solve a linear constraint for: a weightless one, or the last; None if there is none.
 

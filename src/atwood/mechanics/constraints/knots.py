@@ -15,6 +15,7 @@ import numpy as np
 from atwood.errors import AtwoodError
 from atwood.expr import Expression, depends_on, jacobian, jvp, live, substitute
 from atwood.expr.core.analysis import dependents
+from atwood.mechanics.constraints.elimination import solved_with
 from atwood.mechanics.constraints.pfaffian import Places
 from atwood.mechanics.constraints.values import Values
 from atwood.mechanics.dynamics.equations import Constraint, constraint_levels
@@ -46,9 +47,7 @@ def linear_knots(
             continue
         if depends_on([value for _, _, value in values], [own]):
             continue
-        value = -substitute([force], {own: force.graph.zero})[0] / slope
-        found = dict(zip(found, substitute(list(found.values()), {own: value}), strict=True))
-        found[own] = value
+        found = solved_with(found, force, own, slope)
     return found
 
 
@@ -115,9 +114,7 @@ def _balances(
             continue
         pivot = decide(derivation, partial(place_of_largest, tuple(left.entries)))
         symbol = light[left.columns[pivot]]
-        value = -substitute([joined], {symbol: joined.graph.zero})[0] / left.entries[pivot]
-        solved = dict(zip(solved, substitute(list(solved.values()), {symbol: value}), strict=True))
-        solved[symbol] = value
+        solved = solved_with(solved, joined, symbol, left.entries[pivot])
     found = []
     for k, symbol in enumerate(state.speeds):
         if symbol in light and symbol not in solved:

@@ -15,6 +15,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError
 from atwood.expr import Expression, Scalar, depends_on, evaluate, is_zero, jacobian, live, substitute
 from atwood.lazy_dataclasses import dataclass, replace
+from atwood.mechanics.constraints.elimination import solved_with
 from atwood.mechanics.constraints.pfaffian import SWITCHING
 from atwood.mechanics.dynamics.inertia import RigidMass, add_masses
 from atwood.mechanics.kinematics.mechanism import (
@@ -75,10 +76,7 @@ def idle_speeds(derivation: Derivation, state: Movement) -> dict[Expression, Exp
             return None
         columns = sorted(even)
         chosen = columns[decide(derivation, partial(place_of_largest, tuple(even[c] for c in columns)))]
-        speed = speeds[chosen]
-        value = -substitute([rate], {speed: graph.zero})[0] / even[chosen]
-        solved = dict(zip(solved, substitute(list(solved.values()), {speed: value}), strict=True))
-        solved[speed] = value
+        solved = solved_with(solved, rate, speeds[chosen], even[chosen])
     return solved
 
 

@@ -30,7 +30,20 @@ _NONE: Solution = {}
 
 
 @dataclass(frozen=True)
-class Movement:
+class _Symbols:
+    """Symbols of the independent coordinates and speeds of a spanning forest, with names and rates."""
+
+    coordinates: tuple[Expression, ...]
+    speeds: tuple[Expression, ...]
+    accelerations: tuple[Expression, ...]
+    names: tuple[Coordinate, ...]
+    speed_names: tuple[Coordinate, ...]
+    rates: tuple[Expression, ...]
+    orientation_coordinates: tuple[OrientationCoordinates, ...]
+
+
+@dataclass(frozen=True)
+class Movement(_Symbols):
     """Coordinates, speeds, and everything that moves with them.
 
     Attributes
@@ -49,13 +62,6 @@ class Movement:
         Accelerations less that of free fall, of nodes and of reference points.
     """
 
-    coordinates: tuple[Expression, ...]
-    speeds: tuple[Expression, ...]
-    accelerations: tuple[Expression, ...]
-    names: tuple[Coordinate, ...]
-    speed_names: tuple[Coordinate, ...]
-    rates: tuple[Expression, ...]
-    orientation_coordinates: tuple[OrientationCoordinates, ...]
     kinematics: Kinematics
     lifted: Lifted
 
@@ -85,19 +91,6 @@ class Motion:
     all_coordinates: tuple[Expression, ...]
     placements: Placements
     finish: Finish
-
-
-@dataclass(frozen=True)
-class _Symbols:
-    """Symbols of the independent coordinates and speeds of a spanning forest, with names and rates."""
-
-    coordinates: tuple[Expression, ...]
-    speeds: tuple[Expression, ...]
-    accelerations: tuple[Expression, ...]
-    names: tuple[Coordinate, ...]
-    speed_names: tuple[Coordinate, ...]
-    rates: tuple[Expression, ...]
-    orientation_coordinates: tuple[OrientationCoordinates, ...]
 
 
 def _all_symbols(mechanism: Mechanism, forest: SpanningForest) -> tuple[Expression, ...]:
@@ -143,20 +136,6 @@ def _left(mechanism: Mechanism, forest: SpanningForest, solution: Solution, solv
     )
 
 
-def _moved(left: _Symbols, kinematics: Kinematics, lifted: Lifted) -> Movement:
-    return Movement(
-        left.coordinates,
-        left.speeds,
-        left.accelerations,
-        left.names,
-        left.speed_names,
-        left.rates,
-        left.orientation_coordinates,
-        kinematics,
-        lifted,
-    )
-
-
 def motion_in_plane(mechanism: Mechanism, forest: SpanningForest, shape_of: Mapping[int, BodyShape]) -> Motion:
     """Return the motion of a mechanism on a line or in a plane."""
     graph, space = mechanism.table.graph, mechanism.space
@@ -172,11 +151,8 @@ def motion_in_plane(mechanism: Mechanism, forest: SpanningForest, shape_of: Mapp
         still = _substituted(placements, solution) if solution else placements
         lifting = _substituted(movable, solution) if solution else movable
         kinematics = _with_joint_references(mechanism, differentiate(still, time, q, u, a), time, q, u, a)
-        return _moved(
-            left,
-            kinematics,
-            lifted_accelerations(lifting, origin, space.components(mechanism.gravity), time, q, u, a),
-        )
+        lifted = lifted_accelerations(lifting, origin, space.components(mechanism.gravity), time, q, u, a)
+        return Movement(**vars(left), kinematics=kinematics, lifted=lifted)
 
     return Motion(every, placements, finish)
 
@@ -223,7 +199,8 @@ def motion_in_space(mechanism: Mechanism, forest: SpanningForest, shape_of: Mapp
             {mechanism.time: 1.0, **dict(zip(left.coordinates, left.rates, strict=True))},
             dict(zip(left.speeds, left.accelerations, strict=True)),
         )
-        return _moved(left, *move_in_space(graph, mechanism.bodies, forest, shape_of, course, mechanism.gravity))
+        moved = move_in_space(graph, mechanism.bodies, forest, shape_of, course, mechanism.gravity)
+        return Movement(**vars(left), kinematics=moved[0], lifted=moved[1])
 
     every = _all_symbols(mechanism, forest)
     return Motion(every, finish({}).kinematics.placements, finish)

@@ -18,7 +18,7 @@ from atwood.model.declare.contact_laws import FrictionOptions, is_given, state_n
 from atwood.model.declare.law_results import call_law, finite_scalar, one_scalar
 from atwood.model.declare.laws import Law, scalars
 from atwood.model.local.flatten import Part
-from atwood.model.local.parts import LocalConnector, LocalConstraint, multiplier_symbol
+from atwood.model.local.parts import LocalConnector, LocalConstraint, check_reactions, multiplier_symbol
 
 
 @dataclass(frozen=True)
@@ -180,10 +180,7 @@ def _slip(part: Part, law: Law, bound: Any, graph: Graph, stiffness: Expression 
     options: FrictionOptions = law.options
     names = options.reactions
     values = call_law(part.path, law, lambda: [one_scalar(graph, one) for one in scalars(getattr(bound, law.name)())])
-    if len(values) != len(names):
-        raise DeclarationError(
-            f"it returns {len(values)} scalars and names {len(names)} reactions", where=f"{part.path}.{law.name}"
-        )
+    check_reactions(part, law, len(values), names)
     limit = _named(part, law, bound, options.limit, graph)
     static = _named(part, law, bound, options.static_limit, graph) if options.static_limit else limit
     if options.at and options.at not in part.component.contact_laws():

@@ -48,6 +48,7 @@ from atwood.model.local.parts import (
     LocalJoint,
     LocalPart,
     LocalState,
+    check_reactions,
     discrete_states,
     local_states,
     multiplier_symbol,
@@ -336,10 +337,7 @@ def _local_constraints(part: Part, law: Law, bound: Any, graph: Graph) -> Iterab
     names = law.options.reactions
     if len(names) == 1 and len(values) == 3:
         names = tuple(f"{names[0]}.{axis}" for axis in "xyz")
-    if len(names) != len(values):
-        raise DeclarationError(
-            f"it returns {len(values)} scalars and names {len(names)} reactions", where=f"{part.path}.{law.name}"
-        )
+    check_reactions(part, law, len(values), names)
     for index, (value, name) in enumerate(zip(values, names, strict=True)):
         yield LocalConstraint(law, index, value, name, law.options.sign)
 

@@ -130,6 +130,14 @@ def multiplier_symbol(graph: Graph, path: str, law: str, index: int) -> Expressi
     return graph.symbol(f"lambda:{path}.{law}[{index}]")
 
 
+def check_reactions(part: Part, law: Law, count: int, names: Sequence[str]) -> None:
+    """Refuse a law that returns another number of scalars than it names reactions."""
+    if len(names) != count:
+        raise DeclarationError(
+            f"it returns {count} scalars and names {len(names)} reactions", where=f"{part.path}.{law.name}"
+        )
+
+
 @dataclass(frozen=True)
 class LocalPart:
     """What one part contributes, on its local symbols.

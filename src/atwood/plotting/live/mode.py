@@ -11,6 +11,7 @@ from atwood.arrays import FloatArray
 from atwood.codegen.javascript.printer import BITS, print_routines
 from atwood.codegen.javascript.program import print_functions, print_program
 from atwood.codegen.llvm.linear_systems import write_elimination
+from atwood.display import data_of
 from atwood.errors import AtwoodError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, Scalar, depends_on, read_by, substitute
 from atwood.forms.accelerations import accelerations_of
@@ -290,12 +291,7 @@ class ModeText:
         self.programs["events"] = program
         self.data["events"] = [
             {
-                "part": one.part,
-                "law": one.law,
-                "message": one.message,
-                "target": one.target,
-                "direction": one.direction,
-                "impact": one.impact,
+                **data_of(one, "part", "law", "message", "target", "direction", "impact"),
                 "noted": one.is_noted,
                 "small": MARGIN * self.plan.scales.of_law(one.part, one.law, one.unit),
                 "updates": [],

@@ -22,7 +22,7 @@ from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
 from atwood.pipeline import simulate, smooth_assembly_of
 from atwood.result.result import Result
-from atwood.result.work import joined_times
+from atwood.result.work import joined_times, nodes_between
 from atwood.simulation.problem.arguments import RTOL, T_END, check_span
 from atwood.simulation.run.run_record import Run, run_again, times_of_steps
 from atwood.theory.formulas.described import Described
@@ -513,9 +513,7 @@ class Nodes:
 
 def panels(edges: FloatArray) -> Nodes:
     """Return the points between edges."""
-    points = legendre.leggauss(COUNT)[0]
-    middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
-    return Nodes(edges, middle[:, None] + half[:, None] * points)
+    return Nodes(edges, nodes_between(edges, COUNT).reshape(-1, COUNT))
 
 
 Curves: TypeAlias = tuple[FloatArray, FloatArray, FloatArray, FloatArray]

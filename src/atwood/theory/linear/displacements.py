@@ -91,11 +91,16 @@ def _others(count: int, chosen: Sequence[int]) -> tuple[int, ...]:
     return tuple(k for k in range(count) if k not in set(chosen))
 
 
-def _same_speeds(scene: LinearScene, dependent: Sequence[int]) -> tuple[int, ...] | None:
-    """Return the speeds of dependent displacements, so that states come in pairs; None if these have none."""
+def speed_of(scene: LinearScene) -> dict[int, int]:
+    """Return the number of the speed that is the rate of each displacement, of those that have one."""
     e = scene.equations
     number = {speed: i for i, speed in enumerate(e.speeds)}
-    of = {k: number[e.rates[i]] for i, k in scene.tangents.plain if e.rates[i] in number}
+    return {k: number[e.rates[i]] for i, k in scene.tangents.plain if e.rates[i] in number}
+
+
+def _same_speeds(scene: LinearScene, dependent: Sequence[int]) -> tuple[int, ...] | None:
+    """Return the speeds of dependent displacements, so that states come in pairs; None if these have none."""
+    of = speed_of(scene)
     for orientation, numbers in scene.tangents.orientation_coordinates:
         of |= dict(zip(numbers, orientation.speeds, strict=False))
     return tuple(sorted(of[k] for k in dependent)) if all(k in of for k in dependent) else None

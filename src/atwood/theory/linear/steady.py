@@ -26,7 +26,7 @@ from atwood.numerics.newton import Missing, largest, newton
 from atwood.numerics.rank import null_space
 from atwood.pipeline import SCENE, smooth_assembly_of
 from atwood.simulation.dynamics.balance import balance_of
-from atwood.theory.linear.displacements import Minimal
+from atwood.theory.linear.displacements import Minimal, speed_of
 from atwood.theory.linear.operating_point import AT, At, OperatingPoint, find_operating_point, moved_to, values_at
 from atwood.theory.linear.rest import slopes_at
 from atwood.theory.linear.variations import Flow, LinearScene
@@ -240,7 +240,7 @@ def _place_rotation(scene: LinearScene, pair: tuple[int, int]) -> _Field:
     size, count = len(scene.tangents) + len(scene.sizes), len(scene.tangents)
     matrix = np.zeros((size, size))
     (a, b), of_displacement = pair, {k: i for i, k in scene.tangents.plain}
-    speeds = _speed_of(scene)
+    speeds = speed_of(scene)
     matrix[a, b], matrix[b, a] = -1.0, 1.0
     if a in speeds and b in speeds:
         u, v = count + speeds[a], count + speeds[b]
@@ -254,13 +254,6 @@ def _place_rotation(scene: LinearScene, pair: tuple[int, int]) -> _Field:
         return np.asarray(matrix @ state)
 
     return _Field(at, lambda flow: np.asarray(matrix @ flow.field, dtype=float), matrix)
-
-
-def _speed_of(scene: LinearScene) -> dict[int, int]:
-    """Return the number of the speed that is the rate of each displacement, of those that have one."""
-    e = scene.equations
-    number = {speed: i for i, speed in enumerate(e.speeds)}
-    return {k: number[e.rates[i]] for i, k in scene.tangents.plain if e.rates[i] in number}
 
 
 def _turned_in_space(scene: LinearScene, orientation: int, axis: FloatArray) -> _Field:

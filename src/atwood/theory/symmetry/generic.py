@@ -271,23 +271,8 @@ class LooseScene:
         values = [np.asarray(x, dtype=float) for x in self.bound([t], q, u, np.zeros(n) if a is None else a)]
         if not all(np.all(np.isfinite(x)) for x in values):
             raise np.linalg.LinAlgError("a law has no value here")
-        (
-            mass,
-            bias,
-            value,
-            rate,
-            gamma,
-            constraint_jacobian,
-            explicit_rate,
-            places,
-            velocities,
-            seconds,
-            by_place,
-            axes,
-            spins,
-            turns,
-            by_spin,
-        ) = values
+        mass, bias, value, rate, gamma, constraint_jacobian, explicit_rate, *of_bodies = values
+        places, velocities, seconds, by_place, axes, spins, turns, by_spin = of_bodies
         matrix = to_array(from_entries(b.mass_rows, b.mass_columns, mass, (n, n), True))
         jacobian_ = to_array(
             from_entries(b.jacobian_rows, b.jacobian_columns, constraint_jacobian, (b.constraints, n), True)
@@ -315,12 +300,8 @@ class LooseScene:
 def _body_groups(assembly: Assembly, equations: Equations) -> tuple[tuple[OutputGroup, ...], tuple[int, int]]:
     """Return the outputs of `Bodies`, and the numbers of points and of orientations."""
     graph, kinematics = equations.graph, equations.kinematics
-    places: list[Expression] = []
-    velocities: list[Expression] = []
-    seconds: list[Expression] = []
-    axes: list[Expression] = []
-    spins: list[Expression] = []
-    turns: list[Expression] = []
+    lists: tuple[list[Expression], ...] = ([], [], [], [], [], [])
+    places, velocities, seconds, axes, spins, turns = lists
     for body in assembly.mechanism.bodies.bodies[1:]:
         places += kinematics.placements.positions[body.root]
         velocities += kinematics.velocities[body.root]
