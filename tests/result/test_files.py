@@ -12,7 +12,6 @@ from scipy.io import netcdf_file
 
 from atwood import ExternalFunction, ResultError, Scene, UsageError, external
 from atwood.pipeline import simulate
-from atwood.result import files
 from atwood.result.files import load_result, save_result
 from atwood.result.formats import companion, matlab, netcdf
 from atwood.result.result import Result
@@ -186,11 +185,11 @@ def test_a_failed_write_leaves_what_was_there(result: Result, tmp_path: Path, mo
     file = tmp_path / "run.npz"
     file.write_text("before", encoding="utf-8")
 
-    def fail(stream: object, arrays: object) -> None:
+    def fail(stream: object, **arrays: object) -> None:
         stream.write(b"half")  # type: ignore[attr-defined]
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(files, "_savez", fail)
+    monkeypatch.setattr(np, "savez_compressed", fail)
     with pytest.raises(UsageError, match="No space left"):
         save_result(result, file)
     assert file.read_text(encoding="utf-8") == "before"
