@@ -288,10 +288,15 @@ class ExplicitSession(SteppingSession):
             filled, stopped = self._sample_quickly(times, values, rates)
         if stopped is not None or filled == len(times):
             return values[:filled], rates[:filled], stopped or self.here
-        y, yp, step_result = super().sample(times[filled:])
-        reached = filled + len(y)
-        values[filled:reached], rates[filled:reached] = y, yp
-        return values[:reached], rates[:reached], step_result
+        ended = self.here
+        while filled < len(times):
+            ended = self.advance(float(times[filled]))
+            if ended.status is not Status.REACHED:
+                break
+            values[filled], rates[filled] = ended.y, ended.yp
+            filled += 1
+            filled += 0 if self._leaps else self._read_on(times[filled:], values[filled:], rates[filled:])
+        return values[:filled], rates[:filled], self.here if filled == len(times) else ended
 
     def _sample_quickly(
         self, times: FloatArray, values: FloatArray, rates: FloatArray
@@ -312,15 +317,16 @@ class ExplicitSession(SteppingSession):
                     filled += count
                 if outcome is Outcome.TOO_SMALL or self._sees:
                     break
-            if self._is_handed:  # no clock is looked at there
-                filled += self._read_before_root(times[filled:], values[filled:], rates[filled:])
+            if self._is_handed and self._root is not None:  # no clock is looked at there
+                filled += self._read_on(times[filled:], values[filled:], rates[filled:])
 
         stopped = self._timed(fill)
         return filled, stopped
 
-    def _read_before_root(self, times: FloatArray, values: FloatArray, rates: FloatArray) -> int:
-        """Fill tables within the last step up to an event that is located; return how many times are before it."""
-        count = 0 if self._root is None or self._sees else int(np.searchsorted(times, self._root.state[0]))
+    def _read_on(self, times: FloatArray, values: FloatArray, rates: FloatArray) -> int:
+        """Fill tables within the last step as far as nothing happens for certain; return how many times are there."""
+        last = self._newest[0] if self._locator is None else min(self._newest[0], self._searched)
+        count = 0 if self._sees else int(times.searchsorted(last if self._root is None else self._root.state[0]))
         if count:
             try:
                 values[:count], rates[:count], _ = self._stepper.sample(times[:count], 0)
