@@ -256,6 +256,8 @@ class Assembly:
 
     def with_held_of(self, other: Assembly) -> Assembly:
         """Return the same with the discrete states of another mode; what is not there has its start."""
+        if other.shared is self.shared:
+            return self.with_held(other.held_now)
         now = {one.path: value for one, value in zip(other.discrete_states, other.held_now, strict=True)}
         own = zip(self.discrete_states, self.held_at_start, strict=True)
         return self.with_held([now.get(one.path, value) for one, value in own])

@@ -46,6 +46,7 @@ _MOST_ROWS = 40
 
 _CODE: Key[tuple[SetData, SetCode] | None] = Key("machine code of sets")
 _TABLE: Key[FloatArray] = Key("events of gaps and slips for routines")
+_PARTS: Key[dict[str, int]] = Key("numbers of the parts that have contacts")
 _STATES: Key[FloatArray] = Key("states of gaps and slips for routines")
 
 
@@ -115,7 +116,7 @@ def set_data(plan: SceneProblem, t: float, y: FloatArray) -> SetData:
 
 
 def _units(layout: Layout, plan: SceneProblem) -> FloatArray:
-    parts = _parts(layout)
+    parts = _parts_of(layout)
     found, first = np.zeros((len(UNITS), len(layout.first))), 0
     for k, (one, rows) in enumerate(zip(layout.first, layout.units, strict=True)):
         size = plan.scales.of(ALONG[one.law.options.unit])
@@ -247,7 +248,8 @@ def _states(assembly: Assembly) -> FloatArray:
 def _give(jumps: SetSolver, plan: SceneProblem, relative: float, impacts: Sequence[tuple[float, str]]) -> None:
     """Give them parameters and states, and times and parts of the impacts before."""
     assembly = plan.assembly
-    states, parts = assembly.kept.get(_STATES, lambda: _states(assembly)), _parts(layout_of(assembly))
+    states = assembly.kept.get(_STATES, lambda: _states(assembly))
+    parts = assembly.shared.get(_PARTS, lambda: _parts_of(layout_of(assembly)))
     past = [(time, parts[part]) for time, part in impacts if part in parts]
     jumps.give(values_on_constraints(plan), states, NEAR * max(relative, 1e-13), past)
 
@@ -335,6 +337,6 @@ def _struck(layout: Layout, t: float, entry: Sequence[float]) -> EventRecord:
     return told_impact(t, first.row.key[:2], first.law.options.unit, acting, (before, after), loss)
 
 
-def _parts(layout: Layout) -> dict[str, int]:
+def _parts_of(layout: Layout) -> dict[str, int]:
     """Return numbers of the parts that have contacts."""
     return {part: i for i, part in enumerate(dict.fromkeys(one.row.key[0] for one in layout.first))}

@@ -64,7 +64,7 @@ def _times(value: Any) -> Any:
     if isinstance(value, np.ndarray) and value.dtype.kind not in "fiu":
         raise Refused
     times = np.array(value if isinstance(value, np.ndarray) else [_SECONDS.read(one) for one in value], dtype=float)
-    if times.ndim != 1 or not len(times) or not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0.0):
+    if times.ndim != 1 or not len(times) or not np.isfinite(times).all() or (times[1:] <= times[:-1]).any():
         raise Refused
     return times
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -266,12 +267,15 @@ def stiffness_of(
         if found is None or not len(q):
             return None
         program, values = found.program, assembly.parameter_values
-    is_long = program.size >= _LONG and not plan.not_compilable
-    code = compiled_columns(assembly, program) if is_long else assembly.compiled(program, vectorized=True)
-    many = first_order_rows(code.bind(values), count)
+
+    @cache
+    def many() -> Callable[[FloatArray, FloatArray], FloatArray]:
+        is_long = program.size >= _LONG and not plan.not_compilable
+        code = compiled_columns(assembly, program) if is_long else assembly.compiled(program, vectorized=True)
+        return first_order_rows(code.bind(values), count)
 
     def rates(states: FloatArray) -> FloatArray:
-        return many(np.full(len(states), t), states)
+        return many()(np.full(len(states), t), states)
 
     span = max(options.t_end - t, 0.0)
     if goes_on:

@@ -258,19 +258,11 @@ class Recorder:
         pending = self._samples[1]
         if jumps is not None and len(jumps[0]):
             times, states = np.repeat(jumps[0], 2), jumps[1].reshape(-1, jumps[1].shape[-1])
-            count, own = len(t) + len(times), np.searchsorted(t, times) + np.arange(len(times))
-            rest, merged = np.ones(count, dtype=bool), (np.empty(count), np.empty((count, y.shape[1])))
-            rest[own] = False
-            for one, given, inserted in zip(merged, (t, y), (times, states), strict=True):
-                one[rest], one[own] = given, inserted
-            (all_t, all_y), all_shown = merged, np.empty(count, dtype=bool)
-            all_shown[rest], all_shown[own], once = (
-                shown,
-                shows_jumps,
-                np.ones(count, dtype=bool),
-            )  # an output at a jump is that after it
-            once[2:] = (all_t[2:] != all_t[1:-1]) | (all_t[2:] != all_t[:-2])
-            t, y, shown = all_t[once], all_y[once], all_shown[once]
+            t, shows = np.concatenate([times, t]), np.empty(len(times), dtype=bool)
+            shows[:], order, once = shows_jumps, t.argsort(kind="stable"), np.ones(len(t), dtype=bool)
+            t, y, shown = t[order], np.concatenate([states, y])[order], np.concatenate([shows, shown])[order]
+            once[2:] = t[2:] != t[:-2]  # an output at a jump is that after it
+            t, y, shown = t[once], y[once], shown[once]
             self._jumps.append(jumps[0])
         if not len(t):
             return

@@ -113,8 +113,9 @@ def _prepared(
     Where it is made again, it is known what updates have made of its states, and nobody is asked twice.
     """
     samples = sample_times(start.time, options)
-    schedule = find_schedule(assembly, start.time, options.t_end).at_samples(samples.times)
-    check_prescribed(schedule.rows(assembly, samples.times), samples.times)
+    if assembly.own_equations.prescribed:
+        schedule = find_schedule(assembly, start.time, options.t_end).at_samples(samples.times)
+        check_prescribed(schedule.rows(assembly, samples.times), samples.times)
     log: list[Updated] = []
     again = partial(_again, assembly, start, reassemble, log)
     walk = kind(assembly, start, options, reassemble, samples.with_more(between), again, log, known)

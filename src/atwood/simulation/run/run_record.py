@@ -126,9 +126,11 @@ def as_asked(stretches: Sequence[Stretch], outputs: int | FloatArray) -> tuple[S
     time, before = (np.concatenate([getattr(one, name) for one in stretches]) for name in ("time", "shown"))
     ends = np.cumsum([0, *(len(one.time) for one in stretches)]).tolist()
     starts = np.concatenate([first + one.starts for first, one in zip(ends, stretches, strict=False)])
-    later = np.append(np.minimum.accumulate(time[starts][::-1])[::-1][1:], np.inf)
-    place = np.minimum(np.searchsorted(outputs, time), len(outputs) - 1)
-    shown = (outputs[place] == time) & (time < np.repeat(later, np.diff([*starts, len(time)])))
+    place = np.minimum(outputs.searchsorted(time), len(outputs) - 1)
+    shown = outputs[place] == time
+    if len(starts) > 1:
+        later = np.append(np.minimum.accumulate(time[starts][::-1])[::-1][1:], np.inf)
+        shown &= time < np.repeat(later, np.diff([*starts, len(time)]))
     if not shown.any():
         shown[-1] = True
     return tuple(

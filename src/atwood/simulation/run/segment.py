@@ -241,7 +241,11 @@ class _Runner:
     def _cost(self) -> Statistics:
         cost = self.before if self.session is None else self.before + self.session.statistics
         spent = 0.0 if self.monitor is None else self.monitor.seconds
-        return replace(cost, seconds=cost.seconds + spent, monitor_seconds=cost.monitor_seconds + spent)
+        return (
+            cost
+            if not spent
+            else replace(cost, seconds=cost.seconds + spent, monitor_seconds=cost.monitor_seconds + spent)
+        )
 
     def _outcome(self, step_result: StepResult | None) -> Outcome:
         """Record where a solver stopped early, if it did."""
