@@ -15,7 +15,7 @@ A state is projected by the shortest displacement along the speeds, each measure
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import pairwise
 
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, jacobian, solve, substitute
@@ -23,7 +23,7 @@ from atwood.forms.caches import derive_once
 from atwood.forms.program import rates_are_speeds, state_groups
 from atwood.forms.residuals import keep_constraints
 from atwood.lazy_dataclasses import dataclass, names_of
-from atwood.mechanics.dynamics.augmented import SymmetricSystem, back_substitute, eliminate, fill_of
+from atwood.mechanics.dynamics.augmented import Step, SymmetricSystem, back_substitute, eliminate, fill_of, with_right
 from atwood.mechanics.dynamics.equations import Constraint, ContactRow, Equations
 
 _LARGEST_FILL = 60_000
@@ -202,7 +202,7 @@ def _balanced(
     places = {(c, n + k): e for k, row in enumerate(slopes) for c, e in row.items()}
     right = [-one for one in (*bias, *gamma)]
     signs = [1] * n + [-1] * len(slopes)
-    return _solved(SymmetricSystem({**entries, **places}, right, signs))[:n]
+    return _Solved().solve(SymmetricSystem({**entries, **places}, right, signs))[:n]
 
 
 def _accelerations(
@@ -281,11 +281,14 @@ def _projection(equations: Equations, sizes: Sequence[Expression]) -> list[Expre
     rows = [*((held, one) for held in equations.constraints), *((held.row, held.mask) for held in equations.contacts)]
     holding = [(held, mask) for held, mask in rows if held.holonomic and held.value is not None]
     values = [held.value for held, _ in holding if held.value is not None]
-    moved = nearest(equations, [held for held, _ in holding], values, sizes, [mask for _, mask in holding])
+    closest = nearest_to(equations, [held for held, _ in holding], sizes, [mask for _, mask in holding])
+    moved = closest(values)
     coordinates = _moved(equations, [-one * size for one, size in zip(moved, sizes, strict=True)])
     there = dict(zip(equations.coordinates, coordinates, strict=True))
     misses = substitute([held.rate for held, _ in rows], there)
-    changed = nearest(equations, [held for held, _ in rows], misses, sizes, [mask for _, mask in rows])
+    if len(holding) < len(rows):
+        closest = nearest_to(equations, [held for held, _ in rows], sizes, [mask for _, mask in rows])
+    changed = closest(misses)
     speeds = [u - one * size for u, one, size in zip(equations.speeds, changed, sizes, strict=True)]
     return [*coordinates, *speeds, *moved]
 
@@ -298,9 +301,15 @@ def nearest(
     masks: Sequence[Expression],
 ) -> list[Expression]:
     """Return the shortest solution of ``G d = right``, in units of the sizes; of rows whose mask is one, not zero."""
+    return nearest_to(equations, rows, sizes, masks)(right)
+
+
+def nearest_to(
+    equations: Equations, rows: Sequence[Constraint], sizes: Sequence[Expression], masks: Sequence[Expression]
+) -> Callable[[Sequence[Expression]], list[Expression]]:
+    """Return what gives these solutions for any right-hand side; the matrix is eliminated once."""
     zero, slopes = equations.graph.zero, _slopes(equations, rows)
     scaled = [{c: mask * (e * sizes[c]) for c, e in row.items()} for row, mask in zip(slopes, masks, strict=True)]
-    right = [mask * one for one, mask in zip(right, masks, strict=True)]
     by_column: dict[int, list[int]] = {}
     for k, row in enumerate(scaled):
         for column in row:
@@ -314,12 +323,18 @@ def nearest(
         if not (mask - 1.0).is_zero:
             entries[k, k] = (1.0 + _ADDED) * entries.get((k, k), zero) + (1.0 - mask)
     most = _LARGEST_FILL if all(mask.is_constant for mask in masks) else _FILL_OF_CONTACTS
-    found = _solved(SymmetricSystem(entries, right, [1] * len(right)), most) if right else []
-    moved = [zero] * len(sizes)
-    for row, multiplier in zip(scaled, found, strict=True):
-        for column, entry in row.items():
-            moved[column] = moved[column] + entry * multiplier
-    return moved
+    solved = _Solved(most)
+
+    def shortest(right: Sequence[Expression]) -> list[Expression]:
+        right = [mask * one for one, mask in zip(right, masks, strict=True)]
+        found = solved.solve(SymmetricSystem(entries, right, [1] * len(right))) if right else []
+        moved = [zero] * len(sizes)
+        for row, multiplier in zip(scaled, found, strict=True):
+            for column, entry in row.items():
+                moved[column] = moved[column] + entry * multiplier
+        return moved
+
+    return shortest
 
 
 def _moved(equations: Equations, displacements: Sequence[Expression]) -> list[Expression]:
@@ -333,16 +348,27 @@ def _moved(equations: Equations, displacements: Sequence[Expression]) -> list[Ex
     return coordinates
 
 
-def _solved(system: SymmetricSystem, most: int = _LARGEST_FILL) -> list[Expression]:
-    """Return the solution of a system of masses and constraints, written out with so many products at most."""
-    size, places = len(system.right), list(system.entries)
-    order = _order(places, system.signs)
-    if fill_of(places, order) > most:
-        return _solved_by_loops(system)
-    known: dict[int, Expression] = {}
-    for step in reversed(eliminate(system, order)):
-        known[step.unknown] = back_substitute(step, known)
-    return [known[i] for i in range(size)]
+class _Solved:
+    """Solutions of a system of masses and constraints, written out with so many products at most."""
+
+    def __init__(self, most: int = _LARGEST_FILL) -> None:
+        self._most = most
+        self._steps: list[Step] = []
+
+    def solve(self, system: SymmetricSystem) -> list[Expression]:
+        """Return the solution; another one has the same matrix."""
+        if self._steps:
+            self._steps = with_right(self._steps, system.signs, system.right)
+        else:
+            places = list(system.entries)
+            order = _order(places, system.signs)
+            if fill_of(places, order) > self._most:
+                return _solved_by_loops(system)
+            self._steps = eliminate(system, order)
+        known: dict[int, Expression] = {}
+        for step in reversed(self._steps):
+            known[step.unknown] = back_substitute(step, known)
+        return [known[i] for i in range(len(system.right))]
 
 
 def _solved_by_loops(system: SymmetricSystem) -> list[Expression]:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 from atwood.clock import TimeIsUp, within_time
-from atwood.codegen.cache import default_cache, make_key
+from atwood.codegen.cache import Cache, default_cache, make_key
 from atwood.codegen.llvm.build import (
     Built,
     RoutineSource,
@@ -73,9 +73,9 @@ class Tiers:
         is_quick: bool = True,
     ) -> None:
         options, size = default_options(parts, is_brief), sum(part.program.size for part in parts)
-        best = functools.partial(build_code, parts, options, exports=exports, routines=routines)
+        best = functools.partial(_best, parts, options, exports, routines)
         store, self._lock = default_cache(), threading.Lock()
-        is_quick &= store is None or not within_time(lambda: store.has(key_of(parts, options, routines)))
+        is_quick &= store is None or not within_time(lambda: _has_best(store, parts, options, routines))
         self._better: Callable[[], Built] | None = best if is_quick else None
         self._cost = self._left = _LEAST + _COST[options.level > 0] * size
         try:
@@ -109,6 +109,24 @@ class Tiers:
             if better is not None and (built := better()).scratch <= self.now.scratch:
                 self.now = built
         return self.now
+
+
+def _best(parts: Sequence[Part], options: CodeOptions, exports: Sequence[str], routines: RoutineSource | None) -> Built:
+    """Return machine code, and note that there is some of programs of these names and sizes."""
+    built, store = build_code(parts, options, exports=exports, routines=routines), default_cache()
+    if store is not None and not store.has(_rough_key(parts)):
+        store.write(_rough_key(parts), b"")
+    return built
+
+
+def _has_best(store: Cache, parts: Sequence[Part], options: CodeOptions, routines: RoutineSource | None) -> bool:
+    """Return whether there is such code: programs that never had any are not read for its name, which takes longer."""
+    return store.read(_rough_key(parts)) is not None and store.has(key_of(parts, options, routines))
+
+
+def _rough_key(parts: Sequence[Part]) -> str:
+    programs = [(one.name, one.program.name, one.program.size) for one in parts]
+    return make_key(["machine code of", hash_of_generators(), programs])
 
 
 def build_tapes(parts: Sequence[Part], exports: Sequence[str] = (), routines: RoutineSource | None = None) -> Built:

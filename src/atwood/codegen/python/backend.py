@@ -168,12 +168,12 @@ def _between(
     nodes: Sequence[Expression], known: Sequence[Expression], results: Sequence[Expression]
 ) -> list[Expression]:
     """Return what the results need beyond the known values, arguments before users."""
-    have = {node.index for node in known}
-    wanted = {result.index for result in results} - have
+    have, wanted = set(known), set(results)
     for node in reversed(nodes):
-        if node.index in wanted:
-            wanted.update(argument.index for argument in node.arguments if argument.index not in have)
-    return [node for node in nodes if node.index in wanted]
+        if node in wanted and node not in have:
+            wanted.update(node.arguments)
+    wanted -= have
+    return [node for node in nodes if node in wanted]
 
 
 @dataclass(frozen=True, eq=False)

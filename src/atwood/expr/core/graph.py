@@ -285,6 +285,11 @@ class Graph:
     def __deepcopy__(self, memory: object) -> Graph:
         return self
 
+    @property
+    def operations(self) -> frozenset[str]:
+        """The names of all operations in it."""
+        return frozenset(name for name, nodes in list(self._table.items()) if nodes)
+
     def constant(self, value: float) -> Expression:
         """Return the node of a number; there is one zero, without sign."""
         number = float(value)

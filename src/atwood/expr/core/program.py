@@ -124,13 +124,9 @@ class Program:
         These are the values that the rest of the program, or an output, uses directly.
         """
         needed = varying(self.nodes, self.parameters)
-        used = {output.index for output in self.results}
-        for node in self.nodes:
-            if node.index in needed:
-                used.update(argument.index for argument in node.arguments)
-        return tuple(
-            node for node in self.nodes if node.index in used and node.index not in needed and not node.is_constant
-        )
+        used = set(self.results).union(*[node.arguments for node in self.nodes if node.index in needed])
+        once = [node for node in self.nodes if node.index not in needed and node.operation != "constant"]
+        return tuple(node for node in once if node in used)
 
     @cached_property
     def operations(self) -> dict[str, int]:

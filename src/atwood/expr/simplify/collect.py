@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import field
 from heapq import heapify, heappop, heappush
 from itertools import combinations
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -218,8 +218,7 @@ _RANK = 1 << 40
 _COEFFICIENT, _WAVE, _VALUE, _PRODUCT, _INVERSE = range(5)
 
 
-@dataclass(frozen=True)
-class Term:
+class Term(NamedTuple):
     """A product with a sign.
 
     Attributes

@@ -24,7 +24,15 @@ import numpy as np
 from atwood.errors import AtwoodError, UnsupportedError
 from atwood.expr import Expression, absolute, depends_on, jacobian, select, solve, sqrt, substitute, vjp
 from atwood.lazy_dataclasses import replace
-from atwood.mechanics.dynamics.augmented import SymmetricSystem, back_substitute, eliminate, fill_of, minimum_degree
+from atwood.mechanics.dynamics.augmented import (
+    Step,
+    SymmetricSystem,
+    back_substitute,
+    eliminate,
+    fill_of,
+    minimum_degree,
+    with_right,
+)
 from atwood.mechanics.dynamics.equations import Constraint, ContactRow, Equations
 from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide
 from atwood.model.local.parts import multiplier_symbol
@@ -182,6 +190,8 @@ class _System:
         Whether C is positive definite.
     has_inertia
         Whether M is so, but for accelerations that have no entries in it: these come last, and all others in any order.
+    steps
+        How it was eliminated, with the last right-hand side; empty where it was not.
     """
 
     def __init__(
@@ -212,6 +222,7 @@ class _System:
         self.bare = {(self.masses + r, c): e for r, c, e in held.triples}
         self.is_regular = self.has_inertia = False
         self.sharing: list[list[int]] = []
+        self.steps: list[Step] = []
         self.of_contacts = range(self.masses + count, len(self.right)) if contacts else range(0)
 
     def times(self, solved: Sequence[Expression], diagonal: Sequence[Expression]) -> list[Expression]:
@@ -385,8 +396,15 @@ def _give_way(system: _System) -> dict[int, Expression]:
 
 
 def _solve_system(system: _System) -> list[Expression]:
-    """Return accelerations and multipliers: written out if that is short, else in numbers."""
+    """Return accelerations and multipliers: written out if that is short, else in numbers.
+
+    Of one system only the right-hand side changes from one solution to the next.
+    """
     n, size, full, right = system.masses, len(system.right), system.mass, system.right
+    signs = [1] * n + [-1] * (size - n)
+    if system.steps:
+        system.steps = with_right(system.steps, signs, right)
+        return _from_steps(system.steps)
     upper = {(r, c): e for (r, c), e in full.items() if r <= c} | {(c, r): e for (r, c), e in system.slopes.items()}
     upper |= {(n + i, n + i): one for i, one in enumerate(system.diagonal) if not one.is_zero}
     places, light = list(upper), {i for i in range(n) if (i, i) not in full}
@@ -400,19 +418,23 @@ def _solve_system(system: _System) -> list[Expression]:
     most = _FILL_OF_CONTACTS * size if len(system.of_contacts) > _MANY_CONTACTS else _LARGEST_FILL
     if (any_order or not light) and fill_of(places, order) <= most:
         try:
-            steps = eliminate(SymmetricSystem(upper, right, [1] * n + [-1] * (size - n)), order)
+            system.steps = eliminate(SymmetricSystem(upper, right, signs), order)
         except (AtwoodError, KeyError):  # a pivot that is always zero
-            steps = []
-        if steps:
-            known: dict[int, Expression] = {}
-            for step in reversed(steps):
-                known[step.unknown] = back_substitute(step, known)
-            return [known[i] for i in range(size)]
+            system.steps = []
+        if system.steps:
+            return _from_steps(system.steps)
     matrix = dict(full)
     for (i, j), entry in system.slopes.items():
         matrix[i, j], matrix[j, i] = entry, -entry
     matrix |= {(i, i): entry for i, entry in enumerate(system.diagonal, n)}
     return _solve_apart(matrix, right)
+
+
+def _from_steps(steps: Sequence[Step]) -> list[Expression]:
+    known: dict[int, Expression] = {}
+    for step in reversed(steps):
+        known[step.unknown] = back_substitute(step, known)
+    return [known[i] for i in range(len(steps))]
 
 
 def _by_row(matrix: Mapping[tuple[int, int], Expression]) -> dict[int, list[tuple[int, Expression]]]:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from atwood.expr import Expression, Graph, live
 from atwood.expr.core import algebra
-from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_dataclasses import dataclass, replace
 
 Tidy = Callable[[list[Expression]], list[Expression]]
 Place = tuple[int, int]
@@ -55,12 +55,15 @@ class Step:
         It is `right` plus the sum of each share times its unknown.
     is_near
         Whether the pivot depends on parameters alone.
+    inverse
+        One over the pivot.
     """
 
     unknown: int
     right: Expression
     shares: tuple[tuple[int, int, Expression], ...]
     is_near: bool
+    inverse: Expression
 
 
 @dataclass
@@ -101,7 +104,7 @@ def _eliminate_one(
             _change(entry, signs[j] == signs[k] != signs[p], shares[a] * values[b], near)
         _change(right[j], signs[p] < 0 < signs[j], shares[a] * side, near)
     directions = [1 if signs[p] > 0 > signs[j] else -1 for j in others]
-    return Step(p, side * inverse, tuple(zip(others, directions, shares, strict=True)), near)
+    return Step(p, side * inverse, tuple(zip(others, directions, shares, strict=True)), near, inverse)
 
 
 def _change(entry: _Entry, adds: bool, amount: Expression, near: bool) -> None:
@@ -114,6 +117,17 @@ def _change(entry: _Entry, adds: bool, amount: Expression, near: bool) -> None:
 def _settled(entries: Sequence[_Entry], tidy: Tidy) -> list[Expression]:
     values = tidy([entry.near for entry in entries])
     return [near + entry.far for near, entry in zip(values, entries, strict=True)]
+
+
+def with_right(steps: Sequence[Step], signs: Sequence[int], right: Sequence[Expression]) -> list[Step]:
+    """Return the same steps for another right-hand side."""
+    left, found = [_Entry(value, value.graph.zero) for value in right], []
+    for step in steps:
+        (side,) = _settled([left[step.unknown]], list)
+        for other, _, share in step.shares:
+            _change(left[other], signs[step.unknown] < 0 < signs[other], share * side, step.is_near)
+        found.append(replace(step, right=side * step.inverse))
+    return found
 
 
 def back_substitute(step: Step, known: Mapping[int, Expression]) -> Expression:

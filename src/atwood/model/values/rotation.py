@@ -190,7 +190,7 @@ def spin_rate_through(turn_: Turn, rate: Scalar, second: Scalar, spin: Vector, s
 
 def _number(value: Scalar) -> float | None:
     if isinstance(value, Expression):
-        return float(value.payload) if value.is_constant else None
+        return value.payload if value.operation == "constant" else None
     return float(value) if isinstance(value, (int, float)) else None
 
 

@@ -31,8 +31,10 @@ class Vector:
         self.x = x
         self.y = y
         self.z = z
+        if type(x) in _PLAIN and type(y) in _PLAIN and type(z) in _PLAIN:
+            return
         for name, one in (("x", x), ("y", y), ("z", z)):
-            if type(one) not in _PLAIN and not is_scalar(one):
+            if not is_scalar(one):
                 raise DeclarationError(f"{name} cannot be {show(one)}", where="Vector", advice=_COMPONENT)
 
     def __iter__(self) -> Iterator[Scalar]:

@@ -80,6 +80,8 @@ def find_external(assembly: Assembly) -> tuple[Expression, ...]:
 
     def find() -> tuple[Expression, ...]:
         equations = assembly.own_equations
+        if "external" not in equations.graph.operations:
+            return ()
         nodes = live([*equations.rows, *equations.rates, *(one.second for one in equations.constraints)])
         known = _known(assembly, equations)
         calls = (one for one in nodes if one.operation == "external" and not one.is_parametric)

@@ -143,22 +143,24 @@ def announce(assembly: Assembly, not_compilable: str) -> None:
     )
 
 
-def _is_obstacle(node: Expression) -> bool:
+def _is_obstacle(operation: str) -> bool:
     from atwood.codegen.llvm.text import has_code  # not with this module: code that is cached needs no more of LLVM
 
-    return node.operation == "external" or not has_code(node.operation)
+    return operation == "external" or not has_code(operation)
 
 
 def _describe(assembly: Assembly, program: Program | None) -> str:
+    if not any(map(_is_obstacle, assembly.own_equations.graph.operations)):
+        return ""
     nodes = live(_written(assembly.own_equations)) if program is None else program.nodes
     kinds = {node.operation: node for node in nodes}
-    obstacle = next((node for node in kinds.values() if _is_obstacle(node)), None)
+    obstacle = next((node for node in kinds.values() if _is_obstacle(node.operation)), None)
     if obstacle is None:
         return ""
     for path, local in assembly.mechanism.locals_.items():
         for law, expressions in _laws(local):
             for node in live(expressions):
-                if _is_obstacle(node):
+                if _is_obstacle(node.operation):
                     return f"{path}.{law} {_reason(node)}"
     return f"an equation {_reason(obstacle)}"
 
