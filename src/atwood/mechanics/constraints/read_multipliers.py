@@ -449,6 +449,8 @@ def _solve_apart(matrix: Mapping[tuple[int, int], Expression], right: Sequence[E
     """Return what solves a system in numbers: unknowns that share nothing are factored by themselves."""
     from networkx import Graph, connected_components
 
+    if not right:
+        return []
     graph, found = right[0].graph, list(right)
     places: Graph[int] = Graph()
     places.add_nodes_from(range(len(right)))
