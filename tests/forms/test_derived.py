@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+import weakref
 from pathlib import Path
 
 import pytest
@@ -219,3 +220,25 @@ def test_collecting_of_cycles_is_as_it_was_after_deriving(enabled):
     finally:
         gc.enable() if before else gc.disable()
     assert seen == [False, False]
+
+
+def test_what_was_derived_counts_as_old_and_cycles_in_it_still_go():
+    class Ring:
+        pass
+
+    before, seen = gc.isenabled(), []
+    gc.enable()
+    gc.callbacks.append(lambda phase, about: seen.append(about["generation"]))
+    try:
+        with caches.without_collection():
+            ring = Ring()
+            ring.itself, gone = ring, weakref.ref(ring)
+            del ring
+            made = [Ring() for _ in range(2 * gc.get_threshold()[0])]
+        made.append(Ring())
+        assert not seen
+        gc.collect()
+        assert gone() is None
+    finally:
+        gc.callbacks.pop()
+        gc.enable() if before else gc.disable()

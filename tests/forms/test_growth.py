@@ -66,6 +66,19 @@ def test_equal_links_are_rewritten_once(monkeypatch: pytest.MonkeyPatch) -> None
     assert rewritten[0] > 4 * counts[40]
 
 
+def test_energies_of_parts_are_made_when_they_are_asked_for() -> None:
+    assembly = assemble(Chain(links=3))
+    observables, graph = assembly.observables, assembly.mechanism.table.graph
+    assert "bob[0].velocity.x" in observables
+    made = len(graph)
+    kinetic = observables["bob[0].kinetic_energy"]
+    assert len(graph) > made
+    assert {"bob[0].kinetic_energy", "bob[0].potential_energy"} <= set(observables)
+    assert observables["bob[0].kinetic_energy"] is kinetic
+    with pytest.raises(KeyError):
+        observables["ground.kinetic_energy"]  # it has no inertia
+
+
 def test_no_sympy_on_the_way() -> None:
     import subprocess
     import sys
