@@ -10,6 +10,7 @@ import pytest
 
 import atwood as aw
 from atwood import Scene, SolveError, simulate
+from atwood.plotting.live.program import live_program
 from atwood_library import Ground, PointContact, PointMass, RigidBody, VertexContact
 
 G = 9.81
@@ -159,3 +160,12 @@ def test_places_in_a_row_brake_as_their_springs_share_the_load(form: str) -> Non
 def test_exports_say_that_they_do_not_share_loads_by_stiffness(tmp_path: Path) -> None:
     with pytest.raises(aw.UnsupportedError, match="c0 shares loads by its stiffness"):
         aw.export_c(bar((1.0, 2.0, 4.0), (0.1, 0.3, 0.2)), tmp_path)
+
+
+def test_exports_refuse_what_no_run_can_begin_with(tmp_path: Path) -> None:
+    """A program in C slid on by least forces, where a run is refused."""
+    scene = bar((None, None, None), (0.1, 0.3, 0.2))
+    with pytest.raises(SolveError, match="friction depends on how forces are shared, which nothing determines"):
+        aw.export_c(scene, tmp_path)
+    assert not list(tmp_path.iterdir())
+    assert "friction depends on how forces are shared" in live_program(scene).reason

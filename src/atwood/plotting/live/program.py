@@ -37,7 +37,9 @@ from atwood.plotting.live.updates import add_updates
 from atwood.simulation.contacts.groups import refuse_groups
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.initialization.start import Start, settle, start_with_line_signs
+from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.problem.problem import SceneProblem
+from atwood.simulation.run.run import choice_at_start
 
 _OF_QUANTITIES = "path", "unit", "doc", "periodic", "sharing"
 """What pages know of a quantity; see `atwood.mechanics.outputs.observables.Observable`."""
@@ -156,6 +158,11 @@ def live_modes(
         assembly, idle = with_pulls(assembly)
         zeros = {*zeros, *idle}
     assembly, start = start_with_line_signs(with_zeros(assembly, zeros))
+    if (
+        assembly.own_equations.contacts
+    ):  # what no run can begin with, such as undetermined shares that friction asks for
+        options = RunOptions(t_end=assembly.flat.t_start + 1.0)
+        choice_at_start(assembly, start, options, assembly.other_mode)
     first = ModeText(*_prepared(assembly, start), quantities)
     every = add_modes(first, assembly, start, quantities)
     for one in every:

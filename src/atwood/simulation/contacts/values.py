@@ -26,7 +26,7 @@ from atwood.model.values.units import ALONG
 from atwood.numerics.contact_sets import Contacts, Limits, Unit, sizes_of
 from atwood.numerics.matrices import least_norm, or_one, to_array
 from atwood.numerics.rank import null_space
-from atwood.simulation.dynamics.balance import LIGHT, BalanceValues, balance_of, even_balance
+from atwood.simulation.dynamics.balance import LIGHT, BalanceValues, ConstraintValues, balance_of, even_balance
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.scales import Scales, motion_scales
 from atwood.simulation.problem.problem import SceneProblem
@@ -263,10 +263,15 @@ class ContactValues:
         """Accelerations and multipliers of joints without these forces."""
         return self._moved(np.concatenate([-self._now.bias, -self._now.gamma])[:, None])[:, 0]
 
+    @cached_property
+    def _joints(self) -> ConstraintValues:
+        """The constraints of joints, of which Jacobian and explicit rates depend on the place alone."""
+        return balance_of(self.assembly, "dae").constraints_at(self.t, self.q, self.u)
+
     def allowed(self, u: FloatArray) -> FloatArray:
         """Return the nearest speeds of the maximal coordinates, by masses, that joints allow at this place."""
-        now = self._now
-        rate = np.asarray(now.jacobian @ u, dtype=float) + now.explicit_rate
+        joints = self._joints
+        rate = np.asarray(joints.jacobian @ u, dtype=float) + joints.explicit_rate
         change: FloatArray = self._moved(np.concatenate([np.zeros(len(u)), -rate])[:, None])[: len(u), 0]
         return u + change if len(rate) else u
 
