@@ -456,7 +456,10 @@ def _solve_apart(matrix: Mapping[tuple[int, int], Expression], right: Sequence[E
     places.add_nodes_from(range(len(right)))
     places.add_edges_from(place for place, entry in matrix.items() if not entry.is_zero)
     groups: Any = connected_components(places)  # sets, which its types do not say
-    for group in sorted(sorted(one) for one in groups):
+    parts = sorted(sorted(one) for one in groups)
+    if any(matrix.get((i, i), graph.zero).is_zero for i, *others in parts if not others):
+        parts = [list(range(len(right)))]  # nothing determines one of them: in a program that is no value, and no error
+    for group in parts:
         rows = [[matrix.get((i, j), graph.zero) for j in group] for i in group]
         for i, one in zip(group, solve(rows, [right[i] for i in group]), strict=True):
             found[i] = graph.convert(one)
