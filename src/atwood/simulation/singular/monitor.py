@@ -42,6 +42,9 @@ _REVIEW = 8
 _AT_START = 0.7
 """Where less than this share is left at a start of what constraints are around it, it is looked ahead from there."""
 
+_MOST_JUDGED = 60
+"""Looks at more constraints are judged in Python, which knows where their slopes have no entries."""
+
 _AROUND = (-2.0, -1.0, 1.0, 2.0)
 """So many strides from where it begins constraints are looked at to see how independent they are elsewhere."""
 
@@ -164,7 +167,8 @@ class SingularityMonitor(Branches):
         self._compiled.note(self._start.t, self._start.y, self._start.yp)
         self._compiled.settle()
         self._starts_low = self._compiled.least_share < _AT_START and not self._is_behind
-        if self.plan.balance.kinematic_map.is_plain and not self.plan.finding.redundant:
+        finding, is_plain = self.plan.finding, self.plan.balance.kinematic_map.is_plain
+        if is_plain and not finding.redundant and len(finding.kept) <= _MOST_JUDGED:
             self._compiled.judge_from(self._start.t)
 
     def _look_around(self) -> None:
