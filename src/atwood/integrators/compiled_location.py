@@ -123,6 +123,10 @@ class CompiledLocator(EventLocator):
         """Know when parameters change next."""
         self._set(change=t)
 
+    def tell(self, t: float) -> None:
+        """Know that a state was handed out that the steps did not hand out themselves."""
+        self._set(told=t)
+
     def _row(self, name: str) -> FloatArray:
         row: FloatArray = self._rows[ROWS[name]]
         return row

@@ -391,6 +391,8 @@ class ExplicitSession(SteppingSession):
         is_there = self._sees or t_out <= newest
         self._here = self._newest if t_out >= newest or not is_there else self._stepper.interpolate(t_out)
         self._sees = False
+        if is_there and self._leaps and self._compiled is not None:
+            self._compiled.tell(self._here[0])
         return StepResult(*copied(self._here), status, self._no_events) if is_there else None
 
     def _count_steps(self) -> int:
