@@ -441,3 +441,27 @@ def test_what_is_squeezed_rests_when_its_impacts_have_ended(
     assert [one.time for one in run.events if one.kind == "rests"][:1] == pytest.approx([end], abs=3e-9)
     assert abs(run["b.velocity.z"][-1]) < 1e-9
     assert run["b.position.z"][-1] == pytest.approx(0.2, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("restitution", "mass", "known", "doubt"),
+    [(0.95, 1e3, 0.533826055763, 4e-5), (0.98, 1e4, 0.515246397423, 4e-6), (0.9, 1e3, 0.515321972960, 0.0)],
+)
+def test_a_time_of_rest_says_by_how_much_it_may_be_off(
+    restitution: float, mass: float, known: float, doubt: float
+) -> None:
+    """What a heavy body squeezes against the floor; known from 6,000 impacts in 60 digits."""
+    scene = Scene()
+    ground, floor = scene.add("ground", Ground()), scene.add("floor", PointContact(restitution=restitution))
+    light, heavy = scene.add("light", PointMass(mass=1.0)), scene.add("heavy", PointMass(mass=mass))
+    between = scene.add("between", DistanceContact(lower=0.2, restitution=restitution))
+    ends = ((ground.frame, floor.plane), (light.point, floor.point), (light.point, between.a), (heavy.point, between.b))
+    for one, other in ends:
+        scene.connect(one, other)
+    for name, height in (("light", 1.0), ("heavy", 1.5)):
+        scene.start.update({f"{name}.position.x": 0.0, f"{name}.position.z": height})
+        scene.start.update({f"{name}.velocity.{axis}": 0.0 for axis in "xz"})
+    (rest,) = (one for one in simulate(scene, t_end=0.7, rtol=1e-10).events if one.kind == "rests")
+    said = f", at a time that may be off by {doubt:.1g} s" if doubt else ""
+    assert rest.message == f"impacts have accumulated: it rests{said}"
+    assert rest.time == pytest.approx(known, rel=0.0, abs=doubt or 1e-9)

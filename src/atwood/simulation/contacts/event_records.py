@@ -14,10 +14,55 @@ from atwood.numerics.contact_sets import GOES_ON, OPEN, STICKS, State
 from atwood.simulation.contacts.values import Layout
 from atwood.simulation.events.modes import EventRecord, Impact
 
+_RESTS = "impacts have accumulated: it rests"
+
+_LOOKED_AT, _FEW = 10, 4
+"""So many impacts before a rest say how intervals go on to shrink, and no fewer."""
+
+_LARGER = 3.0
+"""Times how far a series seems to be off: it may be off by so much."""
+
 
 def told_rest(t: float, key: tuple[str, str], left: float) -> EventRecord:
     """Return the event of a gap whose impacts have accumulated, which have come to an end some time later."""
-    return EventRecord(t + left, *key, "impacts have accumulated: it rests", "", True, "rests")
+    return EventRecord(t + left, *key, _RESTS, "", True, "rests")
+
+
+def with_doubts(events: Sequence[EventRecord], least: float) -> tuple[EventRecord, ...]:
+    """Return events in which times of rest say by how much they may be off, where that is more than a least time, s.
+
+    What is left of a series whose intervals shrink by r is the last one times ``r/(1 - r)``, and takes about
+    ``1/(1 - r)`` intervals. If r changes by d in each, a share of about ``d/(1 - r)^2`` of it is in doubt, as where
+    what bounces is squeezed by what is nearly too heavy to come to rest.
+    """
+    found = list(events)
+    for number, one in enumerate(events):
+        if one.message != _RESTS:
+            continue
+        times = [x.time for x in events[:number] if x.kind == "impact" and (x.part, x.law) == (one.part, one.law)]
+        doubt = 0.0 if len(times) <= _FEW else one.time - times[-1]
+        for count in range(len(times), _FEW, -1):
+            may_be_off, is_rounding = _doubt(times[max(0, count - _LOOKED_AT) : count], one.time)
+            doubt = min(doubt, may_be_off)
+            if not is_rounding:
+                break
+        if doubt > least:
+            found[number] = replace(one, message=f"{one.message}, at a time that may be off by {doubt:.1g} s")
+    return tuple(found)
+
+
+def _doubt(times: Sequence[float], end: float) -> tuple[float, bool]:
+    """Return by how much the end of a series may be off, as some impacts say, s, and whether rounding tells in these.
+
+    Factors that rise and fall are rounding, and those before say more.
+    """
+    spans, left = np.diff(times), end - times[-1]
+    if not np.all(spans > 0.0) or spans[-1] == spans[-2]:
+        return left, True
+    shares = spans[1:] / spans[:-1]
+    changes = np.diff(shares)
+    doubt = left * min(1.0, _LARGER * abs(float(np.median(changes))) / (1.0 - float(shares[-1])) ** 2)
+    return doubt, bool(np.any(changes > 0.0) and np.any(changes < 0.0))
 
 
 def told_change(t: float, first: ContactRow, before: State, after: State) -> EventRecord | None:

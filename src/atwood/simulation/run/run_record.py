@@ -98,7 +98,12 @@ class Run:
     @cached_property
     def events(self) -> tuple[EventRecord, ...]:
         """Events, in order."""
-        return tuple(one for some in self.told for one in (some.events if isinstance(some, ToldLater) else (some,)))
+        found = tuple(one for some in self.told for one in (some.events if isinstance(some, ToldLater) else (some,)))
+        if self.start is None or not any(one.kind == "rests" for one in found):
+            return found
+        from atwood.simulation.contacts.event_records import with_doubts
+
+        return with_doubts(found, 100.0 * self.options.relative_tolerance * (self.options.t_end - self.start.time))
 
     @property
     def singular_crossings(self) -> tuple[SingularCrossing, ...]:
