@@ -274,6 +274,32 @@ def test_a_place_ever_nearer_to_a_hinge_is_right_or_refused(lever: float) -> Non
         simulate(hinged(1e-9, 1e3, 0.1), t_end=0.01)
 
 
+@FORMS
+@pytest.mark.parametrize("turn", [0.0, 0.7])
+@pytest.mark.parametrize("slope", [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12])
+def test_a_groove_ever_flatter_tells_its_forces_or_is_refused(slope: float, turn: float, form: str) -> None:
+    """A push of .3 of what moves it up one side makes .35 and .65 of its weight; they were told as halves."""
+
+    def way(x: float, z: float) -> tuple[float, float, float]:
+        return math.cos(turn) * x - math.sin(turn) * z, 0.0, math.sin(turn) * x + math.cos(turn) * z
+
+    scene = Scene(gravity=G, gravity_direction=way(0.0, -1.0))
+    ground, m = scene.add("ground", Ground()), scene.add("m", PointMass(mass=1.0))
+    for name, side in (("a", 1.0), ("b", -1.0)):
+        plane = scene.add(name, PointContact(normal=way(side * math.sin(slope), math.cos(slope))))
+        scene.connect(ground.frame, plane.plane)
+        scene.connect(m.point, plane.point)
+    scene.connect(m.point, scene.add("push", Force(direction=way(1.0, 0.0), value=0.3 * math.tan(slope) * G)).point)
+    scene.start.update({f"m.{name}.{axis}": 0.0 for name in ("position", "velocity") for axis in "xz"})
+    if slope < 1e-5:
+        with pytest.raises(UnsupportedError, match=r"its force is (6\.37\d|3\.43\d) N, and formulas give 4\.9"):
+            simulate(scene, form=form, t_end=0.1)
+        return
+    result = simulate(scene, form=form, t_end=0.1)
+    told = [result[f"{name}.normal_force"][-1] for name in "ab"]
+    assert told == pytest.approx([0.35 * G / math.cos(slope), 0.65 * G / math.cos(slope)], rel=1e-4)
+
+
 def test_a_share_that_only_rows_nearly_alike_hold_is_none() -> None:
     """Two floors that differ by 1e-4 held a crank with 8,700 N, which nothing asks for, and forces were off by .8 %."""
     assert run_trial("sets", 990300129)[0].findings == ()

@@ -40,7 +40,9 @@ _ROUNDED = 1e-13
 """The same: what is left of less is rounding, and held by joints and other places; far away so many times more."""
 
 
-def check_told_forces(assembly: Assembly, state: tuple[float, FloatArray, FloatArray], length: float) -> None:
+def check_told_forces(
+    assembly: Assembly, state: tuple[float, FloatArray, FloatArray], length: float, error: float = 0.0
+) -> None:
     """Refuse places whose forces formulas do not give.
 
     Parameters
@@ -51,6 +53,8 @@ def check_told_forces(assembly: Assembly, state: tuple[float, FloatArray, FloatA
         Time, coordinates and speeds in its form, on the constraints.
     length
         Extent of the scene, m.
+    error
+        How far the state may be off, in sizes of the scene: by so much of what falls may things move otherwise.
 
     Raises
     ------
@@ -58,10 +62,12 @@ def check_told_forces(assembly: Assembly, state: tuple[float, FloatArray, FloatA
         If a force is off by more than a thousandth of the largest, or what is pressed opens.
     """
     t, q, u = state
-    assembly.kept.get(_ALIKE, lambda: _are_alike(assembly, state, length), t, q.tobytes(), u.tobytes(), length)
+    assembly.kept.get(
+        _ALIKE, lambda: _are_alike(assembly, state, length, error), t, q.tobytes(), u.tobytes(), length, error
+    )
 
 
-def _are_alike(assembly: Assembly, state: tuple[float, FloatArray, FloatArray], length: float) -> bool:
+def _are_alike(assembly: Assembly, state: tuple[float, FloatArray, FloatArray], length: float, error: float) -> bool:
     """Return that no force is off, or refuse places of which one is."""
     equations, contacts = assembly.own_equations, layout_of(assembly).contacts
     told = [equations.read[one.row.multiplier] for one in contacts if one.row.multiplier in equations.read]
@@ -74,7 +80,7 @@ def _are_alike(assembly: Assembly, state: tuple[float, FloatArray, FloatArray], 
     near, response = [*rows, *loose], values.response / sizes / sizes[:, None]
     if not np.any(np.linalg.eigvalsh(response[np.ix_(near, near)]) < _NEXT_TO_NONE**2):
         return True
-    along, still = values.by_free_ways()
+    along, falls, rest = values.by_free_ways()
     rounded = _ROUNDED * float(max(1.0, *np.abs(state[1] / coordinate_scales(equations, length))))
     parts, each = decompose(along[rows] / sizes[rows, None], rounded, is_whole=False), np.linalg.norm(along, axis=1)
     left = parts.values[: parts.rank]
@@ -84,14 +90,16 @@ def _are_alike(assembly: Assembly, state: tuple[float, FloatArray, FloatArray], 
     program = assembly.shared.get(_TOLD, lambda: coordinate_program(assembly, _TOLD.name, equations, told))
     given = np.array(assembly.kernel(program)([state[0]], *state[1:])[0])
     given, follows = _with_rubbing(values, states, given)
-    moving, least = (still + along @ (along.T @ given)) / sizes, -rounded * float(np.max(np.abs(still / sizes)))
-    for i in (i for i in loose if moving[i] < least):
+    goes, least = falls + along.T @ given, max(rounded, error) * float(np.max(np.abs(falls), initial=0.0))
+    moving = (rest + along @ goes) / sizes
+    for i in (i for i in loose if moving[i] < -least):
         raise _refused(values, i, "it is pressed, and opens", [])
     if not np.any(left < _NEXT_TO_NONE):
         return True
     by_force = parts.right[: parts.rank] @ along.T @ follows[:, rows] / sizes[rows]
     each = or_one(np.linalg.norm(by_force, axis=1))
-    off = least_norm(by_force / each[:, None], parts.range.T @ moving[rows] / left / each)
+    wrong = parts.right[: parts.rank] @ goes + parts.range.T @ (rest[rows] / sizes[rows]) / left
+    off = least_norm(by_force / each[:, None], np.where(np.abs(wrong) > least, wrong, 0.0) / each)
     found = given[rows] - off / sizes[rows]
     most, off = float(np.max(np.abs(sizes[rows] * found))), np.abs(off)
     if np.any(off > _OFF * most):

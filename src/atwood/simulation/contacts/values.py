@@ -293,11 +293,11 @@ class ContactValues:
         found: FloatArray = self.slopes @ self._by_each[: len(self.u)]
         return found
 
-    def by_free_ways(self) -> tuple[FloatArray, FloatArray]:
+    def by_free_ways(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return how rows move along what joints leave free, each way with a unit of inertia, and without forces.
 
-        These are B and b of ``b + B B^T f``. What joints leave of a row is known in B to rounding of the row, and in A
-        to rounding alone of its square.
+        These are B, a and b of ``b + B (a + B^T f)``. What joints leave of a row is known in B to rounding of the row,
+        and in A to rounding alone of its square.
         """
         now, sizes = self._now, self._sizes_by_mass
         mass, jacobian = sizes[:, None] * to_array(now.mass) * sizes, to_array(now.jacobian) * sizes
@@ -306,9 +306,8 @@ class ContactValues:
         inertia, turns = np.linalg.eigh(free.T @ mass @ free)
         has_mass = inertia > LIGHT * np.max(inertia, initial=0.0)
         ways = free @ turns[:, has_mass] / np.sqrt(inertia[has_mass])
-        along = (self.slopes * sizes) @ ways
-        pushed = ways.T @ (sizes * now.bias + mass @ held)
-        return along, self.slopes @ (sizes * held) + self.seconds - along @ pushed
+        along, falls = (self.slopes * sizes) @ ways, -ways.T @ (sizes * now.bias + mass @ held)
+        return along, falls, self.slopes @ (sizes * held) + self.seconds
 
     @cached_property
     def sharing(self) -> tuple[FloatArray, FloatArray]:

@@ -480,7 +480,8 @@ class Walk:
         if about not in self._kept.told:
             from atwood.simulation.contacts.told_forces import check_told_forces
 
-            check_told_forces(assembly, (t, q, u), self.start.length)
+            error = 10.0 * self.options.relative_tolerance if self.segments else 0.0
+            check_told_forces(assembly, (t, q, u), self.start.length, error)
             self._kept.told.add(about)
 
     def _becomes(
