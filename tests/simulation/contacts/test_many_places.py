@@ -276,7 +276,7 @@ def test_a_place_ever_nearer_to_a_hinge_is_right_or_refused(lever: float) -> Non
 
 @FORMS
 @pytest.mark.parametrize("turn", [0.0, 0.7])
-@pytest.mark.parametrize("slope", [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12])
+@pytest.mark.parametrize("slope", [1e-4, 1e-7, 1e-12])
 def test_a_groove_ever_flatter_tells_its_forces_or_is_refused(slope: float, turn: float, form: str) -> None:
     """A push of .3 of what moves it up one side makes .35 and .65 of its weight; they were told as halves."""
 
