@@ -410,7 +410,7 @@ class _Runner:
                 y, step_result = y[: strayed + 1], session.here
             count = len(y)
             jumps = self._all_jumps(session)
-            shows = self._shows(jumps)
+            shows = jumps is None or self._shows(jumps)
             self.recorder.take_many(times[:count], y, segment.samples.shown[done : done + count], jumps, shows)
             done += count
             if step_result.status is not Status.REACHED:
@@ -424,11 +424,10 @@ class _Runner:
                 progress(float(times[-1]))
         return done, None
 
-    def _shows(self, jumps: _Jumps | None) -> NDArray[np.bool_]:
+    def _shows(self, jumps: _Jumps) -> NDArray[np.bool_]:
         """Return whether states before and after jumps are outputs: those before time events are none."""
         is_any = isinstance(self.segment.options.outputs, (int, np.integer))  # or just the times that were asked for
-        times = np.zeros(0) if jumps is None else jumps[0]
-        shows = np.full((len(times), 2), is_any)
+        times, shows = jumps[0], np.full((len(jumps[0]), 2), is_any)
         if self.pieces is not None:
             for i in np.flatnonzero(np.isin(times, self.pieces.times)).tolist():
                 shows[i] = False, self.segment.samples.shows(float(times[i]))
