@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 
 import numpy as np
 
@@ -20,8 +19,8 @@ _EQUAL = 1e-9
 """Moments that differ by less, relative to the largest, are equal."""
 
 
-def polhode(moments: FloatArray, energy: float, points: int = 400) -> Iterator[FloatArray]:
-    """Yield the curves that the angular momentum runs along in a body that turns freely.
+def polhode(moments: FloatArray, energy: float, points: int = 400) -> list[FloatArray]:
+    """Return the curves that the angular momentum runs along in a body that turns freely.
 
     They are where the sphere of its size cuts the ellipsoid of the kinetic energy (Landau and Lifshitz, Mechanics,
     section 37).
@@ -31,12 +30,14 @@ def polhode(moments: FloatArray, energy: float, points: int = 400) -> Iterator[F
     # About the axis of the largest moment where the body is slower than about the middle one, else of the smallest.
     k = 2 if energy <= inverse[1] else 0
     i, j = (one for one in range(3) if one != k)
+    found = []
     for side in (1.0, -1.0):
         curve = np.empty((points, 3))
         along = (energy - inverse[k]) / (inverse[[i, j]] - inverse[k])
         curve[:, i], curve[:, j] = np.sqrt(along[0]) * np.cos(around), np.sqrt(along[1]) * np.sin(around)
         curve[:, k] = side * np.sqrt(np.maximum(1.0 - curve[:, i] ** 2 - curve[:, j] ** 2, 0.0))
-        yield curve
+        found.append(curve)
+    return found
 
 
 @takes(result=instance("a Result, as simulate returns it", Result), body=optional(TEXT), file=optional(FILE))
