@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +14,12 @@ from atwood.cli.running import degrees_of_freedom, multiplier_labels
 from atwood.display import count_of, duration
 from atwood.forms.assembly import Assembly
 from atwood.result.about import solver_name
-from atwood.result.part_energy import PartEnergies, PartEnergy
 from atwood.result.result import Result
 from atwood.stages import STAGES
 from atwood.table import facts, table
+
+if TYPE_CHECKING:  # a run that shows no energies does without files of results
+    from atwood.result.part_energy import PartEnergies, PartEnergy
 
 _ROWS = 16
 _MOST = 40  # components in the table of energies
