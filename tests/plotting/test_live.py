@@ -25,6 +25,7 @@ from ..library.test_tables import hoisted
 from ..machines.bits import task_of
 from ..simulation.contacts.test_drive_trains import lossy_train
 from ..simulation.contacts.test_known_answers import on_plane, start_at
+from ..simulation.contacts.test_stiff_places import bar
 from ..simulation.test_brief_laws import on_a_line
 from ..simulation.test_sides import band, moving
 
@@ -385,6 +386,14 @@ def test_contacts_are_those_of_simulate_in_events_and_states() -> None:
         assert [(one["part"], one["law"], one["kind"]) for one in ours] == told, name
         np.testing.assert_allclose([one["time"] for one in ours], [one.time for one in theirs], rtol=0.0, atol=1e-9)
         assert len(ours) > 0
+
+
+def test_a_page_stops_where_friction_depends_on_shares_that_nothing_determines() -> None:
+    scenes = {"sound": bar((None,) * 3, (0.2, 0.2, 0.2), 0.5), "other": bar((None,) * 3, (0.1, 0.3, 0.2), 0.5)}
+    found = played({name: live_program(one) for name, one in scenes.items()}, RUN, 0.6)
+    assert [one[0] for one in found] == ["reached", "failed"]
+    assert found[1][2] == pytest.approx(math.sqrt(1.0 / 9.81))
+    assert "friction depends on how forces are shared, which nothing determines" in found[1][1]
 
 
 def cue_ball() -> Scene:

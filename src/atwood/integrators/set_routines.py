@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from math import inf
+from math import inf, sqrt
 
 from atwood.codegen.routines import (
     ADDRESS,
@@ -27,7 +27,7 @@ from atwood.codegen.routines import (
     place_of,
 )
 from atwood.integrators.event_routines import do_or_return
-from atwood.numerics.contact_sets import CLEAR, GOES_ON, OPEN, SLACK, STICKS, STILL, TURNS
+from atwood.numerics.contact_sets import CLEAR, GOES_ON, NOTHING, OPEN, SLACK, STICKS, STILL, TURNS
 
 FIELDS: dict[str, Kind] = {
     **dict.fromkeys(("program", "derived", "scratch", "y", "out", "units", "rows", "matrix", "left"), ADDRESS),
@@ -49,15 +49,15 @@ UNITS = {
     name: k
     for k, name in enumerate(
         (
-            *("first", "width", "slip", "at", "speed", "poisson", "part", "small", "slow", "rounding"),
+            *("first", "width", "slip", "at", "speed", "poisson", "part", "owner", "small", "slow", "rounding"),
             *("trigger", "state", "state_x", "state_y", "next", "next_x", "next_y", "closed"),
             *("chosen", "given", "given_x", "given_y", "turned_x", "turned_y", "struck", "stopped", "acts", "series"),
         )
     )
 }
-"""Of each gap and slip: its first row and their number, its kind and gap, what is zero but for errors, and but for
-rounding, what has happened, its state and direction before and after, and whether it was closed at that moment; the
-rest is work. Of what has impacts that accumulate `series` is 1."""
+"""Of each gap and slip: its first row and their number, its kind and gap, its part, and a number that places of one
+part share, what is zero but for errors, and but for rounding, what has happened, its state and direction before and
+after, and whether it was closed at that moment; the rest is work. Of what has impacts that accumulate `series` is 1."""
 
 ROWS = {
     name: k
@@ -76,9 +76,10 @@ CLOSES, OPENS, YIELDS, STOPS = range(1, 5)
 ENTRY = ("unit", "before", "after", "loss")
 """What begins an entry of the log of impacts; impulses of all rows follow."""
 
-NO_VALUE, INSIDE, ENDLESS, GAINS, NO_IMPULSES, NO_SET, FULL = range(1, 8)
+NO_VALUE, INSIDE, ENDLESS, GAINS, NO_IMPULSES, NO_SET, FULL, UNDETERMINED = range(1, 9)
 """Why a set is not found: something has no value, a gap begins inside, impacts follow each other without end, energy
-would grow, or no impulses, or no set, contradict nothing by the rules here; or the log is full."""
+would grow, or no impulses, or no set, contradict nothing by the rules here; or the log is full, or how several parts
+share a load, which nothing determines, moves something."""
 
 REFUSED = {
     NO_VALUE: "something has no value where it touches",
@@ -88,6 +89,7 @@ REFUSED = {
     NO_IMPULSES: "no impulses are found that satisfy the laws of impact and friction",
     NO_SET: "no accelerations are found that satisfy contact and friction",
     FULL: "impacts follow each other without end",
+    UNDETERMINED: "friction depends on how forces are shared, which nothing determines",
 }
 """The same in words."""
 
@@ -564,6 +566,104 @@ def _find() -> Routine:
     return r
 
 
+# -- shares of forces -----------------------------------------------------------------------------------------------
+
+
+def _direction() -> Routine:
+    """Take the longest of some rows as a direction of size one, and what is along it from all; 1 where none is left."""
+    r, m, (rows, count, target, least) = _open(
+        "take_direction", {"rows": INTEGER, "count": INTEGER, "target": ADDRESS, "least": NUMBER}
+    )
+    matrix, size, best, largest = m.matrix, m.size, r.variable(0, INTEGER), r.variable(0.0)
+    with r.count(rows) as i:
+        length = r.sqrt(_sum(r, count, matrix.at(i * size), matrix.at(i * size)))
+        with r.when(length > largest.now):
+            largest.now, best.now = length, i
+    with r.when(~(largest.now > least)):
+        r.give(1)
+    with r.count(count) as j:
+        target[j] = matrix[best.now * size + j] / largest.now
+    with r.count(rows) as i:
+        _make_square(r, matrix.at(i * size), target, count)
+    r.give(0)
+    return r
+
+
+def _make_square(r: Routine, row: Value, direction: Value, count: Value) -> None:
+    """Take from a row what is along a direction, and once more, against rounding."""
+    with r.count(2):
+        share = _sum(r, count, row, direction)
+        with r.count(count) as j:
+            row[j] = row[j] - share * direction[j]
+
+
+def _determined() -> Routine:
+    """Refuse a set in which shares of forces between parts that nothing determines move something.
+
+    Null vectors of the equations for forces that do are looked for; see `atwood.numerics.contact_sets._judged`.
+    """
+    r, m, () = _open("determined")
+    with r.when(m.repeats == 0):
+        r.give(0)
+    place, matrix, size, acting, every = r.arguments[0], m.matrix, m.size, m.row("acting"), m.row("solution")
+    response, top, largest, known = m.result("response"), r.variable(0.0), r.variable(0.0), r.variable(0, INTEGER)
+    count, left, stride = r.call("contact_equations", place, result=INTEGER), m.left, size + 1
+    r.clear(every, every.at(size))
+    with _each(r, m, "chosen") as (k, _, _), _rows(r, m, k) as (_, i):
+        top.now = r.most(response[i * size + i], top.now)
+    with _each(r, m, "chosen") as (k, _, _), _rows(r, m, k) as (_, i):
+        own = response[i * size + i]
+        every[i] = r.choose(own > top.now * NOTHING, r.sqrt(r.size(own)), 0.0)
+
+    def scale(row: Value, of: Value) -> None:
+        """Divide a row by what its columns are scaled by; zero where joints hold what it is of."""
+        with r.count(count) as j:
+            unit = every[r.truncated(acting[j])]
+            row[j] = r.choose(of > 0.0, row[j] / r.choose(unit > 0.0, unit, 1.0), 0.0)
+
+    with r.count(count) as i:
+        row = matrix.at(i * size)
+        scale(row, every[r.truncated(acting[i])])
+        largest.now = 0.0
+        with r.count(count) as j:
+            largest.now = r.most(r.size(row[j]), largest.now)
+        with r.count(count) as j:
+            row[j] = row[j] / r.choose(largest.now > 0.0, largest.now, 1.0)
+    with r.count(count):
+        is_left = r.call("take_direction", place, count, count, left.at(known.now * stride), CLEAR) == 0
+        known.now = known.now + is_left.integer()
+    with r.count(size) as i:
+        row = matrix.at(i * size)
+        with r.count(count) as j:
+            row[j] = response[i * size + r.truncated(acting[j])] / r.choose(every[i] > 0.0, every[i], 1.0)
+        scale(row, every[i])
+        with r.count(known.now) as k:
+            _make_square(r, row, left.at(k * stride), count)
+    with r.count(count, known.now):
+        with r.when(r.call("take_direction", place, size, count, left, sqrt(CLEAR)) != 0):
+            r.give(0)
+        with r.when(_is_shared_by_parts(r, m, left)):
+            r.give(UNDETERMINED)
+    r.give(0)
+    return r
+
+
+def _is_shared_by_parts(r: Routine, m: Sets, way: Value) -> Value:
+    """Tell whether forces of several parts may change along a direction: what is not pressed is only pressed more."""
+    forces, most, first, last = m.row("forces"), r.variable(0.0), r.variable(inf), r.variable(-inf)
+    more, less = r.variable(True, BOOLEAN), r.variable(True, BOOLEAN)
+    with r.count(m.size) as i:
+        most.now = r.most(r.size(forces[i]), most.now)
+    with _each(r, m, "acts") as (k, row, _), r.when(m.unit("slip")[k] == 0.0):
+        share = way[r.truncated(m.row("slot")[row])]
+        with r.when(~(forces[row] > most.now * SLACK)):
+            more.now, less.now = more.now & (share >= -CLEAR), less.now & (share <= CLEAR)
+        with r.when(r.size(share) > sqrt(CLEAR)):
+            owner = m.unit("owner")[k]
+            first.now, last.now = r.least(owner, first.now), r.most(owner, last.now)
+    return (more.now | less.now) & (first.now < last.now)
+
+
 # -- moments --------------------------------------------------------------------------------------------------------
 
 
@@ -639,6 +739,7 @@ def _impulses() -> Routine:
     m.finite = 1.0
     with r.when(code != 0):
         r.give(NO_IMPULSES)
+    do_or_return(r, "determined")
     with r.count(m.size) as i:
         impulses[i] = impulses[i] + forces[i]
     r.give(0)
@@ -938,8 +1039,10 @@ def _settle() -> Routine:
     do_or_return(r, "read_contacts", t)
     r.copy(m.row("wanted"), m.result("free"), m.size)
     _going(r, m, some, repeated := r.variable(False, BOOLEAN))
-    with r.when(some.now), r.when(r.call("find_states", r.arguments[0]) != 0):
-        r.give(NO_SET)
+    with r.when(some.now):
+        with r.when(r.call("find_states", r.arguments[0]) != 0):
+            r.give(NO_SET)
+        do_or_return(r, "determined")
     rests = r.variable(True, BOOLEAN)  # it starts, or has just come to touch: what can rest does, with some share
     with r.count(m.count) as k:
         trigger = m.unit("trigger")[k]
@@ -1149,7 +1252,7 @@ def _resolve() -> Routine:
 
 def write_sets() -> list[Routine]:
     """Return the routines; they take the address of the memory of sets, and ``resolve`` is the one to be called."""
-    sets = (_solve, _least, _equations, _moved, _met, _contradiction, _improved, _find)
+    sets = (_solve, _least, _equations, _moved, _met, _contradiction, _improved, _find, _direction, _determined)
     impacts = (_impulses, _strike, _account, _collide, _stop, _end_impacts, _series)
     moments = (_read, _push, _touch, _hold, _barely_rising, _settle, _check)
     return [_resolve(), *(write() for write in (*sets, *impacts, *moments))]

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
+import re
+import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import atwood as aw
-from atwood import Scene, SolveError, simulate
+from atwood import Scene, SolveError, assemble, simulate
 from atwood.plotting.live.program import live_program
 from atwood_library import Ground, PointContact, PointMass, RigidBody, VertexContact
+
+from ...exported_scenes import FLAGS, apart, built, compiler, printed
 
 G = 9.81
 FORMS = pytest.mark.parametrize("form", ["reduced", "dae"])
@@ -126,7 +130,7 @@ def test_stiffness_decides_only_where_each_has_one() -> None:
         VertexContact(stiffness=0.0)
 
 
-def bar(stiffness: tuple[float, ...], friction: tuple[float, ...], height: float = 0.0) -> Scene:
+def bar(stiffness: tuple[float | None, ...], friction: tuple[float, ...], height: float = 0.0) -> Scene:
     """Return a bar in a plane on three places, and a ball that bounces, so that changes are soon compiled."""
     scene = Scene()
     ground, body = scene.add("ground", Ground()), scene.add("bar", RigidBody(mass=1.0, moments=(0.0, 0.1, 0.0)))
@@ -169,3 +173,33 @@ def test_exports_refuse_what_no_run_can_begin_with(tmp_path: Path) -> None:
         aw.export_c(scene, tmp_path)
     assert not list(tmp_path.iterdir())
     assert "friction depends on how forces are shared" in live_program(scene).reason
+
+
+NONE, QUICK = (None, None, None), ["-O0", *FLAGS[1:]]
+UNDETERMINED = "at t = 0.319275428.* friction depends on how forces are shared, which nothing determines"
+needs_a_compiler = pytest.mark.skipif(compiler() is None, reason="there is no C compiler")
+
+
+@needs_a_compiler
+@FORMS
+def test_c_stops_where_friction_depends_on_shares_that_nothing_determines(form: str, tmp_path: Path) -> None:
+    """It slid on by least forces, where a run is refused."""
+    scene = bar(NONE, (0.1, 0.3, 0.2), height=0.5)
+    with pytest.raises(SolveError, match=UNDETERMINED):
+        simulate(scene, form=form, t_end=0.6, rtol=1e-11)
+    program = built(scene, tmp_path, form, QUICK)
+    done = subprocess.run([program, "0.6", "1e-11", "3"], capture_output=True, text=True)
+    assert done.returncode != 0
+    assert re.match(UNDETERMINED, done.stderr)
+
+
+@needs_a_compiler
+@FORMS
+def test_c_goes_on_where_no_share_moves_anything(form: str, tmp_path: Path) -> None:
+    """Where friction is the same at all places it brakes alike, however they share the load."""
+    scene = bar(NONE, (0.2, 0.2, 0.2), height=0.5)
+    result = simulate(scene, form=form, t_end=0.6, rtol=1e-11, outputs=np.linspace(0.0, 0.6, 5), solver="explicit")
+    assert result["bar.velocity.x"][-1] == pytest.approx(2.0 - 0.2 * G * 0.6, abs=1e-9)
+    found = printed(built(scene, tmp_path, form, QUICK), 0.6, 1e-11, 5)
+    worst, where, _ = apart(found, result, assemble(scene, form=form))
+    assert worst <= 1e-9, where

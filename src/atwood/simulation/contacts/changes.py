@@ -31,12 +31,14 @@ from atwood.integrators.set_routines import (
     NEAR_REST,
     OFTEN,
     RECENT,
+    REFUSED,
     ROUNDED,
     SEEN,
     SHORT,
     SPANS,
     SQUEEZED,
     STEADY,
+    UNDETERMINED,
     WAITS,
 )
 from atwood.lazy_dataclasses import dataclass, replace
@@ -84,7 +86,6 @@ CONTRADICT = "Contacts contradict each other here: look at what moves them, and 
 
 _POISSON = "Choose Poisson's law for the part, with impact_law='poisson' for it or for its gap"
 
-_UNDETERMINED = "friction depends on how forces are shared, which nothing determines"
 _SHARES = "Give each of them a stiffness, as a place that gives way a little has, or one of them no friction."
 
 _HELD = "friction is at its limit where other places hold what would slip, so that nothing says which way it rubs"
@@ -464,7 +465,7 @@ class _Moment:
         """Refuse friction that depends on shares that nothing determines; corners of one part share by least forces."""
         for some in found.moving:
             if len({self.first[chosen[i]].row.key[0].rpartition(".")[0] or i for i in some}) > 1:
-                raise self._contradiction(_UNDETERMINED, [chosen[i] for i in some], _SHARES)
+                raise self._contradiction(REFUSED[UNDETERMINED], [chosen[i] for i in some], _SHARES)
 
     def _turned(self, chosen: list[int], found: Found, begins: Mapping[int, tuple[float, ...]]) -> list[int]:
         """Return what begins to slip in a plane of directions and moves otherwise than the force says that it passes.
@@ -524,7 +525,7 @@ class _Moment:
             parts = {self.first[j].row.key[0].rpartition(".")[0] or j for j in held if self.layout.is_slip[j]}
             soft = self.values.compliance[[row for j in held for row in self.units[j]]]
             if len(parts) > 1 and not np.all(soft > 0.0):
-                raise self._contradiction(_UNDETERMINED, held, _SHARES)
+                raise self._contradiction(REFUSED[UNDETERMINED], held, _SHARES)
 
     def _shared(self, chosen: list[int], found: Found, turned: Collection[int] = ()) -> Found:
         """Let go what need not hold, as long as the least forces that hold contradict a law.
@@ -548,7 +549,7 @@ class _Moment:
             tried = self._without(states, gone)
             if self._rank(tried, FIRM) == least and self._is_shared(tried, holding, turned):
                 return replace(found, states=tuple(tried[k] for k in chosen))
-        raise self._contradiction(_UNDETERMINED, chosen, _SHARES)
+        raise self._contradiction(REFUSED[UNDETERMINED], chosen, _SHARES)
 
     def _is_shared(self, states: list[State], holding: list[int], turned: Collection[int]) -> bool:
         """Return whether the forces that are reported contradict no law, and hold what has to stay."""
