@@ -222,18 +222,21 @@ def test_collecting_of_cycles_is_as_it_was_after_deriving(enabled):
     assert seen == [False, False]
 
 
-def test_what_was_derived_counts_as_old_and_cycles_in_it_still_go():
-    class Ring:
-        pass
+class Ring:
+    """What refers to itself."""
 
+    def __init__(self):
+        self.itself = self
+
+
+def test_what_was_derived_counts_as_old_and_cycles_in_it_still_go(monkeypatch):
+    monkeypatch.setattr(caches, "_MUCH", 100)
     before, seen = gc.isenabled(), []
     gc.enable()
     gc.callbacks.append(lambda phase, about: seen.append(about["generation"]))
     try:
         with caches.without_collection():
-            ring = Ring()
-            ring.itself, gone = ring, weakref.ref(ring)
-            del ring
+            gone = weakref.ref(Ring())
             made = [Ring() for _ in range(2 * gc.get_threshold()[0])]
         made.append(Ring())
         assert not seen
@@ -242,3 +245,21 @@ def test_what_was_derived_counts_as_old_and_cycles_in_it_still_go():
     finally:
         gc.callbacks.pop()
         gc.enable() if before else gc.disable()
+
+
+@pytest.mark.parametrize("much", [20, 20_000])
+def test_cycles_of_who_derives_again_and_again_go(monkeypatch, much):
+    """Counts of the collector that are taken back to zero each time never come to a collection."""
+    monkeypatch.setattr(caches, "_MUCH", much)
+    before, thresholds, rings = gc.isenabled(), gc.get_threshold(), []
+    gc.enable()
+    gc.set_threshold(700, 10, 10)
+    try:
+        for _ in range(2_000):
+            rings.append(weakref.ref(Ring()))
+            with caches.without_collection():
+                pass
+    finally:
+        gc.set_threshold(*thresholds)
+        gc.enable() if before else gc.disable()
+    assert sum(one() is not None for one in rings) < len(rings) / 2

@@ -19,6 +19,7 @@ from contextlib import contextmanager
 from functools import cache
 from hashlib import sha256
 from io import BytesIO
+from itertools import count
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -32,12 +33,20 @@ from atwood.stages import stage
 
 T = TypeVar("T")
 
+_MUCH = 20_000
+"""From so many new objects on the collector takes a millisecond to look through them."""
+
+_AGED = count(1)
+"""How often what was made counted as old at once."""
+
 
 @contextmanager
 def without_collection() -> Iterator[None]:
     """Leave cycles of objects alone: graphs of expressions have none, and to look for them is a sixth of deriving.
 
-    What was made meanwhile counts as old afterwards. Else the next object that is made would begin to look through it.
+    What was made meanwhile counts as old afterwards, if it is much. Else the next object that is made would begin to
+    look through it. That takes the counts of the collector back to zero: every tenth time all is looked through, or
+    cycles of who runs one scene after another would never be.
     """
     was_enabled = gc.isenabled()
     gc.disable()
@@ -45,10 +54,13 @@ def without_collection() -> Iterator[None]:
         yield
     finally:
         if was_enabled:
-            if not gc.get_freeze_count():  # what somebody has frozen stays so
+            is_much = gc.get_count()[0] > _MUCH and not gc.get_freeze_count()  # what somebody has frozen stays so
+            if is_much:
                 gc.freeze()
                 gc.unfreeze()
             gc.enable()
+            if is_much and next(_AGED) % 10 == 0:
+                gc.collect()
 
 
 class Key(Generic[T]):
