@@ -17,7 +17,7 @@ class RollingEllipsoid(Rolling):
     synonyms = ("Rattleback", "Celt", "Ellipsoid on a plane")
     spaces = ("space",)
 
-    radius: Number = parameter(1.0, unit="m", above=0.0, unit_length=True, doc="Unit of the semi-axes.")
+    radius: Number = parameter(1.0, unit="m", above=0.0, doc="Unit of the semi-axes.")
     semi_axes: Triple = parameter(
         (1.0, 1.0, 1.0),
         size=3,

@@ -40,6 +40,7 @@ from atwood.expr.core.program import Program
 from atwood.lazy_dataclasses import dataclass
 
 _MODULE = "codegen.sundials.step_monitor"
+_FILES = ("codegen/sundials/rank_looks.py",)
 
 _LOOK = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, *[ctypes.c_void_p] * 3)
 _JUDGE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_int64)
@@ -280,7 +281,7 @@ def compile_monitor(program: Program, speeds: int, size: int, places: tuple[Arra
     lists = slope_lists(outputs[0], list(zip(rows, columns, strict=True)))
     shape = Shape(inputs[1], speeds, size, outputs[0], len(rows), len(lists["product"]))
     part = Part("held", program)
-    routines = RoutineSource(_MODULE, ("codegen/sundials/rank_looks.py",), (shape,))
+    routines = RoutineSource(_MODULE, _FILES, (shape,))
     built = build_code(
         [part],
         default_options([part], is_brief=True),
@@ -374,7 +375,7 @@ def write_routines(shape: Shape | None) -> list[Routine]:
 @once
 def table_filler() -> Built:
     """Return the code that fills a table without looking at the motion."""
-    return build_code([], CodeOptions(level=2), exports=["fill"], routines=RoutineSource(_MODULE, (), (None,)))
+    return build_code([], CodeOptions(level=2), exports=["fill"], routines=RoutineSource(_MODULE, _FILES, (None,)))
 
 
 def _opened(_: Routine, given: Value) -> tuple[dict[str, Value], Record]:
