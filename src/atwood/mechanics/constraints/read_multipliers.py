@@ -446,23 +446,30 @@ def _by_row(matrix: Mapping[tuple[int, int], Expression]) -> dict[int, list[tupl
 
 
 def _solve_apart(matrix: Mapping[tuple[int, int], Expression], right: Sequence[Expression]) -> list[Expression]:
-    """Return what solves a system in numbers: unknowns that share nothing are factored by themselves."""
+    """Return what solves a system in numbers: unknowns that share nothing are factored by themselves.
+
+    Where nothing determines some of them all are solved for together: in a program that is no value, and no error.
+    """
     from networkx import Graph, connected_components
 
     if not right:
         return []
-    graph, found = right[0].graph, list(right)
+    graph, found, every = right[0].graph, list(right), range(len(right))
+    entries = [place for place, entry in matrix.items() if not entry.is_zero]
     places: Graph[int] = Graph()
-    places.add_nodes_from(range(len(right)))
-    places.add_edges_from(place for place, entry in matrix.items() if not entry.is_zero)
+    places.add_nodes_from(every)
+    places.add_edges_from(entries)
+    is_full = all(len(set(ones)) == len(right) for ones in zip(*entries, strict=True))  # no row or column is zero
     groups: Any = connected_components(places)  # sets, which its types do not say
-    parts = sorted(sorted(one) for one in groups)
-    if any(matrix.get((i, i), graph.zero).is_zero for i, *others in parts if not others):
-        parts = [list(range(len(right)))]  # nothing determines one of them: in a program that is no value, and no error
-    for group in parts:
-        rows = [[matrix.get((i, j), graph.zero) for j in group] for i in group]
-        for i, one in zip(group, solve(rows, [right[i] for i in group]), strict=True):
-            found[i] = graph.convert(one)
+    parts = sorted(sorted(one) for one in groups) if entries and is_full else [[*every]]
+    try:
+        for group in parts:
+            rows = [[matrix.get((i, j), graph.zero) for j in group] for i in group]
+            for i, one in zip(group, solve(rows, [right[i] for i in group]), strict=True):
+                found[i] = graph.convert(one)
+    except AtwoodError:  # some are numbers
+        rows = [[matrix.get((i, j), graph.zero) for j in every] for i in every]
+        return [graph.convert(one) for one in solve(rows, list(right))]
     return found
 
 
