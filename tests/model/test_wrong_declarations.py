@@ -32,6 +32,11 @@ def held(reaction: Any) -> Any:
     return _named(aw.constraint(reaction=reaction, unit="N", doc="A force."), fresh(energy), "hold")
 
 
+def told() -> Any:
+    """Return an observable."""
+    return aw.observable(unit="J", doc="An energy.")(fresh(energy))
+
+
 @pytest.mark.parametrize(
     ("make", "said"),
     [
@@ -43,6 +48,7 @@ def held(reaction: Any) -> Any:
         (lambda: held("two words"), "reaction cannot be 'two words'. Give a name"),
         (lambda: body(hold=held("k")), "Wrong.hold: its reaction 'k' has the name of something else"),
         (lambda: body(hold=held("a.x")), "Wrong.hold: its reaction 'a.x' has the name of something else"),
+        (lambda: body(hold=aw.potential(fresh(energy)), potential_energy=told()), "the potential energy is a quantity"),
         (lambda: body(law=property(aw.potential(fresh(energy)))), "Wrong.law: a property is no law"),
         (lambda: body(spaces=3), "Wrong: spaces cannot be 3. Give a tuple"),
         (lambda: body(spaces=()), r"Wrong: spaces cannot be \(\). Give a tuple"),

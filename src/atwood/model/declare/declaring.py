@@ -104,6 +104,7 @@ def collect_declarations(cls: Any) -> None:
             cls._signals[name] = replaced
             setattr(cls, name, replaced)
     _check_reactions(cls)
+    _check_energies(cls)
 
 
 def _declare_beside(cls: Any, law: ContactLaw) -> None:
@@ -140,6 +141,19 @@ def _check_reactions(cls: Any) -> None:
                 raise DeclarationError(
                     f"its reaction {reaction!r} has the name of something else", where=where, advice=advice
                 )
+
+
+def _check_energies(cls: Any) -> None:
+    """Refuse observables with the name of an energy that is told of every component that has one."""
+    if not any(law.kind in ("inertia", "lagrangian", "potential") for law in cls._laws.values()):
+        return
+    for name in ("kinetic_energy", "potential_energy"):
+        if (law := cls._laws.get(name)) is not None and law.kind == "observable":
+            raise DeclarationError(
+                f"the {name.replace('_', ' ')} is a quantity already, by the laws of inertia and potential",
+                where=f"{cls.__name__}.{name}",
+                advice="Give the observable another name.",
+            )
 
 
 def _merge_inherited(cls: type) -> None:
