@@ -211,10 +211,14 @@ def _substitute_rows(name: str, exported: bool) -> Routine:
         by = x[k]
         with r.count(n, k + 1) as i:
             x[i] = x[i] - a[i * n + k] * by
+    begin, end = r.variable(n, INTEGER), r.variable(n, INTEGER)  # all unknowns that are not zero are between them
     with r.count(n) as turn:
         i = n - 1 - turn
         row, total = a.at(i * n), r.variable(x[i])
-        with r.count(n, i + 1) as j, r.when(x[j] != 0.0):
+        with r.count(end.now, begin.now) as j, r.when(x[j] != 0.0):
             total.now = total.now - row[j] * x[j]
         x[i] = total.now / row[i]
+        with r.when(x[i] != 0.0):
+            end.now = r.choose(begin.now < n, end.now, i + 1)
+            begin.now = i
     return r
