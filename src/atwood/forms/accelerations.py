@@ -35,6 +35,7 @@ from atwood.mechanics.dynamics.augmented import (
     fill_of,
     minimum_degree,
     place_differences,
+    solution_of,
 )
 from atwood.mechanics.dynamics.equations import Equations
 
@@ -201,11 +202,7 @@ def _solve_numerically(entries: Mapping[tuple[int, int], Expression], right: Seq
 
 
 def _solve_in_order(entries: Mapping[tuple[int, int], Expression], right: Sequence[Expression]) -> list[Expression]:
-    steps = eliminate(SymmetricSystem(entries, right, [1] * len(right)), _order(entries, len(right)))
-    known: dict[int, Expression] = {}
-    for step in reversed(steps):
-        known[step.unknown] = back_substitute(step, known)
-    return [known[i] for i in range(len(right))]
+    return solution_of(eliminate(SymmetricSystem(entries, right, [1] * len(right)), _order(entries, len(right))))
 
 
 # -- the augmented system -----------------------------------------------------------------------------------------
@@ -393,10 +390,7 @@ class _Tree:
         if any(squares[i, i].is_zero for i in range(k)):
             return None
         steps = eliminate(SymmetricSystem(squares, [_dot(c, gaps) for c in columns], [1] * k), range(k), self.tidy)
-        solution: dict[int, Expression] = {}
-        for step in reversed(steps):
-            solution[step.unknown] = back_substitute(step, solution)
-        return self.tidy([solution[i] for i in range(k)])
+        return self.tidy(solution_of(steps))
 
 
 def _relative(equations: Equations, node: int, parent: int) -> list[Expression]:

@@ -23,7 +23,7 @@ from atwood.forms.caches import derive_once
 from atwood.forms.program import rates_are_speeds, state_groups
 from atwood.forms.residuals import keep_constraints
 from atwood.lazy_dataclasses import dataclass, names_of
-from atwood.mechanics.dynamics.augmented import Step, SymmetricSystem, back_substitute, eliminate, fill_of, with_right
+from atwood.mechanics.dynamics.augmented import Step, SymmetricSystem, eliminate, fill_of, solution_of, with_right
 from atwood.mechanics.dynamics.equations import Constraint, ContactRow, Equations
 
 _LARGEST_FILL = 60_000
@@ -365,10 +365,7 @@ class _Solved:
             if fill_of(places, order) > self._most:
                 return _solved_by_loops(system)
             self._steps = eliminate(system, order)
-        known: dict[int, Expression] = {}
-        for step in reversed(self._steps):
-            known[step.unknown] = back_substitute(step, known)
-        return [known[i] for i in range(len(system.right))]
+        return solution_of(self._steps)
 
 
 def _solved_by_loops(system: SymmetricSystem) -> list[Expression]:

@@ -27,10 +27,10 @@ from atwood.lazy_dataclasses import replace
 from atwood.mechanics.dynamics.augmented import (
     Step,
     SymmetricSystem,
-    back_substitute,
     eliminate,
     fill_of,
     minimum_degree,
+    solution_of,
     with_right,
 )
 from atwood.mechanics.dynamics.equations import Constraint, ContactRow, Equations
@@ -404,7 +404,7 @@ def _solve_system(system: _System) -> list[Expression]:
     signs = [1] * n + [-1] * (size - n)
     if system.steps:
         system.steps = with_right(system.steps, signs, right)
-        return _from_steps(system.steps)
+        return solution_of(system.steps)
     upper = {(r, c): e for (r, c), e in full.items() if r <= c} | {(c, r): e for (r, c), e in system.slopes.items()}
     upper |= {(n + i, n + i): one for i, one in enumerate(system.diagonal) if not one.is_zero}
     places, light = list(upper), {i for i in range(n) if (i, i) not in full}
@@ -422,19 +422,12 @@ def _solve_system(system: _System) -> list[Expression]:
         except (AtwoodError, KeyError):  # a pivot that is always zero
             system.steps = []
         if system.steps:
-            return _from_steps(system.steps)
+            return solution_of(system.steps)
     matrix = dict(full)
     for (i, j), entry in system.slopes.items():
         matrix[i, j], matrix[j, i] = entry, -entry
     matrix |= {(i, i): entry for i, entry in enumerate(system.diagonal, n)}
     return _solve_apart(matrix, right)
-
-
-def _from_steps(steps: Sequence[Step]) -> list[Expression]:
-    known: dict[int, Expression] = {}
-    for step in reversed(steps):
-        known[step.unknown] = back_substitute(step, known)
-    return [known[i] for i in range(len(steps))]
 
 
 def _by_row(matrix: Mapping[tuple[int, int], Expression]) -> dict[int, list[tuple[int, Expression]]]:

@@ -130,6 +130,14 @@ def with_right(steps: Sequence[Step], signs: Sequence[int], right: Sequence[Expr
     return found
 
 
+def solution_of(steps: Sequence[Step]) -> list[Expression]:
+    """Return all unknowns of a system that is eliminated."""
+    known: dict[int, Expression] = {}
+    for step in reversed(steps):
+        known[step.unknown] = back_substitute(step, known)
+    return [known[i] for i in range(len(steps))]
+
+
 def back_substitute(step: Step, known: Mapping[int, Expression]) -> Expression:
     """Return an unknown from those that were eliminated after it."""
     total = step.right
