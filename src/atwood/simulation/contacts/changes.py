@@ -464,7 +464,7 @@ class _Moment:
     def _check_determined(self, chosen: list[int], found: Found) -> None:
         """Refuse friction that depends on shares that nothing determines; corners of one part share by least forces."""
         for some in found.moving:
-            if len({self.first[chosen[i]].row.key[0].rpartition(".")[0] or i for i in some}) > 1:
+            if len({self.layout.owners[chosen[i]] for i in some}) > 1:
                 raise self._contradiction(REFUSED[UNDETERMINED], [chosen[i] for i in some], _SHARES)
 
     def _turned(self, chosen: list[int], found: Found, begins: Mapping[int, tuple[float, ...]]) -> list[int]:
@@ -522,7 +522,7 @@ class _Moment:
         """Refuse what slips by a share of a load on several parts that nothing has determined."""
         for k in turned:
             held = self._held_with(k)
-            parts = {self.first[j].row.key[0].rpartition(".")[0] or j for j in held if self.layout.is_slip[j]}
+            parts = {self.layout.owners[j] for j in held if self.layout.is_slip[j]}
             soft = self.values.compliance[[row for j in held for row in self.units[j]]]
             if len(parts) > 1 and not np.all(soft > 0.0):
                 raise self._contradiction(REFUSED[UNDETERMINED], held, _SHARES)

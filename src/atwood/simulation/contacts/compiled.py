@@ -116,7 +116,7 @@ def set_data(plan: SceneProblem, t: float, y: FloatArray) -> SetData:
 
 
 def _units(layout: Layout, plan: SceneProblem) -> FloatArray:
-    parts, owners = _parts_of(layout), dict[str | int, int]()
+    parts, owners = _parts_of(layout), layout.owners
     found, first = np.zeros((len(UNITS), len(layout.first))), 0
     for k, (one, rows) in enumerate(zip(layout.first, layout.units, strict=True)):
         size = plan.scales.of(ALONG[one.law.options.unit])
@@ -128,7 +128,7 @@ def _units(layout: Layout, plan: SceneProblem) -> FloatArray:
             "speed": one.is_speed,
             "poisson": one.is_poisson,
             "part": parts[one.row.key[0]],
-            "owner": owners.setdefault(one.row.key[0].rpartition(".")[0] or k, len(owners)),
+            "owner": owners[k],
             "small": size,
             "slow": size / plan.scales.time,
             "rounding": sets.ROUNDED * size,

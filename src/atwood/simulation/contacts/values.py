@@ -79,6 +79,13 @@ class Layout:
     gap_of: tuple[int, ...]
     places: tuple[tuple[int, ...], ...]
 
+    @cached_property
+    def owners(self) -> tuple[int, ...]:
+        """For each unit a number that gaps and slips of one part share, as the corners of a box do."""
+        numbers: dict[str | int, int] = {}
+        keys = [one.row.key[0].rpartition(".")[0] or k for k, one in enumerate(self.first)]
+        return tuple(numbers.setdefault(key, len(numbers)) for key in keys)
+
 
 def layout_of(assembly: Assembly) -> Layout:
     """Return the gaps and slips of a scene."""
