@@ -28,8 +28,6 @@ from atwood.tolerances import tolerances
 
 _TOLD: Key[Program] = Key("forces of gaps and slips by formulas")
 
-_ALIKE: Key[bool] = Key("that numbers give the same forces, at the state that was last asked about")
-
 _OFF = 1e-3
 """Of the largest force: what is off by more is refused. Forces are in units in which each moves its own row alike."""
 
@@ -61,32 +59,24 @@ def check_told_forces(
     UnsupportedError
         If a force is off by more than a thousandth of the largest, or what is pressed opens.
     """
-    t, q, u = state
-    assembly.kept.get(
-        _ALIKE, lambda: _are_alike(assembly, state, length, error), t, q.tobytes(), u.tobytes(), length, error
-    )
-
-
-def _are_alike(assembly: Assembly, state: tuple[float, FloatArray, FloatArray], length: float, error: float) -> bool:
-    """Return that no force is off, or refuse places of which one is."""
     equations, contacts = assembly.own_equations, layout_of(assembly).contacts
     told = [equations.read[one.row.multiplier] for one in contacts if one.row.multiplier in equations.read]
     if len(told) < len(contacts) or (len(contacts) == 1 and not assembly.maximal.constraints):
-        return True
+        return
     values = ContactValues(assembly, *state, length)
     states = states_of(values.layout, assembly.held_now)
     rows = rows_that_hold(values.units, states)
     loose, sizes = [i for i in _at_rest(values) if i not in rows], np.sqrt(or_one(values.alone))
     near, response = [*rows, *loose], values.response / sizes / sizes[:, None]
     if not np.any(np.linalg.eigvalsh(response[np.ix_(near, near)]) < _NEXT_TO_NONE**2):
-        return True
+        return
     along, falls, rest = values.by_free_ways()
     rounded = _ROUNDED * float(max(1.0, *np.abs(state[1] / coordinate_scales(equations, length))))
     parts, each = decompose(along[rows] / sizes[rows, None], rounded, is_whole=False), np.linalg.norm(along, axis=1)
     left = parts.values[: parts.rank]
     loose = [i for i in loose if rounded < each[i] / sizes[i] < _NEXT_TO_NONE]
     if not loose and not np.any(left < _NEXT_TO_NONE):
-        return True
+        return
     program = assembly.shared.get(_TOLD, lambda: coordinate_program(assembly, _TOLD.name, equations, told))
     given = np.array(assembly.kernel(program)([state[0]], *state[1:])[0])
     given, follows = _with_rubbing(values, states, given)
@@ -95,7 +85,7 @@ def _are_alike(assembly: Assembly, state: tuple[float, FloatArray, FloatArray], 
     for i in (i for i in loose if moving[i] < -least):
         raise _refused(values, i, "it is pressed, and opens", [])
     if not np.any(left < _NEXT_TO_NONE):
-        return True
+        return
     by_force = parts.right[: parts.rank] @ along.T @ follows[:, rows] / sizes[rows]
     each = or_one(np.linalg.norm(by_force, axis=1))
     wrong = parts.right[: parts.rank] @ goes + parts.range.T @ (rest[rows] / sizes[rows]) / left
@@ -107,7 +97,6 @@ def _are_alike(assembly: Assembly, state: tuple[float, FloatArray, FloatArray], 
         unit = contacts[rows[worst]].law.options.unit
         said = f"its force is {found[worst]:.4g} {unit}, and formulas give {given[rows[worst]]:.4g}"
         raise _refused(values, rows[worst], said, [rows[i] for i in np.flatnonzero(off > _OFF * most).tolist()])
-    return True
 
 
 def _with_rubbing(values: ContactValues, states: Sequence[State], given: FloatArray) -> tuple[FloatArray, FloatArray]:

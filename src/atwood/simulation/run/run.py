@@ -476,11 +476,11 @@ class Walk:
         if self.held in self._told:
             return
         self._told.add(self.held)
-        about = assembly.shared, assembly.relation_values, self.held, t, q.tobytes(), u.tobytes()
+        error = 10.0 * self.options.relative_tolerance if self.segments else 0.0
+        about = assembly.shared, assembly.relation_values, self.held, t, q.tobytes(), u.tobytes(), error
         if about not in self._kept.told:
             from atwood.simulation.contacts.told_forces import check_told_forces
 
-            error = 10.0 * self.options.relative_tolerance if self.segments else 0.0
             check_told_forces(assembly, (t, q, u), self.start.length, error)
             self._kept.told.add(about)
 
