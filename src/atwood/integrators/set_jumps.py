@@ -340,8 +340,8 @@ class SetJumps(SetSolver, Jumps):
         """Learn when parameters change, and what those from a place on are before and from each of the times on."""
         self._changes = np.append(times, inf), np.ascontiguousarray(relations)
         changes, rows = (one.ctypes.data for one in self._changes)
-        self._put("own", {"changes": changes, "relations": rows, "changed": 0})
-        self._put("own", {"others": relations.shape[1], "relations_at": place})
+        many = {"others": relations.shape[1], "relations_at": place}
+        self._put("own", {"changes": changes, "relations": rows, "changed": 0, **many})
         return True
 
     def rates(self, t: float, y: FloatArray) -> FloatArray:

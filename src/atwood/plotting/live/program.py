@@ -158,9 +158,7 @@ def live_modes(
         assembly, idle = with_pulls(assembly)
         zeros = {*zeros, *idle}
     assembly, start = start_with_line_signs(with_zeros(assembly, zeros))
-    if (
-        assembly.own_equations.contacts
-    ):  # what no run can begin with, such as undetermined shares that friction asks for
+    if assembly.own_equations.contacts:  # refuse what no run can begin with, as friction by undetermined shares
         options = RunOptions(t_end=assembly.flat.t_start + 1.0)
         choice_at_start(assembly, start, options, assembly.other_mode)
     first = ModeText(*_prepared(assembly, start), quantities)

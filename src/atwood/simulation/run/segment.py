@@ -136,7 +136,11 @@ class _Runner:
         self.opened: StepResult | None = None
         self.noted: list[EventRecord | ToldLater] = []
         self.jumped: list[_Jumps] = []
-        self.pieces: Schedule | None = None
+
+    @property
+    def pieces(self) -> Schedule | None:
+        """The time events that steps pass by themselves; None where they pass none."""
+        return self.recorder.pieces
 
     @property
     def method(self) -> Method:
@@ -184,8 +188,7 @@ class _Runner:
             from atwood.simulation.run.moments import change_on_the_way
 
             if change_on_the_way(session, segment.ahead, segment.plan):
-                self.pieces = segment.ahead.schedule
-                self.recorder.pieces = self.pieces
+                self.recorder.pieces = segment.ahead.schedule
                 self.segment = replace(segment, samples=segment.ahead.samples)
 
     def _pass_moments(self, session: Session, y: FloatArray) -> Outcome | None:
@@ -240,12 +243,10 @@ class _Runner:
 
     def _cost(self) -> Statistics:
         cost = self.before if self.session is None else self.before + self.session.statistics
-        spent = 0.0 if self.monitor is None else self.monitor.seconds
-        return (
-            cost
-            if not spent
-            else replace(cost, seconds=cost.seconds + spent, monitor_seconds=cost.monitor_seconds + spent)
-        )
+        if self.monitor is None:
+            return cost
+        spent = self.monitor.seconds
+        return replace(cost, seconds=cost.seconds + spent, monitor_seconds=cost.monitor_seconds + spent)
 
     def _outcome(self, step_result: StepResult | None) -> Outcome:
         """Record where a solver stopped early, if it did."""
