@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["BoolArray", "ComplexArray", "FloatArray", "IndexArray", "IntArray", "address_of"]
+__all__ = ["BoolArray", "ComplexArray", "FloatArray", "IndexArray", "IntArray", "address_of", "uneven"]
 
 FloatArray: TypeAlias = NDArray[np.float64]
 """Numbers."""
@@ -25,6 +25,9 @@ IndexArray: TypeAlias = NDArray[np.intp]
 IntArray: TypeAlias = NDArray[np.int64]
 """Whole numbers of 64 bits, as compiled code reads them."""
 
+_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
+"""The angle whose multiples are spread most evenly."""
+
 _AS_BUFFER: Any = (ctypes.c_char * 0).from_buffer
 
 
@@ -34,3 +37,8 @@ def address_of(array: NDArray[Any]) -> int:
         return ctypes.addressof(_AS_BUFFER(array))
     except (TypeError, ValueError, BufferError):  # it is not to be written to, or not in one piece
         return int(array.ctypes.data)
+
+
+def uneven(count: int, turn: int = 1, shift: float = 0.0) -> FloatArray:
+    """Return numbers between -1 and 1 that no symmetry singles out; others for each number of turns."""
+    return np.asarray(np.sin(turn * _GOLDEN * np.arange(1.0, count + 1.0) + shift))

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from atwood.arrays import address_of
+from atwood.arrays import address_of, uneven
 from atwood.codegen.llvm.build import Built, RoutineSource, build_code, default_options, once
 from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.codegen.routines import (
@@ -126,7 +126,7 @@ class MonitorCode:
             **{name: np.zeros(shape.conditions) for name in ("pivots", "first", "most", "least", "earlier", "known")},
             "left": np.empty(shape.conditions),
             "work": np.empty(len(kept) * (shape.speeds + 2) + shape.speeds if is_small else 1),
-            "right": np.sin(_GOLDEN * np.arange(1.0, shape.conditions + 1.0)),
+            "right": uneven(shape.conditions),
             "kept": np.array([len(kept), *kept, *position], dtype=np.int64),
             **self._lists,
             "notes": np.empty((CAPACITY, shape.note)),
@@ -316,8 +316,6 @@ PAUSED, UNREADABLE = 96, 97
 
 CAPACITY, CARRIED = 24, 6
 """So many looks are noted; of those among which nothing was low the last few are carried on."""
-
-_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 
 _LATER = 2
 """So many looks that are no longer low must follow those that are, before somebody is asked."""

@@ -20,7 +20,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.arrays import FloatArray
+from atwood.arrays import FloatArray, uneven
 from atwood.errors import AtwoodError
 from atwood.expr import Expression, evaluate, jacobian, jvp, live, substitute
 from atwood.expr.core.operations import PIECEWISE_CONSTANT
@@ -38,8 +38,6 @@ _ASKED, NEEDED = 7, 4
 """At so many places coefficients are looked at, and at so many they must have values."""
 
 SWITCHING = PIECEWISE_CONSTANT | {"absolute", "minimum", "maximum", "select", "external"}
-
-_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 
 
 @dataclass(frozen=True)
@@ -147,7 +145,7 @@ class Places:
     def _places(self, mechanism: Mechanism) -> Iterator[dict[Expression, float]]:
         state, length = self.state, extent(mechanism) or 1.0
         for attempt in range(1, _ASKED + 1):
-            numbers = np.sin(attempt * _GOLDEN * np.arange(1.0, len(state.coordinates) + 1.0) + 0.7 * attempt)
+            numbers = uneven(len(state.coordinates), attempt, 0.7 * attempt)
             numbers *= (1.0, 0.3, 0.1)[attempt % 3]  # far away and near, since some things end somewhere
             for i, one in enumerate(state.names):
                 numbers[i] *= length if one.unit == "m" else 2.0 if one.unit == "rad" else 1.0

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.arrays import FloatArray
+from atwood.arrays import FloatArray, uneven
 from atwood.codegen.rounding import ROUGHNESS
 from atwood.errors import KernelEvaluationError
 from atwood.lazy_dataclasses import dataclass, replace
@@ -37,9 +37,6 @@ _STEPS = (1e-2, 3e-2, 3e-2)
 
 _MOVE = 0.2
 """Between two looks at which constraints are kept nothing moves by more of its size; an angle by so many radians."""
-
-_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
-"""The angle whose multiples are spread most evenly."""
 
 
 @dataclass(frozen=True)
@@ -185,7 +182,7 @@ def _nearby(balance: Balance, t: float, q: FloatArray, scales: FloatArray, here:
         if not len(admissible):
             break
         # any direction that no symmetry singles out
-        along = np.sin(attempt * _GOLDEN * np.arange(1.0, len(admissible) + 1.0)) @ admissible
+        along = uneven(len(admissible), attempt) @ admissible
         way = step * scales * along / np.linalg.norm(along)
         # From a singular position, Newton's method falls back into it unless something holds it away.
         held = np.where(np.arange(len(scales)) == np.argmax(np.abs(along)), 0.0, scales)

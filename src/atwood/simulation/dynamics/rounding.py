@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.arrays import FloatArray
+from atwood.arrays import FloatArray, uneven
 from atwood.codegen.rounding import ROUGHNESS, RoughProgram, roughly
 from atwood.expr import Program
 from atwood.forms.assembly import Assembly
@@ -30,9 +30,6 @@ _GROWN = 10.0
 
 _ASIDE = 0.1
 """Relative to the scales: how far from a place errors about it are looked at; there, nothing is exact or infinite."""
-
-_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
-"""The angle whose multiples are spread most evenly."""
 
 
 class RowErrors:
@@ -87,7 +84,7 @@ class RowErrors:
         reach, first = float(np.abs(q).max(initial=0.0)), self._first is None
         passed = 0.0 if self._first is None else abs(t - self._first)
         if first or reach > _GROWN * self._reach or (self.moves_by_itself and passed > _GROWN * self._passed):
-            aside = _ASIDE * scales * np.sin(_GOLDEN * np.arange(1.0, len(scales) + 1.0))
+            aside = _ASIDE * scales * uneven(len(scales))
             self._learn(t, self._kinematic_map.moved(t, q, aside), scales)
             # Afterwards, so that whoever is interrupted meanwhile learns again.
             self._known, self._reach, self._passed = None, max(reach, self._reach, 1.0), max(passed, self._passed)

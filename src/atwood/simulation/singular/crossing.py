@@ -20,7 +20,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from atwood.arrays import FloatArray
+from atwood.arrays import FloatArray, uneven
 from atwood.codegen.sundials.rank_looks import SMALL, UNEVEN
 from atwood.errors import SolveError
 from atwood.integrators.event_location import EventLocator, Root
@@ -184,9 +184,6 @@ def rests_at(
     return rest if near and is_slow(plan, arc, rest, fastest, tolerance) else None
 
 
-_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
-
-
 def has_few(plan: SceneProblem) -> bool:
     """Return whether there are so few constraints that their singular values cost little."""
     return len(plan.finding.kept) <= SMALL and normal_equations(plan) is None
@@ -253,7 +250,7 @@ class RankMeasure:
             found, is_known = np.full(count, np.nan), np.isfinite(slopes).all(axis=(1, 2))
             found[is_known] = singular_values(slopes[is_known])[:, -1] if is_known.any() else np.nan
             return found
-        right = np.sin(_GOLDEN * np.arange(1.0, now.value.shape[1] + 1.0)) * np.ones((count, 1))
+        right = uneven(now.value.shape[1]) * np.ones((count, 1))
         with np.errstate(all="ignore"):
             step = now.step(right / share)
             size: FloatArray = np.linalg.norm(right[:, now.kept], axis=1) / np.linalg.norm(step, axis=1)
