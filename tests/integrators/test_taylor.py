@@ -96,6 +96,32 @@ def test_observed_orders(kind: Kind, order: int) -> None:
     assert order - 0.5 < math.log2(errors[0] / errors[1]) < order + 1.5
 
 
+@pytest.mark.parametrize("rates", [pendulum, forced])
+def test_tapes_are_left_at_any_step(rates: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tapes and machine code give the same bits, after any step."""
+    monkeypatch.setenv("ATWOOD_CACHE", "0")
+    size = 2 if rates is pendulum else 3
+    problem = system(rates, size)
+    tiers = problem.compiled()[0].tiers
+    assert tiers is not None
+    quick, better = tiers.now, tiers._better
+    assert better is not None
+    best = better()
+
+    def ended(before: float) -> list[float]:
+        tiers.now, tiers._better, tiers._left = quick, lambda: best, math.inf
+        stepper = CompiledStepper(problem, tight(1e-6))
+        assert stepper.start(0.0, np.array([1.0, 0.5, 0.2][:size]))
+        for step in range(55):
+            tiers._left = math.inf if step < before else 0.0
+            stepper.run(math.inf, 1)
+        assert (stepper._count("recurrence") == quick.code.addresses["order"]) == (before == math.inf)
+        return [stepper.state()[0], *stepper.state()[1]]
+
+    alone = ended(math.inf)
+    assert all(ended(before) == alone for before in range(50))
+
+
 def test_orders_follow_the_tolerance() -> None:
     assert [choose_order(tight(10.0**-k)) for k in (1, 6, 16)] == [LOWEST, 1 + math.ceil(FACTOR * 6 * math.log(10)), 25]
     assert choose_order(tight(1e-300)) == HIGHEST

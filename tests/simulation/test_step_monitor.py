@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from atwood import simulate
+from atwood import assemble, simulate
 from atwood.codegen.python.backend import BoundKernel
 from atwood.codegen.sundials.step_monitor import MonitorData, slope_lists
 from atwood.integrators.ida import library as sundials_library
@@ -157,3 +157,34 @@ def test_machine_code_measures_what_numpy_does(scene: Any, guards: list[Singular
         plain.rows = rows
         assert np.allclose(found, plain.learn(t, q, known), rtol=1e-9, atol=1e-13)
         assert np.allclose(data.rows, rows, rtol=1e-12)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_looks_leave_their_tape_at_any_time(
+    form: str, guards: list[SingularityMonitor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same looks, crossings and bits, whenever machine code takes the place of a tape."""
+    monkeypatch.setenv("ATWOOD_CACHE", "0")
+    assembly, spend = assemble(FourBarRow(), form=form), MonitorData.spend
+    told, known, calls = {"t_end": 1.0, "rtol": 1e-5, "solver": "explicit"}, [0.0], [0]
+
+    def spending(self: MonitorData, seconds: float) -> None:
+        tiers, calls[0] = self.code.tiers, calls[0] + 1
+        tiers._left = 0.0 if calls[0] > known[0] else np.inf
+        spend(self, seconds)
+
+    monkeypatch.setattr(MonitorData, "spend", spending)
+    known[0] = np.inf
+    first = simulate(assembly, **told)
+    assert len(first.singular_crossings) == 1
+    monitor = guards[0]._compiled.code
+    quick, better, many = monitor.tiers.now, monitor.tiers._better, calls[0]
+    assert better is not None
+    best = better()
+    assert many > 2
+    for before in range(many):
+        monitor.tiers.now, monitor.tiers._better = quick, lambda: best
+        known[0], calls[0] = before, 0
+        again = simulate(assembly, **told)
+        assert monitor.tiers.now is best
+        assert all(np.array_equal(first[path], again[path]) for path in first.paths)

@@ -101,6 +101,7 @@ class ExplicitSession(SteppingSession):
 
     def _begin(self, t: float, y: FloatArray, on_stiff: OnStiff | None, end: float) -> None:
         """Start a run that has cost nothing so far."""
+        self._spend: Callable[[float], None] | None = None
         self._end = end
         self._on_stiff, self._judged, self._is_left = on_stiff, 0, False
         self._leaps = self._is_handed = False
@@ -228,7 +229,7 @@ class ExplicitSession(SteppingSession):
 
     def set_monitor(self, monitor: StepMonitor) -> bool:
         """Let the motion be looked at, and end with `Status.NOTICED` where something is seen; return whether it can."""
-        self._is_watched = self._stepper.set_monitor(monitor)
+        self._is_watched, self._spend = self._stepper.set_monitor(monitor), monitor.spend
         self._leaps = self._leaps and not self._is_watched
         return self._is_watched
 
@@ -409,7 +410,9 @@ class ExplicitSession(SteppingSession):
         return max(0, min(self._chunk, self.budget.max_steps - self._stepper.counts.steps))
 
     def _learn(self, seconds: float, outcome: Outcome) -> None:
-        """Come closer to a chunk that takes a moment."""
+        """Come closer to a chunk that takes a moment; see whether looks are to be taken by faster code."""
+        if self._spend is not None:
+            self._spend(seconds)
         if seconds > 2.0 * _MOMENT:
             self._chunk = max(1, int(self._chunk * _MOMENT / seconds))
         elif outcome is Outcome.USED_UP and seconds < 0.5 * _MOMENT:

@@ -402,6 +402,8 @@ class StepMonitor:
     look
         Address of ``int (double t, double *y, double *yp, data)``: takes one look, and returns whether somebody else
         should.
+    spend
+        Told for how long, in seconds, steps have been taken, or 0 at a start: what is faster may take its place.
     keep
         Whatever must live as long as the addresses are used.
     """
@@ -414,6 +416,7 @@ class StepMonitor:
     due: Callable[[], float]
     due_at: int = 0
     look: int = 0
+    spend: Callable[[float], None] | None = None
     keep: object = None
 
 

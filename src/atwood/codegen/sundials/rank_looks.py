@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import inf, nan
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from atwood.codegen.routines import (
     ADDRESS,
@@ -27,11 +27,8 @@ from atwood.codegen.routines import (
     place_of,
 )
 
-if TYPE_CHECKING:
-    from atwood.codegen.sundials.step_monitor import Shape
-
-Opened: TypeAlias = Callable[[Routine, Value], tuple[dict[str, Value], Record]]
-"""Gives the arrays and the state of a monitor from the address of its data."""
+Opened: TypeAlias = Callable[[Value], tuple[dict[str, Value], Record, Record]]
+"""Gives the arrays, the state and the sizes of a monitor from the address of its data."""
 
 SMALL = 40
 """Up to so many rows singular values cost little."""
@@ -53,9 +50,9 @@ _PLACES, _SECTIONS = 8, 20
 """At so many places eigenvalues are counted at once, so often at most: the last interval is as long as rounding."""
 
 
-def write_measures(shape: Shape, opened: Opened) -> list[Routine]:
+def write_measures(opened: Opened) -> list[Routine]:
     """Write what measures states, and what judges looks by it."""
-    return [_smallest(), _measure(shape, opened), _measures(shape, opened), _judge(shape, opened)]
+    return [_smallest(), _measure(opened), _measures(opened), _judge(opened)]
 
 
 def _smallest() -> Routine:
@@ -140,41 +137,42 @@ def _least_of(r: Routine, squares: Value, rows: Value) -> Value:
     return 0.5 * (low.now + high.now)
 
 
-def _measure(shape: Shape, opened: Opened) -> Routine:
+def _measure(opened: Opened) -> Routine:
     """Write the measure of coordinates at a time."""
     r = Routine("measure", {"t": NUMBER, "q": ADDRESS, "data": ADDRESS}, NUMBER)
     t, q, given = r.arguments
-    data, state = opened(r, given)
+    data, state, shape = opened(given)
     work, count = data["work"], data["kept"].read(0, INTEGER)
     _slopes(r, data, shape, t, q)
     with r.when(count == 0):
         r.give(1.0)
     with r.when(state.is_small != 0.0):
-        end = count * shape.speeds
+        columns = shape.speeds
+        end = count * columns
         r.clear(work, work.at(end))
         with r.count(shape.slopes) as e:
             row, column = (data[name].read(e, INTEGER) for name in ("row", "column"))
             place = data["kept"].at(count + 1).read(row, INTEGER)
             with r.when(place >= 0):
-                work[place * shape.speeds + column] = data["slopes"][e] / _unit(r, data, row)
-        r.give(r.call("smallest", work, count, r.value(shape.speeds, INTEGER), work.at(end), result=NUMBER))
+                work[place * columns + column] = data["slopes"][e] / _unit(r, data, row)
+        r.give(r.call("smallest", work, count, columns, work.at(end), result=NUMBER))
     write_products(r, data, shape)
     r.give(_displacement(r, data, shape, count))
     return r
 
 
-def _slopes(r: Routine, data: dict[str, Value], shape: Shape, t: Value, q: Value) -> None:
+def _slopes(r: Routine, data: dict[str, Value], shape: Record, t: Value, q: Value) -> None:
     """Write slopes along displacements of the sizes; speeds do not enter."""
     outputs = [data["values"], data["slopes"], data["drifts"]]
-    call_kernel(r, "held", [place_of(r, t), q, data["sizes"]], data["derived"], data["scratch"], outputs)
+    call_kernel(r, shape.held, [place_of(r, t), q, data["sizes"]], data["derived"], data["scratch"], outputs)
     with r.count(shape.slopes) as e:
         data["slopes"][e] = data["slopes"][e] * data["sizes"][data["column"].read(e, INTEGER)]
 
 
-def write_products(r: Routine, data: dict[str, Value], shape: Shape) -> None:
+def write_products(r: Routine, data: dict[str, Value], shape: Record) -> None:
     """Write ``G G^T`` from slopes."""
     slopes, matrix = data["slopes"], data["matrix"]
-    r.clear(matrix, matrix.at(shape.conditions**2))
+    r.clear(matrix, matrix.at(shape.conditions * shape.conditions))
     with r.count(shape.products) as p:
         one, other, target = (data[name].read(p, INTEGER) for name in ("one", "other", "product"))
         matrix[target] = matrix[target] + slopes[one] * slopes[other]
@@ -185,7 +183,7 @@ def _unit(r: Routine, data: dict[str, Value], row: Value) -> Value:
     return r.choose(unit > 0.0, unit, 1.0)
 
 
-def _displacement(r: Routine, data: dict[str, Value], shape: Shape, count: Value) -> Value:
+def _displacement(r: Routine, data: dict[str, Value], shape: Record, count: Value) -> Value:
     """Write the measure of many rows, by elimination in ``G G^T``."""
     matrix, left, kept = data["matrix"], data["left"], data["kept"].at(1)
     size, length = r.variable(0.0), r.variable(0.0)
@@ -210,12 +208,12 @@ def _displacement(r: Routine, data: dict[str, Value], shape: Shape, count: Value
     return r.sqrt(size.now / length.now)
 
 
-def _measures(shape: Shape, opened: Opened) -> Routine:
+def _measures(opened: Opened) -> Routine:
     """Write the measure of many states, one row of coordinates each; rows are learned from the first of them."""
     kinds = {"t": ADDRESS, "q": ADDRESS, "states": INTEGER, "known": INTEGER, "least": ADDRESS}
     r = Routine("measures", kinds | {"away": ADDRESS, "data": ADDRESS}, None, exported=True)
     t, q, states, known, least, away, given = r.arguments
-    data, _ = opened(r, given)
+    data, _, shape = opened(given)
     changes, rows = data["changes"], data["rows"]
     with r.count(known) as s:
         _slopes(r, data, shape, t[s], q.at(s * shape.coordinates))
@@ -231,14 +229,14 @@ def _measures(shape: Shape, opened: Opened) -> Routine:
     return r
 
 
-def _judge(shape: Shape, opened: Opened) -> Routine:
+def _judge(opened: Opened) -> Routine:
     """Write the function that tells whether there is something to find at the looks noted, or just ahead of them.
 
     At an end the last look is judged as well, and nothing is ahead. What has no measure is to be looked at.
     """
     r = Routine("judge", {"data": ADDRESS, "at_end": INTEGER}, exported=True)
     given, at_end = r.arguments
-    data, state = opened(r, given)
+    data, state, shape = opened(given)
     count, notes, best = r.truncated(state.count), data["notes"], data["best"]
     largest = r.variable(r.most(r.call("measure", best[0], best.at(1), given, result=NUMBER), state.largest))
     with r.count(count) as i:
@@ -268,23 +266,23 @@ def _judge(shape: Shape, opened: Opened) -> Routine:
         state.judged = notes[(last - 1) * shape.note]
     with r.when(at_end != 0):
         r.give(0)
-    _look_ahead(r, shape, (data, state, given), notes.at((count - 1) * shape.note))
+    _look_ahead(r, (data, state, given), shape, notes.at((count - 1) * shape.note))
     r.give(0)
     return r
 
 
-def _look_ahead(r: Routine, shape: Shape, of: tuple[dict[str, Value], Record, Value], note: Value) -> None:
+def _look_ahead(r: Routine, of: tuple[dict[str, Value], Record, Value], shape: Record, note: Value) -> None:
     """Write what returns 1 where the measure falls to zero at an even rate just ahead of a look, and rises again."""
-    _, state, given = of
+    data, state, given = of
     begin, end, points = AHEAD
-    stride, now, rates = state.stride, note[0], note.at(1 + shape.size + shape.coordinates)
+    stride, now, rates = state.stride, note[0], note.at(shape.size + shape.coordinates + 1)
     with r.when(~((stride < inf) & (note[shape.measured] > 0.0))):
         r.give(0)
-    q, away, least = r.array(shape.coordinates), r.array(points), r.variable(0, INTEGER)
+    q, away, least = data["ahead"], r.array(points), r.variable(0, INTEGER)
     with r.count(points) as k:
         later = stride * (begin + k.number() * ((end - begin) / (points - 1)))
         with r.count(shape.coordinates) as i:
-            q[i] = note[1 + i] + (note[1 + shape.coordinates + i] + 0.5 * rates[i] * later) * later
+            q[i] = note[1 + i] + (note[shape.coordinates + (1 + i)] + 0.5 * rates[i] * later) * later
         t = r.least(r.most(now + later, state.start), state.start + state.whole)
         away[k] = r.call("measure", t, q, given, result=NUMBER)
         with r.when(~r.is_finite(away[k])):

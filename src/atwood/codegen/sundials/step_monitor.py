@@ -5,7 +5,8 @@ are kept is left by the ones before it: the pivots of ``G G^T``, of which one va
 asked anything as long as none of them has fallen to a small share of the most that it has been, and then only where
 what was noted, or what is just ahead, is near a singular position (`atwood.codegen.sundials.rank_looks`).
 
-Routines that look at a motion while SUNDIALS IDA goes on; see `atwood.codegen.sundials.step_monitor`.
+The routines are the same for all mechanisms: how many there are of each is told by their data, as where the program of
+conditions is, which begins as a tape.
 """
 
 from __future__ import annotations
@@ -19,8 +20,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from atwood.arrays import address_of, uneven
-from atwood.codegen.llvm.build import Built, RoutineSource, build_code, default_options, once
+from atwood.codegen.llvm.build import Built, RoutineSource, build_code, once
 from atwood.codegen.llvm.module import CodeOptions, Part
+from atwood.codegen.llvm.tiers import Tiers
 from atwood.codegen.routines import (
     ADDRESS,
     BOOLEAN,
@@ -79,8 +81,8 @@ class MonitorCode:
         See `compile_monitor`.
     shape, lists
         How many there are of each, and where the slopes are; see `slope_lists`.
-    built
-        The code.
+    tiers
+        The code of the conditions.
 
     Attributes
     ----------
@@ -94,9 +96,9 @@ class MonitorCode:
         Address of the function that takes one look; see the same.
     """
 
-    def __init__(self, program: Program, shape: Shape, lists: dict[str, NDArray[np.int64]], built: Built) -> None:
-        self.program, self.shape, self.built = program, shape, built
-        self._lists = lists
+    def __init__(self, program: Program, shape: Shape, lists: dict[str, NDArray[np.int64]], tiers: Tiers) -> None:
+        self.program, self.shape, self.tiers, built = program, shape, tiers, _routines()
+        self._lists, self._keep = lists, built
         self.drive, self.fill = (built.code.addresses[name] for name in ("drive", "fill"))
         self.look_address = built.code.addresses["look"]
         self.look = _LOOK(self.look_address)
@@ -112,7 +114,7 @@ class MonitorCode:
         shape, program = self.shape, self.program
         position = np.full(shape.conditions, -1)
         position[list(kept)] = np.arange(len(kept))
-        derived, scratch = self.built.derive("held", program, parameter_values)
+        derived, scratch = self.tiers.now.derive("held", program, parameter_values)
         arrays: dict[str, NDArray[Any]] = {
             "derived": derived,
             "scratch": scratch,
@@ -123,6 +125,7 @@ class MonitorCode:
             "rows": np.zeros(shape.conditions),
             "changes": np.empty(shape.conditions),
             "matrix": np.empty(shape.conditions**2),
+            "ahead": np.empty(shape.coordinates),
             **{name: np.zeros(shape.conditions) for name in ("pivots", "first", "most", "least", "earlier", "known")},
             "left": np.empty(shape.conditions),
             "work": np.empty(len(kept) * (shape.speeds + 2) + shape.speeds if is_small else 1),
@@ -141,7 +144,8 @@ class MonitorCode:
         places = {name: (slice(*ends[k : k + 2]), one.shape) for k, (name, one) in enumerate(arrays.items())}
         memory = np.concatenate([one.ravel() for one in arrays.values()])
         begins = [address_of(shared[name]) if name in shared else 8 * places[name][0].start for name in FIELDS]
-        is_own = np.array([name in places for name in FIELDS])
+        begins += [*vars(shape).values(), shape.note, shape.measured, 0]
+        is_own = np.array([name in places for name in FIELDS] + [False] * len(SIZES))
         return MonitorData(self, shared, places, (np.array(begins, dtype=np.int64), is_own), memory)
 
 
@@ -169,7 +173,7 @@ class MonitorData:
     places
         Where each other array is in the memory, and its shape.
     begins
-        Where all of them begin, and which do so from the memory on.
+        Where all of them begin, and which do so from the memory on; behind these, how many there are of each.
     memory
         The numbers of these.
 
@@ -195,7 +199,16 @@ class MonitorData:
         self.rows: NDArray[np.float64] = self._arrays["rows"]
         self._state, begin = self._arrays["state"], address_of(memory)
         self._pointers = begins[0] + begin * begins[1]
+        self._take_up(code.tiers.now)
         self.address, self.due_at = address_of(self._pointers), begin + 8 * (places["state"][0].start + AT["next"])
+
+    def spend(self, seconds: float) -> None:
+        """Go on with faster code of the conditions, which has the same bits, where that pays; see `Tiers.spend`."""
+        self._take_up(self.code.tiers.spend(_OF_LOOKS * seconds))
+
+    def _take_up(self, built: Built) -> None:
+        self._built = built
+        self._pointers[-1] = built.code.addresses["held"]
 
     def copied(self) -> MonitorData:
         """Return the same for another run, from what was noted on."""
@@ -280,15 +293,14 @@ def compile_monitor(program: Program, speeds: int, size: int, places: tuple[Arra
         raise UsageError(f"needs a program of (t, q, u), not of {inputs} with {outputs}", where=program.name)
     lists = slope_lists(outputs[0], list(zip(rows, columns, strict=True)))
     shape = Shape(inputs[1], speeds, size, outputs[0], len(rows), len(lists["product"]))
-    part = Part("held", program)
-    routines = RoutineSource(_MODULE, _FILES, (shape,))
-    built = build_code(
-        [part],
-        default_options([part], is_brief=True),
-        exports=["look", "drive", "fill", "judge", "measures"],
-        routines=routines,
-    )
-    return MonitorCode(program, shape, lists, built)
+    return MonitorCode(program, shape, lists, Tiers([Part("held", program)], is_brief=True))
+
+
+@once
+def _routines() -> Built:
+    """Return the code that looks at a motion, whatever moves."""
+    exports = ("look", "drive", "fill", "judge", "measures")
+    return build_code([], CodeOptions(level=2), exports=exports, routines=RoutineSource(_MODULE, _FILES, (True,)))
 
 
 def slope_lists(conditions: int, places: Sequence[tuple[int, int]]) -> dict[str, NDArray[np.int64]]:
@@ -317,16 +329,22 @@ PAUSED, UNREADABLE = 96, 97
 CAPACITY, CARRIED = 24, 6
 """So many looks are noted; of those among which nothing was low the last few are carried on."""
 
+_OF_LOOKS = 0.1
+"""Of the time that steps take looks take no more than about this share."""
+
 _LATER = 2
 """So many looks that are no longer low must follow those that are, before somebody is asked."""
 
 _ARRAYS: tuple[str, ...] = ("derived", "scratch", "sizes", "values", "slopes", "drifts", "rows", "changes", "matrix")
-_ARRAYS += ("pivots", "first", "most", "least", "earlier", "known", "left", "work", "right")
+_ARRAYS += ("ahead", "pivots", "first", "most", "least", "earlier", "known", "left", "work", "right")
 LISTS = ("kept", "row", "column", "one", "other", "product")
 SHARED = ("derived", "sizes", "right", *LISTS)
 FIELDS = (*_ARRAYS, *LISTS, "notes", "best", "state")
 STATE: tuple[str, ...] = ("next", "count", "is_low", "falls", "later", "move", "whole", "idle", "low", "worn", "best")
 STATE += ("is_small", "judges", "judged", "start", "largest", "stride")
+SIZES = ("coordinates", "speeds", "size", "conditions", "slopes", "products", "note", "measured", "held")
+"""Behind the addresses of the arrays: how many there are of each, see `Shape`, and the address of the conditions."""
+
 AT = {name: number for number, name in enumerate(STATE)}
 
 
@@ -360,35 +378,34 @@ class Shape:
         return 1 + 2 * self.size
 
 
-def write_routines(shape: Shape | None) -> list[Routine]:
+def write_routines(looks: bool) -> list[Routine]:
     """Write what looks at a state, what sends IDA from look to look, and what fills a table on the way.
 
     The last alone where nobody looks; its data are then the length of y.
     """
-    if shape is None:
-        return [_fill(None)]
-    return [*write_measures(shape, _opened), _look(shape), _drive(), _fill(shape)]
+    return [*write_measures(_opened), _look(), _drive(), _fill(True)] if looks else [_fill(False)]
 
 
 @once
 def table_filler() -> Built:
     """Return the code that fills a table without looking at the motion."""
-    return build_code([], CodeOptions(level=2), exports=["fill"], routines=RoutineSource(_MODULE, _FILES, (None,)))
+    return build_code([], CodeOptions(level=2), exports=["fill"], routines=RoutineSource(_MODULE, _FILES, (False,)))
 
 
-def _opened(_: Routine, given: Value) -> tuple[dict[str, Value], Record]:
-    """Return the arrays and the state of a monitor from the address of its data."""
+def _opened(given: Value) -> tuple[dict[str, Value], Record, Record]:
+    """Return the arrays, the state and the sizes of a monitor from the address of its data."""
     data = {name: given.read(k, ADDRESS) for k, name in enumerate(FIELDS)}
-    return data, Record(data["state"], dict.fromkeys(STATE, NUMBER))
+    kinds = dict.fromkeys(SIZES, INTEGER) | {"held": ADDRESS}
+    return data, Record(data["state"], dict.fromkeys(STATE, NUMBER)), Record(given.at(len(FIELDS), ADDRESS), kinds)
 
 
-def _look(shape: Shape) -> Routine:
+def _look() -> Routine:
     """Write the function that notes a state, and returns whether somebody should look at what was noted."""
     r = Routine("look", {"t": NUMBER, "y": ADDRESS, "yp": ADDRESS, "data": ADDRESS}, exported=True)
     t, y, yp, given = r.arguments
-    data, state = _opened(r, given)
+    data, state, shape = _opened(given)
     outputs = [data["values"], data["slopes"], data["drifts"]]  # what is not finite there shows in what follows
-    call_kernel(r, "held", [place_of(r, t), y, y.at(shape.coordinates)], data["derived"], data["scratch"], outputs)
+    call_kernel(r, shape.held, [place_of(r, t), y, y.at(shape.coordinates)], data["derived"], data["scratch"], outputs)
     count = r.truncated(state.count)
     note = data["notes"].at(count * shape.note)
     note[0], note[shape.measured] = t, -1.0
@@ -410,7 +427,7 @@ def _look(shape: Shape) -> Routine:
     state.is_low, state.later, state.falls = has, later, r.choose(is_low, 1.0, 0.0)
     carries = is_full & ~asks
     with r.when(carries):
-        r.copy(data["notes"], data["notes"].at((CAPACITY - CARRIED) * shape.note), CARRIED * shape.note)
+        r.copy(data["notes"], data["notes"].at(shape.note * (CAPACITY - CARRIED)), shape.note * CARRIED)
         r.copy(data["earlier"], data["least"], shape.conditions)
         with r.count(shape.conditions) as i:
             data["least"][i] = np.inf
@@ -422,11 +439,11 @@ def _look(shape: Shape) -> Routine:
     return r
 
 
-def _forget(r: Routine, data: dict[str, Value], state: Record, shape: Shape) -> None:
+def _forget(r: Routine, data: dict[str, Value], state: Record, shape: Record) -> None:
     """Write what becomes of looks among which there is nothing to find; see `MonitorData.take` and `settle`."""
     count, notes = r.truncated(state.count), data["notes"]
     with r.when(count > CARRIED):
-        with r.count(CARRIED * shape.note) as i:
+        with r.count(shape.note * CARRIED) as i:
             notes[i] = notes[(count - CARRIED) * shape.note + i]
         state.count = CARRIED
     state.is_low, state.later = state.falls, 0.0
@@ -435,7 +452,7 @@ def _forget(r: Routine, data: dict[str, Value], state: Record, shape: Shape) -> 
         data["known"][i] = data["pivots"][i]
 
 
-def _measure_slopes(r: Routine, data: dict[str, Value], shape: Shape) -> None:
+def _measure_slopes(r: Routine, data: dict[str, Value], shape: Record) -> None:
     """Write how much each condition changes, and ``G G^T``."""
     slopes, changes, rows = (data[name] for name in ("slopes", "changes", "rows"))
     r.clear(changes, changes.at(shape.conditions))
@@ -449,7 +466,7 @@ def _measure_slopes(r: Routine, data: dict[str, Value], shape: Shape) -> None:
     write_products(r, data, shape)
 
 
-def _eliminate(r: Routine, data: dict[str, Value], state: Record, shape: Shape) -> tuple[Value, Value, Value, Value]:
+def _eliminate(r: Routine, data: dict[str, Value], state: Record, shape: Record) -> tuple[Value, Value, Value, Value]:
     """Write the elimination; return whether pivots are low, were low, and have fallen far, and their product.
 
     A pivot is what is left of a condition by those before it, in units of its own. The most that one has been grows, so
@@ -486,7 +503,7 @@ def _eliminate(r: Routine, data: dict[str, Value], state: Record, shape: Shape) 
     return is_low, was_low, is_worn, product.now
 
 
-def _plan_next(r: Routine, arguments: Sequence[Value], sizes: Value, state: Record, shape: Shape) -> None:
+def _plan_next(r: Routine, arguments: Sequence[Value], sizes: Value, state: Record, shape: Record) -> None:
     """Write when to look next: before something has moved farther than it may."""
     t, y, yp, _ = arguments
     move, largest, total = state.move, (r.variable(0.0), r.variable(0.0)), r.variable(0.0)
@@ -548,12 +565,12 @@ def _drive() -> Routine:
     return r
 
 
-def _fill(shape: Shape | None) -> Routine:
+def _fill(looks: bool) -> Routine:
     """Write the function that sends IDA on through times and fills a row of a table at each.
 
     A row is read from the last step that IDA has taken, once no look is due before its time.
     """
-    r = Routine("fill", _FILL if shape is not None else _FILL | {"data": INTEGER}, exported=True)
+    r = Routine("fill", _FILL if looks else _FILL | {"data": INTEGER}, exported=True)
     (
         solve,
         steps,
@@ -575,9 +592,9 @@ def _fill(shape: Shape | None) -> Routine:
     ) = r.arguments
     size: Operand = data
     state = None
-    if shape is not None:
+    if looks:
+        _, state, shape = _opened(data)
         size = shape.size
-        state = Record(data.read(FIELDS.index("state"), ADDRESS), dict.fromkeys(STATE, NUMBER))
     taken = _count_steps(r, steps, memory)
     r.call(current, memory, end)
     with r.forever():

@@ -108,6 +108,7 @@ class NativeSession(SteppingSession):
         self._look_out: Callable[..., tuple[int, float]] | None = None
         self._fill: Callable[..., tuple[int, float, int]] | None = None
         self._noticed_flag: int | None = None
+        self._spend: Callable[[float], None] | None = None
         self._paused_flag, self._goes_on = 0, False
         self._due: Callable[[], float] = lambda: inf
         self._earlier = Statistics(error_test_failures=0, convergence_failures=0)
@@ -147,6 +148,7 @@ class NativeSession(SteppingSession):
         self._look_out, self._fill = self._memory.set_monitor(monitor), self._memory.fill(monitor)
         self._goes_on = self._locator is None and not self._record.calls_python
         self._noticed_flag, self._paused_flag, self._due = monitor.noticed, monitor.paused, monitor.due
+        self._spend = monitor.spend
         return True
 
     @property
@@ -328,7 +330,7 @@ class NativeSession(SteppingSession):
         finally:
             spent = time.perf_counter() - began
             self._seconds += spent
-            self._watchdog.learn(spent, filled < len(times))
+            self._learn(spent, filled < len(times))
 
     def _read(self, filled: int) -> None:
         """Take up that all that was filled has been read, the last of it from the last step."""
@@ -376,8 +378,14 @@ class NativeSession(SteppingSession):
         self._allow()
         began = time.perf_counter()
         flag, t = self._solve(t_out, TO_TIME)
-        self._watchdog.learn(time.perf_counter() - began, flag == TOO_MUCH_WORK)
+        self._learn(time.perf_counter() - began, flag == TOO_MUCH_WORK)
         return self._passed(flag, t)
+
+    def _learn(self, seconds: float, is_used_up: bool) -> None:
+        """Learn how long steps take, and see whether looks are to be taken by faster code."""
+        self._watchdog.learn(seconds, is_used_up)
+        if self._spend is not None:
+            self._spend(seconds)
 
     def _allow(self) -> int:
         """Tell IDA how many steps it may take; return that."""

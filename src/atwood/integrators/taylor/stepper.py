@@ -19,11 +19,12 @@ waits for another.
 The Taylor-series method as machine code: no Python runs between outputs.
 
 The code of the steps is the same for all systems and comes from the cache after the first time.  What a system adds is
-its recurrences, as two compiled programs.
+its recurrences, as two programs, which begin as tapes.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 from functools import partial
 from itertools import accumulate
@@ -34,8 +35,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from atwood.arrays import FloatArray
-from atwood.codegen.llvm.build import RoutineSource, build_lanes, once
+from atwood.codegen.llvm.build import Built, RoutineSource, build_lanes, once
 from atwood.codegen.llvm.module import Part
+from atwood.codegen.llvm.tiers import Tiers
 from atwood.codegen.routines import ADDRESS, CODE, Kind, Lanes, Routine, Value, places_of
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.program import OutputGroup, Program
@@ -219,13 +221,19 @@ class CompiledRecurrences:
         The recurrences, made for `~atwood.integrators.taylor.stepper.LANES`.
     runs
         How many runs are taken side by side; see `atwood.codegen.llvm.module.CodeOptions`.
+
+    Attributes
+    ----------
+    tiers
+        The code of one run; None of several.
     """
 
     def __init__(self, programs: TaylorPrograms, runs: int = 1) -> None:
         self.programs, self.runs = programs, runs
         self.size = len(programs.start.inputs[1].symbols)
         parts = [Part("start", programs.start), _order_alone(programs) if runs == 1 else _order_of_many(programs)]
-        self.built = build_lanes(parts, runs)
+        self.tiers = Tiers(parts) if runs == 1 else None
+        self.built = build_lanes(parts, runs) if self.tiers is None else self.tiers.now
         self.addresses = self.built.code.addresses
         self.layout = _Layout(self)
 
@@ -360,6 +368,7 @@ class CompiledStepper(NativeStepper):
     """
 
     _fields = FIELDS
+    _parameters: tuple[int, int, int]
 
     def __init__(
         self,
@@ -387,6 +396,28 @@ class CompiledStepper(NativeStepper):
         self._set(share=log2(share_of_radius(chosen, options.relative_tolerance)))
         self._set(allowed=DEFECT * options.relative_tolerance + FLOOR)
         self._functions = _routines().functions
+        assert recurrences.tiers is not None
+        self._tiers, self._built = recurrences.tiers, recurrences.built
+
+    def start(self, t: float, y: FloatArray) -> bool:
+        """Start anew from a state; return whether it has finite rates."""
+        self._take_up(self._tiers.spend(0.0))
+        return super().start(t, y)
+
+    def _take_up(self, built: Built) -> None:
+        """Go on with other code of the recurrences, which has the same bits."""
+        if built is not self._built:
+            self._built, code, (_, derived, scratch) = built, built.code.addresses, self._parameters
+            self._set(start=code["start"], prologue=code["order_prologue"], recurrence=code["order"])
+            self._parameters = code["start_prologue"], derived, scratch
+
+    def _go_on(self, last: int, function: str, *arguments: int) -> int | None:
+        """Take steps, and see whether the next ones are to be taken by faster code."""
+        began = time.perf_counter()
+        code = super()._go_on(last, function, *arguments)
+        if self._tiers.now is not self._built or self._tiers.has_better:
+            self._take_up(self._tiers.spend(time.perf_counter() - began))
+        return code
 
     def _lay_out(self, recurrences: CompiledRecurrences, derived: FloatArray, guard: StepGuard | None) -> None:
         """Find a place for everything, in one piece of memory that begins with a cache line."""
@@ -415,6 +446,7 @@ class CompiledStepper(NativeStepper):
 
         What this session knows of parameters is written over by a run that has others.
         """
+        self._take_up(self._tiers.at_its_best())
         factor = 1.0 / self._options.relative_tolerance
         return self._batch_places(_routines().built, self._arrays[ROWS["floors"]], factor, self._parameters)
 

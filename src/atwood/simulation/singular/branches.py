@@ -116,8 +116,9 @@ def as_step_monitor(data: MonitorData) -> StepMonitor:
     from atwood.codegen.sundials.step_monitor import NOTICED, PAUSED
 
     code = data.code
+    data.spend(0.0)
     return StepMonitor(
-        code.drive, code.fill, NOTICED, PAUSED, data.address, data.due, data.due_at, code.look_address, data
+        code.drive, code.fill, NOTICED, PAUSED, data.address, data.due, data.due_at, code.look_address, data.spend, data
     )
 
 
