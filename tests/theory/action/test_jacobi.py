@@ -109,10 +109,12 @@ def test_the_pendulum_that_swings(amplitude):
     np.testing.assert_allclose(found.turning_points, [-amplitude, amplitude], rtol=1e-12)
 
 
-def test_small_amplitudes_lose_digits_and_say_so():
-    found = action_angle(SimplePendulum(release_angle=1e-4))
-    assert found.period == pytest.approx(2.0 * np.pi / np.sqrt(9.81), rel=1e-6)
-    assert 1e-13 < found.error < 1e-6
+@pytest.mark.parametrize("amplitude", [1e-4, 1e-7])
+def test_small_amplitudes_lose_no_digits(amplitude):
+    found, w = action_angle(SimplePendulum(release_angle=amplitude)), np.sqrt(9.81)
+    assert found.period == pytest.approx(2.0 * np.pi / w * (1.0 + amplitude**2 / 16.0), rel=1e-13)
+    assert found.action == pytest.approx(np.pi * w * amplitude**2 * (1.0 - amplitude**2 / 32.0), rel=1e-13)
+    assert found.error < 1e-13
 
 
 def test_the_pendulum_that_goes_round():
@@ -137,10 +139,10 @@ def test_the_angle_rises_evenly_in_time():
 
     scene = SimplePendulum(release_angle=1.0)
     found = action_angle(scene)
-    times = np.linspace(0.0, 0.95 * found.period, 12)
+    times = np.linspace(0.0, 0.94 * found.period, 12)
     run = simulate(scene, t_end=float(times[-1]), rtol=1e-12, outputs=times)
     angles = [found.angle(q, v) for q, v in zip(run["rod.angle"], run["rod.angular_velocity"], strict=True)]
-    np.testing.assert_allclose((np.array(angles) - 0.5) % 1.0, times / found.period, atol=1e-6)
+    np.testing.assert_allclose((np.array(angles) - 0.45) % 1.0, 0.05 + times / found.period, atol=1e-6)
 
 
 def test_a_hoop_that_is_driven_has_action_and_angle():
@@ -191,7 +193,8 @@ def test_the_square_of_a_momentum_is_a_function_of_its_own_coordinate_alone(scen
         assert not found.has(other)
         kept = not scene.expression.has(other)
         assert kept or not found.has(its)
-        energy = float(scene._function(*q, *p))
+        state = dict(zip((*scene.coordinates, *scene.momenta), (*q, *p), strict=True))
+        energy = float(scene.expression.subs({**scene.values, **state}))
         known = {"E": energy, f"alpha_{own}": p[k] ** 2, f"{own}_0": q[k], str(its): p[1 - k], **values}
         curve = scene.motion(str(own), q, p, turn=2.0 * np.pi if not scene.expression.has(own) else None)
         for place in q[k] + np.array([-0.05, 0.0, 0.05]):

@@ -1,15 +1,12 @@
-"""Action and angle of one degree of freedom: turning points, the integral of p, and the time, by quadrature.
+"""Action and angle of one degree of freedom: the integral of p over a turn, and its share at a state, by quadrature.
 
-Where H is quadratic in p, ``H = A p^2 + B p + C``, the momentum at the energy E is ``(-B +- sqrt(D))/(2 A)`` with
-``D = B^2 - 4 A (C - E)``, and ``dp/dE = +-1/sqrt(D)`` is the time (Landau and Lifshitz, Mechanics, section 49). With
-``q = m - r cos(x)`` between the turning points both integrands are smooth and periodic in x, so that the rule of
-equal steps converges faster than any power.
+Where H is quadratic in p, ``H = (p - a)^2/(2 mu) + U``, the momentum at the energy E is ``a +- sqrt(2 mu (E - U))``,
+and ``dp/dE`` is the time (Landau and Lifshitz, Mechanics, section 49).
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -18,13 +15,15 @@ import numpy as np
 from atwood.arguments import instance, takes
 from atwood.arrays import FloatArray
 from atwood.display import data_of
-from atwood.errors import SolveError, UnsupportedError, UsageError
+from atwood.errors import SolveError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
-from atwood.lazy_modules import scipy, sympy
+from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
 from atwood.simulation.initialization.start import find_start
 from atwood.theory.action.complete_integral import complete_integral
+from atwood.theory.dynamics.one_coordinate import RadialAt, parts_of
+from atwood.theory.dynamics.quadrature import FULL_TURN, Path, find_path, on_separatrix
 from atwood.theory.formulas.described import Described
 from atwood.theory.formulas.printers import Sympy
 from atwood.theory.hamiltonian.closed_forms import Quadrature
@@ -79,7 +78,7 @@ class ActionAngle(Described):
 
     @property
     def error(self) -> float:
-        """The relative error of period and action, as estimated: amplitudes far below the scene's size lose digits."""
+        """The relative error of the period, as estimated."""
         return self.level.error
 
     @property
@@ -192,52 +191,53 @@ def action_angle(scene: Model | Assembly | Hamiltonian) -> ActionAngle:
         )
     if not h.is_conserved:
         raise UsageError(f"it has no level of H that it stays on: {h.sentence}", where=h.name)
-    q, p = h.start()
-    angle = h.assembly.reduced.names[0].unit == "rad"
-    size = 1.0 if angle else find_start(h.assembly).length
-
-    def energy(places: FloatArray, momenta: FloatArray) -> FloatArray:
-        return h(places[:, None], momenta[:, None])
-
-    level = level_through(energy, float(q[0]), float(p[0]), size, 2.0 * math.pi if angle else None, h.paths[0])
+    [q], [p] = h.start()
+    begun = find_start(h.assembly)
+    level = level_through(curves_of(h)(begun.time), q, p, *extents_of(h, begun.length), h.paths[0])
     return ActionAngle(h.paths[0], h, level)
 
 
-Energy = Callable[[FloatArray, FloatArray], FloatArray]
-"""H of arrays of q and p."""
+Terms = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+"""mu, a, U and dU/dq of ``H = (p - a)^2/(2 mu) + U`` at places."""
 
-Coefficients = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
-"""A, B and C of places."""
 
-_SHORTEST, _CHANGE, _RISING = 1e-9, 0.1, 1.5
-"""The first step changes the discriminant by no more than such a share; or twice the way such a multiple."""
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """The curves of a coordinate and its momentum, one for each value of ``H = (p - a)^2/(2 mu) + U``.
 
-_FIRST, _STEEPER, _FARTHEST, _LONGEST = 1e-3, 1.05, 1e6, 0.01
-"""Turning points are sought in steps that begin with this share of a size and grow so, up to so many sizes.
+    Attributes
+    ----------
+    terms
+        Gives mu, a, U and its derivative at places.
+    """
 
-Where the coordinate has a period, no step is longer than the last share of it.
-"""
+    terms: Callable[[FloatArray], Terms]
 
-_POINTS, _MOST, _SAME, _NOISE = 16, 2**15, 3e-14, 2e-14
-"""Points at first and at most; the share that halved steps may change, and its part that goes with cancellation."""
+    def at(self, s: FloatArray | Sequence[float]) -> RadialAt:
+        """Return what there is at places; a, which the momentum has besides ``mu q'``, is coupled to the coordinate."""
+        places = np.asarray(s, dtype=float)
+        inertia, shift, potential, slope = self.terms(places)
+        still = np.zeros((1, len(places)))
+        return RadialAt(inertia, potential, slope, still, -shift[None], np.ones(len(places)))
 
-_ENOUGH, _KNOWN = 128, 1e-6
-"""Points from which on it is looked whether more make it worse, and the least accuracy of what is given."""
 
-_QUADRATIC = 1e-9
-"""Relative: a polynomial of second degree through three momenta agrees so well with the energy at a fourth."""
+def curves_of(h: Hamiltonian) -> Callable[[float], Curves]:
+    """Return what gives the curves of a Hamiltonian of one coordinate at a time."""
+    parts = parts_of(h.assembly, h.formulas.expressions, 0)
 
-_ROUNDING = 64.0 * float(np.finfo(float).eps)
-"""Of the terms of a discriminant: what is less is zero."""
+    def at(t: float) -> Curves:
+        def terms(places: FloatArray) -> Terms:
+            now = parts(places[None], t)
+            return now.mass[0, 0], now.linear[0], now.potential, now.potential_slope
 
-_TOUCHES = 1e-12
-"""Of the largest discriminant on the way: one that falls to less comes to zero, as places are rounded, too."""
+        return Curves(terms)
 
-_BESIDE, _CLEAR, _STEEP = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1), 100.0, 3.0
-"""So near to its ends, in shares of the way, a root of first order is looked for, where digits are left first.
+    return at
 
-From half as far on, such a one doubles the discriminant; one of second order makes it fourfold.
-"""
+
+def extents_of(h: Hamiltonian, length: float) -> tuple[float, float | None]:
+    """Return the size of the coordinate of H in a scene of a size, and its period where it is an angle."""
+    return (1.0, FULL_TURN) if h.assembly.reduced.names[0].unit == "rad" else (length, None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,15 +249,15 @@ class Level:
     kind
         ``"libration"`` between two turning points, or ``"rotation"``, through all of a periodic coordinate.
     energy
-        E, J.
+        H.
     ends
-        The turning points, or the begin and the end of the period.
-    action
-        The integral of p dq over one turn, J s.
-    period
-        The derivative of that by E, s.
+        Turning points, or the begin and the end of a period.
+    action, period
+        The integral of p dq over a turn, and the time that it takes.
     error
-        Of both, as a share of them: what halving the steps changed at last.
+        Of the period, relative, as estimated.
+    curves, path
+        Of what it is one, and the motion along it.
     """
 
     kind: str
@@ -266,220 +266,34 @@ class Level:
     action: float
     period: float
     error: float
-    _coefficients: Coefficients
+    curves: Curves
+    path: Path
 
     def momentum(self, q: FloatArray, sign: float = 1.0) -> FloatArray:
         """Return the momentum at places, on the branch where the coordinate rises (1) or falls (-1); nan beyond."""
-        a, b, c = self._coefficients(np.asarray(q, dtype=float))
+        inertia, shift, potential, _ = self.curves.terms(np.ravel(q).astype(float))
         with np.errstate(invalid="ignore"):
-            root = np.sqrt(b * b - 4.0 * a * (c - self.energy))
-        return np.asarray((-b + np.sign(sign) * np.sign(a) * root) / (2.0 * a))
+            found = shift + np.sign(sign) * np.sqrt(2.0 * inertia * (self.energy - potential))
+        return np.asarray(found.reshape(np.shape(q)))
 
     def time_to(self, q: float) -> float:
         """Return the time from the first of the ends to a place, on the branch where the coordinate rises, s."""
-        low, high = self.ends
-        points, weights = np.polynomial.legendre.leggauss(200)
-        if self.kind == "rotation":
-            places = low + 0.5 * (q - low) * (1.0 + points)
-            return float(0.5 * (q - low) * np.sum(weights / self._root(places)))
-        middle, half = 0.5 * (low + high), 0.5 * (high - low)
-        x = 0.5 * np.arccos(np.clip((middle - q) / half, -1.0, 1.0)) * (1.0 + points)
-        if not x[-1] > 0.0:
-            return 0.0
-        width = 0.5 * np.arccos(np.clip((middle - q) / half, -1.0, 1.0))
-        return float(width * np.sum(weights * half * np.sin(x) / self._root(middle - half * np.cos(x))))
-
-    def _root(self, q: FloatArray) -> FloatArray:
-        a, b, c = self._coefficients(q)
-        return np.asarray(np.sqrt(np.abs(b * b - 4.0 * a * (c - self.energy))))
+        share = np.clip((q - self.ends[0]) / (self.ends[1] - self.ends[0]), 0.0, 1.0)
+        phi = FULL_TURN * share if self.kind == "rotation" else 2.0 * np.arcsin(np.sqrt(share))
+        return float(self.path.time_at(np.array([phi]))[0])
 
 
-def level_through(
-    energy: Energy, q: float, p: float, size: float, turn: float | None = None, name: str = "it"
-) -> Level:
+def level_through(curves: Curves, q: float, p: float, size: float, turn: float | None, name: str) -> Level:
     """Return the level of H through a state of one coordinate and its momentum."""
-    total = float(energy(np.array([q]), np.array([p]))[0])
-    unit = _unit(energy, q, p, total)
-    here = max(abs(total), abs(float(energy(np.array([q]), np.zeros(1))[0])), 1e-300)
-
-    def coefficients(places: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        none = energy(places, np.zeros(places.shape))
-        units = unit * np.sqrt(np.maximum(np.abs(none) / here, 1.0))  # so large that their energy is no rounding there
-        up, down = energy(places, units), energy(places, -units)
-        return (up + down - 2.0 * none) / (2.0 * units**2), (up - down) / (2.0 * units), none
-
-    a, b, c = coefficients(np.array([q]))
-    twice = float(energy(np.array([q]), np.array([2.0 * unit]))[0])
-    there = float((a * 4.0 * unit**2 + 2.0 * b * unit + c)[0])
-    if not abs(twice - there) <= _QUADRATIC * (abs(twice) + abs(there) + abs(total)):
-        raise UnsupportedError(
-            f"H of {name} is not quadratic in the momentum",
-            where=name,
-            advice="Its motion has a period all the same: `simulate` with a condition finds it.",
-        )
-
-    def discriminant(place: float) -> float:
-        a, b, c = (float(one[0]) for one in coefficients(np.array([place])))
-        return b * b - 4.0 * a * (c - total)
-
-    def rounding(place: float) -> float:
-        a, _, c = (float(one[0]) for one in coefficients(np.array([place])))
-        return _ROUNDING * abs(a) * (abs(c) + abs(total))
-
-    if not discriminant(q) > 0.0 and all(_way_inside(discriminant, q, sign, _FIRST * size) for sign in (-1.0, 1.0)):
-        raise _takes_for_ever(name)  # at rest on top of its potential
-    ends = [_turning_point(discriminant, rounding, q, sign, size, turn) for sign in (-1.0, 1.0)]
-    if ends[0] is not None and ends[1] is not None:
-        kind, low, high = "libration", ends[0], ends[1]
-        if not high - low > 1e-7 * size:
-            raise SolveError(f"{name} is at rest there", where=name, advice="Take a start with more energy.")
-        if _is_separatrix(coefficients, total, low, high):
-            raise _takes_for_ever(name)
-    elif turn is not None and ends[0] is None and ends[1] is None:
-        kind, low, high = "rotation", q, q + turn
-    else:
+    (inertia,), (shift,), (potential,), _ = curves.terms(np.array([float(q)]))
+    rate = float((p - shift) / inertia)
+    path = find_path(curves, float(q), rate, turn, size, name)
+    if path.kind == "unbounded":
         raise SolveError(f"{name} comes back to no turning point: its motion has no period", where=name)
-    action, period, error = _integrals(coefficients, total, kind, low, high, name)
-    return Level(kind, total, (low, high), action, period, error, coefficients)
-
-
-def _is_separatrix(coefficients: Coefficients, total: float, low: float, high: float) -> bool:
-    """Return whether the discriminant has a root of higher order at an end, to which no motion comes in finite time."""
-    ends = np.array([low, high])
-    inward = np.array([high - low, low - high])
-
-    def below(share: float) -> tuple[FloatArray, FloatArray]:
-        a, b, c = coefficients(ends + share * inward)
-        rounding = _ROUNDING * np.abs(a) * (np.abs(c) + abs(total))
-        return b * b - 4.0 * a * (c - total), rounding
-
-    open_ends = np.ones(2, dtype=bool)
-    for share in _BESIDE:
-        (whole, rounding), (half, _) = below(share), below(0.5 * share)
-        clear = open_ends & (whole > _CLEAR * rounding)
-        if np.any(whole[clear] > _STEEP * np.abs(half[clear])):
-            return True
-        open_ends &= ~clear
-    return False
-
-
-def _takes_for_ever(name: str) -> SolveError:
-    return SolveError(
-        f"{name} takes for ever to come back: its energy is that of a separatrix",
-        where=name,
-        advice="Take a start with a little more or less energy.",
-    )
-
-
-def _unit(energy: Energy, q: float, p: float, total: float) -> float:
-    """Return a momentum with which the terms of H are as large as H."""
-    unit = abs(p) or 1.0
-    for _ in range(8):
-        up, none, down = (float(energy(np.array([q]), np.array([k * unit]))[0]) for k in (1.0, 0.0, -1.0))
-        kinetic = 0.5 * abs(up + down - 2.0 * none)
-        wanted = max(abs(total), abs(none), 1e-300)
-        if 0.1 * wanted <= kinetic <= 10.0 * wanted or not kinetic > 0.0 or not np.isfinite(kinetic):
-            break
-        unit *= float(np.sqrt(wanted / kinetic))
-    return unit
-
-
-def _turning_point(
-    discriminant: Callable[[float], float],
-    rounding: Callable[[float], float],
-    q: float,
-    sign: float,
-    size: float,
-    turn: float | None,
-) -> float | None:
-    """Return where the discriminant comes to zero first, on one side; None where it does not."""
-    step = _FIRST * size
-    places, values = [q], [discriminant(q)]
-    if values[0] <= 0.0:  # at a turning point itself: is the motion on this side?
-        step = _way_inside(discriminant, q, sign, step)
-        if step == 0.0:
-            return q
-        places, values = [q + sign * step], [discriminant(q + sign * step)]
-    else:  # no step passes over a hill
-        while step > _SHORTEST * size:
-            beside = [discriminant(q + sign * share * step) for share in (0.4, 0.7, 1.0)]
-            if max(abs(one - values[0]) for one in beside) <= _CHANGE * values[0]:
-                break
-            step *= 0.5
-    farthest = turn if turn is not None else _FARTHEST * size
-    longest = np.inf if turn is None else _LONGEST * turn
-    while abs(places[-1] - q) < farthest:
-        places.append(places[-1] + sign * step)
-        values.append(discriminant(places[-1]))
-        if not np.isfinite(values[-1]):
-            return None
-        if not values[-1] > 0.0:
-            return float(scipy.optimize.brentq(discriminant, places[-2], places[-1], xtol=1e-15 * size, rtol=1e-15))
-        if len(values) > 2 and values[-2] < min(values[-1], values[-3]):  # it may dip below zero between two steps
-            lowest = _lowest(discriminant, places[-3], places[-1])
-            dip = discriminant(lowest)
-            if not dip > 0.0:
-                return float(scipy.optimize.brentq(discriminant, places[-3], lowest, xtol=1e-15 * size, rtol=1e-15))
-            if dip <= rounding(lowest) + _TOUCHES * max(values):
-                return lowest
-        step = min(step * _STEEPER, longest)
-    return None
-
-
-def _lowest(discriminant: Callable[[float], float], one: float, other: float) -> float:
-    way = other - one  # shares of it are known to more digits than places are
-    found = scipy.optimize.minimize_scalar(
-        lambda share: discriminant(one + share * way), bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-12}
-    )
-    return float(one + found.x * way)
-
-
-def _way_inside(discriminant: Callable[[float], float], q: float, sign: float, step: float) -> float:
-    """Return a small way from a turning point to where the motion is; zero if it is not on that side."""
-    for _ in range(30):
-        there, before = discriminant(q + sign * step), discriminant(q + 0.5 * sign * step)
-        if there > _RISING * before > 0.0:  # it rises from there evenly
-            return step
-        step *= 0.5
-    return 0.0
-
-
-def _integrals(
-    coefficients: Coefficients,
-    total: float,
-    kind: str,
-    low: float,
-    high: float,
-    name: str,
-) -> tuple[float, float, float]:
-    """Return the integral of p over one turn, that of dp/dE, and the share that the last halving of steps changed."""
-    before: tuple[float, float] | None = None
-    best, count = ((0.0, 0.0), np.inf), _POINTS
-    while count <= _MOST:
-        x = np.pi * (np.arange(count) + 0.5) / count
-        if kind == "libration":
-            middle, half = 0.5 * (low + high), 0.5 * (high - low)
-            places, weights = middle - half * np.cos(x), half * np.sin(x) * np.pi / count
-        else:
-            places, weights = low + (high - low) * x / np.pi, np.full(count, (high - low) / count)
-        a, b, c = coefficients(places)
-        root = np.sqrt(np.abs(b * b - 4.0 * a * (c - total)))
-        if not np.all(root > 0.0):
-            raise _takes_for_ever(name)
-        if kind == "libration":
-            found = float(np.sum(weights * root / np.abs(a))), float(2.0 * np.sum(weights / root))
-        else:
-            found = float(np.sum(weights * (root - b) / (2.0 * np.abs(a)))), float(np.sum(weights / root))
-        # Where H is far larger than what the motion exchanges, less is known of the difference.
-        lost = float(np.max(np.abs(c)) + abs(total)) / max(float(np.max(np.abs(c - total))), 1e-300)
-        if before is not None:
-            change = max(abs(n - o) / abs(n) for n, o in zip(found, before, strict=True))
-            if change < best[1]:
-                best = found, change
-            # Beyond some number of points all that is added is rounding close to the turning points.
-            if change <= _SAME + _NOISE * lost or (count > _ENOUGH and change > 4.0 * best[1]):
-                break
-        before, count = found, 2 * count
-    if best[1] <= _KNOWN:
-        return *best[0], best[1]
-    raise _takes_for_ever(name)
+    if path.kind == "rest" and not np.isfinite(path.period):
+        raise on_separatrix(f"{name} rests on top of its potential, where a separatrix ends", name)
+    if path.kind == "rest":
+        raise SolveError(f"{name} is at rest there", where=name, advice="Take a start with more energy.")
+    ends = (path.low, path.high) if path.kind == "libration" else (float(q), float(q + (turn or 0.0)))
+    energy, action = float(potential + 0.5 * inertia * rate**2), path.action + float(path.advance[0])
+    return Level(path.kind, energy, ends, action, path.period, path.error, curves, path)

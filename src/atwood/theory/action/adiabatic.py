@@ -14,15 +14,14 @@ from atwood.arrays import FloatArray
 from atwood.errors import SolveError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
-from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, simulate, smooth_assembly_of
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.arguments import RTOL, T_END
-from atwood.theory.action.action_angle import Energy, level_through
+from atwood.theory.action.action_angle import curves_of, extents_of, level_through
 from atwood.theory.formulas.described import Described
-from atwood.theory.hamiltonian.hamiltonian import Hamiltonian, read_hamiltonian
+from atwood.theory.hamiltonian.hamiltonian import read_hamiltonian
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,27 +102,16 @@ def adiabatic_invariant(
     run = simulate(assembly, t_end=t_end, outputs=outputs, rtol=rtol, samples=1)
     if run.status != "finished" or len(run.run.segments) != 1:
         raise SolveError("its motion does not go to the end without a jump", where=h.name)
-    [segment], angle = run.run.segments, h.assembly.reduced.names[0].unit == "rad"
-    at, size = np.searchsorted(segment.time, run.time), 1.0 if angle else begun.length
+    [segment] = run.run.segments
+    at, curves, extents = np.searchsorted(segment.time, run.time), curves_of(h), extents_of(h, begun.length)
     levels = []
     for t, q, u in zip(run.time, segment.coordinates.T[at], segment.speeds.T[at], strict=True):
-        place = from_regular(h.assembly, q)
-        [momentum] = h.momenta_at(place, u, t)
-        name, turn = f"{h.name} at {t:.6g} s", 2.0 * np.pi if angle else None
-        levels.append(level_through(_energy(h, float(t)), float(place[0]), float(momentum), size, turn, name))
+        [place] = from_regular(h.assembly, q)
+        [momentum] = h.momenta_at([place], u, t)
+        levels.append(level_through(curves(float(t)), place, momentum, *extents, f"{h.name} at {t:.6g} s"))
     time, kinds = run.time, [one.kind for one in levels]
     crossed = [float(t) for t, before, after in zip(time[1:], kinds, kinds[1:], strict=False) if before != after]
     frequency = 1.0 / np.array([one.period for one in levels])
     slowness = float(np.max(np.abs(np.diff(np.log(frequency)) / np.diff(time)) / frequency[1:]))
     values = np.array([[one.action, one.energy] for one in levels])
     return AdiabaticInvariant(h.name, time, values[:, 0], values[:, 1], frequency, tuple(crossed), slowness)
-
-
-def _energy(h: Hamiltonian, t: float) -> Energy:
-    """Return H at a time as a function of arrays of q and p."""
-    if not h.is_short:
-        return lambda q, p: h(q[:, None], p[:, None], t)
-    plain = {one: sympy.Dummy() for one in (*h.coordinates, *h.momenta)}
-    made = h.expression.xreplace({**plain, **h.values, sympy.Symbol("t"): sympy.Float(t)})
-    function = sympy.lambdify([*plain.values()], made, "numpy")
-    return lambda q, p: np.broadcast_to(np.asarray(function(q, p), dtype=float), q.shape)

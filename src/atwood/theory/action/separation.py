@@ -18,7 +18,7 @@ from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import mpmath, sympy
 from atwood.model.compose.composite import Model
-from atwood.theory.action.action_angle import Level, level_through
+from atwood.theory.action.action_angle import Curves, Level, Terms, level_through
 from atwood.theory.action.complete_integral import CompleteIntegral, complete_integral
 from atwood.theory.equations.stated import GAUGE
 from atwood.theory.formulas.described import Described
@@ -233,14 +233,28 @@ class Separation(Described):
         if here.shape != (len(names),) or momenta.shape != here.shape:
             raise UsageError(f"a state has {len(names)} coordinates and momenta", where=self.name)
 
-        def energy(places: FloatArray, along: FloatArray) -> FloatArray:
-            others = [np.full(places.shape, one) for one in (*here, *momenta)]
-            others[i], others[len(names) + i] = places, along
-            return np.broadcast_to(np.asarray(self._function(*others), dtype=float), places.shape)
-
-        size = max(abs(here[i]), 0.1)
-        found = level_through(energy, float(here[i]), float(momenta[i]), size, turn, coordinate)
+        others = dict(zip((*self.coordinates, *self.momenta), (*here, *momenta), strict=True))
+        found = level_through(self._curves(i, others), here[i], momenta[i], max(abs(here[i]), 0.1), turn, coordinate)
         return SeparatedMotion(coordinate, found.kind, found.ends, found.action, found)
+
+    def _curves(self, i: int, state: Mapping[Sympy, float]) -> Curves:
+        """Return the curves of one coordinate and its momentum while the others are held."""
+        q, p = self.coordinates[i], self.momenta[i]
+        held = {one: sympy.Float(value) for one, value in state.items() if one not in (q, p)}
+        h = self.expression.xreplace({**self.values, **held})
+        rate, second = h.diff(p), h.diff(p, 2)
+        if second.has(p) or second == 0:
+            raise UnsupportedError(f"H is not quadratic in {p}", where=str(q))
+        shift = -rate.xreplace({p: sympy.Integer(0)}) / second
+        still = h.subs(p, shift)
+        function = sympy.lambdify(q, [1 / second, shift, still, still.diff(q)], "numpy")
+
+        def terms(places: FloatArray) -> Terms:
+            with np.errstate(all="ignore"):
+                a, b, c, d = (np.broadcast_to(np.asarray(x, dtype=float), places.shape) for x in function(places))
+            return a, b, c, d
+
+        return Curves(terms)
 
     def momentum_squared(self, coordinate: str) -> Sympy:
         """Return ``p_i^2`` of a coordinate as a function of it and of constants of the motion.
@@ -286,11 +300,6 @@ class Separation(Described):
         if not self.separates:
             raise UsageError(self.sentence, where=self.name)
         return names.index(coordinate)
-
-    @cached_property
-    def _function(self) -> Any:
-        made = self.expression.subs(self.values)
-        return sympy.lambdify((*self.coordinates, *self.momenta), made, "numpy")
 
     def __repr__(self) -> str:
         return f"<Separation: {self.sentence}>"

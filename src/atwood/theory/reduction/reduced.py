@@ -18,6 +18,8 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
 from atwood.simulation.initialization.start import find_start
+from atwood.theory.dynamics.one_coordinate import PartsAt, Radial, parts_of
+from atwood.theory.dynamics.quadrature import FULL_TURN, Path, find_path
 from atwood.theory.formulas.described import Described
 from atwood.theory.formulas.notation import SYMBOLS
 from atwood.theory.hamiltonian.hamiltonian import hamiltonian, start_of
@@ -25,13 +27,9 @@ from atwood.theory.hamiltonian.phase_space import EXPRESSION, spelled
 from atwood.theory.hamiltonian.point_transformations import PointTransformation, point_transformation, start_in
 from atwood.theory.hamiltonian.tidied import tidied
 from atwood.theory.reduction.orbit import RadialFormulas
-from atwood.theory.reduction.quadrature import Path, find_path
 from atwood.theory.reduction.routhian import (
-    PartsAt,
-    Radial,
     Routhian,
     ignorable_of,
-    parts_of,
     routhian_of,
     transformed_parts,
 )
@@ -290,9 +288,9 @@ def reduced(
         )
     number, unit = paths.index(left[0]), found.names[paths.index(left[0])].unit
     ignorable = tuple(path for path in paths if path != left[0])
-    parts = parts_of(assembly, number, find_start(assembly).time)
+    whole, t = parts_of(assembly, found, number), find_start(assembly).time
     symbolic = {"routhian": routhian_of(assembly, found, ignorable, symbols)}
-    return _motion(assembly, parts, paths, number, start_of(assembly), unit, symbolic)
+    return _motion(assembly, lambda q: whole(q, t), paths, number, start_of(assembly), unit, symbolic)
 
 
 def _motion(
@@ -310,9 +308,8 @@ def _motion(
     now = parts(q[:, None])
     momenta = now.mass[:, :, 0] @ v + now.linear[:, 0]
     radial = Radial(parts, number, others, momenta[list(others)], q)
-    here, is_angle = radial.at([q[number]]), unit == "rad"
-    scale = 1.0 if is_angle else begun.length
-    path = find_path(radial, float(q[number]), float(v[number]), is_angle, scale, f"{name}: {paths[number]}")
+    here, (turn, scale) = radial.at([q[number]]), (FULL_TURN, 1.0) if unit == "rad" else (None, begun.length)
+    path = find_path(radial, float(q[number]), float(v[number]), turn, scale, f"{name}: {paths[number]}")
     ignorable = tuple(paths[k] for k in others)
     return ReducedMotion(
         coordinate=paths[number],
