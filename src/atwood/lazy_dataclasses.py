@@ -216,8 +216,9 @@ def _constructor(cls: Any, fields: dict[str, Any], frozen: bool) -> Any:
         elif not makes:
             continue  # its default is that of the class
         values[name] = value
-    if frozen:  # all at once, in half the time
-        lines.append(f" self.__dict__.update({', '.join(f'{name}={value}' for name, value in values.items())})")
+    if frozen:  # one by one, so that instances share the names of their fields: a third of the memory of `made_of`
+        known["_put"] = object.__setattr__
+        lines += [f" _put(self, '{name}', {value})" for name, value in values.items()]
     else:
         lines += [f" self.{name} = {value}" for name, value in values.items()]
     if hasattr(cls, "__post_init__"):

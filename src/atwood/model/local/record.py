@@ -197,6 +197,7 @@ class _Writer:
     def __init__(self, record: Record, graph: Graph) -> None:
         self._record = record
         self._known: dict[str, Any] = {"graph": graph, "new": object.__new__, "new_tuple": tuple.__new__}
+        self._known["put"] = object.__setattr__  # instances share the names of what they have
         self._lines: list[str] = []
         self._values: dict[int, _Term] = {}
 
@@ -249,6 +250,6 @@ class _Writer:
         else:
             own = [(one, f"component.{one}") for one in _OF_COMPONENT] if word == "bound" else []
             own += zip(("_bound",) if word == "bound" else names, terms, strict=True)
-            fields = ", ".join(f"{one}={value}" for one, value in own)
-            self._lines += [f"{name} = new({made})", f"{name}.__dict__.update({fields})"]
+            self._lines.append(f"{name} = new({made})")
+            self._lines += [f"put({name}, {one!r}, {value})" for one, value in own]
         return name, True
