@@ -6,6 +6,7 @@ from hypothesis import given, settings
 
 from atwood import expr as ex
 from atwood.errors import AtwoodError
+from atwood.expr.core import graph as nodes
 
 from . import graphs
 
@@ -191,3 +192,22 @@ def test_substituting_values_folds_to_the_values(recipe, values):
     substituted = ex.substitute(outputs, dict(zip(symbols, values, strict=True)))
     expected = ex.evaluate(outputs, dict(zip(symbols, values, strict=True)))
     np.testing.assert_allclose([value.value for value in substituted], expected, rtol=1e-9, atol=1e-12)
+
+
+def test_a_large_graph_forgets_what_nobody_refers_to(xy, monkeypatch):
+    x, y = xy
+    graph, start = x.graph, len(x.graph)
+    kept = ex.sin(2 * x) + y
+    inside = kept.arguments[0].index, kept.arguments[1].index
+    assert (ex.cos(x) * y).operation == "mul"
+    made = len(graph)
+    graph.forget(start)
+    assert graph.find("cos", (x,)) is not None  # it is small
+    monkeypatch.setattr(nodes, "MANY", 0)
+    graph.forget(start)
+    assert len(graph) == made
+    assert graph.find("cos", (x,)) is None
+    assert graph.nodes[kept.index] is kept
+    assert (kept.arguments[0].index, kept.arguments[1].index) == inside
+    assert ex.sin(2 * x) + y is kept
+    assert ex.cos(x).index == made

@@ -1,16 +1,23 @@
 """What a chain costs grows linearly with its length."""
 
+import gc
 import itertools
 from typing import Any
 
+import numpy as np
 import pytest
 from tests.calls import calls
 
+from atwood import Scene, simulate
+from atwood.expr import Expression
+from atwood.expr.core import graph as core_graph
 from atwood.expr.simplify import alike
 from atwood.expr.simplify.collect import collect
+from atwood.forms import caches
 from atwood.forms.accelerations import acceleration_program
+from atwood.mechanics.dynamics import augmented
 from atwood.pipeline import assemble
-from atwood_library.scenes import Chain
+from atwood_library.scenes import Chain, FourBarRow
 
 
 def operations(links: int, form: str) -> int:
@@ -64,6 +71,29 @@ def test_equal_links_are_rewritten_once(monkeypatch: pytest.MonkeyPatch) -> None
     rewritten[0] = 0
     assert nodes_of_accelerations(40) == found[40]
     assert rewritten[0] > 4 * counts[40]
+
+
+@pytest.mark.parametrize(("scene", "share"), [(Chain(links=20), 0.7), (FourBarRow(windows=3), 0.9)])
+def test_what_a_large_graph_forgets_is_nothing_that_anybody_has(
+    scene: Scene, share: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ATWOOD_CACHE", "0")
+    how: dict[str, Any] = {"t_end": 0.05, "outputs": 5, "solver": "explicit"}
+    before = simulate(scene, **how)
+    for module in (core_graph, caches):
+        monkeypatch.setattr(module, "MANY", 0)
+    monkeypatch.setattr(augmented, "_MANY", 50)
+    assembly = assemble(scene)
+    found = simulate(assembly, **how)
+    for path in before:
+        np.testing.assert_allclose(found[path], before[path], rtol=1e-9, atol=1e-9, err_msg=path)
+    graph = assembly.mechanism.table.graph
+    there = {node for node in graph.nodes if node is not graph.zero}
+    assert len(there) < share * len(graph)
+    assert all(argument in there for node in there for argument in node.arguments if argument is not graph.zero)
+    gc.collect()
+    everywhere = {one for one in gc.get_objects() if type(one) is Expression and one.graph is graph}
+    assert everywhere == there | {graph.zero}
 
 
 def test_energies_of_parts_are_made_when_they_are_asked_for() -> None:

@@ -238,7 +238,9 @@ class _Tree:
         self.places = dict(zip(symbols, (*outputs[0].expressions, *outputs[1].expressions), strict=True))
         self.bodies = self._bodies_of_speeds()
         self.depth = {one.body: i for i, one in enumerate(self.reduced.forest.attachments, 1)}
+        start = len(self.graph)
         self.system = self._system()
+        self.graph.forget(start)
         self.works = all(not self.system.entries.get((i, i), self.graph.zero).is_zero for i in range(self.masses))
 
     @property
@@ -313,17 +315,22 @@ class _Tree:
         With `differences` there may be sines and cosines of differences of angles: in a chain these take the place of
         those of the angles, but where many parts meet there is a difference for each pair.
         """
-        self.differences = differences
+        self.differences, start = differences, len(self.graph)
         try:
-            steps = eliminate(self.system, order, self.tidy)
+            short, true = self._unknowns(eliminate(self.system, order, self.tidy))
         except AtwoodError:  # a pivot that is always zero
             return None
+        self.graph.forget(start)
+        return self._project(short, true)
+
+    def _unknowns(self, steps: Sequence[Step]) -> tuple[dict[int, Expression], dict[Expression, Expression]]:
+        """Return the accelerations of the bodies, and what the symbols in them stand for."""
         true: dict[Expression, Expression] = {}
         exact: dict[int, Expression] = {}
         short: dict[int, Expression] = {}
         for step in reversed(steps):
             self._find(step, exact, short, true)
-        return self._project({i: short[i] for i in range(self.masses)}, true)
+        return {i: short[i] for i in range(self.masses)}, true
 
     def _find(
         self, step: Step, exact: dict[int, Expression], short: dict[int, Expression], true: dict[Expression, Expression]
@@ -361,7 +368,7 @@ class _Tree:
         places = {**self.places, **{maximal.accelerations[i]: value for i, value in found.items()}}
         there = place_differences(there, places)
         for k, one in enumerate(joints):
-            wanted = [a[i] for i in one.speeds]
+            wanted, start = [a[i] for i in one.speeds], len(self.graph)
             d = len(here[k])
             mine, theirs = here[k], there[k * d : k * d + d]
             if one.turns_with_joint:
@@ -371,6 +378,7 @@ class _Tree:
             if solution is None:
                 return None
             known.update(zip(wanted, solution, strict=True))
+            self.graph.forget(start)
         if any(symbol not in known for symbol in a):
             return None
         return substitute([known[symbol] for symbol in a], true)

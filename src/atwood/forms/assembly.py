@@ -161,11 +161,13 @@ class Assembly:
 
     def _equations(self, form: FormName, orientation: Orientation) -> Equations:
         mechanism = self.mechanism
+        start = len(mechanism.table.graph)
         forest = grow_spanning_forest(
             form, mechanism.graph, mechanism.bodies, mechanism.locals_, mechanism.space, orientation
         )
         with mechanism.relations.reading():
             made = build_equations(mechanism, forest)
+        mechanism.table.graph.forget(start)
         is_left = any(symbol is value for symbol, value in made.read.items())
         return with_reactions(made, self.maximal) if form == "reduced" and is_left else made
 

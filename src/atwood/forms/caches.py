@@ -26,6 +26,7 @@ from typing import Any, Generic, TypeVar
 from atwood.codegen.cache import default_cache, make_key
 from atwood.errors import UnsupportedError
 from atwood.expr import Expression, Graph
+from atwood.expr.core.graph import MANY
 from atwood.expr.core.operations import BINARY, UNARY
 from atwood.expr.simplify.collect import collect
 from atwood.mechanics.dynamics.equations import Equations
@@ -155,9 +156,6 @@ _FORMAT = 1
 SOURCES = ("expr", "forms", "mechanics")
 """The rooms whose code derives; what other rooms give is read as expressions."""
 
-_LARGEST = 200_000
-"""Graphs of more nodes are derived anew: their entries would fill the cache."""
-
 _PLAIN = 2
 """The format of `marshal` that writes equal values equally, whoever else refers to them."""
 
@@ -169,7 +167,9 @@ def derive_once(
     store = default_cache()
     key = None if store is None else derivation_key(what, graph, read)
     if store is None or key is None:
+        start = len(graph)
         word, values = derive()
+        graph.forget(start)
         return word, list(values)
     found = store.read(key)
     known = None if found is None else _replayed(graph, found)
@@ -178,7 +178,7 @@ def derive_once(
     before, relations = len(graph), _relations(graph)
     word, values = derive()
     content = _written((word, graph.recorded(before), [value.index for value in values]))
-    if content is not None and relations == _relations(graph):
+    if content is not None and relations == _relations(graph) and len(graph) <= MANY:
         store.write(key, content)
     return word, list(values)
 
@@ -201,7 +201,7 @@ def _replayed(graph: Graph, content: bytes) -> tuple[str, list[Expression]] | No
 
 def derivation_key(what: str, graph: Graph, read: object) -> str | None:
     """Return the name of an entry; None where functions of Python are in the graph, whose code no name tells."""
-    if len(graph) > _LARGEST:
+    if len(graph) > MANY:  # their entries would fill the cache
         return None
     nodes, described = _written(graph.plain()), _described(read)
     if nodes is None or described is None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numbers
 from collections import defaultdict
 from collections.abc import Sequence
+from sys import getrefcount
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from atwood.clock import check_time
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 
 _LOOK = 256
 """After so many new nodes the clock is looked at."""
+
+MANY = 200_000
+"""A graph of more nodes forgets what is not needed any more, and is not kept on disk."""
 
 
 class Expression:
@@ -314,7 +318,7 @@ class Graph:
 
     def node(self, operation: str, arguments: tuple[Expression, ...], payload: Any = None) -> Expression:
         """Return the node of an operation as it stands, without any folding."""
-        key = arguments if payload is None else (arguments, payload)
+        key = arguments if payload is None else _key(arguments, payload)
         found = self._table[operation].get(key)
         return self._insert(key, operation, arguments, payload) if found is None else found
 
@@ -358,6 +362,20 @@ class Graph:
             arguments = tuple(nodes[place] for place in places)
             self._insert(_key(arguments, payload), operation, arguments, payload, is_parametric)
 
+    def forget(self, start: int) -> None:
+        """Forget the nodes from a place on to which nobody refers, if there are `MANY`: half of what deriving makes.
+
+        A place whose node is forgotten has the number 0, and is not used again.
+        """
+        if len(self.nodes) <= MANY:
+            return
+        nodes, table, zero = self.nodes, self._table, self.zero
+        for place in range(len(nodes) - 1, start - 1, -1):  # what refers to a node comes after it
+            node = nodes[place]
+            if getrefcount(node) == _UNUSED and node.arguments:
+                del table[node.operation][_key(node.arguments, node.payload)]
+                nodes[place] = zero
+
     def renamed(self, foreign: Sequence[Expression], record: Sequence[RenamedNode], name: str) -> Sequence[Expression]:
         """Return nodes that are there, and after them nodes of a record with another name, made where they are not."""
         found, table = list(foreign), self._table
@@ -365,7 +383,7 @@ class Graph:
             arguments = tuple([found[place] for place in places])
             if operation == "symbol":
                 payload = payload[0] + name + payload[1]
-            key = arguments if payload is None else (arguments, payload)
+            key = arguments if payload is None else _key(arguments, payload)
             node = table[operation].get(key)
             if node is None:
                 node = self._insert(key, operation, arguments, payload, is_parametric)
@@ -394,8 +412,21 @@ class Graph:
 
 
 def _key(arguments: tuple[Expression, ...], payload: Any) -> Any:
-    """Return what a node is told from others of its operation by: mostly the tuple that it has anyhow."""
-    return arguments if payload is None else (arguments, payload)
+    """Return what a node is told from others of its operation by: mostly the tuple or the name that it has anyhow."""
+    if payload is None:
+        return arguments
+    return (arguments, payload) if arguments else payload
+
+
+def _references_of_unused() -> int:
+    """Return the references to a node that only its graph has: those of its list, its table, and who counts."""
+    nodes = [object()]
+    table = {"": nodes[0]}
+    node = nodes[len(table) - 1]
+    return getrefcount(node)
+
+
+_UNUSED = _references_of_unused()
 
 
 def _operand(own: Expression, other: object) -> Expression | None:

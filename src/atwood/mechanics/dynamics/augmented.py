@@ -17,6 +17,9 @@ from atwood.lazy_dataclasses import dataclass, replace
 Tidy = Callable[[list[Expression]], list[Expression]]
 Place = tuple[int, int]
 
+_MANY = 50_000
+"""After so many new nodes a large graph forgets those that nothing refers to."""
+
 _REACH = 40
 """So many sums are taken apart in search of what two values have in common."""
 
@@ -82,7 +85,16 @@ def eliminate(system: SymmetricSystem, order: Sequence[int], tidy: Tidy = list) 
         if not value.is_zero:
             rows[i][j] = rows[j][i] = _Entry(value, graph.zero)
     right = [_Entry(value, graph.zero) for value in system.right]
-    return [_eliminate_one(p, rows, right, system.signs, tidy) for p in order]
+    steps: list[Step] = []
+    first = start = len(graph)
+    for p in order:
+        steps.append(_eliminate_one(p, rows, right, system.signs, tidy))
+        if len(graph) > start + _MANY:
+            graph.forget(start)
+            start = len(graph)
+    right.clear()
+    graph.forget(first)
+    return steps
 
 
 def _eliminate_one(

@@ -322,9 +322,12 @@ def _later_symbols(assembly: Assembly, equations: Equations) -> tuple[frozenset[
 def _is_linear(value: Expression, speeds: Sequence[Expression]) -> bool:
     """Return whether an expression is linear in the speeds: its derivative along them does not depend on them."""
     directions: dict[Expression, Expression | float] = {}
+    start = len(value.graph)
     for u in sorted(speeds, key=lambda u: u.index):  # new nodes come in the same order in every process
         directions[u] = u.graph.symbol(f"direction:{u.name}")
-    return value.is_symbol or not depends_on(jvp([value], directions)[0], speeds)
+    found = value.is_symbol or not depends_on(jvp([value], directions)[0], speeds)
+    value.graph.forget(start)
+    return found
 
 
 def said(unknowns: Sequence[Expression], targets: Sequence[Target], otherwise: FloatArray) -> tuple[FloatArray, bool]:
