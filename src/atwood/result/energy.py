@@ -148,6 +148,8 @@ class Piece:
         Whether it began at a time event.
     is_rest
         Whether it began where impacts had accumulated.
+    is_driven
+        Whether a constraint, a gap or a slip moves with time, so that an impact may put work in.
     """
 
     time: FloatArray
@@ -161,12 +163,13 @@ class Piece:
     is_impact: bool
     is_switched: bool
     is_rest: bool
+    is_driven: bool
 
     def gained_since(self, before: Piece) -> float:
         """Return the work that is done between the end of another piece and the start of this one, J.
 
-        An impact takes kinetic energy away. Where impacts have accumulated, what still rises gives back the friction
-        of a flight that is left out. At a time event, all that jumps is work: of an input that a potential reads, or of
+        An impact takes kinetic energy away, unless what moves with time takes part in it, as a table that shakes. Where
+        impacts have accumulated, what still rises gives back the friction of a flight that is left out. At a time event, all that jumps is work: of an input that a potential reads, or of
         drives whose speed jumps. Other jumps of energy are none of work.
         """
         kinetic = float(self.kinetic[0] - before.kinetic[-1])
@@ -174,7 +177,9 @@ class Piece:
             return kinetic + float(self.potential[0] - before.potential[-1])
         after, earlier = self.switched, before.switched
         gained = (0.0 if after is None else float(after[0])) - (0.0 if earlier is None else float(earlier[-1]))
-        return gained + (kinetic if self.is_rest else min(0.0, kinetic) if self.is_impact else 0.0)
+        if self.is_rest or (self.is_impact and self.is_driven):
+            return gained + kinetic
+        return gained + (min(0.0, kinetic) if self.is_impact else 0.0)
 
 
 def exchange(pieces: Sequence[Piece], work: FloatArray) -> float:
@@ -279,6 +284,8 @@ def accounts(readings: Sequence[SegmentQuantities]) -> list[Piece]:
         energies = state_values(assembly, energy_program(assembly), *state)
         switched = None if switching.results[0].is_zero else state_values(assembly, switching, *state)[0]
         motions, rounding = _motions(joined), _rounding(joined)
+        contacts = [each.row for each in assembly.maximal.contacts]
+        driven = any(_moves_by_itself(assembly.maximal, each) for each in (*assembly.maximal.constraints, *contacts))
         for number, segment in one.parts.items():
             own = one.places[number]
             found[number] = Piece(
@@ -293,6 +300,7 @@ def accounts(readings: Sequence[SegmentQuantities]) -> list[Piece]:
                 is_impact=segment.impact,
                 is_switched=segment.after_time_event,
                 is_rest=segment.rests,
+                is_driven=driven,
             )
     return [found[number] for number in range(len(found))]
 

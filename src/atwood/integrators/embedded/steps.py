@@ -141,13 +141,15 @@ def root_of(r: Routine, a: Value, order: int) -> Value:
 def first_step(pair: Tableau, r: Routine, m: Memory, t: Value, begin: Value) -> Value:
     """Return the first step by the size of the first two derivatives (Hairer, Norsett and Wanner, section II.4).
 
-    `begin` is where the slope at the begin lies.
+    `begin` is where the slope at the begin lies. What is almost zero, as the speed of what has just begun to slip, asks
+    for a step that would not move the time: it is so long that the time tells it to four digits.
     """
     bound = r.least(m.horizon, m.longest)
+    told = r.size(t) * (1e4 * 2.0**-52)
     y, trial, probe = m.row("y"), m.row("trial"), m.row("last")
     d0, d1 = _size(r, m, y), _size(r, m, begin)
     usual = (d0 >= 1e-5) & (d1 >= 1e-5) & (d0 / d1 < inf)
-    h0 = r.least(r.choose(usual, d0 * 0.01 / d1, 1e-6), bound)
+    h0 = r.least(r.most(r.choose(usual, d0 * 0.01 / d1, 1e-6), told), bound)
     with m.parts() as j:
         trial[j] = m.lanes(y, j) + m.lanes(begin, j) * h0
     code = r.call("evaluate", m.session, t + h0, trial, probe)
