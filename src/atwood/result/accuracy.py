@@ -117,6 +117,8 @@ class Accuracy:
 def compared_paths(assembly: Assembly) -> list[str]:
     """Return the positions of all bodies with mass, the coordinates that are angles, and, in space, axes of bodies.
 
+    A frame without a body of its own, as that of a `Rotor`, has a coordinate in a plane that is no quantity: those of
+    the joints are compared then.
     Axes that differ by less than they are long differ by the angle between two orientations, in radians; coordinates
     of orientations differ where nothing does.
     """
@@ -124,6 +126,9 @@ def compared_paths(assembly: Assembly) -> list[str]:
     owners = [path for path, local in assembly.mechanism.locals_.items() if local.point_inertias or local.body_inertias]
     paths = [f"{owner}.position.{axis}" for owner in owners for axis in "xyz"]
     paths += [one.name for one in assembly.reduced.names]
+    if any(one.name not in known and one.unit in ("m", "rad") for one in assembly.reduced.names):
+        joints = [joint for local in assembly.mechanism.locals_.values() for joint in local.joints]
+        paths += [one.name for joint in joints for one in joint.coordinates]
     found = [path for path in dict.fromkeys(paths) if path in known and known[path].unit in ("m", "rad")]
     if assembly.mechanism.space.is_spatial:
         axes = [f"{owner}.{axis}_axis.{part}" for owner in owners for axis in "xyz" for part in "xyz"]
