@@ -11,7 +11,7 @@ import pytest
 import atwood
 from atwood import Component, Scene, UsageError, discrete_state, simulate, update
 from atwood.result.accuracy import difference
-from atwood_library import Ground, Mass1D
+from atwood_library import Ground, Mass1D, RotationalSource, Rotor
 from atwood_library.scenes import (
     ChaplyginSleigh,
     DoublePendulum,
@@ -135,6 +135,21 @@ def test_what_was_asked_for_is_kept_and_asked_for_once() -> None:
         simulate(Kepler(), accuracy=0.0)
     with pytest.raises(UsageError, match="functions at sample times"):
         simulate(counted(), t_end=0.2, accuracy=1e-6)
+
+
+def test_shafts_that_carry_no_body_are_compared_by_their_angles() -> None:
+    """The frame of a rotor has a coordinate of its own that is no quantity: nothing was compared."""
+    scene = Scene(gravity=0.0)
+    ground, rotor = scene.add("ground", Ground()), scene.add("rotor", Rotor(moment=0.5))
+    spring = scene.add("spring", RotationalSource(law="-20*sin(x)"))
+    scene.connect(ground.frame, rotor.a)
+    scene.connect(rotor.shaft, spring.b)
+    scene.start.update({"rotor.angle": 1.0, "rotor.angular_velocity": 0.0})
+    result = simulate(scene, t_end=5.0, accuracy=1e-6, outputs=np.linspace(0.0, 5.0, 51))
+    exact = simulate(scene, t_end=5.0, rtol=1e-13, solver="taylor", outputs=np.linspace(0.0, 5.0, 51))
+    error = float(np.max(np.abs(result["rotor.angle"] - exact["rotor.angle"])))
+    assert result.accuracy.path == "rotor.angle"
+    assert error <= result.accuracy.reached <= 1e-6
 
 
 def test_what_does_not_move_has_no_error() -> None:

@@ -168,9 +168,10 @@ class Piece:
     def gained_since(self, before: Piece) -> float:
         """Return the work that is done between the end of another piece and the start of this one, J.
 
-        An impact takes kinetic energy away, unless what moves with time takes part in it, as a table that shakes. Where
-        impacts have accumulated, what still rises gives back the friction of a flight that is left out. At a time event, all that jumps is work: of an input that a potential reads, or of
-        drives whose speed jumps. Other jumps of energy are none of work.
+        An impact takes kinetic energy away, unless what moves with time takes part in it, as a table that shakes.
+        Where impacts have accumulated, what still rises gives back the friction of a flight that is left out. At a
+        time event, all that jumps is work: of an input that a potential reads, or of drives whose speed jumps. Other
+        jumps of energy are none of work.
         """
         kinetic = float(self.kinetic[0] - before.kinetic[-1])
         if self.is_switched:

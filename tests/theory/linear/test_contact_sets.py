@@ -14,12 +14,14 @@ from atwood_library import (
     BallContact,
     Box,
     BoxContact,
+    Drive,
     Ground,
     Inertia,
     Link,
     PointContact,
     PointMass,
     PointOnLine,
+    RigidBody,
     RotationalFriction,
     RotationalMotion,
     RotationalSpringDamper,
@@ -185,3 +187,32 @@ def test_friction_that_falls_with_speed_makes_oscillations_grow(form: str) -> No
     assert np.sort_complex(model.eigenvalues[:2]) == pytest.approx(np.sort_complex(known), rel=1e-9)
     assert "contacts     rub.slip slips backwards" in str(model)
     assert model.to_data()["contacts"] == {"rub.slip": "slips backwards"}
+
+
+@FORMS
+@pytest.mark.parametrize("time", [0.1, 0.8])
+def test_a_plate_that_is_driven_and_turns_with_nothing_has_no_angle_where_the_gap_is_open(
+    form: str, time: float
+) -> None:
+    """The maximal coordinates of that set are fewer than those of the scene; a spring beside the gap oscillates."""
+    scene = Scene()
+    ground, drive, plate = scene.add("ground", Ground()), scene.add("drive", Drive(axis=(0, 0, 1))), RigidBody(mass=1.0)
+    drive.motion = "0.02*sin(9*t)"
+    scene.add("plate", plate)
+    mass, touch = scene.add("m", PointMass(mass=2.0)), scene.add("c", PointContact(restitution=0.5))
+    guide, spring = scene.add("guide", PointOnLine(axis=(0, 0, 1))), scene.add("spring", Spring(stiffness=50.0))
+    for ends in (
+        (ground.frame, drive.a),
+        (drive.b, plate.frame),
+        (plate.frame, touch.plane),
+        (mass.point, touch.point),
+        (ground.frame, guide.a),
+        (mass.point, guide.b),
+        (ground.frame, spring.a),
+        (mass.point, spring.b),
+    ):
+        scene.connect(*ends)
+    scene.start.update({"m.position.z": 1.0, "m.velocity.z": 0.0})
+    model = linearize(scene, form=form, at=(simulate(scene, t_end=1.0), time))
+    assert model.contacts == {"c.gap": "open"}
+    assert np.abs(model.eigenvalues) == pytest.approx([5.0, 5.0], rel=1e-9)

@@ -169,8 +169,13 @@ def state_in_set(
     before: Assembly, after: Assembly, t: float, q: FloatArray, u: FloatArray, length: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return a state of a scene in the generalized coordinates and speeds of one of its sets, or the other way."""
-    big_q, big_u = maximal_state(before, np.array([t]), q[:, None], u[:, None])
-    place, speeds, _ = generalized_state(before, after, t, (q, u), (big_q[:, 0], big_u[:, 0]), length)
+    whole = maximal_state(before, np.array([t]), q[:, None], u[:, None])
+    sides = [(one.maximal.names, one.maximal.speed_names) for one in (before, after)]
+    maximal = [  # an angle that no law of a set reads is none of its coordinates: it is not known there
+        np.array([dict(zip((x.name for x in had), values[:, 0], strict=True)).get(x.name, np.nan) for x in wanted])
+        for values, had, wanted in zip(whole, *sides, strict=True)
+    ]
+    place, speeds, _ = generalized_state(before, after, t, (q, u), (maximal[0], maximal[1]), length)
     return place, speeds
 
 

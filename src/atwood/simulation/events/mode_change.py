@@ -195,7 +195,10 @@ def generalized_state(
     maximal: tuple[FloatArray, FloatArray],
     length: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the generalized coordinates and speeds, with quaternions, that give the same maximal ones."""
+    """Return the generalized coordinates and speeds, with quaternions, that give the same maximal ones.
+
+    Maximal ones that are nan are not known, and may be anything.
+    """
     equations = after.regular
     reduced_map, maximal_map = kinematic_map_of(after, "regular"), kinematic_map_of(after, "dae")
     program, rows, columns = maximal_places(after)
@@ -220,7 +223,9 @@ def generalized_state(
         found, _, entries = kernel([t], place, still)
         matrix = np.zeros((len(scales), len(still)))
         matrix[rows, columns] = entries
-        apart = maximal_map.difference(t, maximal_map.normalized(np.asarray(found)), maximal[0])
+        matrix[np.isnan(maximal[1])] = 0.0
+        found = maximal_map.normalized(np.asarray(found))
+        apart = maximal_map.difference(t, found, np.where(np.isnan(maximal[0]), found, maximal[0]))
         return Missing(-apart, scales, lambda: matrix)
 
     far = _STILL * float(np.max(np.abs(q) / coordinate_scales(equations, length), initial=1.0))
@@ -234,7 +239,8 @@ def generalized_speeds(after: Assembly, t: float, q: FloatArray, speeds: FloatAr
     still = np.zeros(len(after.regular.speeds))
     matrix = np.zeros((len(sizes), len(still)))
     _, explicit_rate, matrix[rows, columns] = after.kernel(program)([t], q, still)
-    return least_norm(matrix / sizes[:, None], (speeds - np.asarray(explicit_rate)) / sizes)
+    known = ~np.isnan(speeds)
+    return least_norm((matrix / sizes[:, None])[known], ((speeds - np.asarray(explicit_rate)) / sizes)[known])
 
 
 def maximal_places(after: Assembly) -> tuple[Program, tuple[int, ...], tuple[int, ...]]:
