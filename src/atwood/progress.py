@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any, TypeAlias
 
 __all__ = ["Progress", "told"]
@@ -19,22 +18,32 @@ _PAUSE = 0.1
 _BAR = 24
 
 
-@contextmanager
-def told(
-    progress: Progress, name: str, say: Callable[..., tuple[float, str]]
-) -> Iterator[Callable[..., object] | None]:
-    """Yield what is to be called on the way: what was given, or what writes the line; None if nothing is."""
-    if not isinstance(progress, bool):
-        yield progress
-        return
-    if not progress:
-        yield None
-        return
-    line = _Line(name)
-    try:
-        yield lambda *given: line.show(*say(*given))
-    finally:
-        line.clear()
+class told:
+    """Gives what is to be called on the way: what was given, or what writes the line; None if nothing is.
+
+    Parameters
+    ----------
+    progress
+        What a function was given.
+    name
+        What the line begins with.
+    say
+        Gives the share that is done, and words, from what is called with.
+    """
+
+    def __init__(self, progress: Progress, name: str, say: Callable[..., tuple[float, str]]) -> None:
+        self._progress, self._say = progress, say
+        self._line = _Line(name) if progress is True else None
+
+    def __enter__(self) -> Callable[..., object] | None:
+        line, say = self._line, self._say
+        if line is not None:
+            return lambda *given: line.show(*say(*given))
+        return None if isinstance(self._progress, bool) else self._progress
+
+    def __exit__(self, *_: object) -> None:
+        if self._line is not None:
+            self._line.clear()
 
 
 class _Line:

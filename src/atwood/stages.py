@@ -7,8 +7,6 @@ time alone, so that the times of all add up to the whole.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from contextvars import ContextVar
 
 __all__ = ["STAGES", "Stopwatch", "stage", "watching"]
@@ -88,16 +86,16 @@ class stage:
             self._stopwatch.leave()
 
 
-@contextmanager
-def watching() -> Iterator[Stopwatch]:
+class watching:
     """Time the stages in a block; one that watches already goes on."""
-    known = _watch.get()
-    if known is not None:
-        yield known
-        return
-    made = Stopwatch()
-    token = _watch.set(made)
-    try:
-        yield made
-    finally:
-        _watch.reset(token)
+
+    __slots__ = ("_token",)
+
+    def __enter__(self) -> Stopwatch:
+        known = _watch.get()
+        made = Stopwatch() if known is None else known
+        self._token = _watch.set(made)
+        return made
+
+    def __exit__(self, *_: object) -> None:
+        _watch.reset(self._token)

@@ -154,7 +154,7 @@ class Assembly:
             return self.maximal
         return self.reduced if form == "reduced" else self.regular
 
-    @property
+    @cached_property
     def own_equations(self) -> Equations:
         """The equations in the form of this assembly."""
         return self.reduced if self.form == "reduced" else self.maximal

@@ -14,8 +14,7 @@ import pickle
 import platform
 import sys
 import threading
-from collections.abc import Callable, Hashable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Hashable, Sequence
 from functools import cache
 from hashlib import sha256
 from io import BytesIO
@@ -41,20 +40,21 @@ _AGED = count(1)
 """How often what was made counted as old at once."""
 
 
-@contextmanager
-def without_collection() -> Iterator[None]:
+class without_collection:
     """Leave cycles of objects alone: graphs of expressions have none, and to look for them is a sixth of deriving.
 
     What was made meanwhile counts as old afterwards, if it is much. Else the next object that is made would begin to
     look through it. That takes the counts of the collector back to zero: every tenth time all is looked through, or
     cycles of who runs one scene after another would never be.
     """
-    was_enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_enabled:
+    __slots__ = ("_was_enabled",)
+
+    def __enter__(self) -> None:
+        self._was_enabled = gc.isenabled()
+        gc.disable()
+
+    def __exit__(self, *_: object) -> None:
+        if self._was_enabled:
             is_much = gc.get_count()[0] > _MUCH and not gc.get_freeze_count()  # what somebody has frozen stays so
             if is_much:
                 gc.freeze()

@@ -426,8 +426,8 @@ class NativeStepper(Stepper):
         y, yp = np.empty((2, len(times), self._size))
         last, filled, code = self._count("steps") + min(steps, _UNLIMITED), 0, None
         while code is None:
-            left, *tables = (address_of(array[filled:]) for array in (times, y, yp))
-            code = self._go_on(last, "sample", left, len(times) - filled, *tables)
+            left, values, rates = address_of(times[filled:]), address_of(y[filled:]), address_of(yp[filled:])
+            code = self._go_on(last, "sample", left, len(times) - filled, values, rates)
             filled += self._count("filled")
         if code == _NO_VALUE:
             raise self._no_interpolation(float(times[filled]))

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from atwood.arrays import FloatArray
+from atwood.arrays import FloatArray, address_of
 from atwood.clock import within_time
 from atwood.codegen.cache import Cache, default_cache, make_key
 from atwood.codegen.llvm.engine import (
@@ -156,7 +156,7 @@ class Built:
         prologue: Callable[..., None] = _PROLOGUE(self.code.addresses[f"{name}_prologue"])
         if self.failures is not None:
             prologue = self.failures.watch(prologue)
-        prologue(values.ctypes.data, derived.ctypes.data, scratch.ctypes.data)
+        prologue(address_of(values), address_of(derived), address_of(scratch))
         return derived, scratch
 
 

@@ -9,7 +9,7 @@ from ctypes import c_void_p
 import numpy as np
 from numpy.typing import ArrayLike
 
-from atwood.arrays import FloatArray
+from atwood.arrays import FloatArray, address_of
 from atwood.codegen.llvm.build import Built, RoutineSource
 from atwood.codegen.llvm.module import Part
 from atwood.codegen.llvm.tiers import Tiers
@@ -168,8 +168,9 @@ class CompiledAccelerations:
     def fill(self, own: OwnRates, parameter_values: ArrayLike) -> None:
         """Give rates of a session their parameters, by the code that they were opened with."""
         values = np.array(parameter_values, dtype=np.float64)
+        given = address_of(values)
         for prologue, place in zip(own.prologues, own.places, strict=True):
-            _PROLOGUE(prologue)(values.ctypes.data, place, own.scratch)
+            _PROLOGUE(prologue)(given, place, own.scratch)
 
 
 @dataclass(frozen=True)

@@ -35,9 +35,9 @@ from atwood.integrators.protocol import (
     absolute_tolerances,
 )
 from atwood.integrators.stepper import (
+    COUNTED,
     LANE_FIELDS,
     WIDTH,
-    Counts,
     Memory,
     NativeStepper,
     Routines,
@@ -46,7 +46,6 @@ from atwood.integrators.stepper import (
     open_routine as session_routine,
     routines_of,
 )
-from atwood.lazy_dataclasses import names_of
 
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventData
@@ -257,8 +256,8 @@ class CompiledStepper(NativeStepper):
         """Count from zero again, for a run of another typical length, s, and perhaps with other tolerances."""
         if absolute is not None:
             self._arrays[self._rows["absolute"], : self._size] = np.maximum(absolute, np.finfo(float).tiny)
-        self._set(**dict.fromkeys(names_of(Counts), 0), horizon=horizon, longest=self._options.max_step or inf)
-        self._set(watch=0, seen=0)
+        self._integers[self._places["steps"] :][:COUNTED] = 0
+        self._set(horizon=horizon, longest=self._options.max_step or inf, watch=0, seen=0)
 
     def take_over(self, handed: Handed) -> None:
         """Stand behind a step that was taken side by side with those of other runs."""

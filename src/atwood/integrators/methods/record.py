@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from math import inf
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -153,17 +154,17 @@ class Method:
     default_order: int = 0
     is_interpreted: bool = False
 
-    @property
+    @cached_property
     def is_implicit(self) -> bool:
         """Whether it solves equations of multipliers and rates."""
         return self.kind == "implicit"
 
-    @property
+    @cached_property
     def looks_for_events(self) -> bool:
         """Whether steps end where something happens; else what contacts do in a step is at its end."""
         return self.kind != "impulsive"
 
-    @property
+    @cached_property
     def has_equal_steps(self) -> bool:
         """Whether all its steps are equal, so that it takes an order and a step."""
         return self.default_order > 0

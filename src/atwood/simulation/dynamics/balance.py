@@ -115,11 +115,7 @@ class Balance:
         self._all = len(program.holonomic) == program.constraints
         self._constraint_kernel = constraint_kernel
         self.holonomic = np.asarray(program.holonomic, dtype=np.intp)
-
-    @property
-    def constraints(self) -> int:
-        """Number of constraints."""
-        return self.program.constraints
+        self.constraints = program.constraints
 
     def at(self, t: float, q: FloatArray, u: FloatArray) -> BalanceValues:
         """Return the balance at a state."""

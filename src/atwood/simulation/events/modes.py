@@ -255,6 +255,12 @@ class EventProbe:
         self.event_functions = (*condition_functions(assembly, conditions), *find_event_functions(assembly))
         self._start = t, q.copy(), u.copy(), tolerance
 
+    def of(self, plan: SceneProblem) -> EventProbe:
+        """Return the same of a copy of its plan, with what is seen at the start."""
+        made, _ = object.__new__(EventProbe), self.broken
+        vars(made).update(vars(self), plan=plan)
+        return made
+
     def __getattr__(self, name: str) -> Any:
         """Look at the start when somebody asks for what is seen there: most changes of a set are followed by others."""
         if name not in _SEEN:

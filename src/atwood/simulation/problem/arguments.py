@@ -114,6 +114,8 @@ CONDITIONS = optional(Kind(_WATCHED, lambda value: _WATCHES.read(value), "CONDIT
 
 def refuse_idle_settings(solver: str, order: int | None, step: float | None, first_step: float | None = None) -> None:
     """Refuse an order or a step for a solver that chooses these itself, and a first step for one that does not."""
+    if order is None and step is None and first_step is None:
+        return
     equal = [one.key for one in METHODS.values() if one.has_equal_steps]
     for name, value in (("order", order), ("step", step)):
         if value is not None and solver not in equal:

@@ -159,6 +159,8 @@ _PLAIN = (
 
 def conditions_of(until: Any, record: Any) -> tuple[Condition, ...]:
     """Return what a run stops at, and what it notes: conditions, or lists of these."""
+    if until is None and record is None:
+        return ()
     return (*(Condition(one, "stop") for one in _listed(until)), *(Condition(one, "") for one in _listed(record)))
 
 

@@ -323,8 +323,11 @@ class Recorder:
 
         What is projected together rounds as the number of states has it.
         """
-        count = _count(self._samples[1])
-        if count > 1 and self.plan.is_projected:
+        pending = self._samples[1]
+        if not pending:
+            return
+        count = _count(pending) if self.plan.is_projected else 0
+        if count > 1:
             self._settle(count - 1)
         self._settle(None)
 
@@ -333,8 +336,10 @@ class Recorder:
         pending = self._samples[1]
         if pending:
             waiting = _joined(pending)
-            rest = _cut(waiting, count) if count is not None and count < len(waiting[0]) else None
-            self._finish(*_cut(waiting, stop=count), [] if rest is None else [rest])
+            if count is None or count >= len(waiting[0]):
+                self._finish(*waiting)
+            else:
+                self._finish(*_cut(waiting, stop=count), [_cut(waiting, count)])
 
     def last(self) -> tuple[float, FloatArray, FloatArray, Misses]:
         """Return time, coordinates and speeds of the last sample, and what gives misses of constraints up to it."""
@@ -415,8 +420,8 @@ def _count(pending: Sequence[_States]) -> int:
 
 def _joined(pending: Sequence[_States]) -> _States:
     """Return states in one piece."""
-    t, y, shown = (np.concatenate(each) for each in zip(*pending, strict=True))
-    return t, y, shown
+    t, y, shown = zip(*pending, strict=True)
+    return np.concatenate(t), np.concatenate(y), np.concatenate(shown)
 
 
 def _cut(one: _States, start: int | None = None, stop: int | None = None) -> _States:

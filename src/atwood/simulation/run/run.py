@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, TypeVar
+from operator import attrgetter
+from typing import TYPE_CHECKING, TypeVar, cast
 
 import numpy as np
 
@@ -44,7 +45,6 @@ from atwood.simulation.run.run_record import (
     Outcome,
     Run,
     Segment,
-    as_asked,
     goes_on,
     run_out_of_time,
     shortest_mode,
@@ -64,6 +64,14 @@ _Walk = TypeVar("_Walk", bound="Walk")
 
 _AT_START: Key[Changed] = Key("what becomes of gaps and slips at the start")
 _FIRST_EVENT: Key[list[float]] = Key("until when what touches nothing at the start is disturbed")
+
+_READY: Key[tuple[tuple[object, ...], Walk]] = Key("a run that is ready to go, and what it was asked for")
+
+_ASKED_FOR = attrgetter(
+    *("t_end", "relative_tolerance", "absolute_tolerance", "max_order", "max_step", "solver", "structure"),
+    *("conditions", "order", "step", "accuracy", "nominal", "first_step", "impacts"),
+)
+"""What of its options the preparation of a run depends on, besides its samples."""
 
 _SURELY = 1e-3
 """Of the time to the first event: so much later it has happened, whatever the end makes of the steps."""
@@ -110,17 +118,26 @@ def _prepared(
 ) -> _Walk:
     """Return a run that is ready to go, with samples in between that change nothing.
 
-    Where it is made again, it is known what updates have made of its states, and nobody is asked twice.
+    Where it is made again, it is known what updates have made of its states, and nobody is asked twice. How the last
+    run of an assembly began is kept for the next one that is asked for in the same way.
     """
-    samples = sample_times(start.time, options)
+    samples, log = sample_times(start.time, options), list[Updated]()
+    again = partial(_again, assembly, start, reassemble, log)
+    state = start.time, start.coordinates.tobytes(), start.speeds.tobytes(), start.length
+    about = kind, samples, reassemble, *state, *_ASKED_FOR(options)
+    is_plain = kind is Walk and known is None and not len(between)
+    ready = assembly.kept.known(_READY) if is_plain else None
+    if ready is not None and ready[0] == about:
+        return cast(_Walk, ready[1].renewed(assembly, start, options, again, log))
     if assembly.own_equations.prescribed:
         schedule = find_schedule(assembly, start.time, options.t_end).at_samples(samples.times)
         check_prescribed(schedule.rows(assembly, samples.times), samples.times)
-    log: list[Updated] = []
-    again = partial(_again, assembly, start, reassemble, log)
     walk = kind(assembly, start, options, reassemble, samples.with_more(between), again, log, known)
     with named(walk.assembly, walk.t, walk.q, walk.u):
         walk.prepare()
+    if is_plain and walk.can_be_renewed:
+        assembly.kept.take(_READY)
+        assembly.kept.get(_READY, lambda: (about, walk.renewed(None, start, options, again, [])))
     return walk
 
 
@@ -189,6 +206,48 @@ class Walk:
         self._told: set[tuple[float, ...] | None] = set()
         self.probe: EventProbe | None = None
         self.choice: Choice
+
+    @property
+    def can_be_renewed(self) -> bool:
+        """Whether all that preparing it did is in its attributes: nothing was said, and nobody was asked."""
+        plan, probe = self.plan, self.probe
+        if plan is None or probe is None or self.ended is not None or plan.not_compilable or plan.assembly.sides:
+            return False
+        return self.choice.method.tableau is not None and not self.sampler.updates
+
+    def renewed(
+        self,
+        assembly: Assembly | None,
+        start: Start,
+        options: RunOptions,
+        again: Callable[[RunOptions, FloatArray], Run],
+        log: list[Updated],
+    ) -> Walk:
+        """Return a run that is as ready to go as this one, which has gone nowhere; it takes the sessions of a scene."""
+        assert self.plan is not None
+        assert self.probe is not None
+        plan, kept, made = replace(self.plan), KeptSession(assembly), object.__new__(Walk)
+        kept.changes = self._kept.changes
+        vars(made).update(
+            vars(self),
+            start=start,
+            options=options,
+            again=again,
+            log=log,
+            _schedules={**self._schedules},
+            _plans=dict.fromkeys(self._plans, plan),
+            _kept=kept,
+            _sides=SidesOfRun(options),
+            segments=[],
+            events=[*self.events],
+            choices=[],
+            coordinate_switches=[],
+            plan=plan,
+            _impacts=[*self._impacts],
+            _told={*self._told},
+            probe=self.probe.of(plan),
+        )
+        return made
 
     def go(self) -> Run:
         """Go from mode to mode to the end; whatever stops it on the way takes along what came before."""
@@ -650,6 +709,5 @@ class Walk:
 
     def run_so_far(self, status: str, message: str) -> Run:
         """Return what has been made of it."""
-        segments = as_asked(self.segments, self.options.outputs)
-        parts = (self.first, segments, tuple(self.events), self.statistics, status, message)
+        parts = (self.first, tuple(self.segments), tuple(self.events), self.statistics, status, message)
         return Run(*parts, self.start, self.options, tuple(self.choices), tuple(self.coordinate_switches), self.again)

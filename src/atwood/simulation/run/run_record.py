@@ -93,7 +93,8 @@ class Run:
     @cached_property
     def segments(self) -> tuple[SegmentRecord, ...]:
         """The stretches between changes of mode; none where time was used up before the start was recorded."""
-        return tuple(record for one in self.stretches for record in one.records())
+        shown = as_asked(self.stretches, self.options.outputs)
+        return tuple(record for one in shown for record in one.records())
 
     @cached_property
     def events(self) -> tuple[EventRecord, ...]:

@@ -193,8 +193,11 @@ class _Runner:
 
     def _pass_moments(self, session: Session, y: FloatArray) -> Outcome | None:
         """Go on through the moments ahead; None where the session has begun anew, or there are none to pass."""
-        segment, filling = self.segment, self.segment.kept.filling_of(session)
-        if segment.ahead is None or filling is None or self.monitor is not None or len(segment.probe.directions):
+        segment = self.segment
+        if segment.ahead is None or self.monitor is not None or len(segment.probe.directions):
+            return None
+        filling = segment.kept.filling_of(session)
+        if filling is None:
             return None
         assert isinstance(session, ExplicitSession)
         from atwood.simulation.run.moments import pass_moments
@@ -327,14 +330,14 @@ class _Runner:
 
     def _open(self, t: float, y: FloatArray, yp: FloatArray) -> Session:
         segment, choice = self.segment, self.choices[-1]
-        options, spent = segment.options, segment.spent + self.before
+        options, spent = segment.options, segment.spent.steps + self.before.steps
         request = SolverRequest(
             segment.plan,
             segment.probe,
             options,
             segment.end,
             Budget(
-                max_steps=None if options.max_steps is None else max(0, options.max_steps - spent.steps),
+                max_steps=None if options.max_steps is None else max(0, options.max_steps - spent),
                 wall_seconds=None if options.max_seconds is None else max(0.0, time_left()),
                 poll=_both(segment.plan.poll(choice.method), options.on_step),
             ),
@@ -402,9 +405,9 @@ class _Runner:
         ends = samples.ends_of_blocks(_BLOCKS if progress is not None else 1)
         looks = samples.ends_of_blocks(_PARTS) if turns else ends
         while done < len(samples.times):
-            times = samples.times[done : ends[np.searchsorted(ends, done, side="right")]]
+            times = samples.times[done : ends[ends.searchsorted(done, side="right")]]
             if turns and segment.plan.assembly.own_equations.contacts:  # what jumps has happened
-                times = times[: looks[np.searchsorted(looks, done, side="right")] - done]
+                times = times[: looks[looks.searchsorted(done, side="right")] - done]
             y, _, step_result = session.sample(times)
             strayed = self._strayed(y, looks[(looks > done) & (looks <= done + len(y))] - done) if turns else None
             if strayed is not None:  # what comes behind is done again
