@@ -203,10 +203,10 @@ class ExplicitSession(SteppingSession):
 
     def _new_locator(self, horizon: float, signs: tuple[int, ...] | None) -> EventLocator | None:
         """Return what finds events in a new run: routines where events and what is between two steps are compiled."""
-        problem, events, read = self._problem, self._problem.compiled_events, self._stepper.interpolation()
+        problem, events = self._problem, self._problem.compiled_events
         if self._compiled is not None:
             self._compiled.begin(horizon, signs)
-        elif events is not None and read is not None:
+        elif events is not None and (read := self._stepper.interpolation()) is not None:
             self._compiled = CompiledLocator(problem, events, read, horizon, signs)
         return self._compiled or super()._new_locator(horizon, signs)
 

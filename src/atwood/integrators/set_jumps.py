@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping, Sequence
-from copy import copy
 from math import inf
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -82,13 +81,6 @@ class SetLog(JumpLog):
         self._ends = HEAD + 2 * size + 3 * units
         self._begins, self._each = self._ends - 3 * units, len(ENTRY) + rows
 
-    @property
-    def last(self) -> SetLog:
-        """The last change alone."""
-        found = copy(self)
-        found.entries, found.time, found.states = self.entries[-1:], self.time[-1:], self.states[-1:]
-        return found
-
     def strikes(self) -> list[tuple[float, int]]:
         """Return times and gaps of the impacts."""
         found = self.entries[:, 3].astype(int)
@@ -100,10 +92,10 @@ class SetLog(JumpLog):
             for i in range(count)
         ]
 
-    def changes(self) -> list[SetJump]:
-        """Return the changes."""
+    def changes(self, first: int = 0) -> list[SetJump]:
+        """Return the changes from one on."""
         made = []
-        for row, states in zip(self.entries, self.states, strict=True):
+        for row, states in zip(self.entries[first:], self.states[first:], strict=True):
             time, stopped, left, struck = row[:HEAD].tolist()
             impacts = row[self._ends : self._ends + int(struck) * self._each].reshape(-1, self._each)
             set_ = row[self._begins : self._ends].reshape(3, -1)
@@ -219,13 +211,14 @@ class SetSolver:
     ) -> None:
         """Take other parameters, states of gaps and slips, what is small, and impacts that have been."""
         self._pieces["values"][:] = parameter_values
-        self._derive(*(self._at[name] for name in ("values", "derived", "room")))
+        self._derive(self._at["values"], self._at["derived"], self._at["room"])
         units = self._own_units
         for name in ("small", "slow"):
             units[UNITS[name]] = near * self._units[UNITS[name]]
         units[UNITS["state"] : UNITS["state"] + 3] = states
-        known = list(past)[-PAST:]
-        self._pieces["past"][: 2 * len(known)] = np.ravel(known)
+        known = past[-PAST:]
+        if known:
+            self._pieces["past"][: 2 * len(known)] = np.ravel(known)
         self._put("sets", {"known": len(known)})
 
     def resolve(
@@ -331,6 +324,13 @@ class SetJumps(SetSolver, Jumps):
         self._pieces["table"][:] = table.ravel()
         self._put("own", {"logged": 0, **dict(zip(("shortest", *LIMITS, "time"), scales, strict=True))})
         self._told = 0
+
+    def spend(self, seconds: float) -> None:
+        """Go on with faster code, which has the same bits, where that pays after steps that took so long."""
+        tiers = self.set_code.tiers
+        if tiers.has_better and (built := tiers.spend(seconds)) is not self._built:
+            self._keeps, self._built = (*self._keeps, self._built), built
+            self._put("sets", {"program": built.code.addresses["contacts"]})
 
     def begin(self, t: float) -> None:
         """Learn when the present set begins."""

@@ -121,6 +121,7 @@ class CompiledStepper(NativeStepper):
         self.interrupted = False
         self._restart: Callable[[float], None] | None = None
         self._faster_events: Callable[[float], int | None] | None = None
+        self._jumps: Jumps | None = None
         guard = problem.guard
         self._calls_python = problem.compiled is None or (guard is not None and not guard.function)
         rates = self._in_python(problem) if problem.compiled is None else problem.compiled()
@@ -150,7 +151,7 @@ class CompiledStepper(NativeStepper):
 
     def _go_on(self, last: int, function: str, *arguments: int) -> int | None:
         """Take steps, and see whether the next ones are to be taken by faster code."""
-        if self._rates.faster is None and self._faster_events is None:
+        if self._rates.faster is None and self._faster_events is None and self._jumps is None:
             return super()._go_on(last, function, *arguments)
         began = time.perf_counter()
         code = super()._go_on(last, function, *arguments)
@@ -167,6 +168,8 @@ class CompiledStepper(NativeStepper):
         if events is not None:
             self._faster_events = None
             self._set(events=events)
+        if self._jumps is not None:
+            self._jumps.spend(seconds)
 
     def batch_places(self) -> BatchPlaces:
         """Return the addresses with which many runs can be made in one call."""
@@ -199,11 +202,11 @@ class CompiledStepper(NativeStepper):
     def leap(self, locator: CompiledLocator, jumps: Jumps, last: float) -> bool:
         """Locate events without Python, up to a last time, and make the jumps that can be made so."""
         if self._count("locator") != locator.place:
-            self._keep = (self._keep, locator, jumps)
-        search, restart = locator.functions
-        self._set(search=search, restart=restart, locator=locator.place, signs=locator.signs.ctypes.data)
-        self._set(jump=jumps.function, jump_data=jumps.data)
-        self._set(last=last, finish=self._number("t") + self._number("horizon"))
+            self._keep, self._jumps = (self._keep, locator), jumps
+            search, restart = locator.functions
+            self._set(search=search, restart=restart, locator=locator.place, signs=locator.signs.ctypes.data)
+        finish = self._number("t") + self._number("horizon")
+        self._set(jump=jumps.function, jump_data=jumps.data, last=last, finish=finish)
         return True
 
     @property

@@ -261,6 +261,13 @@ class EventProbe:
         vars(made).update(vars(self), plan=plan)
         return made
 
+    def at(self, plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> EventProbe:
+        """Return the same events from another state on, in which the same is watched."""
+        made, start = object.__new__(EventProbe), (t, q.copy(), u.copy(), self._start[3])
+        own = {"event_functions": self.event_functions, "_about": self._about, "_start": start}
+        vars(made).update(own, plan=plan, assembly=plan.assembly, handed=())
+        return made
+
     def __getattr__(self, name: str) -> Any:
         """Look at the start when somebody asks for what is seen there: most changes of a set are followed by others."""
         if name not in _SEEN:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from atwood.integrators.protocol import Nearest
     from atwood.numerics.sparse_batch import Normal, Pattern
 
+_T = TypeVar("_T")
 
 _NORMAL: Key[Normal] = Key("normal equations of the constraints")
 
@@ -237,11 +238,11 @@ def errors_at(plan: SceneProblem, t: FloatArray, q: FloatArray) -> FloatArray:
     return plan.balance.errors.near(float(t[farthest]), q[:, farthest], plan.sizes)
 
 
-def once(make: Misses) -> Misses:
+def once(make: Callable[[], _T]) -> Callable[[], _T]:
     """Return the same, made at the first call; `functools.cache` takes longer than it saves a run."""
-    made: list[FloatArray] = []
+    made: list[_T] = []
 
-    def get() -> FloatArray:
+    def get() -> _T:
         if not made:
             made.append(make())
         return made[0]

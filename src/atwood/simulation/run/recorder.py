@@ -257,11 +257,11 @@ class Recorder:
         """
         pending = self._samples[1]
         if jumps is not None and len(jumps[0]):
-            times, states = np.repeat(jumps[0], 2), jumps[1].reshape(-1, jumps[1].shape[-1])
+            times, states = jumps[0].repeat(2), jumps[1].reshape(-1, jumps[1].shape[-1])
             t, shows = np.concatenate([times, t]), np.empty(len(times), dtype=bool)
-            shows[:], order, once = shows_jumps, t.argsort(kind="stable"), np.ones(len(t), dtype=bool)
+            shows[:], order, once = shows_jumps, t.argsort(kind="stable"), np.empty(len(t), dtype=bool)
             t, y, shown = t[order], np.concatenate([states, y])[order], np.concatenate([shows, shown])[order]
-            once[2:] = t[2:] != t[:-2]  # an output at a jump is that after it
+            once[:2], once[2:] = True, t[2:] != t[:-2]  # an output at a jump is that after it
             t, y, shown = t[once], y[once], shown[once]
             self._jumps.append(jumps[0])
         if not len(t):
@@ -378,7 +378,7 @@ class Recorder:
         crossings = tuple(one for one in self.singular_crossings if one.path is None or one.time <= time[-1])
         starts = np.zeros(1, dtype=int)
         if self._jumps:
-            starts = np.append(starts, np.searchsorted(time, np.concatenate(self._jumps)) + 1)
+            starts = np.concatenate([starts, time.searchsorted(np.concatenate(self._jumps)) + 1])
             starts = starts[starts < len(time)]
         lost = None if self.loss_until is None else self.loss_until(time)
         rest = crossings, starts, tuple(self._changes), lost, rests, self._plan_at, self.pieces

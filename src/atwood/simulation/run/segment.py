@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cache, partial
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,7 +37,7 @@ from atwood.simulation.events.time_events import MOMENT, Schedule
 from atwood.simulation.problem.explicit_scene import project_quickly
 from atwood.simulation.problem.preparation import pack_state
 from atwood.simulation.problem.problem import SceneProblem
-from atwood.simulation.problem.projection import project_safely
+from atwood.simulation.problem.projection import once, project_safely
 from atwood.simulation.run.choice import dead_centre, stiffness_of, turned_stiff
 from atwood.simulation.run.recorder import Recorder
 from atwood.simulation.run.run_record import Outcome, Segment
@@ -431,7 +431,8 @@ class _Runner:
     def _shows(self, jumps: _Jumps) -> NDArray[np.bool_]:
         """Return whether states before and after jumps are outputs: those before time events are none."""
         is_any = isinstance(self.segment.options.outputs, (int, np.integer))  # or just the times that were asked for
-        times, shows = jumps[0], np.full((len(jumps[0]), 2), is_any)
+        times, shows = jumps[0], np.empty((len(jumps[0]), 2), dtype=bool)
+        shows[:] = is_any
         if self.pieces is not None:
             for i in np.flatnonzero(np.isin(times, self.pieces.times)).tolist():
                 shows[i] = False, self.segment.samples.shows(float(times[i]))
@@ -480,18 +481,18 @@ class _Runner:
         """Take up the changes of a set of contacts, and go on with the last of them."""
         from atwood.simulation.contacts.compiled import held_after, noted_sets, told_sets
 
-        segment, assembly, options = self.segment, self.segment.plan.assembly, self.segment.options
-        changes = cache(partial(told_sets, log, assembly))
+        segment, assembly = self.segment, self.segment.plan.assembly
+        changes = once(partial(told_sets, log, assembly))
         self.noted.append(noted_sets(log, assembly, changes))
         self.recorder.take_changes(changes)
         self.recorder.nearest = None  # it takes states onto what holds now
-        [last] = log.last.changes()
+        [last] = log.changes(-1)
         held = held_after(last, assembly)
         if self.pieces is not None:
             assembly = self.pieces.applied(assembly, self.pieces.piece(last.time))
         plan = segment.plan.in_piece(kept_touching(assembly.with_held(held)))
         q, u = plan.program.split(last.states[1])
-        probe = EventProbe(plan, last.time, q, u, options.relative_tolerance, options.conditions)
+        probe = segment.probe.at(plan, last.time, q, u)
         self.segment, self.began = replace(segment, plan=plan, probe=probe), last.time
 
     def _sample_watched(self, session: Session, done: int) -> tuple[int, StepResult | None]:
