@@ -47,6 +47,7 @@ class without_collection:
     look through it. That takes the counts of the collector back to zero: every tenth time all is looked through, or
     cycles of who runs one scene after another would never be.
     """
+
     __slots__ = ("_was_enabled",)
 
     def __enter__(self) -> None:

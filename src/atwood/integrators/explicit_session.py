@@ -133,12 +133,20 @@ class ExplicitSession(SteppingSession):
     @property
     def handed_on(self) -> tuple[int, ...]:
         """What a start from here is to know of the events; see `EventLocator.handed_on`."""
-        if self._stepper.waits and self._compiled is not None:
+        if self._is_waiting:
+            assert self._compiled is not None
             return self._compiled.handed_on(self._here[0], self._compiled.found(FOUND))
         return super().handed_on
 
+    @property
+    def _is_waiting(self) -> bool:
+        """Whether an event is located that nobody has seen to yet."""
+        return self._compiled is not None and self._stepper.waits
+
     def _find_root(self, t_out: float = inf) -> Root | None:
         """Return the first root in the part of the last step that has not been handed out; jumps before are made."""
+        if self._locator is None:
+            return None
         located = self._compiled
         while located is not None and self._stepper.waits:
             if t_out < located.last:
@@ -307,7 +315,7 @@ class ExplicitSession(SteppingSession):
 
         def fill() -> None:
             nonlocal filled
-            while filled < len(times) and (self._stepper.waits or self._find_root() is None):
+            while filled < len(times) and (self._is_waiting or self._find_root() is None):
                 is_ahead = times[-1] > self._newest[0]
                 if is_ahead and self._limit() is not None:
                     break

@@ -275,12 +275,17 @@ class Statistics:
     convergence_failures: int | None = None
 
     def __add__(self, other: Statistics) -> Statistics:
+        if self is NOTHING:
+            return other
         both = zip(_COUNTED(self), _COUNTED(other), strict=True)
         sums: list[Any] = [None if a is None or b is None else a + b for a, b in both]
         return Statistics(*sums)
 
 
 _COUNTED = attrgetter(*Statistics.__annotations__)
+
+NOTHING = Statistics(error_test_failures=0, convergence_failures=0)
+"""What has cost nothing so far."""
 
 
 def choose_linear_solver(problem: ImplicitProblem, options: SolverOptions, has_fixed: bool = False) -> LinearSolver:

@@ -287,7 +287,7 @@ class SetJumps(SetSolver, Jumps):
             "log": self._stride * self._room,
         }
         super().__init__(code, pattern, units, count, more)
-        self._keeps = events, rates
+        self._keeps: tuple[object, ...] = events, rates
         self._pieces["places"][:] = places.ravel()
         self._put(
             "own", {"events": events.count, "size": own, "stride": self._stride, "capacity": self._room, "stays": stays}

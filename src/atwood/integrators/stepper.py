@@ -41,6 +41,9 @@ class Outcome(IntEnum):
     NOTICED = 5
 
 
+_OUTCOMES = {int(one): one for one in Outcome}
+
+
 @dataclass
 class Counts:
     """What a stepper has done.
@@ -431,7 +434,7 @@ class NativeStepper(Stepper):
             filled += self._count("filled")
         if code == _NO_VALUE:
             raise self._no_interpolation(float(times[filled]))
-        return y[:filled], yp[:filled], Outcome(code)
+        return y[:filled], yp[:filled], _OUTCOMES[code]
 
     def interpolation(self) -> tuple[int, int] | None:
         """Return the addresses of the function that reads the last step, and of its session."""

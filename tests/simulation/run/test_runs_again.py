@@ -10,16 +10,27 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from tests.calls import calls
 
 from atwood import Model, Result, assemble, simulate
 from atwood.forms.assembly import Assembly
-from atwood_library.scenes import CartPole, DoublePendulum, FourBar, SliderCrank
+from atwood_library.scenes import (
+    BouncingBall,
+    CartPole,
+    DoublePendulum,
+    FourBar,
+    SimplePendulum,
+    SliderCrank,
+    StickSlip,
+)
 
 SCENES: dict[str, tuple[type[Model], str, tuple[float, float, float], str]] = {
     "double-pendulum": (DoublePendulum, "mass2", (1.0, 2.0, 0.5), "rod1.angle"),
     "four-bar": (FourBar, "coupler_length", (2.5, 2.45, 2.55), "crank.angle"),
     "slider-crank": (SliderCrank, "rod_length", (1.5, 1.4, 1.2), "crank.angle"),
     "cart-pole": (CartPole, "lean", (0.2, 0.1, 0.15), "hinge.angle"),
+    "stick-slip": (StickSlip, "friction", (0.4, 0.3, 0.5), "body.position.x"),
+    "bouncing-ball": (BouncingBall, "height", (0.3, 0.2, 0.4), "ball.position.z"),
 }
 """Each with a parameter, three of its values, and a quantity to compare."""
 
@@ -34,6 +45,8 @@ OPTIONS: tuple[dict[str, Any], ...] = (
     {"atol": 1e-4},
     {"samples": 50},
     {"outputs": [0.0, 0.1, 0.3]},
+    {"outputs": [0.0, 0.2, 0.3]},
+    {"first_step": 1e-4},
 )
 
 
@@ -99,3 +112,19 @@ def test_runs_of_several_scenes_at_the_same_time() -> None:
         found = list(pool.map(lambda k: ran(made[k % 4][0], {})[made[k % 4][1]], range(16)))
     for k, values in enumerate(found):
         assert_array_equal(values, expected[k % 4])
+
+
+@pytest.mark.parametrize(
+    ("make", "options", "most"),
+    [(SimplePendulum, {"t_end": 2.0}, 320), (StickSlip, {"t_end": 3.0, "rtol": 1e-10}, 470)],
+    ids=["pendulum", "stick-slip"],
+)
+def test_a_run_again_makes_few_calls_whatever_happens_in_it(
+    make: type[Model], options: dict[str, Any], most: int
+) -> None:
+    assembly = assemble(make())
+    for _ in range(30):  # classes have their constructors, and what pays is compiled
+        simulate(assembly, **options)
+    with calls() as made:
+        simulate(assembly, **options)
+    assert made.count < most

@@ -4,13 +4,20 @@ from __future__ import annotations
 
 from atwood.errors import UnsupportedError
 from atwood.forms.assembly import Assembly
+from atwood.forms.caches import Key
 from atwood.integrators.methods import MOREAU, advise
 from atwood.model.declare.contact_group import ContactGroup
+
+_GROUPS: Key[list[str]] = Key("groups of bodies of which any two may touch")
 
 
 def groups_of(assembly: Assembly) -> list[str]:
     """Return the paths of the groups of bodies in a scene."""
-    return [path for path, part in assembly.flat.parts.items() if isinstance(part.component, ContactGroup)]
+
+    def find() -> list[str]:
+        return [path for path, part in assembly.flat.parts.items() if isinstance(part.component, ContactGroup)]
+
+    return assembly.shared.get(_GROUPS, find)
 
 
 def refuse_groups(assembly: Assembly) -> None:

@@ -17,7 +17,7 @@ from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key, Shared, without_collection
 from atwood.forms.loose import has_touched, is_loose, kept_touching
-from atwood.integrators.protocol import Statistics
+from atwood.integrators.protocol import NOTHING
 from atwood.lazy_dataclasses import replace
 from atwood.mechanics.outputs.event_functions import CONTACT, UPDATE
 from atwood.simulation.dynamics.numerical_failure import is_numerical, named, numerical_failure
@@ -188,7 +188,7 @@ class Walk:
         self.segments: list[Stretch] = []
         self.events: list[EventRecord | ToldLater] = []
         self.choices: list[Choice] = []
-        self.statistics = Statistics(error_test_failures=0, convergence_failures=0)
+        self.statistics = NOTHING
         self.t = self._piece_start = start.time
         self.assembly, self.q, self.u = settle(assembly, start, reassemble)
         self.held = self.assembly.held_at_start
@@ -226,7 +226,8 @@ class Walk:
         """Return a run that is as ready to go as this one, which has gone nowhere; it takes the sessions of a scene."""
         assert self.plan is not None
         assert self.probe is not None
-        plan, kept, made = replace(self.plan), KeptSession(assembly), object.__new__(Walk)
+        plan = replace(self.plan, _kernels=None, _seen=None, _null_space=None)
+        kept, made = KeptSession(assembly), object.__new__(Walk)
         kept.changes = self._kept.changes
         vars(made).update(
             vars(self),
@@ -602,7 +603,8 @@ class Walk:
         """Return a scene with the relations of functions of time that hold in the present piece of the run."""
         schedule = self._schedule(assembly)
         found = schedule.applied(assembly, schedule.piece(self._piece_start))
-        return found.with_held_of(self.assembly) if self.held else found
+        is_it = found is self.assembly and found.held is not None
+        return found.with_held_of(self.assembly) if self.held and not is_it else found
 
     @property
     def _piece(self) -> tuple[tuple[float, ...], tuple[float, ...] | None]:

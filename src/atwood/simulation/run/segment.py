@@ -17,7 +17,7 @@ from atwood.errors import AtwoodError, SolveError, StartError
 from atwood.forms.loose import kept_touching
 from atwood.integrators.explicit_session import ExplicitSession
 from atwood.integrators.methods import AUTO, Method
-from atwood.integrators.protocol import Budget, Statistics, Status, StepResult
+from atwood.integrators.protocol import NOTHING, Budget, Statistics, Status, StepResult
 from atwood.integrators.session import Session
 from atwood.lazy_dataclasses import replace
 from atwood.mechanics.outputs.event_functions import CONTACT
@@ -31,7 +31,7 @@ from atwood.simulation.dynamics.orientation_coordinates import (
     COORDINATE_SWITCH,
 )
 from atwood.simulation.dynamics.redundancy import RankFinding
-from atwood.simulation.events.modes import EventProbe, EventRecord, ToldLater, seen_late, without_margin
+from atwood.simulation.events.modes import EventRecord, ToldLater, seen_late, without_margin
 from atwood.simulation.events.sides import SIDE
 from atwood.simulation.events.time_events import MOMENT, Schedule
 from atwood.simulation.problem.explicit_scene import project_quickly
@@ -129,7 +129,7 @@ class _Runner:
     def __init__(self, segment: Segment, recorder: Recorder) -> None:
         self.segment, self.recorder = segment, recorder
         self.choices = [segment.choice]
-        self.before = Statistics(error_test_failures=0, convergence_failures=0)
+        self.before = NOTHING
         self.session: Session | None = None
         self.monitor: SingularityMonitor | None = None
         self.request: SolverRequest | None = None
@@ -194,7 +194,7 @@ class _Runner:
     def _pass_moments(self, session: Session, y: FloatArray) -> Outcome | None:
         """Go on through the moments ahead; None where the session has begun anew, or there are none to pass."""
         segment = self.segment
-        if segment.ahead is None or self.monitor is not None or len(segment.probe.directions):
+        if segment.ahead is None or self.monitor is not None or segment.probe.event_functions:
             return None
         filling = segment.kept.filling_of(session)
         if filling is None:
