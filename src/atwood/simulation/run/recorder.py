@@ -260,9 +260,11 @@ class Recorder:
             times, states = jumps[0].repeat(2), jumps[1].reshape(-1, jumps[1].shape[-1])
             t, shows = np.concatenate([times, t]), np.empty(len(times), dtype=bool)
             shows[:], order, once = shows_jumps, t.argsort(kind="stable"), np.empty(len(t), dtype=bool)
-            t, y, shown = t[order], np.concatenate([states, y])[order], np.concatenate([shows, shown])[order]
+            t = t[order]
             once[:2], once[2:] = True, t[2:] != t[:-2]  # an output at a jump is that after it
-            t, y, shown = t[once], y[once], shown[once]
+            if not once.all():
+                t, order = t[once], order[once]
+            y, shown = np.concatenate([states, y])[order], np.concatenate([shows, shown])[order]
             self._jumps.append(jumps[0])
         if not len(t):
             return

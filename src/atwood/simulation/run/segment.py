@@ -235,7 +235,7 @@ class _Runner:
             self._cost(),
             tuple(self.choices),
             noted=tuple(self.noted),
-            handed=self._handed_on(),
+            handed=self._handed_on() if t < self.segment.options.t_end else (),
             held=self.segment.plan.assembly.held,
             begun=None if self.pieces is None else self.began,
         )
