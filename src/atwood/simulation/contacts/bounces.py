@@ -6,22 +6,27 @@ They are those of `atwood.simulation.contacts.changes`, which sees to all others
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TypeAlias
 
 import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.codegen.sundials.events import EventData
+from atwood.forms.caches import Key
 from atwood.forms.loose import is_loose
 from atwood.integrators.jumps import JumpLog, Jumps
 from atwood.integrators.protocol import CompiledRates
 from atwood.mechanics.dynamics.equations import ContactRow
-from atwood.mechanics.outputs.event_functions import CLOSES
+from atwood.mechanics.outputs.event_functions import CLOSES, EventFunction
 from atwood.model.values.units import ALONG
 from atwood.simulation.contacts.changes import NEAR, longest_left
 from atwood.simulation.contacts.event_records import told_impact
 from atwood.simulation.events.modes import LAST, EventProbe, EventRecord, ToldLater
 from atwood.simulation.problem.explicit_scene import impact_code, values_on_constraints
 from atwood.simulation.problem.problem import SceneProblem
+
+_Table: TypeAlias = tuple[FloatArray, dict[str, int], list[int]]
+_TABLE: Key[_Table] = Key("events of gaps for impacts in steps")
 
 
 def _gaps(plan: SceneProblem) -> list[ContactRow]:
@@ -60,21 +65,24 @@ def bounces_of(
 def fill_bounces(
     jumps: Jumps, plan: SceneProblem, probe: EventProbe, relative: float, impacts: Sequence[tuple[float, str]]
 ) -> None:
-    """Give the impacts of a session other parameters, and the times and parts of the impacts before.
+    """Give the impacts of a session other parameters, and the times and parts of the impacts before."""
+    scales, functions = plan.scales, probe.event_functions
+    about = functions, scales, relative
+    table, numbers, parts = plan.assembly.kept.get(_TABLE, lambda: _table(plan, functions, relative), *about)
+    past = [(time, numbers[part]) for time, part in impacts if part in numbers]
+    jumps.fill(values_on_constraints(plan), table, parts, max(longest_left(relative, scales)), past)
 
-    Events of gaps that are not plain have no row.
-    """
+
+def _table(plan: SceneProblem, functions: Sequence[EventFunction], relative: float) -> _Table:
+    """Return what is known of each event, whose gap has no row if it is not plain, and the numbers of parts."""
     gaps, plain, scales = _gaps(plan), _plain(plan), plan.scales
     near = NEAR * max(relative, 1e-13)
     small = [near * scales.of(ALONG[one.law.options.unit]) for one in gaps]
     size = {one.row.key[:2]: each for one, each in zip(gaps, small, strict=True)}
-    watched = [(one.part, one.law) for one in probe.event_functions]
+    watched = [(one.part, one.law) for one in functions]
     rows, sizes = [plain.get(one, -1) for one in watched], np.array([size[one] for one in watched])
     parts = {part: i for i, part in enumerate(dict.fromkeys(one.row.key[0] for one in gaps))}
-    past = [(time, parts[part]) for time, part in impacts if part in parts]
-    table = np.array([rows, sizes, sizes / scales.time])
-    left = max(longest_left(relative, scales))
-    jumps.fill(values_on_constraints(plan), table, [parts[one.row.key[0]] for one in gaps], left, past)
+    return np.array([rows, sizes, sizes / scales.time]), parts, [parts[one.row.key[0]] for one in gaps]
 
 
 def noted_bounces(log: JumpLog, plan: SceneProblem, probe: EventProbe) -> ToldLater:
