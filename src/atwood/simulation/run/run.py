@@ -136,8 +136,9 @@ def _prepared(
     with named(walk.assembly, walk.t, walk.q, walk.u):
         walk.prepare()
     if is_plain and walk.can_be_renewed:
+        unwatched = replace(options, progress=None, on_step=None)  # whoever watches is not kept
         assembly.kept.take(_READY)
-        assembly.kept.get(_READY, lambda: (about, walk.renewed(None, start, options, again, [])))
+        assembly.kept.get(_READY, lambda: (about, walk.renewed(None, start, unwatched, again, [])))
     return walk
 
 
