@@ -17,7 +17,7 @@ from atwood.errors import SolveError
 from atwood.forms.quantities import observer
 from atwood.integrators.ida import library as sundials_library
 from atwood.result.about import describe_run
-from atwood.simulation.singular.arc_routine import Sweep
+from atwood.simulation.singular.arc_routine import Sweeps
 from atwood.simulation.singular.collocation import find_arc
 from atwood_library.scenes import Bricard, FourBar, FourBarRow, RollingDisc, SimplePendulum, SliderCrank
 
@@ -450,13 +450,13 @@ def test_an_arc_is_the_motion_to_rounding(form: str) -> None:
 def test_arcs_of_machine_code_are_those_of_numpy(scene: Any, form: str, monkeypatch: pytest.MonkeyPatch) -> None:
     prepared = prepare(scene, form)
     plan, swept = prepared.plan, [0]
-    sweep = Sweep.__call__
+    sweep = Sweeps.__call__
 
-    def counted(self: Sweep) -> int:
+    def counted(self: Sweeps) -> int:
         swept[0] += 1
         return sweep(self)
 
-    monkeypatch.setattr(Sweep, "__call__", counted)
+    monkeypatch.setattr(Sweeps, "__call__", counted)
     found = []
     for plan.has_rates in (False, True):
         before = swept[0]

@@ -411,6 +411,9 @@ class StepMonitor:
         Told for how long, in seconds, steps have been taken, or 0 at a start: what is faster may take its place.
     keep
         Whatever must live as long as the addresses are used.
+    watch, watch_data, behind
+        The addresses of a function like `look` and of its data, which may pass what was seen, and says so by `CROSSED`;
+        and that of the times from which on and until when it did, before the values with which steps go on behind.
     """
 
     drive: int
@@ -423,6 +426,13 @@ class StepMonitor:
     look: int = 0
     spend: Callable[[float], None] | None = None
     keep: object = None
+    watch: int = 0
+    watch_data: int = 0
+    behind: int = 0
+
+
+CROSSED = 3
+"""What a look returns where steps are to go on behind what was seen; see `StepMonitor`."""
 
 
 @dataclass(frozen=True, eq=False)

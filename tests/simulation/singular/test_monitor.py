@@ -13,7 +13,7 @@ from atwood import simulate
 from atwood.integrators.protocol import Status
 from atwood.simulation.singular import branches as ways, monitor as module
 from atwood.simulation.singular.branches import Sample
-from atwood.simulation.singular.crossing import SingularCrossing
+from atwood.simulation.singular.crossing import SingularCrossing, labels_of
 from atwood.simulation.singular.monitor import SingularityMonitor, singularity_monitor_of
 from atwood_library.scenes import DoublePendulum, FourBar, FourBarRow
 
@@ -292,7 +292,7 @@ def test_what_is_said_of_constraints_names_each_part_once() -> None:
     one = given([1.0])
     made = [SimpleNamespace(label=f"c{k}", key=(part, "pin", k)) for k, part in enumerate(("a", "a", "b"))]
     one.plan.assembly = SimpleNamespace(own_equations=SimpleNamespace(constraints=made))
-    assert one._labels_of((2, 0, 1)) == (("c2", "c0", "c1"), ("b", "a"))
+    assert labels_of(one.plan, (2, 0, 1)) == (("c2", "c0", "c1"), ("b", "a"))
 
 
 def test_a_failure_is_explained_only_where_it_was_at_a_singular_position() -> None:
@@ -311,7 +311,8 @@ def test_a_failure_is_explained_only_where_it_was_at_a_singular_position() -> No
 @pytest.mark.parametrize("solver", ["auto", "ida"])
 def test_no_output_is_lost_where_a_way_begins_with_half_of_it(solver: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where arcs are to be more accurate, the first covers half of the way: a way began behind outputs to come."""
-    monkeypatch.setattr(ways, "_ACCURATE", 1e-11)
+    monkeypatch.setattr(module, "ACCURATE", 1e-11)
+    monkeypatch.setattr(ways, "ACCURATE", 1e-11)
     result = simulate(FourBarRow(), form="dae", rtol=1e-11, outputs=2001, t_end=0.9, solver=solver)
     assert [len(one.path.arcs) > 1 for one in result.singular_crossings if one.path] == [True]
     assert len(result.time) == 2001

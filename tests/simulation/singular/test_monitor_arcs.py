@@ -234,8 +234,8 @@ def past(monkeypatch: pytest.MonkeyPatch, follows: bool) -> tuple[SingularityMon
 
     monkeypatch.setattr(module, "follow", follow)
     monkeypatch.setattr(module, "nearly_lost", lambda measure, near, q: int(q[0]))
+    monkeypatch.setattr(module, "labels_of", lambda plan, lost: ((f"c{lost[0]}",), ("part",)))
     one = measured(moving([0.0, 1.0, 2.0]), 6.25)
-    one._labels_of = lambda lost: ((f"c{lost[0]}",), ("part",))  # type: ignore[method-assign]
     return one, asked
 
 

@@ -20,6 +20,7 @@ from atwood.codegen.routines import (
     INTEGER,
     NUMBER,
     Lanes,
+    Operand,
     Record,
     Routine,
     Value,
@@ -41,10 +42,23 @@ AHEAD = -0.8, 1.6, 13
 """A position is looked for from so far behind to so far ahead of the last look, in strides between looks, at so many
 points: what is just ahead lies between two of them."""
 
+CLEAR, _BETWEEN = 0.075, 5
+"""Nothing is found between the first two looks where at places in so many parts of the way no less than this share of
+the largest measure is left: a position, or rest at one, is looked for where less than two thirds of it are."""
+
+HEADS = 2.0
+"""It is looked ahead where the measure would be zero in so many strides at the rate at which it has fallen."""
+
+COMES = 2
+"""What is returned where nothing is to be found but a position just ahead, at the time `near`; else 1, or 0."""
+
 UNEVEN = 0.5
 """By so large a share steps on both sides of a zero may differ."""
 
 _ROUNDED, _NOTHING = 1e-16, 1e-290
+
+_NEWTON, _NEAR = 16, 1e-9
+"""So many steps at most lead from below, up to one so small that the next is rounding, relative to the square."""
 
 _PLACES, _SECTIONS = 8, 20
 """At so many places eigenvalues are counted at once, so often at most: the last interval is as long as rounding."""
@@ -52,7 +66,8 @@ _PLACES, _SECTIONS = 8, 20
 
 def write_measures(opened: Opened) -> list[Routine]:
     """Write what measures states, and what judges looks by it."""
-    return [_smallest(), _measure(opened), _measures(opened), _judge(opened)]
+    routines = (_measure, _measures, _between, _judge, _heads)
+    return [_smallest(), *(write(opened) for write in routines)]
 
 
 def _smallest() -> Routine:
@@ -110,9 +125,34 @@ def _reflect(r: Routine, place: Value, count: Value, stride: Value | int) -> tup
     return square.now - first * left, square.now
 
 
+def _from_below(r: Routine, squares: Value, rows: Value) -> Value:
+    """Write what returns the smallest singular value where Newton's method finds it, else return what it is not below.
+
+    From zero it comes nearer to the least eigenvalue and never beyond; the quotients of the shifted factors know small
+    ones to rounding (I. Dhillon and B. Parlett, *Multiple representations to compute orthogonal eigenvectors of
+    symmetric tridiagonal matrices*, Linear Algebra Appl. 387, 2004).
+    """
+    shift = r.variable(0.0)
+    with r.count(_NEWTON):
+        s, slope, total, least = r.variable(0.0 - shift.now), r.variable(-1.0), r.variable(0.0), r.variable(inf)
+        with r.count(rows) as k:
+            q = squares[k * 2]
+            pivot = q + s.now
+            share = squares[k * 2 + 1] / pivot
+            least.now = r.least(pivot, least.now)
+            total.now = total.now - slope.now / pivot
+            slope.now, s.now = share * (q / pivot) * slope.now - 1.0, s.now * share - shift.now
+        step = 1.0 / total.now
+        with r.when((least.now > 0.0) & (step > 0.0)):
+            shift.now = shift.now + step
+            with r.when(step <= _NEAR * shift.now):
+                r.give(r.sqrt(shift.now))
+    return r.sqrt(shift.now) * (1.0 - 1e-9)
+
+
 def _least_of(r: Routine, squares: Value, rows: Value) -> Value:
     """Write the smallest singular value from the squares of both diagonals in turn, by counts at several places."""
-    low, high, before = r.variable(0.0), r.variable(inf), r.variable(0.0)
+    low, high, before = r.variable(_from_below(r, squares, rows)), r.variable(inf), r.variable(0.0)
     with r.count(rows) as k:
         high.now = r.least(r.sqrt(squares[k * 2] + before.now), high.now)
         before.now = squares[k * 2 + 1]
@@ -139,7 +179,7 @@ def _least_of(r: Routine, squares: Value, rows: Value) -> Value:
 
 def _measure(opened: Opened) -> Routine:
     """Write the measure of coordinates at a time."""
-    r = Routine("measure", {"t": NUMBER, "q": ADDRESS, "data": ADDRESS}, NUMBER)
+    r = Routine("measure", {"t": NUMBER, "q": ADDRESS, "data": ADDRESS}, NUMBER, exported=True)
     t, q, given = r.arguments
     data, state, shape = opened(given)
     work, count = data["work"], data["kept"].read(0, INTEGER)
@@ -258,6 +298,10 @@ def _judge(opened: Opened) -> Routine:
             behind.now = notes[(i + 1) * shape.note + shape.measured]
         away, fallen = note[shape.measured], largest.now * FALLEN
         is_least = away <= r.least(r.least(before.now, behind.now), largest.now * LOW)
+        with r.when(is_least & (i == 0)):  # as behind a position that was passed
+            left = r.least(r.call("between", given, result=NUMBER), away)
+            behind.now = r.choose(left > largest.now * CLEAR, -inf, behind.now)
+        is_least = is_least & (away <= behind.now)
         falls = (away <= fallen) & (fallen < before.now) & (before.now < inf)
         asks.now = asks.now | ((note[0] > state.judged) & (is_least | falls))
     with r.when(asks.now):
@@ -271,8 +315,56 @@ def _judge(opened: Opened) -> Routine:
     return r
 
 
+def _between(opened: Opened) -> Routine:
+    """Return the least measure from the first look to the second, on the cubic through both with their rates."""
+    r = Routine("between", {"data": ADDRESS}, NUMBER)
+    given = r.arguments[0]
+    data, state, shape = opened(given)
+    one, least = data["notes"], r.variable(inf)
+    other, q = one.at(shape.note), data["ahead"]
+    with r.when(state.count >= 2.0), r.count(_BETWEEN, 1) as k:
+        h, s = other[0] - one[0], k.number() / _BETWEEN
+        write_cubic(r, q, (one.at(1), other.at(1)), (shape.size, shape.coordinates), (h, s))
+        away = r.call("measure", one[0] + s * h, q, given, result=NUMBER)
+        least.now = r.choose(away >= least.now, least.now, away)
+    r.give(least.now)
+    return r
+
+
+def write_cubic(
+    r: Routine, target: Value, ends: tuple[Value, Value], of: tuple[Operand, Operand], at: tuple[Value, Value]
+) -> None:
+    """Write the cubic through two noted states with their rates, which lie so far behind these: so many numbers.
+
+    `at` are the time between both, and the share of it.
+    """
+    (one, other), (rates, count), (h, s) = ends, of, at
+    with r.count(count) as j:
+        a, b, v, w = one[j], other[j], one[j + rates] * h, other[j + rates] * h
+        rise = b - a
+        target[j] = a + s * (v + s * (3.0 * rise - 2.0 * v - w + s * (v + w - 2.0 * rise)))
+
+
+def _heads(opened: Opened) -> Routine:
+    """Write the function that tells whether the measure falls as towards a position that is soon there."""
+    r = Routine("heads", {"data": ADDRESS})
+    given = r.arguments[0]
+    data, state, shape = opened(given)
+    count = r.truncated(state.count)
+    with r.when(count < 2):
+        r.give(0)
+    one, other = (data["notes"].at((count - k) * shape.note) for k in (2, 1))
+    for note in (one, other):
+        with r.when(note[shape.measured] < 0.0):
+            note[shape.measured] = r.call("measure", note[0], note.at(1), given, result=NUMBER)
+    before, away = one[shape.measured], other[shape.measured]
+    fall = (before - away) * (HEADS * state.stride / (other[0] - one[0]))
+    r.give(((fall > 0.0) & (away <= fall)).code())
+    return r
+
+
 def _look_ahead(r: Routine, of: tuple[dict[str, Value], Record, Value], shape: Record, note: Value) -> None:
-    """Write what returns 1 where the measure falls to zero at an even rate just ahead of a look, and rises again."""
+    """Write what tells whether the measure falls to zero at an even rate just ahead of a look, and rises again."""
     data, state, given = of
     begin, end, points = AHEAD
     stride, now, rates = state.stride, note[0], note.at(shape.size + shape.coordinates + 1)
@@ -294,4 +386,8 @@ def _look_ahead(r: Routine, of: tuple[dict[str, Value], Record, Value], shape: R
     one, here, other = (away[least.now + k] for k in (-1, 0, 1))
     higher, lower = r.most(one, other), r.least(one, other)
     uneven = r.size((higher - here) - (here + lower))
-    r.give((uneven < UNEVEN * (higher - here)).code())
+    with r.when(~(uneven < UNEVEN * (higher - here))):
+        r.give(0)
+    share = r.choose(one > other, here, 0.0 - here) / (here + lower)
+    state.near = now + stride * (begin + (least.now.number() + share) * ((end - begin) / (points - 1)))
+    r.give(COMES)

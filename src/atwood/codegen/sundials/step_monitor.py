@@ -92,8 +92,9 @@ class MonitorCode:
         ``IDAGetNumSteps``. It returns `NOTICED`, or IDA's flag.
     fill
         See `~atwood.integrators.protocol.StepMonitor`. It returns the same, or `PAUSED` or `UNREADABLE`.
-    look_address
-        Address of the function that takes one look; see the same.
+    look_address, judge_address, measure_address
+        Addresses of the functions that take one look, see the same, that judge looks, ``int (data, long at_end)``, and
+        of ``double (double t, double *q, data)``: the measure of a state.
     """
 
     def __init__(self, program: Program, shape: Shape, lists: dict[str, NDArray[np.int64]], tiers: Tiers) -> None:
@@ -101,8 +102,9 @@ class MonitorCode:
         self._lists, self._keep = lists, built
         self.drive, self.fill = (built.code.addresses[name] for name in ("drive", "fill"))
         self.look_address = built.code.addresses["look"]
-        self.look = _LOOK(self.look_address)
-        self.judge, self.measures = _JUDGE(built.code.addresses["judge"]), _MEASURES(built.code.addresses["measures"])
+        self.look, self.measure_address = _LOOK(self.look_address), built.code.addresses["measure"]
+        self.judge_address = built.code.addresses["judge"]
+        self.judge, self.measures = _JUDGE(self.judge_address), _MEASURES(built.code.addresses["measures"])
 
     def bind(
         self, parameter_values: ArrayLike, sizes: ArrayLike, kept: Sequence[int], rate: LookRate, is_small: bool
@@ -223,9 +225,22 @@ class MonitorData:
         """From here on tell by itself what need not be looked at; not before a time."""
         self._state[[AT["judges"], AT["start"], AT["judged"]]] = 1.0, start, -np.inf
 
+    def take_judged(self, until: float) -> None:
+        """Learn up to when looks have been judged."""
+        self._state[AT["judged"]] = until
+
+    def pass_in_steps(self) -> None:
+        """Look for positions just ahead whenever something is low, since steps are to pass these by themselves."""
+        self._state[AT["passes"]] = 1.0
+
+    @property
+    def judges(self) -> bool:
+        """Whether it tells by itself what need not be looked at."""
+        return bool(self._state[AT["judges"]])
+
     def finds_at_end(self) -> bool:
         """Return whether there may be something to find at the looks noted, the last of a motion among them."""
-        return not self._state[AT["judges"]] or self.code.judge(self.address, 1) != 0
+        return not self.judges or self.code.judge(self.address, 1) != 0
 
     @property
     def largest(self) -> float:
@@ -299,7 +314,7 @@ def compile_monitor(program: Program, speeds: int, size: int, places: tuple[Arra
 @once
 def _routines() -> Built:
     """Return the code that looks at a motion, whatever moves."""
-    exports = ("look", "drive", "fill", "judge", "measures")
+    exports = ("look", "drive", "fill", "judge", "measure", "measures")
     return build_code([], CodeOptions(level=2), exports=exports, routines=RoutineSource(_MODULE, _FILES, (True,)))
 
 
@@ -341,7 +356,7 @@ LISTS = ("kept", "row", "column", "one", "other", "product")
 SHARED = ("derived", "sizes", "right", *LISTS)
 FIELDS = (*_ARRAYS, *LISTS, "notes", "best", "state")
 STATE: tuple[str, ...] = ("next", "count", "is_low", "falls", "later", "move", "whole", "idle", "low", "worn", "best")
-STATE += ("is_small", "judges", "judged", "start", "largest", "stride")
+STATE += ("is_small", "judges", "judged", "start", "largest", "stride", "near", "passes")
 SIZES = ("coordinates", "speeds", "size", "conditions", "slopes", "products", "note", "measured", "held")
 """Behind the addresses of the arrays: how many there are of each, see `Shape`, and the address of the conditions."""
 
@@ -383,7 +398,7 @@ def write_routines(looks: bool) -> list[Routine]:
 
     The last alone where nobody looks; its data are then the length of y.
     """
-    return [*write_measures(_opened), _look(), _drive(), _fill(True)] if looks else [_fill(False)]
+    return [*write_measures(opened), _look(), _drive(), _fill(True)] if looks else [_fill(False)]
 
 
 @once
@@ -392,7 +407,7 @@ def table_filler() -> Built:
     return build_code([], CodeOptions(level=2), exports=["fill"], routines=RoutineSource(_MODULE, _FILES, (False,)))
 
 
-def _opened(given: Value) -> tuple[dict[str, Value], Record, Record]:
+def opened(given: Value) -> tuple[dict[str, Value], Record, Record]:
     """Return the arrays, the state and the sizes of a monitor from the address of its data."""
     data = {name: given.read(k, ADDRESS) for k, name in enumerate(FIELDS)}
     kinds = dict.fromkeys(SIZES, INTEGER) | {"held": ADDRESS}
@@ -403,7 +418,7 @@ def _look() -> Routine:
     """Write the function that notes a state, and returns whether somebody should look at what was noted."""
     r = Routine("look", {"t": NUMBER, "y": ADDRESS, "yp": ADDRESS, "data": ADDRESS}, exported=True)
     t, y, yp, given = r.arguments
-    data, state, shape = _opened(given)
+    data, state, shape = opened(given)
     outputs = [data["values"], data["slopes"], data["drifts"]]  # what is not finite there shows in what follows
     call_kernel(r, shape.held, [place_of(r, t), y, y.at(shape.coordinates)], data["derived"], data["scratch"], outputs)
     count = r.truncated(state.count)
@@ -422,7 +437,8 @@ def _look() -> Routine:
     later = r.choose(is_low, 0.0, state.later + had)
     noted = count + 1
     is_full = noted >= CAPACITY
-    begins = is_low & (state.falls == 0.0)
+    passes = state.judges * state.passes != 0.0
+    begins = is_low & (state.falls == 0.0) & ~passes
     asks = ((is_full | (later >= _LATER)) & (has != 0.0)) | is_worn | begins
     state.is_low, state.later, state.falls = has, later, r.choose(is_low, 1.0, 0.0)
     carries = is_full & ~asks
@@ -432,11 +448,35 @@ def _look() -> Routine:
         with r.count(shape.conditions) as i:
             data["least"][i] = np.inf
     state.count = r.choose(carries, CARRIED, noted).number()
-    with r.when(asks & (state.judges != 0.0)), r.when(r.call("judge", given, r.value(0, INTEGER)) == 0):
-        _forget(r, data, state, shape)
-        r.give(0)
+    is_asked = r.variable(asks, BOOLEAN)
+    with r.when(is_low & ~asks & passes):
+        is_asked.now = r.call("heads", given) != 0
+    asks = is_asked.now
+    with r.when(asks & (state.judges != 0.0)):
+        found = r.call("judge", given, r.value(0, INTEGER))
+        with r.when(found == 0):
+            _forget(r, data, state, shape)
+        r.give(found)
     r.give(asks.code())
     return r
+
+
+def restart_looks(
+    r: Routine, look: tuple[Value, Value], of: tuple[dict[str, Value], Record, Value], begin: tuple[Value, Value, Value]
+) -> None:
+    """Write what begins to look anew from a state, as `MonitorData.restart`, `note`, `settle` and `judge_from` do.
+
+    `look` are the addresses of the function that looks and of its data, `of` the arrays, the state and the number of
+    conditions, and `begin` time, values and rates.
+    """
+    data, state, conditions = of
+    for name in ("count", "is_low", "falls", "later", "judges"):
+        setattr(state, name, 0.0)
+    with r.count(conditions) as i:
+        data["least"][i] = data["earlier"][i] = np.inf
+    r.call(look[0], *begin, look[1])
+    r.copy(data["known"], data["pivots"], conditions)
+    state.judges, state.start, state.judged = 1.0, begin[0], -np.inf
 
 
 def _forget(r: Routine, data: dict[str, Value], state: Record, shape: Record) -> None:
@@ -593,7 +633,7 @@ def _fill(looks: bool) -> Routine:
     size: Operand = data
     state = None
     if looks:
-        _, state, shape = _opened(data)
+        _, state, shape = opened(data)
         size = shape.size
     taken = _count_steps(r, steps, memory)
     r.call(current, memory, end)

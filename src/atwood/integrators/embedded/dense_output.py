@@ -91,11 +91,11 @@ def _slope(pair: Tableau) -> Routine:
 
 
 def _interpolate(pair: Tableau) -> Routine:
-    """Write values and rates at a time within the last step."""
+    """Write values and rates at a time within the last step, or at its begin for one before that."""
     arguments = {"time": NUMBER, "y_out": ADDRESS, "yp_out": ADDRESS}
     r, m, (time, y_out, yp_out) = open_routine(pair, "interpolate", arguments, exported=True)
     for end, values, rates in ((m.t, "y", "end slope"), (m.t_old, "y_old", 0)):
-        with r.when(time == end):
+        with r.when(time == end if values == "y" else time <= end):
             r.copy(y_out, m.row(values), m.size)
             r.copy(yp_out, m.row(rates), m.size)
             r.give(0)

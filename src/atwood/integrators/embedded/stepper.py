@@ -58,7 +58,7 @@ FIELDS = fields_of(
     (
         *("function", "data", "arrays", "events", "events_data", "values", "signs"),
         *("project", "project_data", "watch", "watch_data", "due", "guard", "guard_data"),
-        *("search", "restart", "locator", "jump", "jump_data"),
+        *("search", "restart", "locator", "jump", "jump_data", "behind"),
     ),
     (
         *("t", "t_old", "h", "next", "stop", "relative", "longest", "horizon", "first", "looked", "likeness", "tried"),
@@ -66,7 +66,7 @@ FIELDS = fields_of(
     ),
     (
         *("size", "padded", "is_dense", "event_count", "watches_stiffness", "seen", "looks"),
-        *("waits", "found"),
+        *("waits", "found", "crossed"),
     ),
 )
 
@@ -238,7 +238,8 @@ class CompiledStepper(NativeStepper):
         """Let the motion be looked at, and come back with `Outcome.NOTICED` where something is seen."""
         self._monitor = monitor
         self._set(jump=0)  # what looks at the motion starts anew at each event
-        self._set(watch=monitor.look, watch_data=monitor.data, due=monitor.due_at)
+        self._set(watch=monitor.watch or monitor.look, watch_data=monitor.watch_data or monitor.data)
+        self._set(due=monitor.due_at, behind=monitor.behind)
         return True
 
     def has_noticed(self) -> bool:

@@ -16,6 +16,7 @@ from atwood.integrators.embedded.dense_output import slopes, weighted, write_den
 from atwood.integrators.embedded.stepper import open_routine
 from atwood.integrators.embedded.tableau import Tableau
 from atwood.integrators.event_location import ROUNDING
+from atwood.integrators.protocol import CROSSED
 from atwood.integrators.stepper import CALM, SAMPLE_ARGUMENTS, STIFF, WIDTH, Memory, write_sample
 
 SAFETY = 0.9
@@ -165,7 +166,7 @@ def _begin(pair: Tableau) -> Routine:
     """Start anew from a state."""
     r, m, (t, start) = open_routine(pair, "begin", {"t": NUMBER, "start": ADDRESS}, exported=True)
     m.t, m.t_old, m.looked, m.likeness = t, t, t, 0.0
-    m.edgy, m.calm, m.looks, m.waits = 0, 0, m.steps, 0
+    m.edgy, m.calm, m.looks, m.waits, m.crossed = 0, 0, m.steps, 0, 0
     r.copy(m.row("y"), start, m.size)
     r.copy(m.row("y_old"), start, m.size)
     with r.when(r.call("evaluate", m.session, t, m.row("y"), m.row("end slope")) != 0):
@@ -198,7 +199,7 @@ def _watched(pair: Tableau) -> Routine:
 
     The end of a step is looked at instead where it is not much later: its state is there already.  It is looked at,
     too, after many steps that were not.  What is seen stays in `seen` until somebody asks; the looks that are then left
-    in the step are taken when the steps go on.
+    in the step are taken when the steps go on. What has been passed is left when times behind its begin are asked for.
     """
     r, m, (t_new,) = open_routine(pair, "watched", {"t_new": NUMBER})
     watch, t, steps = m.watch, m.t_old, m.steps
@@ -224,7 +225,11 @@ def _watched(pair: Tableau) -> Routine:
         moment = r.choose(is_inside, due, t_new)
         m.looked, m.looks = moment, steps
         places = r.choose(is_inside, trial, y), r.choose(is_inside, last, end)
-        with r.when(r.call(watch, moment, *places, m.watch_data) != 0):
+        code = r.call(watch, moment, *places, m.watch_data)
+        with r.when(code == CROSSED):
+            m.crossed = 1
+            r.give(0)
+        with r.when(code != 0):
             m.seen = 1
             r.give(1)
     return r
@@ -360,6 +365,11 @@ def _run(pair: Tableau) -> Routine:
             with r.when(r.call("leap", m.session) != 0):
                 r.give(_NOTICED)
             r.repeat(steps)
+        with r.when(m.crossed != 0):
+            with r.when(m.stop <= m.behind[0]):
+                r.give(_REACHED)
+            with r.when(r.call("begin", m.session, m.behind[1], m.behind.at(2)) != 0):
+                r.give(_TOO_SMALL)
         t = m.t
         with r.when(t >= m.stop):
             with r.when(locates):
@@ -369,6 +379,8 @@ def _run(pair: Tableau) -> Routine:
             r.give(_USED_UP)
         with r.when(r.call("watched", m.session, t) != 0):
             r.give(_NOTICED)
+        with r.when(m.crossed != 0):
+            r.repeat(steps)
         begin, end = m.row(0), m.row("end slope")
         r.copy(begin, end, m.padded)
         m.is_dense = 0

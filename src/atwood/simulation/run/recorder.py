@@ -22,6 +22,7 @@ from atwood.simulation.problem.projection import Misses, TakesNearest, misses_of
 if TYPE_CHECKING:
     from atwood.integrators.time_stepping.session import Change
     from atwood.simulation.singular.crossing import SingularCrossing
+    from atwood.simulation.singular.passing import PassedCrossing
 
 
 _PENDING = 512
@@ -203,6 +204,7 @@ class Recorder:
         self.singular_crossings: list[SingularCrossing] = []
         self.nearest: TakesNearest | None = None
         self._jumps: list[FloatArray] = []
+        self._passed: list[PassedCrossing] = []
         self._changes: list[Callable[[], Sequence[Change]]] = []
         self.pieces: Schedule | None = None
         self._plan_at: Callable[[int], SceneProblem] | None = None
@@ -307,11 +309,21 @@ class Recorder:
         self.settle()
         for crossing in singular_crossings:
             self.singular_crossings.append(crossing)
-            for block in self._samples[0]:
-                inside = crossing.covers(block.time)
-                if crossing.path is not None and inside.any():
-                    q, u, _ = crossing.path.at(block.time[inside])
-                    block.q[:, inside], block.u[:, inside] = self.plan.balance.kinematic_map.normalized(q), u
+            self._cover(crossing)
+
+    def take_passed(self, crossings: Sequence[PassedCrossing]) -> None:
+        """Record crossings that steps have made by themselves, before states that come with them; as the others."""
+        self.singular_crossings += crossings
+        self._passed += crossings
+        self._cover(crossings[0])
+
+    def _cover(self, crossing: SingularCrossing) -> None:
+        """Take states on the way of a crossing from its path."""
+        for block in self._samples[0]:
+            inside = crossing.covers(block.time)
+            if crossing.path is not None and inside.any():
+                q, u, _ = crossing.path.at(block.time[inside])
+                block.q[:, inside], block.u[:, inside] = self.plan.balance.kinematic_map.normalized(q), u
 
     def rewind(self, t: float) -> None:
         """Forget all samples after a time."""
@@ -387,13 +399,38 @@ class Recorder:
         return Stretch(self.plan, impact, after_time_event, time, q, u, shown, misses, *rest)
 
     def _finish(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_], waiting: Sequence[_States] = ()) -> None:
-        made = project_rows(self.plan, t, y, self.nearest) if self.plan.balance.constraints else None
+        arcs = [arc for one in self._passed for arc in one.arcs if arc.end > t[0]]
+        if arcs:
+            from atwood.simulation.singular.collocation import states_on  # few runs come to such a position
+
+            self._finish_around(t, y, shown, waiting, states_on(arcs, t))
+        else:
+            self._add(self._projected(t, y, shown), waiting)
+
+    def _finish_around(
+        self,
+        t: FloatArray,
+        y: FloatArray,
+        shown: NDArray[np.bool_],
+        waiting: Sequence[_States],
+        known: tuple[NDArray[np.bool_], FloatArray, FloatArray],
+    ) -> None:
+        """Project states but those on the ways over singular positions, which are known."""
+        inside, *states = known
+        block = self._projected(t[~inside], y[~inside], shown[~inside])
+        q, u = (np.empty((len(one), len(t))) for one in states)
+        for all_of, rest, own in zip((q, u), (block.q, block.u), states, strict=True):
+            all_of[:, ~inside], all_of[:, inside] = rest, own
+        self._add(_Block(t, q, u, shown, partial(misses_of, self.plan, t, q, u)), waiting)
+
+    def _projected(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_]) -> _Block:
+        """Return states on the constraints; those before one that cannot be projected are kept where there is one."""
+        made = project_rows(self.plan, t, y, self.nearest) if len(t) and self.plan.balance.constraints else None
         if made is None or not self.plan.is_projected:
             q, u = (part.copy() for part in self.plan.program.split(y.T))
             q = self.plan.balance.kinematic_map.normalized(q)
             misses = partial(np.zeros, (2, len(t))) if made is None else made.misses
-            self._add(_Block(t, q, u, shown, misses), waiting)
-            return
+            return _Block(t, q, u, shown, misses)
         block = _Block(t, made.coordinates, made.speeds, shown, made.misses)
         doubtful = np.flatnonzero(made.doubtful).tolist()
         q, u = (part.copy() for part in self.plan.program.split(y.T)) if doubtful else (y.T, y.T)
@@ -404,7 +441,7 @@ class Recorder:
             except SolveError:
                 self._add(block.first(int(i)))
                 raise
-        self._add(block, waiting)
+        return block
 
     def _add(self, block: _Block, waiting: Sequence[_States] = ()) -> None:
         blocks = self._samples[0]

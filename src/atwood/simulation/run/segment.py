@@ -367,6 +367,8 @@ class _Runner:
 
         monitor = singularity_monitor_of(segment.plan, segment.options.relative_tolerance, segment.end, session.here)
         self.monitor = monitor
+        if monitor is not None and not (self.method.is_implicit or session.budget.poll or segment.probe.directions):
+            monitor.pass_in_steps(segment.end)
         looks = None if monitor is None else monitor.step_monitor
         if monitor is not None and (looks is None or not session.set_monitor(looks)):
             monitor.look_in_python()
@@ -409,6 +411,7 @@ class _Runner:
             if turns and segment.plan.assembly.own_equations.contacts:  # what jumps has happened
                 times = times[: looks[looks.searchsorted(done, side="right")] - done]
             y, _, step_result = session.sample(times)
+            self._take_passed()
             strayed = self._strayed(y, looks[(looks > done) & (looks <= done + len(y))] - done) if turns else None
             if strayed is not None:  # what comes behind is done again
                 y, step_result = y[: strayed + 1], session.here
@@ -427,6 +430,14 @@ class _Runner:
             if progress is not None:
                 progress(float(times[-1]))
         return done, None
+
+    def _take_passed(self) -> None:
+        """Take singular crossings that steps have made by themselves into the record."""
+        passed = [] if self.monitor is None else self.monitor.take_passed()
+        if passed:
+            restarts = Statistics(reinitializations=len(passed), error_test_failures=0, convergence_failures=0)
+            self.before = self.before + restarts
+            self.recorder.take_passed(passed)
 
     def _shows(self, jumps: _Jumps) -> NDArray[np.bool_]:
         """Return whether states before and after jumps are outputs: those before time events are none."""

@@ -1,4 +1,4 @@
-"""One sweep of an arc as machine code: what `atwood.simulation.singular.collocation` does again and again.
+"""Sweeps of an arc as machine code: what `atwood.simulation.singular.collocation` does until nothing changes.
 
 States at the points are taken onto the constraints, rates are asked for there, and both are integrated.
 """
@@ -13,29 +13,46 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import address_of
-from atwood.codegen.llvm.build import Built, RoutineSource, build_code, once
-from atwood.codegen.llvm.module import CodeOptions
 from atwood.codegen.routines import ADDRESS, BOOLEAN, INTEGER, NUMBER, Kind, Record, Routine, Value
 from atwood.integrators.protocol import CompiledRates
 
 SWEPT, ELSEWHERE, NOWHERE = range(3)
-"""What a sweep returns: that it is done; that states are to be taken onto constraints in another way; that there the
+"""What sweeps return: that they are done; that states are to be taken onto constraints in another way; that there the
 motion does not go on."""
 
-_SWEEP = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
+SWEEPS = 60
+
+PATIENCE = 8
+"""In so many sweeps changes must become clearly smaller."""
+
+SETTLED = 3e-13
+"""Relative to the scene's sizes: ten times what the next sweep would change must be less. Near singular positions
+rounding leaves 1e-12 of what forces are asked for, and further sweeps would only stir it."""
+
+ROUNDED = 1e-8
+"""Relative to the scene's sizes: changes that are smaller and do not shrink any more are those of rounding."""
+
+TOO_FAR = 1e3
+"""Relative to the scene's sizes: where a sweep changes more, no motion is found."""
+
+LAST = 2
+"""What the last so many coefficients add up to tells the error of a polynomial."""
+
+_SETTLE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
 
 _ARRAYS = ("times", "integral", "values", "first", "states", "held", "later", "rates", "integrated", "sizes")
 _FUNCTIONS = ("project", "project_data", "function", "function_data")
 _COUNTS = ("points", "coordinates", "unknowns", "is_plain")
-_FIELDS: dict[str, Kind] = {
+ARC: dict[str, Kind] = {
     **dict.fromkeys((*_ARRAYS, *_FUNCTIONS), ADDRESS),
     **dict.fromkeys(_COUNTS, INTEGER),
-    **dict.fromkeys(("half", "change"), NUMBER),
+    **dict.fromkeys(("settled", "half", "change", "error"), NUMBER),
 }
+"""What an arc is swept with; the first are the arguments of `Sweeps`."""
 
 
-class Sweep:
-    """Sweeps of one arc.
+class Sweeps:
+    """Sweeps of an arc.
 
     Parameters
     ----------
@@ -50,10 +67,16 @@ class Sweep:
     coordinates, is_plain
         Their number, and whether the speeds are their rates.
 
+    settle, settled
+        The address of the routine that sweeps, and what the next sweep would change where it ends, relative to the
+        sizes.
+
     Attributes
     ----------
     integrated
         Coefficients of coordinates and speeds.
+    address
+        Where its record is.
     """
 
     def __init__(
@@ -63,6 +86,8 @@ class Sweep:
         half: float,
         coordinates: int,
         is_plain: bool,
+        settle: int,
+        settled: float,
     ) -> None:
         times, integral, values, first, states, sizes = (np.ascontiguousarray(one) for one in arrays)
         points, unknowns = states.shape
@@ -71,42 +96,72 @@ class Sweep:
         parts = (room[:points], room[points : 2 * points], room[2 * points :])
         self._kept = code, times, integral, values, first, sizes, room
         given = (times, integral, values, first, states, *parts, self.integrated, sizes)
-        self._data = np.zeros(len(_FIELDS), dtype=np.int64)
-        self._data[:-2] = [
+        self._data = np.zeros(len(ARC), dtype=np.int64)
+        self._data[:-4] = [
             *map(address_of, given),
             *(code.project, code.project_data, code.function, code.data),
             *(points, coordinates, unknowns, is_plain),
         ]
-        self._numbers = self._data[-2:].view(float)
-        self._numbers[0] = half
-        self._run: Any = _SWEEP(_code().code.addresses["sweep"])
+        self._data[-4:].view(float)[:2] = settled, half
+        self.address = address_of(self._data)
+        self._run: Any = _SETTLE(settle)
 
     def __call__(self) -> int:
-        """Sweep once, and return how that went."""
-        return int(self._run(address_of(self._data)))
+        """Sweep until nothing changes, and return how that went."""
+        return int(self._run(self.address))
 
     @property
-    def change(self) -> float:
-        """By how much the last sweep changed the states, relative to the sizes."""
-        return float(self._numbers[1])
+    def error(self) -> float:
+        """Estimate of the largest error of the states, relative to the sizes."""
+        return float(self._data[-1:].view(float)[0])
 
 
-@once
-def _code() -> Built:
-    source = RoutineSource("simulation.singular.arc_routine")
-    return build_code([], CodeOptions(level=2), exports=["sweep"], routines=source)
+def write_sweeps() -> list[Routine]:
+    """Write what sweeps once, and until nothing changes."""
+    return [_sweep(), _settle()]
 
 
-def write_routines() -> list[Routine]:
+def _settle() -> Routine:
+    """Write sweeps until nothing changes, or where they do not come to that."""
+    r = Routine("settle", {"data": ADDRESS}, exported=True)
+    data = r.arguments[0]
+    m = Record(data, ARC)
+    changes, last = r.array(SWEEPS), r.variable(np.inf)
+    with r.count(SWEEPS) as k:
+        code = r.call("sweep", data)
+        with r.when(code != SWEPT):
+            r.give(code)
+        change = m.change
+        changes[k] = change
+        with r.when(~(change <= TOO_FAR)):
+            r.give(NOWHERE)
+        with r.when((k >= PATIENCE) & (change > ROUNDED)), r.when(change > 0.3 * changes[k + (1 - PATIENCE)]):
+            r.give(NOWHERE)
+        left = r.choose(last.now < np.inf, change * change / last.now, change)  # what the next would change, about
+        is_still = r.least(change, 10.0 * left) < m.settled
+        with r.when(is_still | ((change < ROUNDED) & (change >= 0.5 * last.now))):
+            rest = r.variable(0.0)
+            with r.count(m.unknowns) as j:
+                one, other = (m.integrated[(m.points - i) * m.unknowns + j] for i in range(LAST))
+                total = r.size(one) + r.size(other)
+                rest.now = r.most(total / m.sizes[j], rest.now)
+            m.error = r.most(r.least(change, left), rest.now)
+            r.give(SWEPT)
+        last.now = change
+    r.give(NOWHERE)
+    return r
+
+
+def _sweep() -> Routine:
     """Write one sweep."""
-    r = Routine("sweep", {"data": ADDRESS}, exported=True)
-    m = Record(r.arguments[0], _FIELDS)
+    r = Routine("sweep", {"data": ADDRESS})
+    m = Record(r.arguments[0], ARC)
     points, n, width = m.points, m.coordinates, m.unknowns
     held, later, rates = m.held, m.later, m.rates
     with r.count(points) as i:
         state, row = held.at(i * width), i * width
         r.copy(state, m.states.at(row), width)
-        with r.when(_misses(r, m, m.times[i], state, width)):
+        with r.when(misses(r, m, m.times[i], state, width)):
             r.give(ELSEWHERE)
         r.call(m.function, m.times[i], state, rates.at(row), m.function_data)
     for_speeds = n, width
@@ -117,7 +172,7 @@ def write_routines() -> list[Routine]:
         r.copy(state, held.at(i * width), n)
         holds = held.at(i * width)
         r.copy(holds, state, width)
-        with r.when(_misses(r, m, m.times[i], holds, width)):
+        with r.when(misses(r, m, m.times[i], holds, width)):
             r.give(NOWHERE)
         with r.when(m.is_plain != 0):
             r.copy(rates.at(i * width), holds.at(n), n)
@@ -133,10 +188,10 @@ def write_routines() -> list[Routine]:
     m.change = r.choose(r.is_finite(total.now), change.now, np.inf)
     r.copy(m.states, later, points * width)
     r.give(SWEPT)
-    return [r]
+    return r
 
 
-def _misses(r: Routine, m: Record, t: Value, state: Value, width: Value) -> Value:
+def misses(r: Routine, m: Record, t: Value, state: Value, width: Value) -> Value:
     """Take a state onto the constraints; return whether that failed."""
     failed, total = r.variable(0, BOOLEAN), r.variable(0.0)
     with r.when(~r.is_null(m.project)):

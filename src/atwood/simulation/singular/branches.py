@@ -26,11 +26,13 @@ from atwood.simulation.singular.crossing import (
     find_loss,
     has_few,
     is_slow,
+    labels_of,
     nearly_lost,
     rests_at,
     slowest,
     stuck_at,
 )
+from atwood.simulation.singular.crossing_routine import BEYOND, CENTRED, REACH
 
 if TYPE_CHECKING:
     from atwood.codegen.sundials.step_monitor import MonitorCode, MonitorData
@@ -131,19 +133,10 @@ _QUITE_CLOSE = 0.02
 _NEAR = 0.6
 """The same where a solver cannot start behind a position at a tight tolerance: rounding is larger there."""
 
-_REACH = 0.2
-"""An arc begins so far before the place, in what moves most, if it can."""
-
-_CENTRED = 0.06
-"""So far from its middle an arc may pass the place, relative to half its length; its points keep twice that away."""
-
-_ACCURATE = 1e-7
+ACCURATE = 1e-7
 """Arcs over a place are taken whose estimates are smaller, or within the tolerance; errors are far below these."""
 
 _FINE = 17
-
-_BEYOND = 2.5
-"""The motion is guessed so far behind the last look, in strides."""
 
 _AGREES = 30.0
 """Times the tolerance: a solver whose states behind the place differ by less from the arc has gone the same way."""
@@ -192,7 +185,7 @@ class Branches:
         longest: Path | None = None
         for share in (1.0, 0.3, 0.1):
             arc = find_arc(self.plan, *begin, first.t + share * stride)
-            if arc is None or not arc.error < max(self.tolerance, _ACCURATE):
+            if arc is None or not arc.error < max(self.tolerance, ACCURATE):
                 continue
             times = np.linspace(arc.start, arc.end, _FINE)
             away = self._measures.learn(times, arc.at(times)[0])
@@ -235,13 +228,13 @@ class Branches:
         away = self._measures.at(np.array([near]), known[0][:, [int(np.argmin(np.abs(times - near)))]])[0]
         begin = self._state(one) if away < _CLOSE * self._largest else None
         arc = None if begin is None else find_arc(self.plan, *begin, 2.0 * near - one.t, self._between)
-        if arc is None or not arc.error < max(self.tolerance, _ACCURATE):
+        if arc is None or not arc.error < max(self.tolerance, ACCURATE):
             return None
         rest = rests_at(self.plan, self._measures, arc, self._largest, self._fastest, self.tolerance)
         if rest is None:
             return None
         lost = nearly_lost(self._measures, rest, arc.at(np.array([rest]))[0][:, 0])
-        return SingularCrossing(rest, 0, *self._labels_of((lost,)), None)
+        return SingularCrossing(rest, 0, *labels_of(self.plan, (lost,)), None)
 
     @property
     def _fastest(self) -> float:
@@ -307,7 +300,7 @@ class Branches:
         if failed:
             self.trouble = near, lost
             return None
-        return SingularCrossing(near, 0, *self._labels_of((lost,)), None)
+        return SingularCrossing(near, 0, *labels_of(self.plan, (lost,)), None)
 
     def explain(self, message: str) -> SolveError | None:
         """Return the error of a solver that failed at a singular position; None if it failed elsewhere."""
@@ -316,18 +309,13 @@ class Branches:
         t, lost = self.trouble
         return stuck_at(self.plan.assembly.own_equations.constraints[lost], t, message)
 
-    def _labels_of(self, constraints: tuple[int, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Return the labels of constraints, and the parts that they belong to."""
-        every = [self.plan.assembly.own_equations.constraints[i] for i in constraints]
-        return tuple(one.label for one in every), tuple(dict.fromkeys(one.key[0] for one in every))
-
     def _begin(self, near: float, reach: float) -> tuple[float, FloatArray, FloatArray] | None:
         """Return a state from which an arc may start."""
         speeds, sizes = slice(self._n, self._n + self._m), self.plan.sizes
         moved = (
             (one, float(np.max(np.abs(one.y[speeds]) / sizes)) * (near - one.t)) for one in reversed(self._samples)
         )
-        one = next((one for one, move in moved if move >= reach * _REACH), None)
+        one = next((one for one, move in moved if move >= reach * REACH), None)
         if one is None and self._samples[0].t < near:
             one = self._samples[0]
         return None if one is None else self._state(one)
@@ -348,7 +336,7 @@ class Branches:
 
     def _over(self, near: float, t: float, q: FloatArray, u: FloatArray) -> SingularCrossing | None:
         """Return the way over a singular position near a time, from a state."""
-        plan, accurate = self.plan, max(self.tolerance, _ACCURATE)
+        plan, accurate = self.plan, max(self.tolerance, ACCURATE)
         before: tuple[Arc, ...] = ()
         for _ in range(8):
             arc = find_arc(plan, t, q, u, 2.0 * near - t, self._between)
@@ -365,7 +353,7 @@ class Branches:
             if found is None or found[0] <= t:
                 return None
             now, away = found
-            if abs(now - near) > _CENTRED * (near - t):
+            if abs(now - near) > CENTRED * (near - t):
                 near = now
                 continue
             return self._crossing(arc, now, away, before)
@@ -376,7 +364,7 @@ class Branches:
         looks = self._samples
         if len(looks) < 2 or not looks[0].t <= t[0]:
             return None
-        if t[-1] > looks[-1].t + _BEYOND * (looks[-1].t - looks[-2].t):
+        if t[-1] > looks[-1].t + BEYOND * (looks[-1].t - looks[-2].t):
             return None
         times = np.array([one.t for one in looks])
         y, yp = (np.stack([getattr(one, name)[: self._n + self._m] for one in looks], axis=1) for name in ("y", "yp"))
@@ -395,5 +383,5 @@ class Branches:
         return (
             None
             if loss is None
-            else SingularCrossing(t, loss.rank, *self._labels_of(loss.constraints), Path((*before, arc)), loss.gap)
+            else SingularCrossing(t, loss.rank, *labels_of(self.plan, loss.constraints), Path((*before, arc)), loss.gap)
         )

@@ -8,12 +8,13 @@ repeated integration, with each state projected onto the constraints before forc
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import TypeAlias
 
 import numpy as np
 from numpy.polynomial import legendre
+from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.clock import check_time
@@ -24,7 +25,18 @@ from atwood.simulation.dynamics.reactions import accelerations_at
 from atwood.simulation.problem.explicit_scene import compiled_on_constraints
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.projection import ProjectedStates, nearly_projected, project_safely, project_states
-from atwood.simulation.singular.arc_routine import ELSEWHERE, NOWHERE, SWEPT, Sweep
+from atwood.simulation.singular.arc_routine import (
+    LAST,
+    NOWHERE,
+    PATIENCE,
+    ROUNDED,
+    SETTLED,
+    SWEEPS,
+    SWEPT,
+    TOO_FAR,
+    Sweeps,
+)
+from atwood.simulation.singular.crossing_routine import POINTS, singular_routines
 
 States: TypeAlias = tuple[FloatArray, FloatArray]
 """Coordinates and speeds, each of shape (number, times)."""
@@ -32,28 +44,11 @@ States: TypeAlias = tuple[FloatArray, FloatArray]
 State: TypeAlias = tuple[float, FloatArray, FloatArray]
 """A time, coordinates and speeds."""
 
-_POINTS = 12
-"""Of the polynomials."""
-
-_DERIVATIVE = legendre.legder(np.eye(_POINTS + 1))
+_DERIVATIVE = legendre.legder(np.eye(POINTS + 1))
 """Gives coefficients of the derivative of a polynomial from its own."""
-
-_LAST = 2
-"""What the last so many coefficients add up to tells the error of a polynomial."""
-
-_SWEEPS = 60
-_PATIENCE = 8
-"""In so many sweeps changes must become clearly smaller."""
 
 _CLOSE = 3e-2
 """Once a sweep changes less, one Newton step is enough to project what it gave."""
-
-_SETTLED = 3e-13
-"""Relative to the scene's sizes: ten times what the next sweep would change must be less. Near singular positions
-rounding leaves 1e-12 of what forces are asked for, and further sweeps would only stir it."""
-
-_ROUNDED = 1e-8
-"""Relative to the scene's sizes: changes that are smaller and do not shrink any more are those of rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +87,18 @@ def _values(x: FloatArray, count: int) -> FloatArray:
         np.multiply(x, found[k - 1], out=found[k])
         found[k] += (1.0 - 1.0 / k) * (found[k] - found[k - 2])
     return found
+
+
+def states_on(arcs: Sequence[Arc], t: FloatArray) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
+    """Return which times are within one of some arcs in a row, and coordinates and speeds there."""
+    starts, ends = (np.array([getattr(one, name) for one in arcs]) for name in ("start", "end"))
+    which = starts.searchsorted(t) - 1
+    inside = (which >= 0) & (t < ends[which])
+    which = which[inside]
+    each = _values((2.0 * t[inside] - starts[which] - ends[which]) / (ends - starts)[which], POINTS + 1)
+    tables = (np.stack([getattr(one, name) for one in arcs])[which] for name in ("coordinates", "speeds"))
+    q, u = (np.einsum("kt,tkn->nt", each, one) for one in tables)
+    return inside, q, u
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,29 +140,29 @@ def find_arc(
     guess: Callable[[FloatArray], States | None] | None = None,
 ) -> Arc | None:
     """Return how a motion goes on from a state; None where no smooth motion is found."""
-    x, _ = _points()
+    x = points()[0]
     times = t + 0.5 * (end - t) * (x + 1.0)
     if not np.all(np.diff(times) > 0.0):  # too short for the digits of time
         return None
     try:
         with np.errstate(all="ignore"):
             known = None if guess is None else guess(times)
-            begin = known or (np.repeat(q[:, None], _POINTS, 1), np.repeat(u[:, None], _POINTS, 1))
+            begin = known or (np.repeat(q[:, None], POINTS, 1), np.repeat(u[:, None], POINTS, 1))
             return _settle(plan, (t, q, u), end, times, begin, known is None)
     except (AtwoodError, np.linalg.LinAlgError):  # a state without a value, or without accelerations: nothing goes on
         return None
 
 
 @cache
-def _points() -> tuple[FloatArray, FloatArray]:
-    """Return the points, and the matrix that gives coefficients of the integral from values at them."""
-    x, weights = legendre.leggauss(_POINTS)
-    order = np.arange(_POINTS)
-    coefficients = (order + 0.5)[:, None] * (legendre.legvander(x, _POINTS - 1) * weights[:, None]).T
-    return x, np.asarray(legendre.legint(coefficients, lbnd=-1), dtype=np.float64)
+def points() -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the points, and the matrices that give coefficients of a polynomial and its integral from values there."""
+    x, weights = legendre.leggauss(POINTS)
+    order = np.arange(POINTS)
+    coefficients = (order + 0.5)[:, None] * (legendre.legvander(x, POINTS - 1) * weights[:, None]).T
+    return x, coefficients, np.asarray(legendre.legint(coefficients, lbnd=-1), dtype=np.float64)
 
 
-_REACH = legendre.legvander(legendre.leggauss(_POINTS)[0], _POINTS)
+_REACH = legendre.legvander(legendre.leggauss(POINTS)[0], POINTS)
 """Gives values at the points from coefficients."""
 
 
@@ -172,27 +179,27 @@ def _settle(
     half, last, sizes = 0.5 * (end - t), np.inf, list[float]()
     states = np.ascontiguousarray(np.concatenate(guess).T)
     code = compiled_on_constraints(plan, t, np.concatenate([q, u])) if plan.has_rates else None
-    sweep = None if code is None else _compiled(plan, code, begin, half, times, states)
-    for _ in range(_SWEEPS):
-        check_time()
-        went = ELSEWHERE if sweep is None else sweep()
+    if code is not None:
+        sweeps = sweeps_of(plan, code, np.concatenate([q, u]), half, times, states)
+        went = sweeps()
         if went == NOWHERE:
             return None
-        if sweep is not None and went == SWEPT:
-            change, integrated = sweep.change, sweep.integrated
-        else:
-            integrated = _sweep(plan, begin, half, times, states, is_far)
-            now = _REACH @ integrated
-            change = _size(plan, *_parts(now - states, len(q)))
-            states[:] = now
-        if not np.isfinite(change) or change > 1e3:
+        if went == SWEPT:
+            return Arc(t, end, sweeps.integrated[:, : len(q)], sweeps.integrated[:, len(q) :], sweeps.error)
+    for _ in range(SWEEPS):
+        check_time()
+        integrated = _sweep(plan, begin, half, times, states, is_far)
+        now = _REACH @ integrated
+        change = _size(plan, *_parts(now - states, len(q)))
+        states[:] = now
+        if not change <= TOO_FAR:
             return None
         sizes.append(change)
-        if len(sizes) > _PATIENCE and change > 0.3 * sizes[-_PATIENCE] and change > _ROUNDED:
+        if len(sizes) > PATIENCE and change > 0.3 * sizes[-PATIENCE] and change > ROUNDED:
             return None
         left = change * change / last if last < np.inf else change  # what the next sweep would change, about
-        if min(change, 10.0 * left) < _SETTLED or (change < _ROUNDED and change >= 0.5 * last):
-            rest = _size(plan, *_parts(np.sum(np.abs(integrated[-_LAST:]), axis=0)[None, :], len(q)))
+        if min(change, 10.0 * left) < SETTLED or (change < ROUNDED and change >= 0.5 * last):
+            rest = _size(plan, *_parts(np.sum(np.abs(integrated[-LAST:]), axis=0)[None, :], len(q)))
             return Arc(t, end, integrated[:, : len(q)], integrated[:, len(q) :], max(min(change, left), rest))
         last, is_far = change, change > _CLOSE
     return None
@@ -203,14 +210,20 @@ def _parts(states: FloatArray, coordinates: int) -> States:
     return states[:, :coordinates].T, states[:, coordinates:].T
 
 
-def _compiled(
-    plan: SceneProblem, code: CompiledRates, begin: State, half: float, times: FloatArray, states: FloatArray
-) -> Sweep:
-    """Return sweeps by machine code."""
-    _, q, u = begin
+def sweeps_of(
+    plan: SceneProblem,
+    code: CompiledRates,
+    first: FloatArray,
+    half: float,
+    times: FloatArray,
+    states: FloatArray,
+    settled: float = SETTLED,
+) -> Sweeps:
+    """Return sweeps by machine code, from coordinates and speeds at the start and guesses at the points."""
     sizes = np.concatenate([plan.coordinate_sizes, plan.sizes / plan.scales.time])
-    arrays = times, _points()[1], _REACH, np.concatenate([q, u]), states, sizes
-    return Sweep(code, arrays, half, len(q), plan.balance.kinematic_map.is_plain)
+    arrays, kinematic_map = (times, points()[2], _REACH, first, states, sizes), plan.balance.kinematic_map
+    settle = singular_routines().code.addresses["settle"]
+    return Sweeps(code, arrays, half, len(plan.coordinate_sizes), kinematic_map.is_plain, settle, settled)
 
 
 def _sweep(
@@ -218,7 +231,7 @@ def _sweep(
 ) -> FloatArray:
     """Return coefficients of coordinates and speeds from states at the points, one row each."""
     _, q, u = begin
-    integral = _points()[1]
+    integral = points()[2]
     held = _projected(plan, times, *_parts(states, len(q)), is_far)
     kept, balance = np.asarray(plan.finding.kept, dtype=np.intp), plan.columns(plan.balance.program.program)
     accelerations = accelerations_at(
@@ -279,7 +292,7 @@ def follow(
     whole, arcs = end - t, []
     h = 0.25 * whole
     far = here = float(measure(np.array([t]), q[:, None])[0])
-    x = _points()[0]
+    x = points()[0]
     for _ in range(int(np.clip(_WORK / plan.program.size, _FEWEST, _TRIES))):
         h = min(h, end - t)
         arc = find_arc(plan, t, q, u, t + h)

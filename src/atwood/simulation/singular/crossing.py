@@ -17,7 +17,6 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray, uneven
@@ -32,7 +31,8 @@ from atwood.numerics.rank import decompose, lost_rank, rank, singular_values
 from atwood.simulation.events.modes import EventProbe
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.problem.projection import ConstraintsAt, constraints_at, errors_at, normal_equations
-from atwood.simulation.singular.collocation import Arc
+from atwood.simulation.singular.collocation import Arc, points
+from atwood.simulation.singular.crossing_routine import NARROWER, sign_change
 from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
@@ -154,10 +154,15 @@ _LEAST = 1e-7
 """At tighter tolerances the same; rank is judged to be lost within 1e-5."""
 
 
+def least_energy(tolerance: float) -> float:
+    """Return the share of a motion's energy that is little at the tolerance of a run."""
+    return max(_ENERGIES * tolerance, _LEAST)
+
+
 def is_slow(plan: SceneProblem, arc: Arc, t: float, fastest: float, tolerance: float) -> bool:
     """Return whether a motion has so little energy at a time that errors could have it turn back."""
     here, *ends = np.max(np.abs(arc.at(np.array([t, arc.start, arc.end]))[1]) / plan.sizes[:, None], axis=0).tolist()
-    return bool(here**2 < max(_ENERGIES * tolerance, _LEAST) * max(fastest, *ends) ** 2)
+    return bool(here**2 < least_energy(tolerance) * max(fastest, *ends) ** 2)
 
 
 def slowest(t: FloatArray, speeds: FloatArray, sizes: FloatArray) -> float | None:
@@ -269,76 +274,17 @@ class RankMeasure:
 def find_crossing(measure: RankMeasure, arc: Arc) -> tuple[float, float] | None:
     """Return when an arc passes closest to a singular position, and how far away it is at its ends; None if never."""
     middle, half = 0.5 * (arc.start + arc.end), 0.5 * (arc.end - arc.start)
+    x, series, _ = points()
     far = np.inf
     for _ in range(2):  # once more near by, where nothing else bends the measure
-        times = middle + half * _POINTS[0]
+        times = middle + half * x
         away = measure.at(times, arc.at(times)[0])
-        root = _sign_change(away)
+        root = sign_change(away, x, series)
         if root is None:
             return None
         far = min(far, float(max(away[0], away[-1])))
-        middle, half = middle + half * root, 0.3 * half
+        middle, half = middle + half * root, NARROWER * half
     return middle, far
-
-
-_POINTS = legendre.leggauss(12)
-
-_SERIES = (np.arange(12) + 0.5)[:, None] * (legendre.legvander(_POINTS[0], 11) * _POINTS[1][:, None]).T
-"""Gives coefficients of Legendre polynomials from values at the points."""
-
-
-def _sign_change(away: FloatArray) -> float | None:
-    """Return where a measure at the points of Gauss and Legendre falls to zero to rise again; None if it does not.
-
-    What falls to zero and rises again is smooth if its sign changes there.
-    """
-    x = _POINTS[0]
-    order, least = np.arange(len(x)), int(np.argmin(away))
-    if not np.all(np.isfinite(away)) or least in (0, len(x) - 1):
-        return None
-    smoothest, found = np.inf, None
-    for first in (least, least + 1):  # the right one of two is that whose coefficients die away
-        series = _SERIES @ np.where(order < first, -away, away)
-        tail = float(np.sum(np.abs(series[-2:])))
-        if tail < smoothest:
-            smoothest, found = tail, _root(series, float(x[first - 1]), float(x[first]))
-    return found
-
-
-def _root(series: FloatArray, below: float, above: float) -> float:
-    """Return where a series of Legendre polynomials is zero between two places of which it has the signs - and +.
-
-    By false position, the end that stays being given half its weight (M. Dowell and P. Jarratt, *A modified regula
-    falsi method*, BIT 11, 1971).
-    """
-    coefficients = series.tolist()
-    low, high = (_clenshaw(coefficients, one) for one in (below, above))
-    x, last = below, 0.0
-    for _ in range(_ROOT_STEPS):
-        if not above - below > _ROOTED:
-            break
-        x = (below * high - above * low) / (high - low) if low < 0.0 < high else 0.5 * (below + above)
-        value = _clenshaw(coefficients, x)
-        if value == 0.0:
-            break
-        if value < 0.0:
-            below, low, high = x, value, 0.5 * high if last < 0.0 else high
-        else:
-            above, high, low = x, value, 0.5 * low if last > 0.0 else low
-        last = value
-    return x
-
-
-_ROOT_STEPS, _ROOTED = 60, 1e-15
-"""So many steps of false position at most, and how long the last interval is: rounding of numbers of size one."""
-
-
-def _clenshaw(coefficients: list[float], x: float) -> float:
-    """Return the value of a series of Legendre polynomials at one place; numbers one by one are fastest here."""
-    value = after = 0.0
-    for k in range(len(coefficients) - 1, 0, -1):
-        value, after = coefficients[k] + ((2 * k + 1) * x * value) / (k + 1) - (k + 1) / (k + 2) * after, value
-    return coefficients[0] + x * value - 0.5 * after
 
 
 def zero_ahead(times: FloatArray, away: FloatArray) -> float | None:
@@ -370,6 +316,12 @@ def find_loss(measure: RankMeasure, arc: Arc, t: float, away: float) -> Loss | N
         return Loss(0, ())
     left = set(_independent(constraint_jacobian, least))
     return Loss(lost, tuple(i for i in kept if i not in left), float(np.max(misses, initial=0.0)))
+
+
+def labels_of(plan: SceneProblem, constraints: tuple[int, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the labels of constraints, and the parts that they belong to."""
+    every = [plan.assembly.own_equations.constraints[i] for i in constraints]
+    return tuple(one.label for one in every), tuple(dict.fromkeys(one.key[0] for one in every))
 
 
 def nearly_lost(measure: RankMeasure, t: float, q: FloatArray) -> int:

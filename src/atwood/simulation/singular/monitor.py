@@ -19,6 +19,7 @@ from atwood.forms.caches import Key
 from atwood.integrators.protocol import Status, StepMonitor, StepResult
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.singular.branches import (
+    ACCURATE,
     Branches,
     Sample,
     as_step_monitor,
@@ -27,6 +28,7 @@ from atwood.simulation.singular.branches import (
     stride_from,
 )
 from atwood.simulation.singular.crossing import SingularCrossing, has_few, zero_ahead
+from atwood.simulation.singular.passing import Passages, PassedCrossing
 from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
@@ -90,6 +92,7 @@ class SingularityMonitor(Branches):
         When somebody should look next, s; infinite where a session does.
     """
 
+    _passages: Passages | None = None
     _best: tuple[float, FloatArray] | None = None
     _seen_ahead: tuple[FloatArray, FloatArray] | None = None
 
@@ -137,7 +140,24 @@ class SingularityMonitor(Branches):
     @property
     def step_monitor(self) -> StepMonitor | None:
         """See the attributes."""
-        return None if self._compiled is None else as_step_monitor(self._compiled)
+        found = None if self._compiled is None else as_step_monitor(self._compiled)
+        return found if found is None or self._passages is None else self._passages.watched(found)
+
+    def pass_in_steps(self, end: float) -> None:
+        """Let explicit steps up to a time pass singular positions by themselves, if they can."""
+        compiled, plan = self._compiled, self.plan
+        is_plain = plan.has_rates and has_few(plan) and len(plan.balance.holonomic) == plan.balance.constraints
+        if compiled is not None and compiled.judges and is_plain:
+            start = self._start.t, self._start.y
+            self._passages = Passages(plan, compiled, start, self.tolerance, max(self.tolerance, ACCURATE), end)
+
+    def take_passed(self) -> list[PassedCrossing]:
+        """Return what steps have passed by themselves since this was last asked."""
+        passed = [] if self._passages is None else self._passages.take()
+        if passed:
+            self._start_anew()
+            self._since, self._is_behind, self._about = passed[-1].arcs[-1].end, True, None
+        return passed
 
     def look_in_python(self) -> None:
         """Sample step by step, since the session cannot."""
@@ -152,7 +172,7 @@ class SingularityMonitor(Branches):
 
     def _start_anew(self) -> None:
         self._samples, self._away = [], []
-        self._judged = -np.inf
+        self._judged, self._since = -np.inf, self._start.t
         self.trouble = None
 
     def _begin_looks(self) -> None:
@@ -210,6 +230,8 @@ class SingularityMonitor(Branches):
             if found is None and failed:
                 found = self._ahead() or self._from_start(step_result.t)
             self._forget()
+            if self._compiled is not None:
+                self._compiled.take_judged(self._judged)
             return found
         finally:
             self.seconds += time.perf_counter() - began
@@ -251,7 +273,7 @@ class SingularityMonitor(Branches):
 
     def _in_run(self, times: FloatArray) -> FloatArray:
         """Return times, none of them outside the run: what begins slowly has long strides, and drives other places."""
-        return np.clip(times, self._start.t, self._start.t + self._whole)
+        return np.clip(times, self._since, self._since + self._whole)
 
     def _coming(self, now: float) -> SingularCrossing | None:
         """Return the singular position just ahead of a solver, which need not come near it; None if there is none.
