@@ -279,7 +279,8 @@ def module_of(eq: EquationsOfMotion) -> str:
         ]
     body = "\n\n\n".join(functions)
     used = [name for name in code.MATH if re.search(rf"\b{name}\b", body)]
-    head = [f'"""Equations of motion of {eq.name}, {eq.form} form: {_statement(eq)}', "", *_listing(eq)]
+    stated = "M a + h = G^T lambda, G a + gamma = 0." if found.constraints else "M a + h = 0."
+    head = [f'"""Equations of motion of {eq.name}, {eq.form} form: {stated}', "", *_listing(eq)]
     head += [*filter(None, [eq.sign_said]), '"""', ""]
     head += [f"from math import {', '.join(used)}", ""] if used else []
     head += ["import numpy as np", "from numpy.linalg import solve", ""]
@@ -292,10 +293,6 @@ def module_of(eq: EquationsOfMotion) -> str:
     ]
     solved = (_SOLVED_WITH if found.constraints else _SOLVED).replace("N]", f"{n}]").replace("[N:", f"[{n}:")
     return "\n".join(head) + f"\n\n\n{body}\n\n\n{solved}"
-
-
-def _statement(eq: EquationsOfMotion) -> str:
-    return "M a + h = G^T lambda, G a + gamma = 0." if eq.expressions.constraints else "M a + h = 0."
 
 
 def _listing(eq: EquationsOfMotion) -> list[str]:

@@ -15,6 +15,7 @@ from atwood.errors import UnsupportedError
 from atwood.expr import Expression, collect, cos, depends_on, jacobian, jvp, live, sin, substitute
 from atwood.forms.lagrangian import lagrangian_of, rows_by_part
 from atwood.forms.quantities import find_observables, internal_reactions_of, places
+from atwood.lazy_modules import sympy
 from atwood.mechanics.outputs.reactions import Reaction
 from atwood.theory.equations.euler_angles import in_whole_angles, middle_angles
 
@@ -30,14 +31,8 @@ _LARGEST_SYSTEM = 4
 
 def blocks(size: int, entries: Collection[tuple[int, int]]) -> Iterator[list[int]]:
     """Yield the rows that belong together since entries join them."""
-    left = set(range(size))
-    while left:
-        block, new = set[int](), {min(left)}
-        while new:
-            block |= new
-            new = {j for i, j in entries if i in new} - block
-        left -= block
-        yield sorted(block)
+    groups = sympy.utilities.iterables.connected_components((list(range(size)), list(entries)))
+    yield from sorted(map(sorted, groups))
 
 
 def entries_of(

@@ -448,7 +448,8 @@ def follow_null_space(search: RestSearch, rest: Rest) -> Degenerate:
             return Degenerate(moved, family, "undecided" if order < 0 else "", beside)
         verdict = ("stable" if field.is_potential else "undecided") if order % 2 and sign < 0.0 else falls
     else:
-        moved, outward = rest, np.array([ray @ one[1] for ray, one in _signed(there)])
+        signed = [((1.0, -1.0)[k % 2] * ray, one[1]) for k, (ray, one) in enumerate(there) if one is not None]
+        moved, outward = rest, np.array([ray @ force for ray, force in signed])
         largest = float(np.max(np.abs(forces)))
         verdict = falls if np.max(outward) > _CLEAR * largest else "undecided"
         if np.max(outward) < -_CLEAR * largest and field.is_potential and felt.rank == count:
@@ -466,12 +467,6 @@ def _has_gyroscopic(search: RestSearch, rest: Rest) -> bool:
     by = mass @ (by[own] / sizes[own][:, None] * sizes[own])
     unit = float(np.max(np.abs(mass), initial=0.0)) * np.sqrt(search.slope)
     return bool(np.max(np.abs(by - by.T), initial=0.0) > 1e-9 * unit)
-
-
-def _signed(
-    there: list[tuple[FloatArray, tuple[FloatArray, FloatArray] | None]],
-) -> list[tuple[FloatArray, tuple[FloatArray, FloatArray]]]:
-    return [((1.0, -1.0)[k % 2] * ray, one) for k, (ray, one) in enumerate(there) if one is not None]
 
 
 def _root(field: _Field, axis: FloatArray) -> tuple[Rest, int, float, tuple[FloatArray, ...]]:

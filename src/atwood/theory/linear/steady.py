@@ -104,7 +104,7 @@ def find_steady(scene: LinearScene, flow: Flow, kept: Sequence[int]) -> Steady:
     is_still = bool(np.all(np.abs(goal) <= _STEADY)) or len(kept) == len(scene.sizes)  # or all is held
     if is_still and not scene.depends_on_time and not np.any(flow.variation.u):
         return still(flow)
-    tiers = [[_time_shift(scene)], _shifts(scene), _rotations(scene), _own_rotations(scene)]
+    tiers = [[_constant(np.zeros(size), is_time=True)], _shifts(scene), _rotations(scene), _own_rotations(scene)]
     found: list[_Field] = []
     states = [flow, *_near_by(scene, flow, kept, pace)]
     symmetries = np.zeros((size, 0))
@@ -196,10 +196,6 @@ def _constant(value: FloatArray, is_time: bool = False) -> _Field:
     size = len(value)
     still = np.zeros(size)
     return _Field(lambda _: value, lambda _: still, np.zeros((size, size)), is_time)
-
-
-def _time_shift(scene: LinearScene) -> _Field:
-    return _constant(np.zeros(len(scene.tangents) + len(scene.sizes)), is_time=True)
 
 
 def _shifts(scene: LinearScene) -> Iterator[_Field]:
@@ -418,8 +414,8 @@ class _Trial:
 
 def _trial(point: OperatingPoint, values: Mapping[str, float], free: set[int]) -> _Trial:
     linear = point.scene
-    columns = _value_columns(point)
-    current = linear.with_inputs({name: values[path] for path, names in columns.items() for name in names})
+    pushed = {linear.inputs[k].name: value for path, value in values.items() for k in _numbers_of(point, path)}
+    current = linear.with_inputs(pushed)
     flow = current.flow(point.t, point.q, point.u, point.kept)
     minimal, a, slopes = slopes_at(current, flow, point.kept)
     own = linear.sizes[list(minimal.speeds)]
@@ -455,10 +451,6 @@ def _numbers_of(point: OperatingPoint, path: str) -> list[int]:
             found = [first + 3 * k for k in range(len(one.keys))]
         first += 3 * len(one.keys)
     return found
-
-
-def _value_columns(point: OperatingPoint) -> dict[str, list[str]]:
-    return {one.path: [point.scene.inputs[k].name for k in _numbers_of(point, one.path)] for one in point.inputs}
 
 
 def _free_numbers(point: OperatingPoint, free: Sequence[str]) -> set[int]:

@@ -250,7 +250,8 @@ class _Search:
         assert place is not None
         name, value = found.names[place], self.quantities.momenta[k]
         rotates = name.unit != "m"
-        if is_kept(self.states, number) and not self._is_silent(number):
+        silent = is_constant(np.array([one.values[number] for one in self.states]))
+        if is_kept(self.states, number) and not silent:
             proven = self.prover.along(value, {k: found.graph.one})
             unit = "kg*m^2/s" if rotates else "kg*m/s"
             meaning = f"momentum of {name.name}, which is ignorable"
@@ -387,9 +388,6 @@ class _Search:
         terms = [one if w == 1.0 else float(w) * one for w, one in zip(weights, values, strict=True) if w]
         numeric = np.array([one.values[list(numbers)] for one in self.states]) @ weights
         return add_up([self.found.graph.zero, *terms]), numeric
-
-    def _is_silent(self, number: int) -> bool:
-        return is_constant(np.array([one.values[number] for one in self.states]))
 
     def _is_known(self, values: FloatArray, told: str = "") -> bool:
         """Return whether a quantity follows from what was found; where it is one of these, that one says so."""
