@@ -5,16 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from atwood.arrays import FloatArray
+from atwood.plotting.camera import Camera
 from atwood.plotting.canvas import GREY, Axes
 
-
-def _view(azimuth: float, elevation: float) -> FloatArray:
-    """Return the axes of the picture (right, up, towards the eye) as rows."""
-    (sa, ca), (se, ce) = ((np.sin(angle), np.cos(angle)) for angle in np.radians([azimuth, elevation]))
-    return np.array([[-sa, ca, 0.0], [-se * ca, -se * sa, ce], [ce * ca, ce * sa, se]])
-
-
-SEEN = _view(38.0, 24.0)
+SEEN = Camera(128.0, 24.0).axes
 """The first axis points to the lower left, the second to the lower right, the third up."""
 
 

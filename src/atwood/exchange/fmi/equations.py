@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, jvp
+from atwood.expr import Expression, InputGroup, OutputGroup, Program, dependencies as symbols_in, jvp
 from atwood.expr.core.graph import Graph
 from atwood.plotting.live.mode import ModeText
 
@@ -20,29 +20,15 @@ def known_symbols(mode: ModeText, inputs: Sequence[int]) -> list[Expression]:
 
 def dependencies(mode: ModeText, inputs: Sequence[int]) -> tuple[Dependencies, Dependencies]:
     """Return on what rates of states depend, and quantities; inputs are numbers of parameters."""
-    knowns = known_symbols(mode, inputs)
-    reads: dict[int, frozenset[int]] = {one.index: frozenset({k}) for k, one in enumerate(knowns)}
-    rates = [_read(one, reads) for one in _rates(mode)]
-    n = len(mode.equations.coordinates)
-    for symbol, found in zip(mode.equations.accelerations, rates[n:], strict=True):
-        reads[symbol.index] = found
-    quantities = [_read(one, reads) for one in _quantities(mode)]
-    return [sorted(one) for one in rates], [sorted(one) for one in quantities]
+    reads = {one: {k} for k, one in enumerate(known_symbols(mode, inputs))}
 
+    def read(values: Sequence[Expression]) -> Dependencies:
+        return [sorted(set().union(*(reads[one] for one in own))) for own in symbols_in(values, list(reads))]
 
-def _read(root: Expression, reads: dict[int, frozenset[int]]) -> frozenset[int]:
-    """Return what an expression depends on; what is found is kept."""
-    waiting = [root]
-    while waiting:
-        node = waiting[-1]
-        open_ = [one for one in node.arguments if one.index not in reads] if node.index not in reads else []
-        if open_:
-            waiting += open_
-            continue
-        if node.index not in reads:
-            reads[node.index] = frozenset().union(*(reads[one.index] for one in node.arguments))
-        waiting.pop()
-    return reads[root.index]
+    rates = read(_rates(mode))
+    own = rates[len(mode.equations.coordinates) :]
+    reads |= {one: set(found) for one, found in zip(mode.equations.accelerations, own, strict=True)}
+    return rates, read(_quantities(mode))
 
 
 def _rates(mode: ModeText) -> list[Expression]:

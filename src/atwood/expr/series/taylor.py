@@ -24,6 +24,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from atwood.errors import UsageError
+from atwood.expr.core.analysis import live
 from atwood.expr.core.graph import Expression, Graph
 from atwood.expr.core.program import InputGroup, OutputGroup, Program
 from atwood.expr.series.recurrence import Convolution, Recurrence
@@ -84,8 +85,8 @@ def taylor_programs(
         following.append(target.zero if value is None else step * value)
     pairs, squares = _arrange(_needed(recurrence.convolutions, following), lanes)
     inputs, outputs = _groups(pairs, squares, numbers, symbols, following)
-    live = {node.index for node in _traverse([e for group in outputs for e in group.expressions])}
-    known = [(node, symbol) for node, symbol in recurrence.values if symbol.index in live]
+    read = set(live(e for group in outputs for e in group.expressions))
+    known = [(node, symbol) for node, symbol in recurrence.values if symbol in read]
     order = Program(f"{name} (Taylor coefficients)", inputs, tuple(symbol for _, symbol in known), outputs)
     start = Program(
         f"{name} (order zero)",
@@ -117,18 +118,6 @@ def _groups(
         OutputGroup("next", tuple(following)),
     )
     return inputs, outputs
-
-
-def _traverse(outputs: Sequence[Expression]) -> list[Expression]:
-    """Return every node that the outputs need."""
-    found: dict[int, Expression] = {}
-    stack = list(outputs)
-    while stack:
-        node = stack.pop()
-        if node.index not in found:
-            found[node.index] = node
-            stack.extend(node.arguments)
-    return list(found.values())
 
 
 def _needed(convolutions: Sequence[Convolution], outputs: Sequence[Expression]) -> list[Convolution]:
@@ -170,7 +159,7 @@ def _arrange(used: Sequence[Convolution], lanes: int) -> tuple[list[Convolution]
 def _depths(outputs: Sequence[Expression]) -> dict[int, int]:
     """Return how many operations are one behind the other before a value is known."""
     found: dict[int, int] = {}
-    for node in sorted(_traverse(outputs), key=lambda node: node.index):
+    for node in live(outputs):
         known = not node.arguments or node.is_parametric
         found[node.index] = 0 if known else 1 + max(found[argument.index] for argument in node.arguments)
     return found

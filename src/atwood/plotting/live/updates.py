@@ -9,10 +9,9 @@ import numpy as np
 from atwood.errors import AtwoodError, ParameterError
 from atwood.expr import OutputGroup, Program
 from atwood.forms.program import state_groups
-from atwood.model.declare.component import Binding, bind
 from atwood.model.declare.laws import numbers_in
 from atwood.plotting.live.mode import ModeText, NotLiveError
-from atwood.simulation.events.sampling import Update, evaluated, find_sampler, in_order, update_inputs_of
+from atwood.simulation.events.sampling import Update, evaluated, find_sampler, in_order, update_inputs_of, with_states
 
 
 def add_updates(mode: ModeText) -> None:
@@ -78,17 +77,13 @@ def _traced(mode: ModeText, one: Update) -> Program:
         raise NotLiveError(
             f"{label} is an update that may remember what it was called with: pure=True says it does not"
         )
-    part, local, reading = mode.flat.parts[one.path], assembly.mechanism.locals_[one.path], update_inputs_of(assembly)
+    local, reading = assembly.mechanism.locals_[one.path], update_inputs_of(assembly)
     symbols = {state.path: state.symbol for state in assembly.discrete_states}
     symbols |= {state.path: state.symbol for state in equations.states}
     known: dict[str, Any] = dict(local.binding.values)
     inputs = zip(reading.inputs, reading.program.results, strict=True)
     known |= {name: value for (path, name), value in inputs if path == one.path}
-    for name, spec in part.component.state_specs().items():
-        numbers = [symbols[f"{one.path}.{own}"] for own in spec.names(part.values)]
-        known[name] = numbers[0] if spec.count is None else tuple(numbers)
-    space = assembly.mechanism.space
-    bound = bind(part.component, Binding(values=known, time=equations.time, space=space.name, line=space.line))
+    bound = with_states(assembly, one.path, equations.time, known, symbols.__getitem__)
     try:
         found = tuple(graph.convert(value) for value in numbers_in(getattr(bound, one.law.name)()))
     except (AtwoodError, TypeError, ValueError) as error:

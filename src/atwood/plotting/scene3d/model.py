@@ -14,6 +14,7 @@ from atwood.plotting.scene3d.pieces import Bench, Piece, Tip
 from atwood.plotting.scene3d.reading import Joining, Reading, Tie
 from atwood.plotting.scene3d.turning_parts import FORK, WHITE, add_gimbals, add_shafts, add_tops, pale
 from atwood.plotting.shapes.meshes import box, cylinder, frame_along, revolved
+from atwood.topology.graph import connected_groups
 
 AXIS_COLOURS = (COLOURS[1], COLOURS[2], COLOURS[0])
 """Of x, y and z."""
@@ -115,28 +116,13 @@ def _pairs(reading: Reading) -> list[tuple[int, int]]:
 
 def _depths(reading: Reading) -> dict[int, int]:
     """Return how many joints each body is away from the world."""
-    pairs = _pairs(reading)
-    found, front = {0: 0}, [0]
-    while front:
-        reached = []
-        for body in front:
-            for pair in pairs:
-                if body in pair:
-                    other = pair[1] if pair[0] == body else pair[0]
-                    if other not in found:
-                        found[other] = found[body] + 1
-                        reached.append(other)
-        front = reached
-    return found
-
-
-def _together(reading: Reading, body: int) -> set[int]:
-    """Return the bodies that hang together with a body, not through the world."""
-    pairs = [pair for pair in _pairs(reading) if 0 not in pair]
-    found, grows = {body}, True
-    while grows:
-        more = {one for pair in pairs if found & set(pair) for one in pair} - found
-        found, grows = found | more, bool(more)
+    pairs, found, bodies = _pairs(reading), {0: 0}, [0]
+    for body in bodies:  # to which those are added that are found meanwhile
+        for pair in pairs:
+            other = pair[1] if pair[0] == body else pair[0]
+            if body in pair and other not in found:
+                found[other] = found[body] + 1
+                bodies.append(other)
     return found
 
 
@@ -353,7 +339,9 @@ def _held_height(bench: Bench, node: int) -> float | None:
     reading = bench.reading
     ends = [one.nodes for one in reading.joinings] + [(one.nodes[0], one.nodes[-1]) for one in reading.ties]
     beside = {reading.body_of[b if a == node else a] for a, b in ends if node in (a, b)} - {0}
-    held = {body for one in beside for body in _together(reading, one)}
+    apart = [pair for pair in _pairs(reading) if 0 not in pair]  # what hangs together, not through the world
+    groups = connected_groups(dict.fromkeys(reading.body_of.values()), apart)
+    held = {body for group in groups if beside.intersection(group) for body in group}
     heights = [reading.place(other)[:, 2].mean() for other in reading.used if reading.body_of[other] in held]
     heights += [
         reading.poses[shape.lump.body].place(shape.center)[:, 2].mean()

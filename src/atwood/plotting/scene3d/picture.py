@@ -9,6 +9,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_modules import scipy
 from atwood.plotting.camera import Camera
 from atwood.plotting.canvas import COLOURS
 from atwood.plotting.scene3d.model import SpaceModel, build_model
@@ -183,17 +184,5 @@ def _outermost(corners: FloatArray) -> FloatArray:
 
 
 def hull(points: FloatArray) -> FloatArray:
-    """Return the corners of the convex hull of points on the page, counter-clockwise (Andrew's monotone chain)."""
-    order = points[np.lexsort((points[:, 1], points[:, 0]))]
-    found: list[FloatArray] = []
-    for side in (order, order[::-1]):
-        chain: list[FloatArray] = []
-        for point in side:
-            while len(chain) > 1:
-                (a, b), (c, d) = chain[-1] - chain[-2], point - chain[-2]
-                if a * d - b * c > 0.0:
-                    break
-                chain.pop()
-            chain.append(point)
-        found += chain[:-1]
-    return np.array(found)
+    """Return the corners of the convex hull of points on the page, counter-clockwise."""
+    return np.asarray(points[scipy.spatial.ConvexHull(points).vertices])
