@@ -15,8 +15,8 @@ from atwood.display import fitted
 from atwood.errors import AtwoodError
 from atwood.expr.core import algebra
 from atwood.expr.core.analysis import evaluate, live
-from atwood.expr.core.functions import Scalar, graph_of
-from atwood.expr.core.graph import Expression, Graph
+from atwood.expr.core.functions import Scalar
+from atwood.expr.core.graph import Expression, Graph, graph_of
 from atwood.expr.core.operations import ExternalFunction
 from atwood.lazy_modules import sympy
 

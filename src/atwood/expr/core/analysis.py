@@ -13,7 +13,7 @@ from typing import Any
 from atwood.clock import check_time
 from atwood.errors import AtwoodError
 from atwood.expr.core import algebra
-from atwood.expr.core.graph import Expression, Graph
+from atwood.expr.core.graph import Expression, graph_of
 from atwood.expr.core.operations import BINARY, LEAVES, UNARY, UNCOUNTED, solve_or_nan
 
 _INDEX = attrgetter("index")
@@ -144,7 +144,9 @@ def substitute(
     """
     if not outputs:
         return []
-    graph = _graph_of(outputs, mapping)
+    graph = graph_of(*outputs, *mapping)
+    if graph is None:
+        raise AtwoodError("there is no expression among the outputs")
     nodes = live(outputs)
     if len(mapping) > len(nodes):  # one part of a large scene
         mapping = {node: mapping[node] for node in nodes if node in mapping}
@@ -167,13 +169,6 @@ def substitute(
             replaced[index] = algebra.build(graph, node.operation, arguments, node.payload)
     converted = [graph.convert(output) for output in outputs]
     return [replaced.get(output.index, output) for output in converted]
-
-
-def _graph_of(outputs: Sequence[Expression | float], mapping: Mapping[Expression, Expression | float]) -> Graph:
-    for value in (*outputs, *mapping):
-        if isinstance(value, Expression):
-            return value.graph
-    raise AtwoodError("there is no expression among the outputs")
 
 
 def evaluate(

@@ -8,7 +8,7 @@ What outgrows all numbers is differentiated by its logarithm, so that a quotient
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Container, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from atwood.errors import AtwoodError
@@ -16,7 +16,7 @@ from atwood.expr.core import algebra
 from atwood.expr.core.algebra import component, select, unary
 from atwood.expr.core.analysis import dependents, live, substitute, varying
 from atwood.expr.core.arithmetic import add, divide, multiply, negate, subtract
-from atwood.expr.core.graph import Expression, Graph
+from atwood.expr.core.graph import Expression, Graph, graph_of
 from atwood.expr.core.operations import LEAVES, PIECEWISE_CONSTANT
 
 _Rule = Callable[[Expression, Expression], Expression]
@@ -224,7 +224,7 @@ def jvp(outputs: Sequence[Expression | float], tangents: Mapping[Expression, Exp
     list of Expression
         One derivative for each output; the constant 0 where the output does not move.
     """
-    graph, nodes = _graph_of(outputs, tangents), live(outputs)
+    graph, nodes = _graph_of(*outputs, *tangents), live(outputs)
     if len(tangents) > len(nodes):  # one part of a large scene
         tangents = {node: tangents[node] for node in nodes if node in tangents}
     seeds = {key.index: graph.convert(rate) for key, rate in tangents.items()}
@@ -253,7 +253,7 @@ def vjp(
     list of Expression
         One derivative for each entry of ``wrt``.
     """
-    graph = _graph_of(outputs, wrt)
+    graph = _graph_of(*outputs, *wrt)
     nodes = live(outputs)
     active = dependents(nodes, wrt)
     roots = {root.index for root in wrt}
@@ -336,7 +336,7 @@ def jacobian(
     """
     if not wrt or not any(isinstance(output, Expression) for output in outputs):
         return SparseMatrix((), (), ())
-    graph = _graph_of(outputs)
+    graph = _graph_of(*outputs)
     nodes = live(outputs)
     by_index = {node.index: node for node in nodes}
     users = _users(nodes)
@@ -420,12 +420,11 @@ def _reached(seeds: Mapping[int, Expression], users: Mapping[int, Sequence[int]]
     return sorted(found)
 
 
-def _graph_of(*groups: Iterable[Expression | float]) -> Graph:
-    for group in groups:
-        for value in group:
-            if isinstance(value, Expression):
-                return value.graph
-    raise AtwoodError("there is no expression to differentiate")
+def _graph_of(*values: Expression | float) -> Graph:
+    graph = graph_of(*values)
+    if graph is None:
+        raise AtwoodError("there is no expression to differentiate")
+    return graph
 
 
 Slopes = list[tuple[Expression, Expression]]

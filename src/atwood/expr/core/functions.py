@@ -18,7 +18,7 @@ from atwood.arguments import Kind, Refused, check, each, show, takes
 from atwood.errors import AtwoodError, KernelEvaluationError, UsageError
 from atwood.expr.core import algebra
 from atwood.expr.core.elementary import ON_ARRAYS, ON_FLOATS, STRICT
-from atwood.expr.core.graph import Expression, Graph
+from atwood.expr.core.graph import Expression, Graph, graph_of
 from atwood.expr.core.operations import ExternalFunction, floor as _floor_of_float, sign as _sign_of_float, solve_floats
 from atwood.lazy_modules import sympy
 
@@ -54,14 +54,6 @@ def _checked(function: str, **values: Scalar) -> None:
     """Refuse what a function has no value of at all; values that are plain numbers need not come here."""
     for name, value in values.items():
         check(SCALAR, value, name, function)
-
-
-def graph_of(*values: object) -> Graph | None:
-    """Return the graph of the first expression among the values, if there is one."""
-    for value in values:
-        if isinstance(value, Expression):
-            return value.graph
-    return None
 
 
 def _unary(operation: str, x: Scalar, on_float: Callable[[float], float], sympy_name: str = "") -> Scalar:

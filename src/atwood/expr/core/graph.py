@@ -463,3 +463,11 @@ def _describe(expression: Expression, depth: int) -> str:
     elif expression.payload is not None:
         name = f"{name}[{expression.payload}]"
     return f"{name}({inner}{more})"
+
+
+def graph_of(*values: object) -> Graph | None:
+    """Return the graph of the first expression among the values, if there is one."""
+    for value in values:
+        if isinstance(value, Expression):
+            return value.graph
+    return None

@@ -19,8 +19,8 @@ from atwood.errors import AtwoodError, ParameterError
 from atwood.expr.core import algebra
 from atwood.expr.core.analysis import evaluate, live
 from atwood.expr.core.derivatives import jvp
-from atwood.expr.core.functions import Scalar, graph_of
-from atwood.expr.core.graph import Expression, Graph
+from atwood.expr.core.functions import Scalar
+from atwood.expr.core.graph import Expression, Graph, graph_of
 from atwood.model.declare.time_functions import StoredFunction, read_text, steps_of, unknown_name
 from atwood.model.values.space import Vector
 from atwood.model.values.units import Unit

@@ -13,7 +13,7 @@ from atwood.lazy_dataclasses import dataclass, replace
 from atwood.theory.formulas.printers import latex, text
 from atwood.theory.formulas.quantities import distances_in, moments_in
 from atwood.theory.formulas.search import Search
-from atwood.theory.formulas.tree import Call, Name, Node, Sum, Symbol, Term, alone, names_in, replaced
+from atwood.theory.formulas.tree import Name, Node, Sum, Symbol, Term, alone, names_in, replaced, sums_within
 
 _WIDTH = 88
 """Columns of a line of formulas, as plain text."""
@@ -102,7 +102,7 @@ def _with_short_names(sections: Sequence[Section], taken: Iterable[str]) -> list
     formulas = [one for section in sections for line in section.lines for one in formulas_of(line)]
     if not any(width(text.formula(one)) > _LONG * _WIDTH for one in formulas):
         return list(sections)
-    counts = Counter(bracket for one in formulas for bracket in _brackets(one))
+    counts = Counter(bracket for bracket in sums_within(formulas, in_calls=False) if len(bracket.terms) > 1)
     chosen = [one for one, n in counts.items() if n >= _TIMES and width(text.formula(one)) >= _WORTH_A_NAME]
     if not chosen:
         return list(sections)
@@ -129,18 +129,6 @@ def _with_short_names(sections: Sequence[Section], taken: Iterable[str]) -> list
 def formulas_of(line: Line | Matrix) -> list[Sum]:
     """Return the formulas in a line."""
     return [line.formula] if isinstance(line, Line) else [one for row in line.entries for one in row]
-
-
-def _brackets(node: Node) -> Iterable[Sum]:
-    """Yield the sums within products, outer ones first."""
-    if isinstance(node, Call):
-        return
-    if isinstance(node, Sum):
-        for term in node.terms:
-            for inner, _ in term.factors:
-                if isinstance(inner, Sum) and len(inner.terms) > 1:
-                    yield inner
-                yield from _brackets(inner)
 
 
 def line_with(line: Line | Matrix, change: Callable[[Sum], Sum]) -> Line | Matrix:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from itertools import combinations
 from typing import TypeAlias
 
-from atwood.theory.formulas.tree import ONE, Call, Name, Node, Number, Sum, Symbol, Term, names_in
+from atwood.theory.formulas.tree import ONE, Name, Node, Number, Sum, Symbol, Term, names_in, sums_within
 
 _TIMES = 3
 """A moment of inertia has a name where it stands so often."""
@@ -34,7 +34,7 @@ def distances_in(formulas: Iterable[Node], legend: Iterable[Symbol]) -> dict[Sum
             name = Name(Symbol("r", tuple(ends), kind="distance"))
             known[frozenset((_expanded(square) or {}).items())] = name, square
     found: dict[Sum, tuple[Name, Sum]] = {}
-    for bracket in dict.fromkeys(_brackets(formulas)) if known else ():
+    for bracket in dict.fromkeys(sums_within(formulas)) if known else ():
         plain = _expanded(bracket)
         if plain is not None and (key := frozenset(plain.items())) in known:
             found[bracket] = known[key]
@@ -43,7 +43,7 @@ def distances_in(formulas: Iterable[Node], legend: Iterable[Symbol]) -> dict[Sum
 
 def moments_in(formulas: Sequence[Node]) -> dict[Sum, Name]:
     """Return sums ``I + m c^2`` of parameters that stand often, each with a letter J and the index of I."""
-    counts = Counter(one for one in _brackets(formulas) if len(one.terms) > 1)
+    counts = Counter(one for one in sums_within(formulas) if len(one.terms) > 1)
     found: dict[Sum, Name] = {}
     for one in sorted(counts, key=lambda node: len(node.terms)):
         moments = [term.factors[0][0] for term in one.terms if len(term.factors) == 1 and term.factors[0][1] == 1]
@@ -56,19 +56,6 @@ def moments_in(formulas: Sequence[Node]) -> dict[Sum, Name]:
         if times >= _TIMES and name not in found.values():
             found[one] = name
     return found
-
-
-def _brackets(formulas: Iterable[Node]) -> Iterator[Sum]:
-    """Yield all sums within products and functions."""
-    for node in formulas:
-        if isinstance(node, Call):
-            yield from _brackets(node.arguments)
-        elif isinstance(node, Sum):
-            for term in node.terms:
-                for inner, _ in term.factors:
-                    if isinstance(inner, Sum):
-                        yield inner
-                    yield from _brackets([inner])
 
 
 def _expanded(node: Sum) -> Plain | None:

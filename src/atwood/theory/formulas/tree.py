@@ -177,6 +177,19 @@ def names_in(nodes: Iterable[Node]) -> Iterator[Name]:
             stack += [inner for term in node.terms[::-1] for inner, _ in term.factors[::-1]]
 
 
+def sums_within(formulas: Iterable[Node], *, in_calls: bool = True) -> Iterator[Sum]:
+    """Yield all sums within products, outer ones first, and within functions."""
+    for node in formulas:
+        if isinstance(node, Call) and in_calls:
+            yield from sums_within(node.arguments)
+        elif isinstance(node, Sum):
+            for term in node.terms:
+                for inner, _ in term.factors:
+                    if isinstance(inner, Sum):
+                        yield inner
+                    yield from sums_within([inner], in_calls=in_calls)
+
+
 def replaced(node: Node, by: Mapping[Node, Node]) -> Node:
     """Return a formula with some of its parts replaced, from the outside inwards."""
     if node in by:
