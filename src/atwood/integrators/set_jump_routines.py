@@ -80,14 +80,16 @@ def _take() -> Routine:
     r = Routine("take_states", {"place": ADDRESS, "states": ADDRESS}, CODE)
     m, rows = _Leap(r.arguments[0], JUMP), r.arguments[1]
     sets, values = Sets(m.sets, FIELDS), m.values
-    count, places = sets.count, m.places
+    count, places, is_loose = sets.count, m.places, r.variable(1, INTEGER)
     with r.count(count) as k:
+        is_loose.now = r.choose(rows[k] == float(OPEN), is_loose.now, 0)
         is_slip = sets.unit("slip")[k] != 0.0
         state = r.choose(is_slip, rows[k], rows[k] * 0.5)
         values[r.truncated(places[k])] = state
         way = places[count + k]
         with r.when(way >= 0.0):
             values[r.truncated(way)] = rows[count + k]
+    m.loose = is_loose.now
     for name in ("kernel", "nearer", "event"):
         prologue: Value = getattr(m, f"{name}_prologue")
         scratch = m.event_scratch if name == "event" else m.scratch
@@ -103,7 +105,32 @@ def _take_relations() -> Routine:
     sets, values = Sets(m.sets, FIELDS), m.values
     r.copy(values.at(m.relations_at), m.relations.at(m.changed * m.others), m.others)
     r.call(m.set_prologue, values, sets.derived, sets.scratch, result=None)
+    with r.when(m.chooses != 0):
+        r.call(m.loose_prologue, values, m.loose_derived, m.loose_scratch, result=None)
+        r.call(m.loose_nearer_prologue, values, m.loose_nearer_derived, m.loose_scratch, result=None)
     r.give(0)
+    return r
+
+
+def _rates() -> Routine:
+    """Return the rates of the present set; where all are open, by the shorter program."""
+    r = Routine("rates", {"t": NUMBER, "y": ADDRESS, "yp": ADDRESS, "data": ADDRESS}, CODE, exported=True)
+    t, y, yp, data = r.arguments
+    m = _Leap(data, JUMP)
+    with r.when(m.loose != 0):
+        r.give(r.call(m.loose_rates, t, y, yp, m.loose_data))
+    r.give(r.call(m.whole_rates, t, y, yp, m.whole_data))
+    return r
+
+
+def _project() -> Routine:
+    """Take a state onto what the present set holds."""
+    r = Routine("project", {"t": NUMBER, "y": ADDRESS, "data": ADDRESS}, CODE, exported=True)
+    t, y, data = r.arguments
+    m = _Leap(data, JUMP)
+    with r.when(m.loose != 0):
+        r.give(r.call(m.loose_project, t, y, m.loose_project_data))
+    r.give(r.call(m.whole_project, t, y, m.whole_project_data))
     return r
 
 
@@ -251,8 +278,13 @@ def _back(r: Routine, m: _Leap, search: Search, changes: Value) -> None:
 
 
 def write_routines() -> list[Routine]:
-    """Return the routine ``jump``, and what it calls; it takes the address of its memory, a search, and a time."""
+    """Return the routine ``jump``, and what it calls; it takes the address of its memory, a search, and a time.
+
+    And the rates of sets; they take that memory for their data.
+    """
     return [
         *write_sets(),
         *(write() for write in (_triggers, _sharpen, _take, _take_relations, _meet, _arm, _log, _jump)),
+        _rates(),
+        _project(),
     ]

@@ -13,35 +13,40 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from atwood.arrays import FloatArray
+from atwood.arrays import BoolArray, FloatArray
 from atwood.codegen.llvm.build import Built, RoutineSource, build_code, once
 from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.codegen.llvm.tiers import Tiers
 from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Kind
 from atwood.expr.core.program import Program
 from atwood.integrators.jumps import ROOM, JumpLog, Jumps
-from atwood.integrators.protocol import RATES
+from atwood.integrators.protocol import RATES, CompiledRates
 from atwood.integrators.set_routines import CAPACITY, ENTRY, FIELDS, ROWS, UNITS
 
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventData
-    from atwood.integrators.protocol import CompiledRates
+    from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
 
 _PROGRAMS = tuple(f"{name}_{what}" for name in ("kernel", "nearer", "event") for what in ("prologue", "derived"))
+
+_CHOSEN = ("rates", "data", "project", "project_data")
+_LOOSE = ("prologue", "derived", "nearer_prologue", "nearer_derived", "scratch")
 
 JUMP: dict[str, Kind] = {
     **dict.fromkeys(("sets", "table", "shift", "margins", "seen", "states", "near", "before", "values"), ADDRESS),
     **dict.fromkeys(("places", "log", "project", "project_data", "scratch", "event_scratch", *_PROGRAMS), ADDRESS),
     **dict.fromkeys(("rates", "rates_data", "changes", "relations", "set_prologue"), ADDRESS),
+    **dict.fromkeys((f"{kind}_{what}" for kind in ("whole", "loose") for what in _CHOSEN), ADDRESS),
+    **dict.fromkeys((f"loose_{what}" for what in _LOOSE), ADDRESS),
     **dict.fromkeys(("now", "then", "late", "began", "shortest", "ahead", "rough", "later", "time"), NUMBER),
     **dict.fromkeys(("events", "size", "stride", "logged", "capacity", "stays"), INTEGER),
-    **dict.fromkeys(("changed", "others", "relations_at"), INTEGER),
+    **dict.fromkeys(("changed", "others", "relations_at", "chooses", "loose"), INTEGER),
 }
 """The memory of changes. `late` is by how much an event was seen after its zero, `then` the time of that zero,
 `now` that of the event, which is later where only rounding made it late, `began` when the set did, `shortest` how long
 one lasts at least, `time` that of the scene, `stays` whether all may open; `changes`: when parameters change, infinity
 last, `relations` the last `others` of them before the first of these times and from each on, `changed` how many times
-are over."""
+are over; `chooses` whether there are rates for when all are open, `loose`: as they are now."""
 
 _PLACES = {
     piece: {name: (kind, place) for place, (name, kind) in enumerate(fields.items())}
@@ -81,6 +86,12 @@ class SetLog(JumpLog):
         self._ends = HEAD + 2 * size + 3 * units
         self._begins, self._each = self._ends - 3 * units, len(ENTRY) + rows
 
+    def closings(self, was_open: bool) -> list[SetJump]:
+        """Return the changes by which something touches, slips or sticks where all was open before."""
+        units = (self._ends - self._begins) // 3
+        touches: BoolArray = np.any(self.entries[:, self._begins : self._begins + units], axis=1)
+        return self.changes(touches & np.append(was_open, ~touches[:-1]))
+
     def strikes(self) -> list[tuple[float, int]]:
         """Return times and gaps of the impacts."""
         found = self.entries[:, 3].astype(int)
@@ -92,10 +103,10 @@ class SetLog(JumpLog):
             for i in range(count)
         ]
 
-    def changes(self, first: int = 0) -> list[SetJump]:
-        """Return the changes from one on."""
+    def changes(self, which: slice | BoolArray = slice(None)) -> list[SetJump]:
+        """Return the changes, or some of them."""
         made = []
-        for row, states in zip(self.entries[first:], self.states[first:], strict=True):
+        for row, states in zip(self.entries[which], self.states[which], strict=True):
             time, stopped, left, struck = row[:HEAD].tolist()
             impacts = row[self._ends : self._ends + int(struck) * self._each].reshape(-1, self._each)
             set_ = row[self._begins : self._ends].reshape(3, -1)
@@ -110,7 +121,8 @@ _FILES = (*(f"integrators/{name}.py" for name in _OWN), "numerics/contact_sets.p
 @once
 def _routines() -> Built:
     source = RoutineSource("integrators.set_jump_routines", _FILES)
-    return build_code([], CodeOptions(level=2), exports=("jump", "resolve"), routines=source)
+    exports = ("jump", "resolve", "rates", "project")
+    return build_code([], CodeOptions(level=2), exports=exports, routines=source)
 
 
 _PROLOGUE = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)
@@ -259,6 +271,13 @@ class SetJumps(SetSolver, Jumps):
         Where states and directions of each are among the parameters; -1 where there is none.
     stays
         Whether a set in which all are open is one of them.
+    loose
+        Shorter programs for that set, and rates by them; None where steps do not go on with these.
+
+    Attributes
+    ----------
+    compiled
+        The rates that steps take: those of whichever set there is.
     """
 
     def __init__(
@@ -272,6 +291,7 @@ class SetJumps(SetSolver, Jumps):
         given: tuple[tuple[int, ...], tuple[int, ...], int],
         places: FloatArray,
         stays: bool,
+        loose: tuple[CompiledAccelerations, OwnRates] | None = None,
     ) -> None:
         own, number = code.coordinates + code.speeds, units.shape[1]
         self._stride = HEAD + 2 * own + 3 * number + MOST_IMPACTS * (count + len(ENTRY))
@@ -292,8 +312,17 @@ class SetJumps(SetSolver, Jumps):
         self._put(
             "own", {"events": events.count, "size": own, "stride": self._stride, "capacity": self._room, "stays": stays}
         )
-        self._place(events, rates, given)
-        self._rates = RATES(rates.function), rates.data
+        self._loose, self.compiled = loose, rates
+        if loose is not None:
+            own_rates = loose[1]
+            for name, prologue, place in zip(
+                ("loose", "loose_nearer"), own_rates.prologues, own_rates.places, strict=True
+            ):
+                self._put("own", {f"{name}_prologue": prologue, f"{name}_derived": place})
+            self._put("own", {"loose_scratch": own_rates.scratch, "chooses": True})
+            self.compiled = self._choosing(rates, loose[1].rates)
+        self._place(events, self.compiled, given)
+        self._rates = RATES(self.compiled.function), self.compiled.data
         self._put("own", {"set_prologue": self._built.code.addresses["contacts_prologue"]})
         self.function, self.data = code.routines.code.addresses["jump"], self._at["own"]
 
@@ -311,6 +340,33 @@ class SetJumps(SetSolver, Jumps):
         self._put("own", {"project": rates.project, "project_data": rates.project_data, "scratch": scratch})
         for name, prologue, place in zip(("kernel", "nearer"), prologues, kept, strict=True):
             self._put("own", {f"{name}_prologue": prologue, f"{name}_derived": place})
+
+    def _choosing(self, *both: CompiledRates) -> CompiledRates:
+        """Return rates that are, by the present set, those for all sets or those for when all are open."""
+        for kind, one in zip(("whole", "loose"), both, strict=True):
+            addresses = one.function, one.data, one.project, one.project_data
+            self._put("own", {f"{kind}_{what}": place for what, place in zip(_CHOSEN, addresses, strict=True)})
+        code, data, own = self.set_code.routines.code.addresses, self._at["own"], self._memory
+
+        def faster(seconds: float) -> CompiledRates | None:
+            made = [None if one.faster is None else one.faster(seconds) for one in both]
+            if not any(made):
+                return None
+            return self._choosing(*(new or old for new, old in zip(made, both, strict=True)))
+
+        kept = own, self.set_code, *(one.keep for one in both)
+        is_quick = any(one.faster is not None for one in both)
+        return CompiledRates(code["rates"], data, kept, code["project"], data, faster if is_quick else None)
+
+    def give(
+        self, parameter_values: FloatArray, states: FloatArray, near: float, past: Sequence[tuple[float, float]]
+    ) -> None:
+        """Take other parameters and states, as `SetSolver.give` does; rates for when all are open have them, too."""
+        super().give(parameter_values, states, near, past)
+        self._put("own", {"loose": not states[0].any()})
+        if self._loose is not None:
+            code, own = self._loose
+            code.fill(own, parameter_values)
 
     def _got(self, name: str) -> int:
         return int(self._pieces["own"].view(np.int64)[_PLACES["own"][name][1]])

@@ -28,8 +28,13 @@ from atwood.simulation.contacts.changes import NEAR, Changed, longest_left
 from atwood.simulation.contacts.event_records import in_own_words, told_change, told_impact, told_rest
 from atwood.simulation.contacts.states import states_of
 from atwood.simulation.contacts.values import Layout, layout_of
-from atwood.simulation.events.modes import MARGIN, EventProbe, EventRecord, ToldLater
-from atwood.simulation.problem.explicit_scene import light_speeds, program_on_constraints, values_on_constraints
+from atwood.simulation.events.modes import MARGIN, EventProbe, EventRecord, ToldLater, find_event_functions
+from atwood.simulation.problem.explicit_scene import (
+    light_speeds,
+    own_rates_on_constraints,
+    program_on_constraints,
+    values_on_constraints,
+)
 from atwood.simulation.problem.problem import SceneProblem
 
 HAPPENED = {CLOSES: sets.CLOSES, OPENS: sets.OPENS, YIELDS: sets.YIELDS, STOPS: sets.STOPS, RESTS: sets.STOPS}
@@ -38,7 +43,7 @@ HAPPENED = {CLOSES: sets.CLOSES, OPENS: sets.OPENS, YIELDS: sets.YIELDS, STOPS: 
 _SHORT = 300
 """Programs for all states that are no longer than this are used where nothing touches, too."""
 
-FEW_ROWS = 6
+FEW_ROWS = 8
 """The program of a set of so few gaps and slips is small, so that it pays from the first change on."""
 
 _MOST_ROWS = 40
@@ -93,6 +98,11 @@ def in_no_contact(assembly: Assembly) -> Assembly:
     for place in (place for places in layout_of(assembly).places for place in places):
         held[place] = 0.0
     return assembly.with_held(held)
+
+
+def not_touching(assembly: Assembly) -> bool:
+    """Return whether nothing touches, slips or sticks, whichever programs there are."""
+    return not any(assembly.held_now[place] for places in layout_of(assembly).places for place in places)
 
 
 def set_data(plan: SceneProblem, t: float, y: FloatArray) -> SetData:
@@ -162,8 +172,15 @@ def kept_whole(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray, stops
         return plan
     if not changes_in_steps(plan) or why_in_python(assembly):
         return plan
-    whole = plan.in_piece(kept_touching(assembly))
-    return whole if _is_short(whole, t, np.concatenate([q, u])) else plan
+    whole, y = plan.in_piece(kept_touching(assembly)), np.concatenate([q, u])
+    watched = find_event_functions(whole.assembly)
+    return whole if _is_short(whole, t, y) or _is_changed(whole, t, y, watched) else plan
+
+
+def _is_changed(plan: SceneProblem, t: float, y: FloatArray, watched: Sequence[EventFunction]) -> bool:
+    """Return whether steps change sets by themselves, where all that is watched are these events."""
+    is_watched = any(one.target not in CONTACT for one in watched)
+    return not (is_watched or plan.not_compilable) and changes_in_steps(plan) and _code_of(plan, t, y) is not None
 
 
 def _is_short(plan: SceneProblem, t: float, y: FloatArray) -> bool:
@@ -178,18 +195,19 @@ def sets_of(
     Nothing but gaps and slips in one direction may be watched.
     """
     assembly, layout = plan.assembly, layout_of(plan.assembly)
-    is_watched = any(one.target not in CONTACT for one in probe.event_functions)
-    if is_watched or is_loose(assembly) or not changes_in_steps(plan):
-        return None
-
-    made = _code_of(plan, t, y)
+    made = None
+    if not is_loose(assembly) and _is_changed(plan, t, y, probe.event_functions):
+        made = _code_of(plan, t, y)
     if made is None:
         return None
     (data, code), before = made, len(assembly.mechanism.table.values)
     places = np.array([[before + one[0], before + one[1] if len(one) > 1 else -1] for one in layout.places]).T
     given, count = (rates.prologues, rates.places, rates.scratch), len(layout.contacts)
-    own, stays = (code, data.pattern, _units(layout, plan), count), _is_short(plan, t, y)
-    return SetJumps(*own, events, rates.rates, given, places, stays)
+    own, stays, loose = (code, data.pattern, _units(layout, plan), count), _is_short(plan, t, y), None
+    if not stays and count <= FEW_ROWS:
+        loose = own_rates_on_constraints(plan.in_piece(in_no_contact(assembly)), t, y)
+        stays = loose is not None
+    return SetJumps(*own, events, rates.rates, given, places, stays, loose)
 
 
 def solver_of(plan: SceneProblem, t: float, y: FloatArray) -> SetSolver | None:

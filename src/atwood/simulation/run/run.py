@@ -204,7 +204,7 @@ class Walk:
         self._unsettled: tuple[EventRecord, ...] | None = ()
         self._late: tuple[float, FloatArray] | None = None
         self._impacts: list[tuple[float, str]] = []
-        self._told: set[tuple[float, ...] | None] = set()
+        self._told: set[tuple[float, ...]] = set()
         self.probe: EventProbe | None = None
         self.choice: Choice
 
@@ -373,6 +373,8 @@ class Walk:
         self.segments.append(self._sides.recorded(record, self.plan, self.assembly, bool(outcome.sides)))
         self._follow(outcome)
         if contacts and outcome.error is None and options.looks_for_events:
+            for assembly, t, y in outcome.closed:
+                self._check_told(assembly, t, *recorder.plan.program.split(y))
             self._check_told(self.assembly, *recorder.last()[:3])
         return recorder, outcome
 
@@ -534,11 +536,11 @@ class Walk:
 
     def _check_told(self, assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> None:
         """Refuse places whose forces formulas do not give, once for each set that holds."""
-        if self.held in self._told:
+        if assembly.held_now in self._told:
             return
-        self._told.add(self.held)
+        self._told.add(assembly.held_now)
         error = 10.0 * self.options.relative_tolerance if self.segments else 0.0
-        about = assembly.shared, assembly.relation_values, self.held, t, q.tobytes(), u.tobytes(), error
+        about = assembly.shared, assembly.relation_values, assembly.held_now, t, q.tobytes(), u.tobytes(), error
         if about not in self._kept.told:
             from atwood.simulation.contacts.told_forces import check_told_forces
 

@@ -225,6 +225,9 @@ class Outcome:
         Since when the last set of contacts and the last piece have held, s, where it went through time events.
     late
         How long after its zero an event was seen, s, and the rates of the state there; None where that is not known.
+    closed
+        The scene with what holds, time and state where steps have closed contacts while all were open; once for each
+        set.
     """
 
     t: float
@@ -242,6 +245,7 @@ class Outcome:
     passed: Passed | None = None
     begun: float | None = None
     late: tuple[float, FloatArray] | None = None
+    closed: tuple[tuple[Assembly, float, FloatArray], ...] = ()
 
 
 def goes_on(outcome: Outcome, end: float) -> bool:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.clock import TimeIsUp, check_time, more_time, time_left
 from atwood.errors import AtwoodError, SolveError, StartError
+from atwood.forms.assembly import Assembly
 from atwood.forms.loose import kept_touching
 from atwood.integrators.explicit_session import ExplicitSession
 from atwood.integrators.methods import AUTO, Method
@@ -136,6 +137,7 @@ class _Runner:
         self.opened: StepResult | None = None
         self.noted: list[EventRecord | ToldLater] = []
         self.jumped: list[_Jumps] = []
+        self.closed: dict[tuple[float, ...], tuple[Assembly, float, FloatArray]] = {}
 
     @property
     def pieces(self) -> Schedule | None:
@@ -238,6 +240,7 @@ class _Runner:
             handed=self._handed_on() if t < self.segment.options.t_end else (),
             held=self.segment.plan.assembly.held,
             begun=None if self.pieces is None else self.began,
+            closed=tuple(self.closed.values()),
         )
 
     def _handed_on(self) -> tuple[int, ...]:
@@ -490,21 +493,26 @@ class _Runner:
 
     def _take_sets(self, log: SetLog) -> None:
         """Take up the changes of a set of contacts, and go on with the last of them."""
-        from atwood.simulation.contacts.compiled import held_after, noted_sets, told_sets
+        from atwood.simulation.contacts.compiled import held_after, not_touching, noted_sets, told_sets
 
         segment, assembly = self.segment, self.segment.plan.assembly
         changes = once(partial(told_sets, log, assembly))
         self.noted.append(noted_sets(log, assembly, changes))
         self.recorder.take_changes(changes)
         self.recorder.nearest = None  # it takes states onto what holds now
-        [last] = log.changes(-1)
-        held = held_after(last, assembly)
-        if self.pieces is not None:
-            assembly = self.pieces.applied(assembly, self.pieces.piece(last.time))
-        plan = segment.plan.in_piece(kept_touching(assembly.with_held(held)))
+        for one in log.closings(not_touching(assembly)):
+            held = held_after(one, assembly)
+            self.closed.setdefault(held, (self._in_piece(assembly.with_held(held), one.time), one.time, one.states[1]))
+        [last] = log.changes(slice(-1, None))
+        assembly = self._in_piece(assembly.with_held(held_after(last, assembly)), last.time)
+        plan = segment.plan.in_piece(kept_touching(assembly))
         q, u = plan.program.split(last.states[1])
         probe = segment.probe.at(plan, last.time, q, u)
         self.segment, self.began = replace(segment, plan=plan, probe=probe), last.time
+
+    def _in_piece(self, assembly: Assembly, t: float) -> Assembly:
+        """Return the scene in the piece of a time, where steps pass time events by themselves."""
+        return assembly if self.pieces is None else self.pieces.applied(assembly, self.pieces.piece(t))
 
     def _sample_watched(self, session: Session, done: int) -> tuple[int, StepResult | None]:
         """Let an explicit method fill tables, with looks at the motion where constraints stay."""

@@ -521,6 +521,7 @@ def _open_on_constraints(
     settings = replace(settings, absolute_tolerances=absolute)
     explicit = _watched(request, problem, method)
     own = own_rates_on_constraints(plan, t, y) if _can_be_kept(explicit, method) else None
+    rates = None if own is None else own[1].rates
     if own is not None and explicit.compiled_events is not None and kept.jumps(plan.assembly):
         from atwood.simulation.contacts.bounces import bounces_of
         from atwood.simulation.contacts.compiled import sets_of
@@ -528,12 +529,12 @@ def _open_on_constraints(
         alone = None if request.options.impacts == "one_by_one" else own[1]
         found = bounces_of(plan, probe, t, y, explicit.compiled_events, own[1].rates)
         if found is None and alone is not None:
-            found = sets_of(plan, probe, t, y, explicit.compiled_events, alone)
+            found = sets = sets_of(plan, probe, t, y, explicit.compiled_events, alone)
+            rates = rates if sets is None else sets.compiled
         explicit = replace(explicit, jumps=found)
     fill = None if own is None else Filling(*own, explicit, values_on_constraints)
-    if own is not None and fill is not None:
+    if rates is not None and fill is not None:
         fill(request)
-        rates = own[1].rates
         explicit = replace(explicit, compiled=lambda: rates)
     series, _ = equations_of(request, explicit, (t, y))
     task = Task(
