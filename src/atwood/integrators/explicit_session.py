@@ -222,6 +222,10 @@ class ExplicitSession(SteppingSession):
         """Take states, one row each, onto the constraints as steps are; None where none can be taken so."""
         return self._stepper.nearest(t, y, sizes)
 
+    def nearest_open(self, t: FloatArray, y: FloatArray, sizes: FloatArray) -> Nearest | None:
+        """Take states onto the constraints alone, whatever contacts there were; None where none can be taken so."""
+        return None if self._jumps is None else self._jumps.while_open(lambda: self.nearest(t, y, sizes))
+
     def through(self, changes: Changes) -> Moments | None:
         """Return a way through moments at which parameters change, from the start on; None where there is none."""
         plain = self._locator is None and self._jumps is None and self.budget.poll is None

@@ -6,6 +6,7 @@ has happened before ever faster, is left to Python.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import inf
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from atwood.codegen.sundials.events import EventData
-    from atwood.integrators.protocol import CompiledRates
+    from atwood.integrators.protocol import CompiledRates, Nearest
 
 FIELDS: dict[str, Kind] = {
     **dict.fromkeys(("program", "derived", "scratch", "shift", "seen", "table", "parts"), ADDRESS),
@@ -163,6 +164,10 @@ class Jumps:
         self._numbers[_PLACES["left"]] = left
         self._told = len(known)
         self._set(logged=self._told, capacity=self._told + self._room)
+
+    def while_open(self, call: Callable[[], Nearest | None]) -> Nearest | None:
+        """Call a function of the steps as if all contacts were open; None where these have no programs for that."""
+        return None
 
     def begin(self, t: float) -> None:
         """Learn when the steps begin, where that matters."""

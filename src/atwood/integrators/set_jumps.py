@@ -7,7 +7,7 @@ shorter.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import inf
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -26,6 +26,7 @@ from atwood.integrators.set_routines import CAPACITY, ENTRY, FIELDS, ROWS, UNITS
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventData
     from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
+    from atwood.integrators.protocol import Nearest
 
 _PROGRAMS = tuple(f"{name}_{what}" for name in ("kernel", "nearer", "event") for what in ("prologue", "derived"))
 
@@ -387,6 +388,17 @@ class SetJumps(SetSolver, Jumps):
         if tiers.has_better and (built := tiers.spend(seconds)) is not self._built:
             self._keeps, self._built = (*self._keeps, self._built), built
             self._put("sets", {"program": built.code.addresses["contacts"]})
+
+    def while_open(self, call: Callable[[], Nearest | None]) -> Nearest | None:
+        """Call a function of the steps as if all contacts were open; None where these have no programs for that."""
+        if self._loose is None:
+            return None
+        loose = self._got("loose")
+        self._put("own", {"loose": True})
+        try:
+            return call()
+        finally:
+            self._put("own", {"loose": loose})
 
     def begin(self, t: float) -> None:
         """Learn when the present set begins."""

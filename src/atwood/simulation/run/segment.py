@@ -484,14 +484,14 @@ class _Runner:
         from atwood.integrators.set_jumps import SetLog
 
         if isinstance(log, SetLog):
-            self._take_sets(log)
+            self._take_sets(session, log)
         else:
             from atwood.simulation.contacts.bounces import noted_bounces
 
             self.noted.append(noted_bounces(log, self.segment.plan, self.segment.probe))
         return log.time, log.states
 
-    def _take_sets(self, log: SetLog) -> None:
+    def _take_sets(self, session: Session, log: SetLog) -> None:
         """Take up the changes of a set of contacts, and go on with the last of them."""
         from atwood.simulation.contacts.compiled import held_after, not_touching, noted_sets, told_sets
 
@@ -499,7 +499,8 @@ class _Runner:
         changes = once(partial(told_sets, log, assembly))
         self.noted.append(noted_sets(log, assembly, changes))
         self.recorder.take_changes(changes)
-        self.recorder.nearest = None  # it takes states onto what holds now
+        assert isinstance(session, ExplicitSession)
+        self.recorder.nearest = session.nearest_open  # what holds now did not before
         for one in log.closings(not_touching(assembly)):
             held = held_after(one, assembly)
             self.closed.setdefault(held, (self._in_piece(assembly.with_held(held), one.time), one.time, one.states[1]))
