@@ -34,6 +34,7 @@ from atwood.integrators.session import SteppingSession, copied
 from atwood.integrators.stepper import Outcome, Stepper
 
 if TYPE_CHECKING:
+    from atwood.codegen.sundials.events import EventData
     from atwood.integrators.moments import Changes, Moments
 
 FIRST_CHUNK, LARGEST_CHUNK = 4000, 100_000
@@ -129,6 +130,11 @@ class ExplicitSession(SteppingSession):
             return None
         self._starts += len(made.time)
         return made
+
+    @property
+    def watched(self) -> EventData | None:
+        """The events as machine code, of the unknowns that are handed out; None where they are not."""
+        return self._problem.compiled_events
 
     @property
     def handed_on(self) -> tuple[int, ...]:

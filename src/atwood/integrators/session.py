@@ -6,7 +6,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from math import inf
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -25,6 +25,9 @@ from atwood.integrators.protocol import (
     StepMonitor,
     StepResult,
 )
+
+if TYPE_CHECKING:
+    from atwood.codegen.sundials.events import EventData
 
 _T = TypeVar("_T")
 
@@ -95,6 +98,11 @@ class Session(ABC):
 
     def take_jumps(self) -> JumpLog | None:
         """Return the jumps that were made without stopping since this was last asked; None where there are none."""
+        return None
+
+    @property
+    def watched(self) -> EventData | None:
+        """The events as machine code, of the unknowns that are handed out; None where they are not."""
         return None
 
     def set_monitor(self, monitor: StepMonitor) -> bool:

@@ -265,8 +265,7 @@ class _Runner:
             self.recorder.settle()
             return self._ended(step_result.t, "finished", "")
         if step_result.status is Status.EVENT:
-            probe, split = self.segment.probe, self.segment.plan.program.split
-            at_event = (lambda t, y: probe.values(t, *split(y))), probe.shift
+            at_event = self._at_event()
             step_result = without_margin(*at_event, step_result, self.began)
             self.recorder.rewind(step_result.t)
             event, *together = self.segment.probe.changing(step_result)
@@ -297,6 +296,15 @@ class _Runner:
             message = self.segment.options.out_of_steps(step_result.t)
         ended = self._ended(step_result.t, step_result.status.value, message)
         return ended if step_result.status is not Status.FAILED else replace(ended, error=self._explain(step_result))
+
+    def _at_event(self) -> tuple[Callable[[float, FloatArray], FloatArray], FloatArray]:
+        """Return the values of events, as steps see them if these are compiled, and what is added to each."""
+        probe, split = self.segment.probe, self.segment.plan.program.split
+        watched = None if self.session is None else self.session.watched
+        if watched is None:
+            return (lambda t, y: probe.values(t, *split(y))), probe.shift
+        values = watched.function()
+        return (lambda t, y: values(t, y, y)), watched.arrays[1].copy()
 
     def _notes(self, step_result: StepResult) -> bool:
         """After an event that changes nothing, note it: the solver then goes on as if nothing had happened."""
