@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from atwood.expr import Expression, substitute
-from atwood.forms.assembly import Assembly
+from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import replace
 from atwood.mechanics.dynamics.equations import ContactRow, Equations
@@ -63,11 +63,14 @@ def has_touched(assembly: Assembly) -> bool:
     return bool(assembly.own_equations.contacts) and not is_loose(assembly)
 
 
-def loosened(assembly: Assembly, values: Sequence[Expression]) -> list[Expression]:
-    """Return expressions as they are in the present states, if these are all zero; else as they stand."""
+def loosened(assembly: Assembly, values: Sequence[Expression], form: FormName | None = None) -> list[Expression]:
+    """Return expressions, in its own coordinates or others, as they are in the present states, if these are all zero.
+
+    Else they stand as they are.
+    """
     if not is_loose(assembly):
         return list(values)
-    equations, states = assembly.own_equations, assembly.discrete_states
+    equations, states = assembly.in_coordinates(form or assembly.form), assembly.discrete_states
     known = {equations.read.get(one, one) for one in equations.contact_multipliers}
     zeros = {one: equations.graph.zero for one in known if not one.is_constant}
     without = substitute(list(values), zeros)

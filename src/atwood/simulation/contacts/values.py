@@ -15,8 +15,9 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, read_by, substitute
 from atwood.forms.assembly import Assembly
+from atwood.forms.balance_program import BalanceProgram, balance_program
 from atwood.forms.caches import Key
-from atwood.forms.loose import state_paths
+from atwood.forms.loose import loosened, state_paths
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import to_maximal
 from atwood.lazy_dataclasses import dataclass, replace
@@ -26,13 +27,23 @@ from atwood.model.values.units import ALONG
 from atwood.numerics.contact_sets import Contacts, Limits, Unit, sizes_of
 from atwood.numerics.matrices import least_norm, or_one, to_array
 from atwood.numerics.rank import null_space
-from atwood.simulation.dynamics.balance import LIGHT, BalanceValues, ConstraintValues, balance_of, even_balance
+from atwood.simulation.dynamics.balance import (
+    LIGHT,
+    Balance,
+    BalanceValues,
+    ConstraintValues,
+    balance_by,
+    balance_of,
+    even_balance,
+)
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.scales import Scales, motion_scales
 from atwood.simulation.problem.problem import SceneProblem
 
 _LAYOUT: Key[Layout] = Key("gaps and slips")
 _OWN_SIZES: Key[Scales] = Key("sizes of forces of gaps and slips")
+_APART: Key[BalanceProgram] = Key("balance of forces without gaps and slips")
+_BALANCE_APART: Key[Balance] = Key("the same with parameters")
 
 _LIMITS = ("limits", "static limits", "limits backwards", "static limits backwards")
 
@@ -177,6 +188,21 @@ def with_own_sizes(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -
     return replace(plan, scales=assembly.kept.get(_OWN_SIZES, make, t, q.tobytes(), u.tobytes(), scales.time))
 
 
+def without_contacts(assembly: Assembly) -> Balance:
+    """Return the balance of forces in maximal coordinates of a scene in which nothing touches, slips or sticks."""
+    held = list(assembly.held_now)
+    for place in (place for places in layout_of(assembly).places for place in places):
+        held[place] = 0.0
+    apart = assembly.with_held(held)
+
+    def make() -> BalanceProgram:
+        equations = replace(apart.maximal, rows=tuple(loosened(apart, apart.maximal.rows, "dae")), contacts=())
+        return balance_program(f"{assembly.flat.name} (dae, without contacts)", equations, assembly.parameters)
+
+    program = assembly.shared.get(_APART, make)
+    return apart.kept.get(_BALANCE_APART, lambda: balance_by(apart, "dae", program))
+
+
 class ContactValues:
     """Gaps and slips at a state.
 
@@ -232,11 +258,8 @@ class ContactValues:
 
     @cached_property
     def _now(self) -> BalanceValues:
-        """The balance of forces without these forces."""
-        held = list(self.assembly.held_now)
-        for place in (place for places in self.layout.places for place in places):
-            held[place] = 0.0
-        return balance_of(self.assembly.with_held(held), "dae").at(self.t, self.q, self.u)
+        """The balance of forces without these forces, by a program in which they do not occur."""
+        return without_contacts(self.assembly).at(self.t, self.q, self.u)
 
     @property
     def _sizes_by_mass(self) -> FloatArray:

@@ -209,11 +209,11 @@ class Balance:
 
 def balance_of(assembly: Assembly, form: FormName) -> Balance:
     """Return the balance of forces of a scene in the coordinates of either form."""
-    return assembly.kept.get(_BALANCES[form], lambda: _balance_of(assembly, form))
+    return assembly.kept.get(_BALANCES[form], lambda: balance_by(assembly, form, assembly.balance(form)))
 
 
-def _balance_of(assembly: Assembly, form: FormName) -> Balance:
-    program = assembly.balance(form)
+def balance_by(assembly: Assembly, form: FormName, program: BalanceProgram) -> Balance:
+    """Return the balance of forces of a scene by a program."""
     mass = None if program.mass_product is None else partial(mass_at, assembly, form)
     held = partial(assembly.kernel, program.constraints_alone)
     places, kinematic_map = (program.jacobian_rows, program.jacobian_columns), kinematic_map_of(assembly, form)
