@@ -6,7 +6,19 @@ import numpy as np
 import pytest
 from tests.helpers.runs import difference_quotient, moved, prepare
 
-from atwood import Component, ExternalFunction, Point, Scene, UsageError, connector, dynamics, external, force, select
+from atwood import (
+    Component,
+    ExternalFunction,
+    Point,
+    Scene,
+    UsageError,
+    assemble,
+    connector,
+    dynamics,
+    external,
+    force,
+    select,
+)
 from atwood.errors import KernelEvaluationError
 from atwood.forms.quantities import observer
 from atwood.model.declare.law_results import Load
@@ -160,6 +172,13 @@ def test_functions_in_python_are_called_too() -> None:
     scene.connect(bob.point, wind.point)
     found = dynamics(scene)
     assert found.forward_dynamics([[3.0, 0.0], [5.0, 0.0]], [0.0, 0.0])[:, 0] == pytest.approx([3.0, 5.0])
+
+
+def test_the_start_is_known_in_any_coordinates_of_an_orientation() -> None:
+    made = [assemble(SCENES["heavy-top"](), orientation=one) for one in ("quaternion", "euler-zxz", "euler-zyx")]
+    first, *others = ((found := dynamics(one)).forward_dynamics(*found.start()) for one in made)
+    for a in others:
+        assert a == pytest.approx(first, rel=1e-12, abs=1e-12)
 
 
 def test_many_bodies_go_column_by_column() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, dependencies as symbols_in, jvp
 from atwood.expr.core.graph import Graph
@@ -66,8 +66,3 @@ def tangent_programs(mode: ModeText, inputs: Sequence[int]) -> dict[str, Program
 
 def _symbols(graph: Graph, name: str, count: int) -> list[Expression]:
     return [graph.symbol(f"{name} {k}") for k in range(count)]
-
-
-def indices(found: Iterable[int], first: int) -> str:
-    """Return numbers as XML lists them."""
-    return " ".join(str(first + one) for one in found)

@@ -13,7 +13,7 @@ import numpy as np
 
 from atwood.arguments import NAME, check, optional, takes
 from atwood.arrays import FloatArray
-from atwood.errors import SolveError, UnsupportedError, UsageError, suggestion_in_parts
+from atwood.errors import SolveError, UsageError, suggestion_in_parts
 from atwood.expr import (
     Expression,
     InputGroup,
@@ -28,7 +28,6 @@ from atwood.expr import (
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.program import is_too_long, state_groups
-from atwood.forms.quantities import to_maximal
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.model.compose.composite import Model
@@ -36,7 +35,7 @@ from atwood.numerics.rank import independent_rows
 from atwood.pipeline import SCENE, smooth_assembly_of
 from atwood.simulation.dynamics.balance import BalanceValues, balance_of, mass_at, solve_balance
 from atwood.simulation.dynamics.scales import motion_scales
-from atwood.simulation.initialization.start import Start, find_start
+from atwood.simulation.initialization.start import Start, find_start, own_state
 from atwood.simulation.problem.arguments import FORM, ORIENTATION
 from atwood.theory.dynamics.functions import Function, Numbers, as_numbers, as_time, at_time
 
@@ -92,18 +91,10 @@ class Dynamics:
         Raises
         ------
         StartError
-            If the start is not consistent.
-        UnsupportedError
-            If orientations are in three coordinates.
+            If the start is not consistent, or three coordinates of an orientation are singular there.
         """
-        begun, assembly = self._start, self.assembly
-        if self.equations is assembly.regular:
-            return begun.coordinates.copy(), begun.speeds.copy()
-        if assembly.form == "reduced":
-            advice = "Assemble the scene with quaternions."
-            raise UnsupportedError("its start is known in quaternions", where=self._name, advice=advice)
-        q, u = assembly.kernel(to_maximal(assembly, "regular"))([begun.time], begun.coordinates, begun.speeds)
-        return np.asarray(q, dtype=float), np.asarray(u, dtype=float)
+        q, u = own_state(self.assembly, self._start)
+        return q.copy(), u.copy()
 
     def __repr__(self) -> str:
         n, m = len(self.speeds), len(self.constraints)

@@ -17,6 +17,7 @@ from atwood.forms.quantities import observer
 from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
+from atwood.result.segment_quantities import state_values
 from atwood.simulation.initialization.start import find_start
 from atwood.theory.dynamics.one_coordinate import PartsAt, Radial, parts_of
 from atwood.theory.dynamics.quadrature import FULL_TURN, Path, find_path
@@ -209,10 +210,10 @@ class ReducedMotion(Described):
         if not chosen:
             return {}
         q = np.array([found[one.name] for one in e.names])
-        still = np.zeros((len(e.speeds), len(times)))
-        kernel = assembly.kernel(observer(assembly, tuple(chosen)), vectorized=True)
-        values = kernel(times[None, :], q, still, still, np.zeros((len(assembly.reactions), len(times))))[0]
-        return {path: np.broadcast_to(row, times.shape) for path, row in zip(chosen, values, strict=True)}
+        values = state_values(
+            assembly, observer(assembly, tuple(chosen)), times, q, np.zeros((len(e.speeds), len(times)))
+        )
+        return dict(zip(chosen, values, strict=True))
 
     def __repr__(self) -> str:
         low, high = self.turning_points

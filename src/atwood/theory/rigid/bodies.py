@@ -18,8 +18,7 @@ from atwood.lazy_modules import sympy
 from atwood.mechanics.dynamics.inertia import CarriedInertia
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, smooth_assembly_of
-from atwood.simulation.dynamics.orientation_coordinates import from_regular
-from atwood.simulation.initialization.start import find_start
+from atwood.simulation.initialization.start import find_start, own_state
 from atwood.solids.properties import MassProperties
 from atwood.theory.dynamics.dynamics import dynamics
 from atwood.theory.formulas.notation import SYMBOLS
@@ -89,15 +88,16 @@ def principal_body(assembly: Assembly, body: str | None = None) -> PrincipalBody
         order.append(max((i for i in range(3) if i not in order), key=lambda i: abs(float(axes[k, i]))))
     axes = axes[:, order] * np.where(np.diag(axes[:, order]) < 0.0, -1.0, 1.0)
     axes[:, 2] *= np.sign(np.linalg.det(axes))
-    q, u = _start(assembly)
-    spin = axes.T @ _vector(assembly, f"{part}.spin", find_start(assembly).time, q, u)
+    start = find_start(assembly)
+    q, u = own_state(assembly, start)
+    spin = axes.T @ _vector(assembly, f"{part}.spin", start.time, q, u)
     return PrincipalBody(part, float(found[0]), found[1:4], moments[order], axes, spin)
 
 
 def check_free(assembly: Assembly, part: str) -> None:
     """Refuse a body that a torque about its centre of mass acts on, at its start or as it turns otherwise there."""
     found, t, rng = dynamics(assembly), find_start(assembly).time, np.random.default_rng(5)
-    q, start = _start(assembly)
+    q, start = found.start()
     rates = OutputGroup("rates", found.equations.rates)
     program = Program(f"{part} rates", state_groups(found.equations), assembly.parameters, (rates,))
     others = () if found.equations.constraints else rng.normal(size=(2, len(start)))
@@ -114,14 +114,6 @@ def check_free(assembly: Assembly, part: str) -> None:
                 where=f"{assembly.flat.name}: {part}",
                 advice="For a top on its tip there is `symmetric_top`.",
             )
-
-
-def _start(assembly: Assembly) -> tuple[FloatArray, FloatArray]:
-    """Return coordinates and speeds of the form of an assembly at the start."""
-    if assembly.form != "reduced":
-        return dynamics(assembly).start()
-    start = find_start(assembly)
-    return from_regular(assembly, start.coordinates), start.speeds
 
 
 def _vector(assembly: Assembly, path: str, t: float, q: FloatArray, u: FloatArray) -> FloatArray:

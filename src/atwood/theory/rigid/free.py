@@ -21,6 +21,7 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.lazy_modules import scipy
 from atwood.model.compose.composite import Model
 from atwood.pipeline import smooth_assembly_of
+from atwood.result.work import integral_in_steps, nodes_between
 from atwood.simulation.initialization.start import find_start
 from atwood.theory.formulas.notation import SYMBOLS
 from atwood.theory.formulas.sheet import FormulaSheet, statements_of
@@ -30,6 +31,9 @@ _KINDS = ("asymmetric", "separatrix", "symmetric", "steady")
 
 _SAME = 1e-12
 """Relative: moments of inertia, or L^2 and 2 E I, that differ by less are one."""
+
+_NODES = 12
+"""Of Gauss between two times, where a rate is integrated."""
 
 
 @takes_names
@@ -240,10 +244,9 @@ class FreeRotation:
 
 def integrated(rate: Callable[[FloatArray], FloatArray], start: float, times: FloatArray) -> FloatArray:
     """Return the integral of a rate from a start to times, which rise, by Gauss's nodes between them."""
-    nodes, weights = np.polynomial.legendre.leggauss(12)
-    steps = np.diff(np.r_[start, times])
-    inside = (times - steps)[:, None] + 0.5 * steps[:, None] * (1.0 + nodes)
-    return np.asarray(np.cumsum(0.5 * steps * (rate(inside.ravel()).reshape(inside.shape) @ weights)))
+    ends = np.r_[start, times]
+    rates = rate(nodes_between(ends, _NODES)).reshape(-1, _NODES)
+    return integral_in_steps(ends, rates)[0][1:]
 
 
 _TRIPLE = each(number(), "three numbers", 3, single=False)
