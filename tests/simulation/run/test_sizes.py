@@ -5,9 +5,23 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from atwood import DeclarationError, Scene, assemble, parameter, simulate, sweep
+from atwood import (
+    Component,
+    DeclarationError,
+    Point,
+    Scalar,
+    Scene,
+    assemble,
+    connector,
+    event,
+    parameter,
+    simulate,
+    sweep,
+)
 from atwood.simulation.dynamics.scales import scene_length
 from atwood_library import (
+    Box,
+    BoxContact,
     Ground,
     Link,
     Mass1D,
@@ -145,3 +159,40 @@ def test_a_place_is_in_metres() -> None:
         parameter(1.0, unit="rad", place=True, doc="An angle.")
     with pytest.raises(DeclarationError, match="a unit of length is in metres"):
         parameter(1.0, unit="rad", unit_length=True, doc="An angle.")
+
+
+def block(size: float, **given: float) -> Scene:
+    """Return a block on its edge, in a plane, as large as is said."""
+    scene = Scene()
+    ground, box = scene.add("ground", Ground()), scene.add("box", Box(length_x=size, length_z=2.0 * size, **given))
+    floor = scene.add("floor", BoxContact(length=size, height=2.0 * size, friction=2.0))
+    scene.connect(ground.frame, floor.plane)
+    scene.connect(box.frame, floor.box)
+    return scene
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e3])
+def test_a_thickness_that_a_plane_does_not_read_is_no_size(size: float) -> None:
+    assert scene_length(assemble(block(size, mass=1.0))) == 2.0 * size
+    assert scene_length(assemble(block(size, mass=1.0, length_y=7e4))) == 2.0 * size
+    thick = scene_length(assemble(block(size, density=1.0, length_y=7e4)))  # its mass depends on it
+    assert thick == 7e4
+
+
+class Trap(Component):
+    """A point that is caught at a place, which its event alone knows."""
+
+    reach = parameter(3.0, unit="m", doc="Where it is caught.")
+    a = connector(Point, "The point.")
+
+    @event(unit="m", target="stop", message="caught")
+    def caught(self) -> Scalar:
+        """Return how far it is from there."""
+        return self.a.position.x - self.reach
+
+
+def test_a_length_that_an_event_alone_reads_is_a_size() -> None:
+    scene = Scene()
+    bead, trap = scene.add("bead", PointMass(mass=1.0)), scene.add("trap", Trap())
+    scene.connect(bead.point, trap.a)
+    assert scene_length(assemble(scene)) == 3.0

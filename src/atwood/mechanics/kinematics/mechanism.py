@@ -216,7 +216,7 @@ def started_at(mechanism: Mechanism, places: Mapping[str, Mapping[Expression, fl
 
 
 def extent(mechanism: Mechanism) -> float:
-    """Return the extent of a mechanism, m: the largest length among the parameters of what moves; 0 if none is.
+    """Return the extent of a mechanism, m: the largest length that a law of what moves reads; 0 if none is.
 
     Of a vector that is its magnitude, which does not depend on how the scene is turned.
     """
@@ -228,15 +228,19 @@ def extent(mechanism: Mechanism) -> float:
 def sizing_parameters(mechanism: Mechanism) -> Iterator[tuple[str, str, float]]:
     """Yield the part and the name of each parameter that is a length of what moves, and no place in the world.
 
+    Lengths that no law reads say nothing, unless an output of their part is linked to an input.
     With them goes the value that says nothing: of a unit of length its default, else zero.
     """
+    sources = {path for path, _ in mechanism.links.values()}
     for path, local in mechanism.locals_.items():
         bodies = {mechanism.bodies.body_of[mechanism.graph.node_of[path, name]] for name in local.connectors}
         if bodies == {0}:
             continue  # where the ground is says nothing about the size of what moves
         for name, spec in local.part.component.parameter_specs().items():
             is_length = spec.unit.exponents == (0, 1, 0, 0) and not spec.place
-            if is_length and local.part.values[name] is not None:
+            if not is_length or local.part.values[name] is None:
+                continue
+            if path in sources or name not in local.unread:
                 yield path, name, spec.default if spec.unit_length else 0.0
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from atwood.errors import DeclarationError, suggestion
-from atwood.expr import Expression, Graph, Scalar
+from atwood.expr import Expression, Graph, Scalar, live
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.component import Binding
+from atwood.model.declare.connectors import Connector
 from atwood.model.declare.contact_laws import state_names
 from atwood.model.declare.field_functions import StateSpec
 from atwood.model.declare.law_results import (
@@ -214,6 +216,24 @@ class LocalPart:
         """Connectors of which it asks for the inertia of the body that they are on, which is not known yet."""
         return [name for name, one in self.binding.motions.items() if isinstance(one.body, Asked) and one.body.is_read]
 
+    @cached_property
+    def unread(self) -> frozenset[str]:
+        """Names of parameters that are in none of its laws: the thickness of a box in a plane, or sizes as drawn.
+
+        Of what has laws for some modes, sets of contacts or moments only, as events are, all are read.
+        """
+        component = self.part.component
+        if component.modes or component.contact_laws() or component.laws("event") or component.laws("update"):
+            return frozenset()
+        laws = [value for name, value in vars(self).items() if name not in ("part", "binding", "connectors")]
+        read = set(live(_expressions(laws, self.binding.space)))
+        own = {
+            name: [one for one in _expressions(value, "space") if one.is_symbol]
+            for name, value in self.binding.values.items()
+            if isinstance(value, Expression | Vector | tuple)
+        }
+        return frozenset(name for name, some in own.items() if some and read.isdisjoint(some))
+
     @property
     def velocities(self) -> list[Expression]:
         """The symbols that say how fast its connectors move and turn."""
@@ -227,6 +247,22 @@ class LocalPart:
             and all(key in solved for key in keys)
             and not (self.potentials or self.dissipations or self.loads or self.lagrangians)
         )
+
+
+def _expressions(given: Any, space: str) -> Iterator[Expression]:
+    """Yield the expressions in what laws return, or in values of parameters, that count in a space."""
+    if isinstance(given, Expression):
+        yield given
+    elif isinstance(given, Mapping):
+        yield from _expressions([*given, *given.values()], space)
+    elif isinstance(given, list | tuple | Vector):
+        for one in given:
+            yield from _expressions(one, space)
+    elif not isinstance(given, Law | Connector) and hasattr(given, "__dict__"):
+        across = {"tensor"} if isinstance(given, BodyInertia) and space != "space" else ()
+        for name, value in vars(given).items():
+            is_flat = space == "plane" and name in ("displacement", "center_of_mass")
+            yield from _expressions((value.x, value.z) if is_flat else () if name in across else value, space)
 
 
 def _symbols(part: Part, spec: StateSpec, graph: Graph) -> list[Expression]:
