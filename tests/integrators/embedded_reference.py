@@ -64,14 +64,16 @@ def first_step(
 
     with np.errstate(all="ignore"):
         d0, d1 = size(y), size(yp)
-        h0 = 1e-6 if not (d0 >= 1e-5 and d1 >= 1e-5 and np.isfinite(d0 / d1)) else 0.01 * d0 / d1
-        h0 = min(h0, longest)
-        d2 = size(rates(t + h0, y + h0 * yp) - yp) / h0
-    if not np.isfinite(d2):
+        told = 1e4 * ROUNDING * abs(t)
+        h0 = 0.01 * max(d0, 1.0) / d1 if d1 * longest > 1.0 else 1e-6 * longest
+        h0 = min(max(h0, told), longest)
+        change = size(rates(t + h0, y + h0 * yp) - yp) / h0
+        d2 = max(change, d1 * ROUNDING / h0)
+    if not 0.0 < d2 < np.inf:
         return h0
-    steepest = max(d1, d2)
-    h1 = max(1e-6, 1e-3 * h0) if steepest <= 1e-15 else float((0.01 / steepest) ** (1.0 / order))
-    return min(100.0 * h0, h1, longest)
+    span = max(d1 / d2, 1.0 / sqrt(d2))
+    h1 = span * float((0.01 / (d2 * span * span)) ** (int(256 / order) / 256))
+    return min(100.0 * h0, max(h1, told), longest)
 
 
 def estimate(h: float, fifth: float, third: float, size: int) -> float:

@@ -35,6 +35,9 @@ the estimate is taken to be no smaller than the ratio in the step before makes i
 RETREAT = 0.25
 """The share of a step that is tried where a step had no finite value."""
 
+_PROBE = 1e-6
+"""The share of a run that is tried first where the slope at its begin leads less far in it than is allowed."""
+
 _BEHIND, _ROUGH = 1.001, 0.01
 """A step is taken anew with so many times the length up to an event, where the last term of its dense output is there
 larger than this share of what is allowed."""
@@ -142,24 +145,29 @@ def root_of(r: Routine, a: Value, order: int) -> Value:
 def first_step(pair: Tableau, r: Routine, m: Memory, t: Value, begin: Value) -> Value:
     """Return the first step by the size of the first two derivatives (Hairer, Norsett and Wanner, section II.4).
 
+    The book takes a root of the larger of both, so that its step depends on the unit of time.  Here the time in which
+    the slope changes by itself is the unit, or that in which its change leads as far as is allowed, if that is longer;
+    how far the change leads in that time is what a power of the step is a share of.
+
     `begin` is where the slope at the begin lies. What is almost zero, as the speed of what has just begun to slip, asks
     for a step that would not move the time: it is so long that the time tells it to four digits.
     """
     bound = r.least(m.horizon, m.longest)
-    told = r.size(t) * (1e4 * 2.0**-52)
+    told = r.size(t) * (1e4 * ROUNDING)
     y, trial, probe = m.row("y"), m.row("trial"), m.row("last")
     d0, d1 = _size(r, m, y), _size(r, m, begin)
-    usual = (d0 >= 1e-5) & (d1 >= 1e-5) & (d0 / d1 < inf)
-    h0 = r.least(r.most(r.choose(usual, d0 * 0.01 / d1, 1e-6), told), bound)
+    h0 = r.choose(d1 * bound > 1.0, r.most(d0, 1.0) * 0.01 / d1, bound * _PROBE)
+    h0 = r.least(r.most(h0, told), bound)
     with m.parts() as j:
         trial[j] = m.lanes(y, j) + m.lanes(begin, j) * h0
     code = r.call("evaluate", m.session, t + h0, trial, probe)
-    d2 = _size(r, m, probe, begin) / h0
-    steepest = r.most(d2, d1)
-    root = root_of(r, 0.01 / steepest, pair.order)
-    h1 = r.choose(steepest <= 1e-15, r.most(h0 * 1e-3, 1e-6), root)
+    change = _size(r, m, probe, begin) / h0
+    d2 = r.most(change, d1 * ROUNDING / h0)
+    span = r.most(d1 / d2, r.sqrt(1.0 / d2))
+    h1 = span * root_of(r, 0.01 / (d2 * span * span), pair.order)
     failed = code != 0 if m.runs == 1 else code.integer().conditions(m.runs)
-    return r.choose(~failed & (d2 < inf), r.least(r.least(h0 * 100.0, h1), bound), h0)
+    known = ~failed & (change < inf) & (h1 > 0.0)
+    return r.choose(known, r.least(r.least(h0 * 100.0, r.most(h1, told)), bound), h0)
 
 
 def _begin(pair: Tableau) -> Routine:
