@@ -123,6 +123,17 @@ def test_two_mechanisms_stay_on_their_ways(apart: float, slower: float, form: st
 
 
 @pytest.mark.parametrize("form", FORMS)
+def test_each_place_of_two_mechanisms_is_told(form: str) -> None:
+    result = simulate(parallelograms((1.0, 1.0), (6.0, 2.0)), form=form, t_end=3.0, rtol=1e-8)
+    turns = [result[f"crank{n}.angle"][-1] / np.pi for n in (0, 1)]
+    passed = sum(int(abs(one)) for one in turns)
+    assert passed == len(result.singular_crossings) == 9
+    assert {one.ways for one in result.singular_crossings} == {1}
+    named = [sorted(one.parts)[0][-2] for one in crossings(result)]
+    assert sorted(map(int, {*named})) == [0, 1]
+
+
+@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("longer", [1e-3, 1e-5, 1e-7])
 def test_a_near_miss_is_left_to_python(longer: float, form: str) -> None:
     scene = FourBar(crank_length=1.0, coupler_length=2.0 * (1.0 + longer), rocker_length=1.0, frame_length=2.0)

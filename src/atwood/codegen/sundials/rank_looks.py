@@ -43,8 +43,8 @@ AHEAD = -0.8, 1.6, 13
 points: what is just ahead lies between two of them."""
 
 CLEAR, _BETWEEN = 0.075, 5
-"""Nothing is found between the first two looks where at places in so many parts of the way no less than this share of
-the largest measure is left: a position, or rest at one, is looked for where less than two thirds of it are."""
+"""Nothing is found around the least of the looks where at places in so many parts of the ways to those beside it no
+less than this share of the largest measure is left: places, and rest at one, are looked for below two thirds of it."""
 
 HEADS = 2.0
 """It is looked ahead where the measure would be zero in so many strides at the rate at which it has fallen."""
@@ -66,7 +66,7 @@ _PLACES, _SECTIONS = 8, 20
 
 def write_measures(opened: Opened) -> list[Routine]:
     """Write what measures states, and what judges looks by it."""
-    routines = (_measure, _measures, _between, _judge, _heads)
+    routines = (_measure, _measures, _between, _is_clear, _judge, _heads)
     return [_smallest(), *(write(opened) for write in routines)]
 
 
@@ -298,9 +298,9 @@ def _judge(opened: Opened) -> Routine:
             behind.now = notes[(i + 1) * shape.note + shape.measured]
         away, fallen = note[shape.measured], largest.now * FALLEN
         is_least = away <= r.least(r.least(before.now, behind.now), largest.now * LOW)
-        with r.when(is_least & (i == 0)):  # as behind a position that was passed
-            left = r.least(r.call("between", given, result=NUMBER), away)
-            behind.now = r.choose(left > largest.now * CLEAR, -inf, behind.now)
+        with r.when(is_least & (i + 1 < count)):
+            clear = r.call("is_clear", given, i, largest.now)
+            behind.now = r.choose(clear != 0, -inf, behind.now)
         is_least = is_least & (away <= behind.now)
         falls = (away <= fallen) & (fallen < before.now) & (before.now < inf)
         asks.now = asks.now | ((note[0] > state.judged) & (is_least | falls))
@@ -316,18 +316,44 @@ def _judge(opened: Opened) -> Routine:
 
 
 def _between(opened: Opened) -> Routine:
-    """Return the least measure from the first look to the second, on the cubic through both with their rates."""
-    r = Routine("between", {"data": ADDRESS}, NUMBER)
-    given = r.arguments[0]
-    data, state, shape = opened(given)
-    one, least = data["notes"], r.variable(inf)
-    other, q = one.at(shape.note), data["ahead"]
-    with r.when(state.count >= 2.0), r.count(_BETWEEN, 1) as k:
+    """Return the least measure from a look to the next one, on the cubic through both with their rates."""
+    r = Routine("between", {"data": ADDRESS, "first": INTEGER}, NUMBER)
+    given, first = r.arguments
+    data, _, shape = opened(given)
+    one, least, q = data["notes"].at(first * shape.note), r.variable(inf), data["ahead"]
+    other = one.at(shape.note)
+    with r.count(_BETWEEN, 1) as k:
         h, s = other[0] - one[0], k.number() / _BETWEEN
         write_cubic(r, q, (one.at(1), other.at(1)), (shape.size, shape.coordinates), (h, s))
         away = r.call("measure", one[0] + s * h, q, given, result=NUMBER)
         least.now = r.choose(away >= least.now, least.now, away)
     r.give(least.now)
+    return r
+
+
+def _is_clear(opened: Opened) -> Routine:
+    """Write the function that tells whether nobody would find anything around the least of the looks; see `CLEAR`.
+
+    Before it, or at it, the motion must not head for a position that it would come to before the next look, either.
+    """
+    r = Routine("is_clear", {"data": ADDRESS, "least": INTEGER, "largest": NUMBER})
+    given, least, largest = r.arguments
+    data, _, shape = opened(given)
+    end = data["notes"][(least + 1) * shape.note]
+    for back in (0, 1):
+        with r.when(least > back):
+            one, other = (data["notes"].at((least - back - k) * shape.note) for k in (1, 0))
+            before, away = one[shape.measured], other[shape.measured]
+            there = other[0] + (other[0] - one[0]) * away / (before - away)
+            with r.when((away < before) & (there <= end)):
+                r.give(0)
+    limit = largest * CLEAR
+    with r.when(~(data["notes"][least * shape.note + shape.measured] > limit)):
+        r.give(0)
+    for back in (0, 1):
+        with r.when(least >= back), r.when(~(r.call("between", given, least - back, result=NUMBER) > limit)):
+            r.give(0)
+    r.give(1)
     return r
 
 

@@ -189,9 +189,14 @@ def rests_at(
     return rest if near and is_slow(plan, arc, rest, fastest, tolerance) else None
 
 
+_FEW = 20
+"""The same where rows have few entries, of which the other measure makes less work: it sees a position only quite near
+where one of several mechanisms is in it."""
+
+
 def has_few(plan: SceneProblem) -> bool:
     """Return whether there are so few constraints that their singular values cost little."""
-    return len(plan.finding.kept) <= SMALL and normal_equations(plan) is None
+    return len(plan.finding.kept) <= (SMALL if normal_equations(plan) is None else _FEW)
 
 
 @dataclass(frozen=True)
