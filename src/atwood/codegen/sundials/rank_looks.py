@@ -405,6 +405,8 @@ def _look_ahead(r: Routine, of: tuple[dict[str, Value], Record, Value], shape: R
         away[k] = r.call("measure", t, q, given, result=NUMBER)
         with r.when(~r.is_finite(away[k])):
             r.give(1)
+        with r.when((state.passes != 0.0) & (now + later < state.start)):
+            away[k] = inf  # what has been passed just now is not ahead
         with r.when(away[k] < away[least.now]):
             least.now = k
     with r.when((least.now == 0) | (least.now == points - 1)):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import field
 from functools import cached_property
@@ -217,10 +217,25 @@ def solve_at(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> Solv
     """Return the loops of a mechanism solved by formulas on the branch of a position, with the best choice there."""
     if not can_be_solved(plan):
         return None
-    known: dict[tuple[object, ...], Solved | None] = plan.assembly.kept.get(_SOLVED, dict)
-    about = t, q.tobytes(), u.tobytes(), plan.finding.kept, plan.scales.length
+    return _remembered(plan, (t, q, u), None, lambda: _solve_at(plan, t, q, u))
+
+
+def stay_at(plan: SceneProblem, form: ClosedForm, t: float, q: FloatArray, u: FloatArray) -> Solved | None:
+    """Return the same with the choice of a form; see `on_branch`."""
+    return _remembered(plan, (t, q, u), form, lambda: on_branch(plan, form, t, q, u))
+
+
+def _remembered(
+    plan: SceneProblem,
+    state: tuple[float, FloatArray, FloatArray],
+    form: ClosedForm | None,
+    solve: Callable[[], Solved | None],
+) -> Solved | None:
+    """Return how loops are solved at a place where it has been asked before, else solve them."""
+    (t, q, u), known = state, plan.assembly.kept.get(_SOLVED, dict)
+    about = t, q.tobytes(), u.tobytes(), plan.finding.kept, plan.scales.length, form
     if about not in known:
-        known[about] = _solve_at(plan, t, q, u)
+        known[about] = solve()
         for oldest in [*known][:-_REMEMBERED]:
             del known[oldest]
     return known[about]
@@ -228,7 +243,7 @@ def solve_at(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> Solv
 
 _SOLVED: Key[dict[tuple[object, ...], Solved | None]] = Key("solved loops")
 
-_REMEMBERED = 8
+_REMEMBERED = 16
 """At so many places it is known how loops are solved: a run begins anew at its start, and where dead centres are."""
 
 

@@ -20,7 +20,7 @@ from atwood.integrators.methods import Method, Task
 from atwood.integrators.protocol import LOOSEST, Budget, ExplicitProblem, SolverOptions, Statistics, Status, StepResult
 from atwood.integrators.session import Session
 from atwood.lazy_dataclasses import replace
-from atwood.simulation.problem.closed_loops import Solved, levels, on_branch, solve_at
+from atwood.simulation.problem.closed_loops import Solved, levels, solve_at, stay_at
 from atwood.simulation.problem.explicit_scene import explicit_problem_of
 from atwood.simulation.run.session import SolverRequest, equations_of
 
@@ -165,7 +165,7 @@ class ClosedLoopSession(Session):
         if found is None or found.form is self._solved.form:
             return found
         plan = self._request.plan
-        here = on_branch(plan, self._solved.form, result.t, *plan.program.split(y))
+        here = stay_at(plan, self._solved.form, result.t, *plan.program.split(y))
         return found if here is None or found.margin > _BETTER * here.margin else here
 
     def _at(self, t: float, y: FloatArray) -> Solved | None:
