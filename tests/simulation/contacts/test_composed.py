@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -212,3 +213,47 @@ def test_a_wedge_is_pressed_out_by_what_lies_on_it(form: str) -> None:
     assert float(result["m.velocity.x"][-1]) == pytest.approx(0.5 * acceleration, abs=1e-10)
     assert float(result["above.normal_force"][-1]) == pytest.approx(pressed, abs=1e-8)
     assert float(result["below.normal_force"][-1]) == pytest.approx(carried, abs=1e-8)
+
+
+@FORMS
+@pytest.mark.parametrize("solver", ["explicit", "taylor", "ida"])
+def test_conditions_are_met_by_jumps_too(form: str, solver: str) -> None:
+    """The speed goes from -4.4 to 2.2 m/s in no time, and the force of the floor from nothing to the weight."""
+    falls = math.sqrt(2.0 / G)
+    plain = {"form": form, "t_end": 1.0, "rtol": 1e-10, "solver": solver}
+
+    def thrown(restitution: float) -> Scene:
+        return on_plate((0, 0, 1), "0", (0.0, 1.0, 1.0, 0.0), restitution=restitution, friction=0.1)
+
+    for until in ("m.velocity.z rises above 0", lambda q: q["m.velocity.z"] > 1.0):
+        result = simulate(thrown(0.5), until=until, **plain)  # type: ignore[arg-type]
+        assert (result.status, result.events[0].kind) == ("stopped", "impact")
+        assert float(result.time[-1]) == pytest.approx(falls, abs=1e-9)
+        assert float(result["m.velocity.z"][-1]) == pytest.approx(0.5 * G * falls, abs=1e-9)
+    loaded = simulate(thrown(0.0), until="c.normal_force rises above 5", **plain)  # type: ignore[arg-type]
+    assert (loaded.status, float(loaded["c.normal_force"][-1])) == ("stopped", pytest.approx(G))
+    speeds = ["m.velocity.z falls below -1", "m.velocity.z rises above 1"]
+    noted = simulate(thrown(0.5), record=speeds, **plain)  # type: ignore[arg-type]
+    passed = [one.time for one in noted.events if one.kind == "event"]
+    up = falls + (0.5 * G * falls + 1.0) / G
+    assert passed == pytest.approx([1.0 / G, falls, up, 2.0 * falls], abs=1e-8)
+
+
+@FORMS
+@pytest.mark.parametrize("height", [1e-12, 1e-14, 5.6e-17])
+def test_a_height_that_is_rounding_is_no_size_of_the_scene(form: str, height: float) -> None:
+    """Impacts were taken for slow beside a scene of that size, and went on for ever: 4,000 in five seconds."""
+    scene = on_plate((0, 0, 1), "0", (0.0, height, 1.0, -1.0), restitution=0.5, friction=0.3)
+    result = run(scene, form, 0.5, max_steps=3000)
+    assert result.status == "finished"
+    assert times(result, "rests") == pytest.approx([2.0 / G], abs=1e-9)
+
+
+def test_a_step_of_a_force_meets_conditions() -> None:
+    scene = on_plate((0, 0, 1), "0", (0.0, 0.0, 0.0, 0.0), friction=0.1)
+    push = scene.add("push", Force(value="select(t < 0.5, 0, select(t < 1, 10, 0))"))
+    mass: Any = scene.parts["m"]
+    scene.connect(mass.point, push.point)
+    conditions = ["m.acceleration.x rises above 1", "m.acceleration.x falls below -0.5"]
+    result = run(scene, "reduced", 1.2, record=conditions)
+    assert [one.time for one in result.events if one.kind == "event"] == pytest.approx([0.5, 1.0], abs=1e-12)

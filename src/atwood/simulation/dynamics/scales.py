@@ -69,15 +69,21 @@ def size_of(unit: str, length: Sizes, time: Sizes, mass: Sizes) -> Sizes:
     return mass**masses * length**lengths * time**times
 
 
+_NO_EXTENT = 1e-12
+"""Of the way of the fastest in the time of the scene: positions that are less are where they are by rounding."""
+
+
 def scene_length(assembly: Assembly) -> float:
     """Return the extent of a scene, from its parameters and start values that are lengths; 1 m if it has none.
 
     Positions of a mechanism far from the world's origin count from where all others do, those of bodies that float far
-    from it from each other.
+    from it from each other. Positions alone that are rounding beside the way that the speeds lead are none.
     """
-    given = []
+    given, fastest = [], 0.0
     for path, value in assembly.flat.start.items():
         observable = assembly.start_observables.get(path)
+        if observable is not None and observable.unit == "m/s":
+            fastest = max(fastest, abs(value))
         if observable is not None and observable.unit == "m":
             given.append((observable.value, value - origin_part(assembly, observable)))
     own, farthest = extent(assembly.mechanism), max((abs(at) for _, at in given), default=0.0)
@@ -85,6 +91,8 @@ def scene_length(assembly: Assembly) -> float:
         near = max(own, spread(assembly, given))
         if farthest > FAR * near > 0.0:
             return near
+    if not own and farthest < _NO_EXTENT * fastest * (assembly.flat.t_end - assembly.flat.t_start):
+        return 1.0
     return max(own, farthest) or 1.0
 
 

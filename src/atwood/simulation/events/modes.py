@@ -442,6 +442,22 @@ class EventProbe:
         n, m = len(self.assembly.own_equations.coordinates), len(self.assembly.own_equations.speeds)
         return lambda t, y, yp: self.values(t, y[:n], y[n : n + m])
 
+    def sides_of_conditions(self, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
+        """Return on which side of zero each condition is at a state; 0 where it is at zero."""
+        own = [one for one in self.event_functions if not one.part]
+        sizes = [self.plan.scales.of_law(one.part, one.law, one.unit) for one in own]
+        values = (self.values(t, q, u) - self.shift)[: len(own)]
+        return np.where(np.abs(values) > MARGIN * self._start[3] * np.array(sizes), np.sign(values), 0.0)
+
+    def jumped(self, before: FloatArray, t: float, q: FloatArray, u: FloatArray) -> list[EventRecord]:
+        """Return the conditions that a jump has taken from one side of zero to the other, as that of an impact."""
+        found = zip(self.event_functions, before, self.sides_of_conditions(t, q, u), strict=False)
+        return [
+            self._record(t, one)
+            for one, was, side in found
+            if one.is_there is None and was * side < 0.0 and one.direction in (0, side)
+        ]
+
     def broken_at_start(self, t: float) -> EventRecord | None:
         """Return the first event whose one-sided bound does not hold from the outset."""
         return None if self.broken is None else self._record(t, self.broken)

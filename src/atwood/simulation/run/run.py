@@ -201,6 +201,8 @@ class Walk:
         self._handed: tuple[int, ...] = ()
         self.plan: SceneProblem | None = None
         self.ended: EventRecord | None = None
+        self._sides_before: FloatArray | None = None
+        """On which sides of zero conditions were where the last stretch ended."""
         self._unsettled: tuple[EventRecord, ...] | None = ()
         self._late: tuple[float, FloatArray] | None = None
         self._impacts: list[tuple[float, str]] = []
@@ -333,9 +335,15 @@ class Walk:
         """Run one stretch in the present mode, until the next time event at most."""
         options, schedule = self.options, self._schedule(self.assembly)
         after_time_event = self._arrive(schedule)
+        jumped = self._meet_conditions()
         if self.ended is not None:
             assert self.plan is not None
-            return Recorder(self.plan), Outcome(self.t, "event", "", self.statistics, (self.choice,), self.ended)
+            recorder = Recorder(self.plan)
+            if jumped:
+                recorder.take(self.t, np.concatenate([self.q, self.u]), True)
+                record = recorder.stretch(self.impact, after_time_event, self.rests)
+                self.segments.append(self._sides.recorded(record, self.plan, self.assembly, False))
+            return recorder, Outcome(self.t, "event", "", self.statistics, (self.choice,), self.ended)
         t, q, u = self.t, self.q, self.u
         assert self.plan is not None
         assert self.probe is not None
@@ -371,12 +379,24 @@ class Walk:
             return recorder, outcome
         record = recorder.stretch(self.impact, after_time_event, self.rests)
         self.segments.append(self._sides.recorded(record, self.plan, self.assembly, bool(outcome.sides)))
+        if options.conditions and self.probe is not None:
+            self._sides_before = self.probe.sides_of_conditions(*recorder.last()[:3])
         self._follow(outcome)
         if contacts and outcome.error is None and options.looks_for_events:
             for assembly, t, y in outcome.closed:
                 self._check_told(assembly, t, *recorder.plan.program.split(y))
             self._check_told(self.assembly, *recorder.last()[:3])
         return recorder, outcome
+
+    def _meet_conditions(self) -> bool:
+        """Tell of conditions that a jump of the state has met; return whether the run is to stop at one."""
+        before, self._sides_before = self._sides_before, None
+        if before is None or self.probe is None or self.ended is not None:
+            return False
+        told = self.probe.jumped(before, self.t, self.q, self.u)
+        self.ended = next((one for one in told if one.target == "stop"), None)
+        self.events += [one for one in told if one.target != "stop"]
+        return self.ended is not None
 
     def _first_event(self) -> list[float]:
         """Return until when what touches nothing at the start is known to be disturbed; infinity where it is not."""
