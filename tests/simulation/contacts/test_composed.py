@@ -29,6 +29,7 @@ from atwood_library import (
     Slider,
     Table,
     TranslationalSource,
+    VertexContact,
 )
 
 G = 9.81
@@ -257,3 +258,30 @@ def test_a_step_of_a_force_meets_conditions() -> None:
     conditions = ["m.acceleration.x rises above 1", "m.acceleration.x falls below -0.5"]
     result = run(scene, "reduced", 1.2, record=conditions)
     assert [one.time for one in result.events if one.kind == "event"] == pytest.approx([0.5, 1.0], abs=1e-12)
+
+
+@FORMS
+def test_what_bounces_far_away_is_measured_by_what_it_bounces_on(form: str) -> None:
+    """A place over a floor does not float: a height of 1 m was as good as zero beside a way of 1e9 m, and closed."""
+    scene = on_plate((0, 0, 1), "0", (1e9, 1.0, 1.0, 0.0), restitution=0.5)
+    result = run(scene, form, 1.0)
+    falls = math.sqrt(2.0 / G)
+    assert times(result, "impact") == pytest.approx([falls, 2.0 * falls], abs=1e-9)
+    assert result.energy.max_drift < 1e-9
+
+
+@FORMS
+@pytest.mark.parametrize("end", [0.5, 3.0])
+def test_what_is_driven_against_a_floor_is_named_when_it_comes_there(form: str, end: float) -> None:
+    """Something else moves by itself; no force would change the speed of what is driven."""
+    scene = Scene()
+    ground, drive = scene.add("ground", Ground()), scene.add("drive", Drive(axis=(0, 0, 1), motion="1 - t"))
+    body, touch, mass = scene.add("body", RigidBody()), scene.add("c", VertexContact()), scene.add("m", PointMass())
+    for a, b in ((ground.frame, drive.a), (drive.b, body.frame), (ground.frame, touch.plane), (body.frame, touch.body)):
+        scene.connect(a, b)
+    scene.start.update({f"{mass.path}.{what}.{axis}": 0.0 for what in ("position", "velocity") for axis in "xz"})
+    if end < 1.0:
+        assert float(run(scene, form, end)["c.gap"][-1]) == pytest.approx(0.5)
+        return
+    with pytest.raises(aw.SolveError, match="c: at t = 1 no impulses satisfy"):
+        run(scene, form, end)

@@ -247,7 +247,8 @@ def _floats(assembly: Assembly, equations: Equations, places: tuple[int, ...]) -
     """Return whether nothing changes where coordinates all grow alike, and others stay."""
 
     def find() -> frozenset[tuple[int, ...]]:
-        laws = [*equations.rows, *(one.value for one in equations.constraints if one.value is not None)]
+        kept = (*equations.constraints, *(one.row for one in equations.contacts))
+        laws = [*equations.rows, *(one.value for one in kept if one.value is not None)]
         groups = _movable(assembly, equations)
         bound = set(jacobian(laws, [_direction(equations, group) for group in groups]).columns)
         return frozenset(group for number, group in enumerate(groups) if number not in bound)

@@ -16,6 +16,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.codegen import BoundKernel
 from atwood.errors import KernelEvaluationError
+from atwood.expr import DivisionByExactZeroError
 from atwood.forms.accelerations import AccelerationProgram, accelerations_of
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
@@ -204,7 +205,10 @@ def impact_code(plan: SceneProblem, t: float, y: FloatArray, gaps: Sequence[Cont
         from atwood.integrators.jumps import JumpCode
 
         equations, loose = loose_equations(assembly, rows)
-        program = impact_program(assembly.flat.name, equations, loose, gaps, assembly.parameters, kept, light)
+        try:
+            program = impact_program(assembly.flat.name, equations, loose, gaps, assembly.parameters, kept, light)
+        except DivisionByExactZeroError:  # no gap moves by a force: where it closes, that is told
+            return None
         return None if any(node.operation == "external" for node in program.nodes) else JumpCode(program)
 
     return assembly.shared.get(_IMPACTS, make, assembly.form, kept, light)
