@@ -296,7 +296,8 @@ def simulate(
     until
         Where the run stops: text such as ``"rod1.angle crosses 30 deg"``, with crosses, rises above or falls below; or
         a function of the scene's quantities by path, ``lambda q: q["bob.position.z"] < -1.0``, which returns a
-        comparison that becomes true, or what passes zero; or a list of these. It stops at `t_end` at the latest.
+        comparison that becomes true, or what passes zero; or a list of these. It stops at `t_end` at the latest,
+        and where a jump over a value meets a condition, as that of a speed in an impact, just behind it.
     record
         The same, where the run goes on; `Result.events` has when. It changes nothing in the run.
     accuracy

@@ -61,6 +61,8 @@ def why_not_batched(request: SweepRequest) -> str:
         return "each run has tolerances for its accuracy"
     if any(one.is_there is not None for one in condition_functions(assembly, options.conditions)):
         return "each run stops at a condition on an angle that comes out within one turn"
+    if options.conditions and any(one.target not in ("", "stop") for one in find_event_functions(assembly)):
+        return "each run may stop at a condition that a change of mode meets"
     if options.max_seconds is not None:
         return "each run has a limit of time"
     if request.has_turns:
