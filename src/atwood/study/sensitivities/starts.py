@@ -10,12 +10,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.expr import Expression, OutputGroup, Program, jacobian
+from atwood.expr import Expression, Program, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.other_values import starting
-from atwood.forms.program import state_groups
-from atwood.forms.quantities import to_maximal
+from atwood.forms.quantities import coordinate_program, to_maximal
 from atwood.numerics.matrices import least_norm, or_one
 from atwood.numerics.rank import rank
 from atwood.simulation.dynamics.scales import coordinate_scales, motion_scales
@@ -96,9 +95,8 @@ def _slopes(assembly: Assembly, expressions: tuple[Expression, ...], start: Star
 
     def make() -> tuple[Program, tuple[int, ...], tuple[int, ...]]:
         made = jacobian(expressions, [*equations.coordinates, *equations.speeds, *parameters])
-        name = f"{assembly.flat.name} slopes at the start"
-        outputs = (OutputGroup("entries", tuple(made.entries)),)
-        return Program(name, state_groups(equations), parameters, outputs), made.rows, made.columns
+        program = coordinate_program(assembly, "slopes at the start", equations, made.entries)
+        return program, made.rows, made.columns
 
     program, rows, columns = assembly.shared.get(_SLOPES, make, expressions)
     found = np.zeros((len(expressions), n + len(parameters)))

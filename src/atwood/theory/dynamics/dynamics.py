@@ -17,7 +17,6 @@ from atwood.errors import SolveError, UsageError, suggestion_in_parts
 from atwood.expr import (
     Expression,
     InputGroup,
-    OutputGroup,
     Program,
     depends_on,
     jacobian,
@@ -37,7 +36,7 @@ from atwood.simulation.dynamics.balance import BalanceValues, balance_of, mass_a
 from atwood.simulation.dynamics.scales import motion_scales
 from atwood.simulation.initialization.start import Start, find_start, own_state
 from atwood.simulation.problem.arguments import FORM, ORIENTATION
-from atwood.theory.dynamics.functions import Function, Numbers, as_numbers, as_time, at_time
+from atwood.theory.dynamics.functions import Function, Numbers, as_numbers, as_time, at_time, known_function
 
 _PROGRAM: Key[Program] = Key("program of a function of the state")
 
@@ -257,14 +256,8 @@ class Dynamics:
     ) -> Function:
         groups = {group.name: group for group in state_groups(self.equations)}
         groups["a"] = InputGroup("a", self.equations.accelerations)
-
-        def make() -> Program:
-            chosen = (groups["t"], *(groups[letter] for letter in inputs))
-            outputs = (OutputGroup(name, tuple(expressions())),)
-            return Program(f"{self._name} {name}", chosen, self.assembly.parameters, outputs)
-
-        program = self.assembly.shared.get(_PROGRAM, make, self.assembly.form, name)
-        return Function(self.assembly, program, shape)
+        chosen = [groups[letter] for letter in ("t", *inputs)]
+        return known_function(self.assembly, _PROGRAM, chosen, name, expressions, shape, self.assembly.form)
 
     @cached_property
     def _inverse(self) -> Function:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from atwood.arguments import check, number, show
 from atwood.arrays import FloatArray
 from atwood.codegen import NativeProgram, compile_native, compile_program
 from atwood.errors import KernelEvaluationError, UsageError
-from atwood.expr import Program
+from atwood.expr import Expression, InputGroup, OutputGroup, Program
 from atwood.expr.core.relations import values_just_after
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
@@ -175,3 +175,21 @@ def _each(kernel: Any, out: FloatArray, rows: Sequence[FloatArray]) -> int:
     for i in range(len(out)):  # functions in Python raise what went wrong
         out[i] = kernel(*(one[i] for one in rows))[0]
     return len(out)
+
+
+def known_function(
+    assembly: Assembly,
+    key: Key[Program],
+    inputs: Iterable[InputGroup],
+    name: str,
+    expressions: Callable[[], Sequence[Expression]],
+    shape: tuple[int, ...],
+    *about: Hashable,
+) -> Function:
+    """Return a function whose program is made once for all assemblies of a structure."""
+
+    def make() -> Program:
+        outputs = (OutputGroup(name, tuple(expressions())),)
+        return Program(f"{assembly.flat.name} {name}", tuple(inputs), assembly.parameters, outputs)
+
+    return Function(assembly, assembly.shared.get(key, make, *about, name), shape)

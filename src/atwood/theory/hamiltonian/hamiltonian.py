@@ -14,14 +14,13 @@ from atwood.arguments import FLAG, optional, takes
 from atwood.arrays import FloatArray
 from atwood.display import count_of
 from atwood.errors import KernelEvaluationError, StartError, UnsupportedError
-from atwood.expr import Expression, Program, depends_on, substitute, vjp
+from atwood.expr import Expression, depends_on, substitute, vjp
 from atwood.forms.assembly import Assembly
-from atwood.forms.caches import Key
 from atwood.forms.lagrangian import Lagrangian, lagrangian_of
-from atwood.forms.quantities import known_program
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, smooth_assembly_of
+from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.problem.arguments import ORIENTATION
@@ -46,8 +45,6 @@ from atwood.theory.hamiltonian.legendre import (
 )
 from atwood.topology.orientation_coordinates import Orientation
 
-_VELOCITIES: Key[Program] = Key("velocities")
-
 _LONGEST = 2_000
 """Signs and symbols beyond which H is not written down."""
 
@@ -71,13 +68,11 @@ def start_of(assembly: Assembly) -> tuple[FloatArray, FloatArray]:
     StartError
         If the start is not consistent, or the coordinates are singular there.
     """
-    begun, equations = find_start(assembly), assembly.reduced
+    begun = find_start(assembly)
     q = from_regular(assembly, begun.coordinates)
-    program = known_program(assembly, _VELOCITIES, lambda: list(equations.rates))
-    idle = np.zeros(len(equations.speeds)), np.zeros(len(assembly.reactions))
     try:
-        found = assembly.kernel(program)([begun.time], q, begun.speeds, *idle)[0]
-        return q, np.asarray(found[: len(equations.names)], dtype=float)
+        rates = kinematic_map_of(assembly, "reduced").rates(begun.time, q, begun.speeds)
+        return q, np.array(rates[: len(assembly.reduced.names)])
     except KernelEvaluationError as error:
         raise StartError(
             f"it starts where its coordinates as {assembly.orientation.kind!r} are singular",

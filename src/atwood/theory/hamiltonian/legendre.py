@@ -15,13 +15,13 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.display import count_of
 from atwood.errors import AtwoodError, KernelEvaluationError, SolveError, UnsupportedError, UsageError
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian_by_rows, jvp, substitute, vjp
+from atwood.expr import Expression, InputGroup, Program, depends_on, jacobian_by_rows, jvp, substitute, vjp
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.lagrangian import Lagrangian
 from atwood.simulation.dynamics.orientation_coordinates import from_regular
 from atwood.simulation.initialization.start import find_start
-from atwood.theory.dynamics.functions import Function, Numbers, as_numbers, shape_of_states
+from atwood.theory.dynamics.functions import Function, Numbers, as_numbers, known_function, shape_of_states
 from atwood.tolerances import tolerances
 
 _PROGRAM: Key[Program] = Key("program of the Legendre transformation")
@@ -163,17 +163,11 @@ class LegendreTransform:
         """Return one of the quantities in numbers; its function is made when it is first asked for."""
         if name not in self._functions:
             expressions, shape = self._quantities[name]
-            self._functions[name] = Function(self.assembly, self._program(name, expressions), shape)
-        return self._functions[name](t, (q, v), None)
-
-    def _program(self, name: str, expressions: Callable[[], Sequence[Expression]]) -> Program:
-        def make() -> Program:
             state = {"t": (self.lagrangian.time,), "q": self.lagrangian.coordinates, "v": self.velocity_symbols}
-            inputs = tuple(InputGroup(letter, symbols) for letter, symbols in state.items())
-            outputs = (OutputGroup(name, tuple(expressions())),)
-            return Program(f"{self.assembly.flat.name} {name}", inputs, self.assembly.parameters, outputs)
-
-        return self.assembly.shared.get(_PROGRAM, make, self.assembly.orientation.kind, name)
+            inputs = [InputGroup(letter, symbols) for letter, symbols in state.items()]
+            kind = self.assembly.orientation.kind
+            self._functions[name] = known_function(self.assembly, _PROGRAM, inputs, name, expressions, shape, kind)
+        return self._functions[name](t, (q, v), None)
 
     @cached_property
     def force_expressions(self) -> tuple[Expression, ...]:

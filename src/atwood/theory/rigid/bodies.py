@@ -9,15 +9,14 @@ import numpy as np
 from atwood.arguments import FLAG, TEXT, one_of, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UnsupportedError, UsageError, check_known
-from atwood.expr import OutputGroup, Program
 from atwood.forms.assembly import Assembly
-from atwood.forms.program import state_groups
 from atwood.forms.quantities import observer
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import sympy
 from atwood.mechanics.dynamics.inertia import CarriedInertia
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, smooth_assembly_of
+from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.initialization.start import find_start, own_state
 from atwood.solids.properties import MassProperties
 from atwood.theory.dynamics.dynamics import dynamics
@@ -98,11 +97,10 @@ def check_free(assembly: Assembly, part: str) -> None:
     """Refuse a body that a torque about its centre of mass acts on, at its start or as it turns otherwise there."""
     found, t, rng = dynamics(assembly), find_start(assembly).time, np.random.default_rng(5)
     q, start = found.start()
-    rates = OutputGroup("rates", found.equations.rates)
-    program = Program(f"{part} rates", state_groups(found.equations), assembly.parameters, (rates,))
+    moving = kinematic_map_of(assembly, assembly.form)
     others = () if found.equations.constraints else rng.normal(size=(2, len(start)))
     for u in (start, *others):  # what is constrained cannot have any speeds
-        dq, du = np.asarray(assembly.kernel(program)([t], q, u)[0]), found.forward_dynamics(q, u, t=t)
+        dq, du = moving.rates(t, q, u), found.forward_dynamics(q, u, t=t)
         scale = 1e-5 / (1e-300 + float(np.max(np.abs(u))))
         before, after = (
             _vector(assembly, f"{part}.angular_momentum", t, q + step * dq, u + step * du) for step in (-scale, scale)

@@ -13,9 +13,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.expr import Expression, OutputGroup, Program, evaluate, jvp, vjp
+from atwood.expr import Expression, evaluate, jvp, vjp
 from atwood.forms.assembly import Assembly
-from atwood.forms.program import state_groups
+from atwood.forms.quantities import coordinate_program
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.outputs.totals import add_up
 from atwood.model.declare.contact_laws import value_names
@@ -80,8 +80,7 @@ class Pushes:
     def __init__(self, assembly: Assembly, pushes: Sequence[Push]) -> None:
         self.pushes, e = tuple(pushes), assembly.reduced
         every = tuple(slope for one in pushes for slope in one.slopes)
-        program = Program("pushes", state_groups(e), assembly.parameters, (OutputGroup("slopes", every),))
-        self._kernel = assembly.kernel(program)
+        self._kernel = assembly.kernel(coordinate_program(assembly, "pushes", e, every))
 
     def at(self, state: State) -> FloatArray:
         """Return the slopes of all rows along speeds, shape (rows, speeds)."""
