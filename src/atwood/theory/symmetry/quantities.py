@@ -26,8 +26,7 @@ from atwood.mechanics.kinematics.orientation import spin_in_world
 from atwood.mechanics.outputs.totals import add_up
 from atwood.numerics.matrices import least_norm
 from atwood.numerics.rank import null_space, span
-from atwood.simulation.dynamics.orientation_coordinates import from_regular
-from atwood.simulation.initialization.start import find_start
+from atwood.simulation.initialization.start import find_start, start_in_maximal
 from atwood.theory.symmetry.states import KEPT, State
 from atwood.topology.spanning_forest import Attachment
 
@@ -131,8 +130,7 @@ class Quantities:
     def center(self) -> tuple[FloatArray, float]:
         """Mean place of the bodies at the start, along the axes of the scene, and the size of the scene about it, m."""
         assembly, start = self.assembly, find_start(self.assembly)
-        q = from_regular(assembly, start.coordinates)
-        places = np.asarray(assembly.kernel(to_maximal(assembly))([start.time], q, start.speeds)[0], dtype=float)
+        places, _ = start_in_maximal(assembly, start)
         count = len(assembly.mechanism.space.basis)
         origin = evaluate(list(assembly.mechanism.table.origin), assembly.mechanism.table.values)
         every = [places[list(one.coordinates)] for one in assembly.maximal.forest.attachments]
