@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from atwood.arrays import BoolArray, FloatArray
-from atwood.codegen.llvm.build import Built, RoutineSource, build_code, once
+from atwood.codegen.llvm.build import Built, RoutineSource, build_code, once, prologue_at
 from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.codegen.llvm.tiers import Tiers
 from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Kind
@@ -126,7 +126,6 @@ def _routines() -> Built:
     return build_code([], CodeOptions(level=2), exports=exports, routines=source)
 
 
-_PROLOGUE = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)
 _RESOLVE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, ctypes.c_int64, ctypes.c_int64)
 
 
@@ -203,7 +202,7 @@ class SetSolver:
         self._put("sets", {"program": self._built.code.addresses["contacts"]})
         self._put("sets", {"coordinates": code.coordinates, "speeds": code.speeds})
         self._put("sets", {"count": number, "size": size, "entries": len(pattern), "inside": 1.0})
-        self._derive = _PROLOGUE(self._built.code.addresses["contacts_prologue"])
+        self._derive = prologue_at(self._built.code.addresses["contacts_prologue"])
         self._resolve = _RESOLVE(code.routines.code.addresses["resolve"])
 
     def _put(self, piece: str, fields: Mapping[str, float]) -> None:

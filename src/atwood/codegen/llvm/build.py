@@ -12,7 +12,7 @@ import functools
 import json
 import threading
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, lru_cache
 from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
@@ -79,7 +79,8 @@ def once(make: Callable[P, T]) -> Callable[P, T]:
     return found
 
 
-_PROLOGUE = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)
+prologue_at = lru_cache(maxsize=256)(ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3))
+"""What computes, at an address, what depends on parameters alone: from values, to a place, with scratch."""
 
 _SMALL = 20_000
 """Beyond so many nodes LLVM's quickest level is used: it takes a sixth of the time, for code that is a tenth slower.
@@ -153,7 +154,7 @@ class Built:
                 f"needs {count} parameter values but got an array of shape {values.shape}", where=program.name
             )
         derived, scratch = np.empty(len(program.prologue)), np.empty(self.scratch)
-        prologue: Callable[..., None] = _PROLOGUE(self.code.addresses[f"{name}_prologue"])
+        prologue: Callable[..., None] = prologue_at(self.code.addresses[f"{name}_prologue"])
         if self.failures is not None:
             prologue = self.failures.watch(prologue)
         prologue(address_of(values), address_of(derived), address_of(scratch))

@@ -15,7 +15,8 @@ from ctypes import Array, c_double, c_int, c_int64, c_void_p
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from atwood.codegen.llvm.build import RoutineSource
+from atwood.arrays import address_of
+from atwood.codegen.llvm.build import RoutineSource, prologue_at
 from atwood.codegen.llvm.module import Part
 from atwood.codegen.llvm.tiers import Tiers
 from atwood.codegen.routines import (
@@ -170,9 +171,10 @@ class EventCode:
 
     def fill(self, data: EventData, parameter_values: ArrayLike, shifts: ArrayLike) -> None:
         """Give the functions of a session other parameters and shifts; arguments as of `bind`."""
-        derived, shift = data.arrays
+        (derived, shift), (prologue, scratch) = data.arrays, data.prologue
         shift[:] = shifts
-        derived[:], _ = self._tiers.now.derive("kernel", self.program, parameter_values)
+        values = np.array(parameter_values, dtype=np.float64)
+        prologue_at(prologue)(address_of(values), address_of(derived), scratch)
 
 
 def compile_events(program: Program, for_ida: bool, is_brief: bool = False) -> EventCode:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable
-from ctypes import c_void_p
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from atwood.arrays import FloatArray, address_of
-from atwood.codegen.llvm.build import Built, RoutineSource
+from atwood.codegen.llvm.build import Built, RoutineSource, prologue_at
 from atwood.codegen.llvm.module import Part
 from atwood.codegen.llvm.tiers import Tiers
 from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Routine, Value, call_kernel, place_of
@@ -18,8 +16,6 @@ from atwood.errors import UnsupportedError
 from atwood.expr.core.program import Program
 from atwood.integrators.protocol import MET, STEPS, CompiledRates
 from atwood.lazy_dataclasses import dataclass
-
-_PROLOGUE = ctypes.CFUNCTYPE(None, *[c_void_p] * 3)
 
 
 def rates_source(coordinates: int | None, speeds: int | None, given: bool, projects: bool = False) -> RoutineSource:
@@ -170,7 +166,7 @@ class CompiledAccelerations:
         values = np.array(parameter_values, dtype=np.float64)
         given = address_of(values)
         for prologue, place in zip(own.prologues, own.places, strict=True):
-            _PROLOGUE(prologue)(given, place, own.scratch)
+            prologue_at(prologue)(given, place, own.scratch)
 
 
 @dataclass(frozen=True)

@@ -216,7 +216,7 @@ class Walk:
         plan, probe = self.plan, self.probe
         if plan is None or probe is None or self.ended is not None or plan.not_compilable or plan.assembly.sides:
             return False
-        return self.choice.method.tableau is not None and not self.sampler.updates
+        return self.choice.method.kind in ("explicit", "series") and not self.sampler.updates
 
     def renewed(
         self,
