@@ -107,6 +107,8 @@ def longest_step(equations: Equations, u: FloatArray) -> float:
     A uniform turn is a straight line in some of them, and its steps would grow until rounding is amplified; and a
     step that is longer than the margin could pass its singular place unseen.
     """
+    if not equations.orientation_coordinates:
+        return np.inf
     own = [
         list(body_orientation.speeds)
         for body_orientation in equations.orientation_coordinates

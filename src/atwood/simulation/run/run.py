@@ -318,8 +318,10 @@ class Walk:
 
     def _arrive(self, schedule: Schedule) -> bool:
         """Pass time events and updates that are due, and make ready what comes; return whether there were any."""
-        self.t = schedule.reached(self.t)
-        has_passed = schedule.piece(self.t) != schedule.piece(self._piece_start)
+        has_passed = False
+        if len(schedule.times):
+            self.t = schedule.reached(self.t)
+            has_passed = schedule.piece(self.t) != schedule.piece(self._piece_start)
         if has_passed:
             self._pass_time_event()
         if due := self._due():
@@ -465,7 +467,7 @@ class Walk:
 
     def _due(self) -> tuple[int, ...]:
         """Return which updates are still to be made now."""
-        return self.sampler.due_at(self.t) if self.t > self._sampled else ()
+        return self.sampler.due_at(self.t) if self.sampler.updates and self.t > self._sampled else ()
 
     def prepare(self) -> None:
         """Make all that is needed in the present mode, and between two time events, if it is not there."""

@@ -154,11 +154,12 @@ class _Runner:
         self.began, done = t, 0
         try:
             session = self._open(t, y, yp)
-            self._change_on_the_way(session)
-            passed = self._pass_moments(session, y)
-            if passed is not None:
-                return passed
-            session = self.session or session
+            if self.segment.ahead is not None:
+                self._change_on_the_way(session)
+                passed = self._pass_moments(session, y)
+                if passed is not None:
+                    return passed
+                session = self.session or session
             while True:
                 if not self.method.is_implicit and (self.monitor is None or self.monitor.next == np.inf):
                     done, step_result = self._sample_watched(session, done)
