@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from atwood.arrays import BoolArray, FloatArray
+from atwood.arrays import BoolArray, FloatArray, address_of
 from atwood.codegen.llvm.build import Built, RoutineSource, build_code, once, prologue_at
 from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.codegen.llvm.tiers import Tiers
@@ -405,8 +405,8 @@ class SetJumps(SetSolver, Jumps):
 
     def change_at(self, times: FloatArray, relations: FloatArray, place: int) -> bool:
         """Learn when parameters change, and what those from a place on are before and from each of the times on."""
-        self._changes = np.append(times, inf), np.ascontiguousarray(relations)
-        changes, rows = (one.ctypes.data for one in self._changes)
+        self._changes = np.concatenate([times, [inf]]), np.array(relations, order="C")
+        changes, rows = map(address_of, self._changes)
         many = {"others": relations.shape[1], "relations_at": place}
         self._put("own", {"changes": changes, "relations": rows, "changed": 0, **many})
         return True

@@ -116,7 +116,7 @@ def test_runs_of_several_scenes_at_the_same_time() -> None:
 
 @pytest.mark.parametrize(
     ("make", "options", "most"),
-    [(SimplePendulum, {"t_end": 2.0}, 320), (StickSlip, {"t_end": 3.0, "rtol": 1e-10}, 470)],
+    [(SimplePendulum, {"t_end": 2.0}, 305), (StickSlip, {"t_end": 3.0, "rtol": 1e-10}, 440)],
     ids=["pendulum", "stick-slip"],
 )
 def test_a_run_again_makes_few_calls_whatever_happens_in_it(

@@ -155,12 +155,15 @@ class Samples:
         ahead = slice(*self.times.searchsorted([t, limit], side="right"))
         times, shown, between = self.times[ahead], self.shown[ahead], self.between[ahead]
         if not len(times) or times[-1] != limit:
-            times, shown, between = np.append(times, limit), np.append(shown, False), np.append(between, False)
+            times, no = np.concatenate([times, [limit]]), np.zeros(1, dtype=bool)
+            shown, between = np.concatenate([shown, no]), np.concatenate([between, no])
         return Samples(times, shown, between)
 
     def without_last_shown(self) -> Samples:
         """Return the same, of which the last is no output."""
-        return Samples(self.times, np.append(self.shown[:-1], False), self.between)
+        shown = self.shown.copy()
+        shown[-1:] = False
+        return Samples(self.times, shown, self.between)
 
     def shows(self, t: float) -> bool:
         """Return whether a time is that of an output."""

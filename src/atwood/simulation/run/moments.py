@@ -102,7 +102,7 @@ def times_ahead(plan: SceneProblem, schedule: Schedule, sampler: Sampler, t: flo
         or options.conditions
         or any(one.law.options.at for one in sampler.updates)
     )
-    gaps = np.diff(np.append(times, end))
+    gaps = np.diff(np.concatenate([times, [end]]))
     return times if is_plain and np.all(gaps > MOMENT * np.spacing(np.abs(times) + end)) else np.array([t])
 
 

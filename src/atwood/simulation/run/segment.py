@@ -457,7 +457,9 @@ class _Runner:
         times, shows = jumps[0], np.empty((len(jumps[0]), 2), dtype=bool)
         shows[:] = is_any
         if self.pieces is not None:
-            for i in np.flatnonzero(np.isin(times, self.pieces.times)).tolist():
+            moments = self.pieces.times
+            after = moments.searchsorted(times).clip(max=len(moments) - 1)
+            for i in (moments[after] == times).nonzero()[0].tolist():
                 shows[i] = False, self.segment.samples.shows(float(times[i]))
         return shows.ravel()
 
