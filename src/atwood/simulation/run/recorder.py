@@ -266,7 +266,8 @@ class Recorder:
             once[:2], once[2:] = True, t[2:] != t[:-2]  # an output at a jump is that after it
             if not once.all():
                 t, order = t[once], order[once]
-            y, shown = np.concatenate([states, y])[order], np.concatenate([shows, shown])[order]
+            # An index of rows takes twenty times as long as `take`.
+            y, shown = np.concatenate([states, y]).take(order, axis=0), np.concatenate([shows, shown])[order]
             self._jumps.append(jumps[0])
         if not len(t):
             return
