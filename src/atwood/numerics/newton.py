@@ -75,10 +75,20 @@ def newton(
     halvings: int = 0,
     is_even: bool = False,
     refused: tuple[type[Exception], ...] = (),
+    missed: Callable[[_Place], FloatArray] | None = None,
 ) -> tuple[_Place, Missing]:
-    """Return the place near by at which nothing is missing, or that to which so many steps have led."""
-    now = look(place)
+    """Return the place near by at which nothing is missing, or that to which so many steps have led.
+
+    `missed` gives no more than by how much equations are missed, where that takes less than a look.
+    """
+    now = there = look(place)
     last = inf
+
+    def value(trial: _Place) -> FloatArray:
+        nonlocal there
+        there = look(trial)
+        return there.value
+
     for _ in range(steps):
         miss = now.miss
         if miss <= exact or (not halvings and miss < met and miss >= _MUCH * last):
@@ -91,13 +101,13 @@ def newton(
             step = scales * units * np.where(np.isinf(longest), 1.0, 1.0 / over)
             if not halvings:
                 break
-            trial, there, left = _nearer(look, moved, place, step, now, far / over, halvings, refused)
+            trial, left = _nearer(missed or value, moved, place, step, now, far / over, halvings, refused)
             if left < _MUCH * miss:
                 break
         if halvings:
             if left >= miss and (miss < met or left == inf):
                 break
-            place, now, last = trial, there, miss
+            place, now, last = trial, there if missed is None else look(trial), miss
             continue
         place = moved(place, -step)
         if far <= still:
@@ -107,7 +117,7 @@ def newton(
 
 
 def _nearer(
-    look: Callable[[Any], Missing],
+    missed: Callable[[Any], FloatArray],
     moved: Callable[[Any, FloatArray], Any],
     place: Any,
     step: FloatArray,
@@ -115,20 +125,19 @@ def _nearer(
     far: float,
     halvings: int,
     refused: tuple[type[Exception], ...],
-) -> tuple[Any, Missing, float]:
-    """Return where a step leads, halved until less is missing in today's units, what is missing there, and how much.
+) -> tuple[Any, float]:
+    """Return where a step leads, halved until less is missing in today's units, and how much.
 
     It is infinitely much if no step leads nearer.
     """
-    trial, there, left, is_short = place, now, inf, far < _SHORT
+    trial, left, is_short = place, inf, far < _SHORT
     for _ in range(halvings):
         try:
             trial = moved(place, -step)
-            there = look(trial)
-            left = largest(there.value / now.units)
+            left = largest(missed(trial) / now.units)
         except refused:
             left = inf
         if left < now.miss or is_short:
             break
         step, far = 0.5 * step, 0.5 * far
-    return trial, there, inf if left >= now.miss and far < _NO_WAY else left
+    return trial, inf if left >= now.miss and far < _NO_WAY else left

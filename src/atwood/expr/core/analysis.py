@@ -196,35 +196,31 @@ def evaluate(
     known: dict[int, float] = {}
     unknowns: dict[int, list[float]] = {}
     for node in live(outputs) if nodes is None else nodes:
-        value = given.get(node)
-        if value is None and node.operation == "symbol":
+        value, operation = given.get(node), node.operation
+        if value is None and operation == "symbol":
             value = given.get(node.name)
             if value is None:
                 raise AtwoodError(f"no value was given for the symbol {node.name}")
         if value is not None:
             known[node.index] = float(value)
-        elif node.operation == "solve":
+        elif operation in BINARY:
+            a, b = node.arguments
+            known[node.index] = BINARY[operation](known[a.index], known[b.index])
+        elif operation in UNARY:
+            known[node.index] = UNARY[operation](known[node.arguments[0].index])
+        elif operation in LEAVES:
+            known[node.index] = node.value
+        elif operation == "solve":
             data = [known[argument.index] for argument in node.arguments]
             split = node.payload**2
             unknowns[node.index] = solve_or_nan(node.payload, data[:split], data[split:])
             known[node.index] = 0.0
-        elif node.operation == "component":
+        elif operation == "component":
             known[node.index] = unknowns[node.arguments[0].index][node.payload]
         else:
-            known[node.index] = _value_of(node, known)
+            data = [known[argument.index] for argument in node.arguments]
+            if operation == "select":
+                known[node.index] = data[1] if data[0] != 0.0 else data[2]
+            else:
+                known[node.index] = float(node.payload.function(*data))
     return [known[output.index] if isinstance(output, Expression) else float(output) for output in outputs]
-
-
-def _value_of(node: Expression, known: Mapping[int, float]) -> float:
-    """Return the value of one node from those of its arguments."""
-    operation = node.operation
-    if operation in LEAVES:
-        return node.value
-    data = [known[argument.index] for argument in node.arguments]
-    if operation in UNARY:
-        return UNARY[operation](data[0])
-    if operation in BINARY:
-        return BINARY[operation](data[0], data[1])
-    if operation == "select":
-        return data[1] if data[0] != 0.0 else data[2]
-    return float(node.payload.function(*data))

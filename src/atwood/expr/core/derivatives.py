@@ -145,6 +145,8 @@ def _tangent(n: Expression, tangents: Mapping[int, Expression], seeds: Mapping[i
     """Return the derivative of a node from those of its arguments; None for a structural zero."""
     operation = n.operation
     arguments = n.arguments
+    if operation in _USUAL:
+        return _usual_tangent(operation, *arguments, *[tangents.get(one.index) for one in arguments])
     moving = [(k, tangents[a.index]) for k, a in enumerate(arguments) if a.index in tangents]
     if not moving or operation in PIECEWISE_CONSTANT:
         return None
@@ -152,8 +154,6 @@ def _tangent(n: Expression, tangents: Mapping[int, Expression], seeds: Mapping[i
         zero = n.graph.zero
         a, b = (tangents.get(argument.index, zero) for argument in arguments[1:])
         return select(arguments[0], a, b)
-    if len(moving) == 2 and operation == "mul" and arguments[0] is arguments[1]:
-        return multiply(n.graph.constant(2.0), multiply(arguments[0], moving[0][1]))
     if operation == "div" and (slopes := logarithmic_slopes(arguments[1], seeds)) is not None:
         return tangent_of_quotient(n, slopes, tangents)
     if len(moving) == 2 and operation == "div":
@@ -168,6 +168,28 @@ def _tangent(n: Expression, tangents: Mapping[int, Expression], seeds: Mapping[i
     for position, t in others:
         total = add(total, _partial(n, position, t))
     return total
+
+
+_USUAL = frozenset({"add", "sub", "mul"})
+
+
+def _usual_tangent(
+    operation: str, a: Expression, b: Expression, s: Expression | None, t: Expression | None
+) -> Expression | None:
+    """Return the derivative of a sum, difference or product from those of both, which are most of all nodes."""
+    if operation == "mul":
+        if s is None:
+            return None if t is None else multiply(a, t)
+        if t is None:
+            return multiply(b, s)
+        if a is b:
+            return multiply(a.graph.constant(2.0), multiply(a, s))
+        return add(multiply(b, s), multiply(a, t))
+    if t is None:
+        return s
+    if operation == "sub":
+        t = negate(t)
+    return t if s is None else add(s, t)
 
 
 def _solve_tangent(n: Expression, tangents: Mapping[int, Expression]) -> list[Expression]:

@@ -35,6 +35,7 @@ class KinematicMap:
 
     def __init__(self, program: RatesProgram, kernel: Callable[[Program, bool], BoundKernel]) -> None:
         self.program, self._kernel = program, kernel
+        self._last: tuple[tuple[float, bytes] | None, Matrix] = (None, np.zeros((0, 0)))
         homogeneous = [orientation for orientation in program.orientation_coordinates if orientation.is_homogeneous]
         self._homogeneous = [np.asarray(orientation.coordinates, dtype=np.intp) for orientation in homogeneous]
         self._kinds = [orientation.kind for orientation in homogeneous]
@@ -68,16 +69,18 @@ class KinematicMap:
         return u if program is None else np.asarray(self._kernel(program, True)(t[None, :], q, u)[0])
 
     def matrix(self, t: float, q: FloatArray) -> Matrix:
-        """Return B, of shape (coordinates, speeds)."""
-        made = self.program
+        """Return B, of shape (coordinates, speeds): not to be changed, since the last one is known."""
+        made, key = self.program, (t, q.tobytes())
         if made.program is None:
             return np.eye(len(q))
-        entries = self._kernel(made.program, False)([t], q, np.zeros(made.speeds))[1]
-        return from_entries(made.rows, made.columns, entries, (made.coordinates, made.speeds))
+        if self._last[0] != key:
+            entries = self._kernel(made.program, False)([t], q, np.zeros(made.speeds))[1]
+            self._last = key, from_entries(made.rows, made.columns, entries, (made.coordinates, made.speeds))
+        return self._last[1]
 
     def reach(self, t: float, q: FloatArray) -> Matrix:
         """Return B with each coordinate of an orientation moved as any of them: whichever shows it, all of it turns."""
-        matrix = self.matrix(t, q)
+        matrix = self.matrix(t, q).copy()
         orientations = [list(one.coordinates) for one in self.program.orientation_coordinates]
         if is_full(matrix):
             for one in orientations:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -100,6 +101,7 @@ class System:
         self.kinematic_map = None if of_speeds else kinematic_map
         self.program = made.program
         self.kernel = assembly.kernel(made.program)
+        self._last: tuple[tuple[float, bytes, bytes] | None, tuple[Any, ...]] = (None, ())
         self.rows, self.columns, self.shape = made.rows, made.columns, made.shape
         places = made.rows, made.columns
         held = [one.key[:2] for one in equations.constraints if of_speeds or one.value is not None]
@@ -109,6 +111,7 @@ class System:
         )
         self._assembly = assembly if equations is assembly.regular else None  # what starts closed may float no more
         self.targets, self.constraints = targets, made.shape[0] - len(targets)
+        self._wanted = np.array([one.value for one in targets], dtype=float)
         self.wrapped = [one.observable.periodic or (whole_turns and one.observable.unit == "rad") for one in targets]
         self.speed_names = tuple(one.name for one in equations.speed_names)
         self.speeds = len(equations.speeds)
@@ -127,16 +130,23 @@ class System:
 
     def at(self, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, Matrix]:
         """Return what is missing in each equation, and the derivatives."""
-        values, entries = self.kernel([t], q, u)
-        matrix = from_entries(self.rows, self.columns, entries, self.shape)
+        residual = self.missing(t, q, u)
+        matrix = from_entries(self.rows, self.columns, self._last[1][1], self.shape)
         if self.kinematic_map is not None and not self.kinematic_map.is_plain:
             matrix = matrix @ self.kinematic_map.matrix(t, q)
-        residual = np.asarray(values, dtype=float)
-        for i, target in enumerate(self.targets, start=self.constraints):
-            residual[i] -= target.value
-            if self.wrapped[i - self.constraints]:
-                residual[i] = np.remainder(residual[i] + np.pi, 2.0 * np.pi) - np.pi
         return residual, matrix
+
+    def missing(self, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
+        """Return what is missing in each equation."""
+        key = t, q.tobytes(), u.tobytes()
+        if self._last[0] != key:
+            self._last = key, self.kernel([t], q, u)
+        residual = np.array(self._last[1][0], dtype=float)
+        residual[self.constraints :] -= self._wanted
+        for i, is_wrapped in enumerate(self.wrapped, start=self.constraints):
+            if is_wrapped:
+                residual[i] = np.remainder(residual[i] + np.pi, 2.0 * np.pi) - np.pi
+        return residual
 
 
 def nearest(
@@ -144,10 +154,10 @@ def nearest(
 ) -> tuple[FloatArray, FloatArray, Matrix]:
     """Move to the nearest configuration that fulfils a system; return it with what is missing, scaled."""
     assert system.kinematic_map is not None
-    errors = system.errors.near(t, q, scales)
+    errors, still = system.errors.near(t, q, scales), np.zeros_like(scales)
 
     def look(place: FloatArray) -> Missing:
-        residual, matrix = system.at(t, place, np.zeros_like(scales))
+        residual, matrix = system.at(t, place, still)
         rows = row_scales(matrix, scales, errors)
         # Which components of a law are small depends on how a scene is turned.
         return Missing(residual, rows, lambda: matrix, system.errors.shared(rows))
@@ -164,6 +174,7 @@ def nearest(
         longest=system.longest(scales),
         halvings=_HALVINGS,
         is_even=True,
+        missed=lambda place: system.missing(t, place, still),
     )
     # What hardly changes with any coordinate, as where links line up, is measured by the scene.
     sizes = np.maximum(now.units, 1e-4 * max(now.units.max(initial=0.0), scales.max(initial=0.0)))
