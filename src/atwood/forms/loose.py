@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from atwood.expr import Expression, substitute
 from atwood.forms.assembly import Assembly, FormName
+from atwood.forms.balance_program import BalanceProgram, balance_program
 from atwood.forms.caches import Key
 from atwood.lazy_dataclasses import replace
 from atwood.mechanics.dynamics.equations import ContactRow, Equations
@@ -17,6 +18,7 @@ from atwood.model.declare.contact_laws import state_names
 
 _STATES: Key[tuple[int, ...]] = Key("states of gaps and slips")
 _LOOSE: Key[bool] = Key("whether nothing touches")
+_BALANCE: Key[BalanceProgram] = Key("balance of forces where nothing touches")
 _WHOLE: Key[Assembly] = Key("the scene with the programs for all states")
 
 
@@ -75,6 +77,19 @@ def loosened(assembly: Assembly, values: Sequence[Expression], form: FormName | 
     zeros = {one: equations.graph.zero for one in known if not one.is_constant}
     without = substitute(list(values), zeros)
     return substitute(without, {states[i].symbol: equations.graph.zero for i in _states(assembly)})
+
+
+def balance_now(assembly: Assembly, form: FormName) -> BalanceProgram:
+    """Return the balance of forces in the coordinates of either form, as it is in the present states."""
+    if not is_loose(assembly):
+        return assembly.balance(form)
+
+    def make() -> BalanceProgram:
+        equations = assembly.in_coordinates(form)
+        rows = tuple(loosened(assembly, equations.rows, form))
+        return balance_program(f"{assembly.flat.name} ({form})", replace(equations, rows=rows), assembly.parameters)
+
+    return assembly.shared.get(_BALANCE, make, form)
 
 
 def loose_equations(assembly: Assembly, rows: Sequence[Expression]) -> tuple[Equations, tuple[Expression, ...]]:

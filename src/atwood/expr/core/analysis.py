@@ -7,31 +7,42 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from functools import lru_cache
 from operator import attrgetter
 from typing import Any
 
 from atwood.clock import check_time
 from atwood.errors import AtwoodError
 from atwood.expr.core import algebra
-from atwood.expr.core.graph import Expression, graph_of
+from atwood.expr.core.graph import KINDS, Expression, graph_of
 from atwood.expr.core.operations import BINARY, LEAVES, UNARY, UNCOUNTED, solve_or_nan
 
 _INDEX = attrgetter("index")
 
 
-def live(outputs: Iterable[Expression | float]) -> list[Expression]:
+def live(
+    outputs: Iterable[Expression | float], roots: Collection[Expression] = (), leaves: Collection[Expression] = ()
+) -> list[Expression]:
     """Return every node that the outputs need, themselves included, arguments before users.
 
     Parameters
     ----------
     outputs
         Expressions of one graph; numbers among them are passed over.
+    roots
+        Where only what depends on some of these matters: most of the rest, which reads other kinds of symbols, is left
+        out.
+    leaves
+        Expressions of which it does not matter what they are made of.
     """
     check_time()
     stack = [output for output in outputs if isinstance(output, Expression)]
     for output in stack:
         if output.graph is not stack[0].graph:
             raise AtwoodError("the outputs belong to different graphs")
+    kinds = frozenset([root.reads for root in roots]) if 0 < len(roots) <= _MOST_ROOTS else _ANY
+    if leaves or 0 not in kinds:
+        return _live_with(stack, _with_kinds(kinds), leaves)
     found = set(stack)
     add, pop, push = found.add, stack.pop, stack.append
     while stack:
@@ -39,6 +50,32 @@ def live(outputs: Iterable[Expression | float]) -> list[Expression]:
             if node not in found:
                 add(node)
                 if node.arguments:
+                    push(node)
+    return sorted(found, key=_INDEX)
+
+
+_MOST_ROOTS = 300
+"""With more of them nothing is left out: to look at all of these would take longer in one part of a large scene."""
+
+_ANY = frozenset([0])
+
+
+@lru_cache(maxsize=256)
+def _with_kinds(kinds: frozenset[int]) -> list[bool]:
+    """Return whether what reads some kinds of symbols may depend on what reads some of these."""
+    return [any(one & reads == one for one in kinds) for reads in range(1 << KINDS)]
+
+
+def _live_with(stack: list[Expression], is_kept: Sequence[bool], leaves: Collection[Expression]) -> list[Expression]:
+    """Return what is live beyond leaves, and kept by the kinds of symbols that it reads."""
+    found = {output for output in stack if is_kept[output.reads]}
+    stack = [output for output in found if output not in leaves]
+    add, pop, push = found.add, stack.pop, stack.append
+    while stack:
+        for node in pop().arguments:
+            if node not in found and is_kept[node.reads]:
+                add(node)
+                if node.arguments and node not in leaves:
                     push(node)
     return sorted(found, key=_INDEX)
 
@@ -70,12 +107,13 @@ def dependencies(outputs: Sequence[Expression | float], symbols: Sequence[Expres
 def depends_on(values: Expression | float | Iterable[Expression | float], symbols: Collection[Expression]) -> bool:
     """Return whether an expression, or any of several, depends on any of the symbols."""
     wanted = _to_look_up(symbols)
-    return any(node in wanted for node in live([values] if isinstance(values, Expression | float) else values))
+    several = [values] if isinstance(values, Expression | float) else values
+    return any(node in wanted for node in live(several, wanted))
 
 
-def read_by(values: Iterable[Expression | float], symbols: Iterable[Expression]) -> list[Expression]:
+def read_by(values: Iterable[Expression | float], symbols: Collection[Expression]) -> list[Expression]:
     """Return those of some symbols on which any of several expressions depends."""
-    reached = set(live(values))
+    reached = set(live(values, symbols))
     return [symbol for symbol in symbols if symbol in reached]
 
 
@@ -129,7 +167,7 @@ def count_nodes(nodes: Sequence[Expression], parameters: Collection[Expression] 
 def substitute(
     outputs: Sequence[Expression | float],
     mapping: Mapping[Expression, Expression | float],
-    again: Iterable[Expression] = (),
+    again: Collection[Expression] = (),
 ) -> list[Expression]:
     """Replace expressions by others and simplify what follows from it.
 
@@ -147,7 +185,9 @@ def substitute(
     graph = graph_of(*outputs, *mapping)
     if graph is None:
         raise AtwoodError("there is no expression among the outputs")
-    nodes = live(outputs)
+    is_large = len(mapping) > _MOST_ROOTS
+    leaves = () if is_large else {old for old in mapping if old.arguments}
+    nodes = live(outputs, () if is_large else [*mapping, *again], leaves)
     if len(mapping) > len(nodes):  # one part of a large scene
         mapping = {node: mapping[node] for node in nodes if node in mapping}
     replaced = {old.index: graph.convert(new) for old, new in mapping.items()}

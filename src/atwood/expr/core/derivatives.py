@@ -246,7 +246,7 @@ def jvp(outputs: Sequence[Expression | float], tangents: Mapping[Expression, Exp
     list of Expression
         One derivative for each output; the constant 0 where the output does not move.
     """
-    graph, nodes = _graph_of(*outputs, *tangents), live(outputs)
+    graph, nodes = _graph_of(*outputs, *tangents), live(outputs, tangents)
     if len(tangents) > len(nodes):  # one part of a large scene
         tangents = {node: tangents[node] for node in nodes if node in tangents}
     seeds = {key.index: graph.convert(rate) for key, rate in tangents.items()}
@@ -276,7 +276,7 @@ def vjp(
         One derivative for each entry of ``wrt``.
     """
     graph = _graph_of(*outputs, *wrt)
-    nodes = live(outputs)
+    nodes = live(outputs, wrt)
     active = dependents(nodes, wrt)
     roots = {root.index for root in wrt}
     weights: dict[int, Expression] = {}
@@ -359,7 +359,7 @@ def jacobian(
     if not wrt or not any(isinstance(output, Expression) for output in outputs):
         return SparseMatrix((), (), ())
     graph = _graph_of(*outputs)
-    nodes = live(outputs)
+    nodes = live(outputs, [one for each in wrt for one in ([each] if isinstance(each, Expression) else each)])
     by_index = {node.index: node for node in nodes}
     users = _users(nodes)
     rows_of: dict[int, list[int]] = {}

@@ -21,6 +21,12 @@ from atwood.expr.core import algebra
 if TYPE_CHECKING:
     from atwood.expr.core.relations import TimeRelations
 
+KINDS = 8
+"""So many kinds of symbols are told apart, by what stands before a colon in their names; others share these bits.
+
+The sets of them are the numbers that Python has once.
+"""
+
 _LOOK = 256
 """After so many new nodes the clock is looked at."""
 
@@ -50,9 +56,11 @@ class Expression:
         The position in order of creation.
     is_parametric
         Whether it depends on constants and parameters alone, so that it is computed once a run.
+    reads
+        A bit for each kind of symbols that it depends on, of which parameters are none; see `Graph`.
     """
 
-    __slots__ = ("arguments", "graph", "index", "is_parametric", "operation", "payload")
+    __slots__ = ("arguments", "graph", "index", "is_parametric", "operation", "payload", "reads")
 
     graph: Graph
     operation: str
@@ -60,6 +68,7 @@ class Expression:
     payload: Any
     index: int
     is_parametric: bool
+    reads: int
 
     def __init__(
         self,
@@ -69,6 +78,7 @@ class Expression:
         payload: Any,
         index: int,
         is_parametric: bool,
+        reads: int,
     ) -> None:
         self.graph = graph
         self.operation = operation
@@ -76,6 +86,7 @@ class Expression:
         self.payload = payload
         self.index = index
         self.is_parametric = is_parametric
+        self.reads = reads
 
     @property
     def is_constant(self) -> bool:
@@ -270,11 +281,12 @@ class Graph:
         Where positions are counted from, if that is far from the world's origin: sums keep it outside.
     """
 
-    __slots__ = ("_table", "nodes", "one", "origin", "relations", "zero")
+    __slots__ = ("_kinds", "_table", "nodes", "one", "origin", "relations", "zero")
 
     def __init__(self) -> None:
         self.origin: tuple[Expression, ...] | None = None
         self.relations: TimeRelations | None = None
+        self._kinds: dict[str, int] = {}
         self.nodes: list[Expression] = []
         self._table: defaultdict[str, dict[Any, Expression]] = defaultdict(dict)  # by operation, then by `_key`
         self.zero = self.constant(0.0)
@@ -400,12 +412,15 @@ class Graph:
     ) -> Expression:
         if not len(self.nodes) % _LOOK:
             check_time()
-        known = is_parameter or operation == "constant" or bool(arguments)
+        known, reads = is_parameter or operation == "constant" or bool(arguments), 0
         for argument in arguments:
             if not argument.is_parametric:
                 known = False
-                break
-        created = Expression(self, operation, arguments, payload, len(self.nodes), known)
+                reads |= argument.reads
+        if operation == "symbol" and not known:
+            kinds = self._kinds
+            reads = 1 << kinds.setdefault(payload.partition(":")[0] if ":" in payload else "", len(kinds)) % KINDS
+        created = Expression(self, operation, arguments, payload, len(self.nodes), known, reads)
         self._table[operation][key] = created
         self.nodes.append(created)
         return created

@@ -15,9 +15,8 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, read_by, substitute
 from atwood.forms.assembly import Assembly
-from atwood.forms.balance_program import BalanceProgram, balance_program
 from atwood.forms.caches import Key
-from atwood.forms.loose import loosened, state_paths
+from atwood.forms.loose import state_paths
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import to_maximal
 from atwood.lazy_dataclasses import dataclass, replace
@@ -32,7 +31,6 @@ from atwood.simulation.dynamics.balance import (
     Balance,
     BalanceValues,
     ConstraintValues,
-    balance_by,
     balance_of,
     even_balance,
 )
@@ -42,8 +40,6 @@ from atwood.simulation.problem.problem import SceneProblem
 
 _LAYOUT: Key[Layout] = Key("gaps and slips")
 _OWN_SIZES: Key[Scales] = Key("sizes of forces of gaps and slips")
-_APART: Key[BalanceProgram] = Key("balance of forces without gaps and slips")
-_BALANCE_APART: Key[Balance] = Key("the same with parameters")
 
 _LIMITS = ("limits", "static limits", "limits backwards", "static limits backwards")
 
@@ -193,14 +189,7 @@ def without_contacts(assembly: Assembly) -> Balance:
     held = list(assembly.held_now)
     for place in (place for places in layout_of(assembly).places for place in places):
         held[place] = 0.0
-    apart = assembly.with_held(held)
-
-    def make() -> BalanceProgram:
-        equations = replace(apart.maximal, rows=tuple(loosened(apart, apart.maximal.rows, "dae")), contacts=())
-        return balance_program(f"{assembly.flat.name} (dae, without contacts)", equations, assembly.parameters)
-
-    program = assembly.shared.get(_APART, make)
-    return apart.kept.get(_BALANCE_APART, lambda: balance_by(apart, "dae", program))
+    return balance_of(assembly.with_held(held), "dae")
 
 
 class ContactValues:

@@ -16,6 +16,7 @@ from atwood.forms.accelerations import accelerations_of
 from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.balance_program import BalanceProgram
 from atwood.forms.caches import Key
+from atwood.forms.loose import balance_now
 from atwood.lazy_dataclasses import dataclass
 from atwood.numerics.matrices import (
     LARGEST_FULL,
@@ -209,11 +210,11 @@ class Balance:
 
 def balance_of(assembly: Assembly, form: FormName) -> Balance:
     """Return the balance of forces of a scene in the coordinates of either form."""
-    return assembly.kept.get(_BALANCES[form], lambda: balance_by(assembly, form, assembly.balance(form)))
+    return assembly.kept.get(_BALANCES[form], lambda: _balance_of(assembly, form))
 
 
-def balance_by(assembly: Assembly, form: FormName, program: BalanceProgram) -> Balance:
-    """Return the balance of forces of a scene by a program."""
+def _balance_of(assembly: Assembly, form: FormName) -> Balance:
+    program = balance_now(assembly, form)
     mass = None if program.mass_product is None else partial(mass_at, assembly, form)
     held = partial(assembly.kernel, program.constraints_alone)
     places, kinematic_map = (program.jacobian_rows, program.jacobian_columns), kinematic_map_of(assembly, form)
@@ -308,7 +309,7 @@ def columns_of(kernel: BoundKernel, size: int, *groups: Any) -> FloatArray:
 
 def mass_at(assembly: Assembly, form: FormName, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
     """Return a mass matrix that is not written out, at one state."""
-    program = assembly.balance(form)
+    program = balance_now(assembly, form)
     assert program.mass_product is not None
     return columns_of(assembly.kernel(program.mass_product, vectorized=True), program.speeds, [t], q, u)
 

@@ -21,7 +21,7 @@ from atwood.forms.accelerations import AccelerationProgram, accelerations_of
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.constrained import ConstrainedProgram, constrained_program, impact_program
-from atwood.forms.loose import has_touched, is_loose, loose_equations
+from atwood.forms.loose import balance_now, has_touched, is_loose, loose_equations
 from atwood.forms.quantities import to_maximal
 from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
 from atwood.integrators.protocol import MET, PROJECTION, RATES, STEPS, CompiledRates, ExplicitProblem, Values
@@ -277,7 +277,7 @@ def _light_speeds(plan: SceneProblem, t: float, y: FloatArray) -> tuple[int, ...
     q, u = plan.program.split(y)
     if assembly.form == "reduced":
         q, u = (np.asarray(one) for one in assembly.kernel(to_maximal(assembly))([t], q, u))
-    program = assembly.balance("dae")
+    program = balance_now(assembly, "dae")
     entries = assembly.kernel(program.program)([t], q, u)[0]
     places = list(zip(program.mass_rows.tolist(), program.mass_columns.tolist(), strict=True))
     value = dict(zip(places, entries, strict=True))
