@@ -81,9 +81,15 @@ def loosened(assembly: Assembly, values: Sequence[Expression], form: FormName | 
 
 def balance_now(assembly: Assembly, form: FormName) -> BalanceProgram:
     """Return the balance of forces in the coordinates of either form, as it is in the present states."""
-    if not is_loose(assembly):
-        return assembly.balance(form)
+    return _loose_balance(assembly, form) if is_loose(assembly) else assembly.balance(form)
 
+
+def balance_with_masses(assembly: Assembly, form: FormName) -> BalanceProgram:
+    """Return the shortest balance of forces that has the masses, which are those of all states."""
+    return _loose_balance(assembly, form) if assembly.own_equations.contacts else assembly.balance(form)
+
+
+def _loose_balance(assembly: Assembly, form: FormName) -> BalanceProgram:
     def make() -> BalanceProgram:
         equations = assembly.in_coordinates(form)
         rows = tuple(loosened(assembly, equations.rows, form))

@@ -12,6 +12,7 @@ from atwood.errors import StartError, TopologyError
 from atwood.expr import Expression, OutputGroup, Program, SparseMatrix, depends_on, is_zero, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
+from atwood.forms.loose import balance_now
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import known_program
 from atwood.lazy_dataclasses import dataclass
@@ -192,7 +193,7 @@ def check_massless_directions(
 ) -> None:
     """Refuse a direction in which something can move without inertia."""
     n = len(now.bias)
-    if n == 0 or (is_wide(assembly.balance(assembly.form)) and _bodies_have_inertia(assembly, *state)):
+    if n == 0 or (is_wide(balance_now(assembly, assembly.form)) and _bodies_have_inertia(assembly, *state)):
         return
     mass = now.mass
     sizes = _sizes_of_inertia(mass, sizes)

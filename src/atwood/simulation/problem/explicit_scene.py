@@ -21,7 +21,7 @@ from atwood.forms.accelerations import AccelerationProgram, accelerations_of
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.constrained import ConstrainedProgram, constrained_program, impact_program
-from atwood.forms.loose import balance_now, has_touched, is_loose, loose_equations
+from atwood.forms.loose import balance_with_masses, has_touched, is_loose, loose_equations
 from atwood.forms.quantities import to_maximal
 from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
 from atwood.integrators.protocol import MET, PROJECTION, RATES, STEPS, CompiledRates, ExplicitProblem, Values
@@ -60,11 +60,10 @@ def explicit_problem_of(
 ) -> ExplicitProblem:
     """Return what an explicit method is given of accelerations."""
     _, n, m = (len(group.symbols) for group in program.program.inputs)
-    kernel = assembly.compiled(program.program).bind(values)
 
     return ExplicitProblem(
         size=n + m,
-        rates=first_order(kernel, n),
+        rates=_when_asked(lambda: first_order(assembly.compiled(program.program).bind(values), n)),
         events=events,
         event_count=len(directions),
         event_directions=directions,
@@ -81,6 +80,14 @@ def first_order(kernel: BoundKernel, coordinates: int) -> Callable[[float, Float
         return [*(u if len(found) == 1 else found[0]), *found[-1]]
 
     return rates
+
+
+def _when_asked(
+    make: Callable[[], Callable[[float, FloatArray], Sequence[float]]],
+) -> Callable[[float, FloatArray], Sequence[float]]:
+    """Return a function that is made at its first call: compiled steps make none."""
+    made = cache(make)
+    return lambda t, y: made()(t, y)
 
 
 def first_order_rows(
@@ -175,15 +182,14 @@ def constrained_problem(
     assembly, program = plan.assembly, program_on_constraints(plan, t, y)
     n, m = plan.program.coordinates, plan.program.speeds
     values = values_on_constraints(plan)
-    kernel = assembly.compiled(program.accelerations).bind(values)
-    nearer = assembly.compiled(program.projection).bind(values)
+    nearer = cache(lambda: assembly.compiled(program.projection).bind(values))
 
     def project(t: float, y: FloatArray) -> FloatArray:
-        return _projected(nearer, t, y, n)
+        return _projected(nearer(), t, y, n)
 
     return ExplicitProblem(
         size=n + m,
-        rates=first_order(kernel, n),
+        rates=_when_asked(lambda: first_order(assembly.compiled(program.accelerations).bind(values), n)),
         events=events,
         event_count=len(directions),
         event_directions=directions,
@@ -277,7 +283,7 @@ def _light_speeds(plan: SceneProblem, t: float, y: FloatArray) -> tuple[int, ...
     q, u = plan.program.split(y)
     if assembly.form == "reduced":
         q, u = (np.asarray(one) for one in assembly.kernel(to_maximal(assembly))([t], q, u))
-    program = balance_now(assembly, "dae")
+    program = balance_with_masses(assembly, "dae")
     entries = assembly.kernel(program.program)([t], q, u)[0]
     places = list(zip(program.mass_rows.tolist(), program.mass_columns.tolist(), strict=True))
     value = dict(zip(places, entries, strict=True))
