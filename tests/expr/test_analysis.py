@@ -3,6 +3,7 @@ from hypothesis import given, settings
 
 from atwood import expr as ex
 from atwood.errors import AtwoodError
+from atwood.expr.core.analysis import dependents
 
 from . import graphs
 
@@ -32,6 +33,37 @@ def test_dependencies():
     assert ex.depends_on(ex.sin(x * y), [y, z])
     assert not ex.depends_on(ex.sin(x * y), [z])
     assert not ex.depends_on(1.0, [z])
+
+
+@given(graphs.recipes, graphs.recipes)
+@settings(max_examples=40)
+def test_what_does_not_depend_on_roots_may_be_left_out(first, second):
+    """Nothing that depends on one is, whether it is a symbol or not, and with any number of kinds of symbols."""
+    graph = ex.Graph()
+    start = [graph.parameter("p"), *(graph.symbol(f"{chr(97 + k)}:x") for k in range(12))]
+    outputs = [*graphs.follow(first, start), *graphs.follow(second, start[::-1])]
+    every = ex.live(outputs)
+    for roots in ([start[1]], [start[12], start[9]], [start[0]], [every[len(every) // 2]], [every[-1], start[3]]):
+        found, wanted = ex.live(outputs, roots), dependents(every, roots)
+        assert [node for node in found if node.index in wanted] == [node for node in every if node.index in wanted]
+        assert set(found) <= set(every)
+        assert ex.live(outputs, roots, roots) == [node for node in found if node in ex.live(outputs, roots, roots)]
+        assert ex.depends_on(outputs, roots) == any(root in every for root in roots)
+    few, many = ex.live([outputs[0] * start[2]], [start[2]]), ex.live([outputs[0] * start[2]])
+    assert len(few) <= len(many)
+
+
+def test_other_kinds_of_symbols_are_passed_over():
+    graph = ex.Graph()
+    q, u, a = (graph.symbol(f"{kind}:x") for kind in "qua")
+    force = ex.sin(q) * u / (1.0 + q * q)
+    row = 2.0 * a + force
+    assert len(ex.live([row], [a])) == 3
+    assert ex.live([row], [a], [force]) == ex.live([row], [a])
+    assert force in ex.live([row], [u])
+    made = len(graph)
+    assert ex.substitute([row], {force: 0.0}) == [2.0 * a]
+    assert len(graph) == made
 
 
 def test_live_is_in_topological_order():

@@ -54,6 +54,24 @@ def test_a_step_that_leads_away_is_halved() -> None:
     assert left.miss == largest(near) < 1e-12
 
 
+def test_halved_steps_ask_for_no_slopes_where_what_is_missing_is_known_without() -> None:
+    look, asked = counted(lambda x: np.arctan(x), lambda x: np.diag(1.0 / (1.0 + x**2)))
+    told = {"steps": 20, "met": 1e-12, "halvings": 8}
+    plain, _ = newton(look, np.add, np.array([3.0]), ONE, **told)
+    many, missed = len(asked), list[np.ndarray]()
+    asked.clear()
+
+    def value(place: np.ndarray) -> np.ndarray:
+        missed.append(place)
+        return np.arctan(place)
+
+    found, left = newton(look, np.add, np.array([3.0]), ONE, missed=value, **told)
+    assert found == plain
+    assert left.miss < 1e-12
+    assert len(missed) == many - 1
+    assert len(asked) < many
+
+
 def test_no_step_is_longer_than_allowed() -> None:
     look, asked = counted(lambda x: x - 10.0, lambda _: np.eye(1))
     newton(look, np.add, np.zeros(1), ONE, steps=4, longest=0.5, halvings=1)
