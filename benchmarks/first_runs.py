@@ -1,10 +1,10 @@
 """The first result of a scene whose structure is new to the process and to the cache, over the import of NumPy.
 
 In each round a process imports NumPy and Atwood and runs other scenes, so that what a machine compiles once, whatever
-the scene, is in the cache. For each scene and form it forks: the child takes a copy of that cache, and makes the scene
-and its first result. The ratio is of time of the processor, or of the clock, over that of the import in that round;
-medians of the rounds are shown. LLVM is what is awaited of it. "Again" is the same structure in a new scene in the
-same child. BLAS has one thread.
+the scene, is in the cache; modules have bytecode, as where they are installed. For each scene and form it forks: the
+child takes a copy of that cache, and makes the scene and its first result. The ratio is of time of the processor, or of
+the clock, over that of the import in that round; medians of the rounds are shown. LLVM is what is awaited of it.
+"Again" is the same structure in a new scene in the same child. BLAS has one thread.
 """
 
 from __future__ import annotations
@@ -135,6 +135,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     names = chosen.scenes[:2] if chosen.quick else chosen.scenes
     rounds = []
     told = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    told.pop("PYTHONDONTWRITEBYTECODE", None)
     for _ in range(chosen.repeat):
         with tempfile.TemporaryDirectory() as folder:
             report = Path(folder) / "round.json"
