@@ -24,7 +24,9 @@ from atwood_library import (
     Ground,
     PointContact,
     PointMass,
+    Pulley,
     RigidBody,
+    Rope,
     RotaryDrive,
     Slider,
     Table,
@@ -285,3 +287,35 @@ def test_what_is_driven_against_a_floor_is_named_when_it_comes_there(form: str, 
         return
     with pytest.raises(aw.SolveError, match="c: at t = 1 no impulses satisfy"):
         run(scene, form, end)
+
+
+@FORMS
+def test_a_part_whose_force_has_no_value_is_named_by_its_path(form: str) -> None:
+    """A light pulley on a rope is free to swing: nothing says how it moves, and the floor's force follows from that."""
+    scene = Scene()
+    top, ground, pulley = scene.add("top", Ground(position=(0, 0, 5))), scene.add("ground", Ground()), Pulley()
+    scene.add("pulley", pulley)
+    hung, over = (
+        scene.add("hung", Rope(length=1.0, when_slack="slack")),
+        Rope(length=7.5, when_slack="slack", pulleys=1),
+    )
+    scene.add("over", over)
+    a, b = scene.add("a", PointMass(mass=1.0)), scene.add("b", PointMass(mass=3.0))
+    floor = scene.add("floor", PointContact(friction=0.5))
+    for one, other in (
+        (top.frame, hung.a),
+        (pulley.center, hung.b),
+        (ground.frame, floor.plane),
+        (a.point, floor.point),
+        (a.point, over.a),
+        (pulley.groove, over.over[0]),
+        (b.point, over.b),
+    ):
+        scene.connect(one, other)
+    places = {"a": 0.0, "b": 0.5}
+    scene.start.update({f"{name}.position.{axis}": places[name] * (axis == "z") for name in places for axis in "xz"})
+    scene.start.update({f"{name}.velocity.{axis}": 0.0 for name in places for axis in "xz"})
+    scene.start.update({"pulley.position.x": 0.0, "pulley.position.z": 4.0})
+    with pytest.raises(aw.StartError) as error:
+        run(scene, form, 1.0)
+    assert error.value.where in ("floor", "pulley")

@@ -221,7 +221,7 @@ def _law_values(assembly: Assembly) -> tuple[list[_Quantity], Program]:
                     quantities.append(_Quantity(path, words))
                     expressions.append(value)
     for symbol, value in equations.read.items():
-        path, _, law = symbol.name.removeprefix("lambda:").partition("[")[0].rpartition(".")
+        path, _, law = symbol.name.removeprefix("read:").removeprefix("lambda:").partition("[")[0].rpartition(".")
         why = "no reaction agrees with the forces that it causes, as where friction jams or is without bounds"
         quantities.append(_Quantity(path, f"the reaction of the law {law!r}, which a force reads,", why))
         expressions.append(value)
