@@ -175,7 +175,7 @@ def _read(pair: Tableau, runs: int) -> Routine:
 
 _FILES = (
     *(f"integrators/embedded/{name}.py" for name in ("dense_output", "looks", "steps", "stepper", "tableau")),
-    *(f"integrators/{name}.py" for name in ("batch", "lanes", "stepper")),
+    *(f"integrators/{name}.py" for name in ("batch", "event_location", "lanes", "stepper")),
     *(f"codegen/{name}.py" for name in ("sundials/events", "tangents")),
 )
 

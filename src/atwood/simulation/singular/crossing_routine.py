@@ -62,7 +62,10 @@ PASSED = ("time", "start", "end", "error", "away")
 @once
 def singular_routines() -> Built:
     """Return sweeps of arcs, and what passes singular positions, as machine code."""
-    files = ("simulation/singular/arc_routine.py", "codegen/sundials/step_monitor.py", "codegen/sundials/rank_looks.py")
+    files = (
+        *("simulation/singular/arc_routine.py", "integrators/protocol.py"),
+        *(f"codegen/sundials/{name}.py" for name in ("step_monitor", "rank_looks")),
+    )
     source = RoutineSource("simulation.singular.crossing_routine", files)
     return build_code([], CodeOptions(level=2), exports=["settle", "sign_change", "watch"], routines=source)
 
