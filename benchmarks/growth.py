@@ -158,9 +158,10 @@ def measured(name: str, count: int) -> dict[str, float] | None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Measure and print."""
+    from drawing import draw_growth
     from timing import options, print_table, save
 
-    chosen = options(__doc__, arguments, scenes=list(SCENES))
+    chosen = options(__doc__, arguments, plot=True, scenes=list(SCENES))
     results: dict[str, Any] = {}
     for name in chosen.scenes[:1] if chosen.quick else chosen.scenes:
         rows = []
@@ -172,6 +173,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             rows.append([f"{count:,}", *cells, made["ns, step and body"]])
         print_table(name, ["bodies", *STAGES, "ns, step and body"], rows)
     save(chosen.json, results)
+    if chosen.plot:
+        draw_growth(chosen.plot, results, STAGES)
 
 
 if __name__ == "__main__":

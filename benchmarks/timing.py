@@ -98,7 +98,7 @@ def options(
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what was measured to a file")
     parser.add_argument("--cflags", default="-O3 -march=native", help="how the C by hand is compiled")
     if plot:
-        parser.add_argument("--plot", type=Path, metavar="FOLDER", help="draw work-precision diagrams there")
+        parser.add_argument("--plot", type=Path, metavar="FOLDER", help="draw what was measured there")
     if scenes:
         parser.add_argument("--scenes", nargs="+", choices=scenes, default=scenes, help="which ones; all")
     chosen = parser.parse_args(arguments)

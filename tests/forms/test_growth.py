@@ -9,12 +9,13 @@ import pytest
 from tests.calls import calls
 
 from atwood import Scene, simulate
-from atwood.expr import Expression
+from atwood.expr import Expression, affine_coefficients
 from atwood.expr.core import graph as core_graph
 from atwood.expr.simplify import alike
 from atwood.expr.simplify.collect import collect
 from atwood.forms import caches
 from atwood.forms.accelerations import acceleration_program
+from atwood.mechanics.constraints import elimination
 from atwood.mechanics.dynamics import augmented
 from atwood.pipeline import assemble
 from atwood_library.scenes import Chain, FourBarRow
@@ -44,6 +45,19 @@ def test_a_hundred_links_are_derived_at_once(form: str) -> None:
         needed.append(made.count)
     assert sum(operations.values()) < 5000
     assert needed[1] < 2.2 * needed[0]
+
+
+def test_a_constraint_looks_at_its_own_coordinates(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: dict[int, int] = {}
+    for windows in (5, 10):
+
+        def counted(value: Any, free: Any, known: Any, windows: int = windows) -> Any:
+            asked[windows] = max(asked.get(windows, 0), len(free))
+            return affine_coefficients(value, free, known)
+
+        monkeypatch.setattr(elimination, "affine_coefficients", counted)
+        assert assemble(FourBarRow(windows=windows)).reduced.constraints
+    assert 0 < asked[5] == asked[10]
 
 
 def nodes_of_accelerations(links: int) -> list[tuple[object, ...]]:

@@ -419,6 +419,13 @@ def test_of_many_coordinates_few_choices_are_tried(monkeypatch: pytest.MonkeyPat
     assert len(made) <= 5  # each of eleven cranks before
 
 
+def test_a_row_of_one_freedom_has_formulas_however_long_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(closed_loops, "_LARGEST", 0)
+    assert solved(FourBarRow(windows=3)) is not None
+    monkeypatch.setattr(closed_loops, "_FEW_FREEDOMS", 0)
+    assert solved(FourBarRow(windows=3)) is None
+
+
 def test_other_values_and_starts_use_the_same_programs() -> None:
     assembly = assemble(FourBar())
     first = simulate(assembly, t_end=0.2)

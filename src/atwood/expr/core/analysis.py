@@ -182,7 +182,7 @@ def substitute(
     """
     if not outputs:
         return []
-    graph = graph_of(*outputs, *mapping)
+    graph = graph_of(*outputs) or graph_of(*mapping)  # a large scene has many to be replaced
     if graph is None:
         raise AtwoodError("there is no expression among the outputs")
     is_large = len(mapping) > _MOST_ROOTS

@@ -264,7 +264,7 @@ def closed_form(
     None where a dependent coordinate is read otherwise than by its sine and cosine, as by a law in a sum with another
     angle that is not one of the mechanism.
     """
-    free, moving = loops.independent, loops.speeds
+    free, moving = dict.fromkeys(loops.independent), dict.fromkeys(loops.speeds)
     moved = _Moved(equations, loops)
     q, u = equations.coordinates, equations.speeds
     places = loops.places

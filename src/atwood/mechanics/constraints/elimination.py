@@ -89,19 +89,20 @@ def eliminate_linear(
     orientation_coordinates = {
         number for orientation in forest.orientation_coordinates for number in orientation.coordinates
     }
-    curved = [s for number, s in enumerate(q) if number in orientation_coordinates]
-    flat = [s for number, s in enumerate(q) if number not in orientation_coordinates]
+    curved = {s for number, s in enumerate(q) if number in orientation_coordinates}
+    numbers = {s: number for number, s in enumerate(q)}
     solution = dict(before or {})
     for number, (path, constraint, original) in enumerate(values):
         value = substitute([original], solution)[0]
-        if depends_on(value, curved):
+        read = {node for node in live([value]) if node in numbers}
+        if not read.isdisjoint(curved):
             continue
-        free = [s for s in flat if s not in solution]
-        affine = affine_coefficients(value, free, list(parameters))
+        free = sorted((s for s in read if s not in solution), key=numbers.__getitem__)
+        affine = affine_coefficients(value, free, parameters)
         if affine is None:
             continue
         coefficients, remainder = affine
-        light = [q.index(symbol) in weightless for symbol in free]
+        light = [numbers[symbol] in weightless for symbol in free]
         index = decide(derivation, partial(_pivot, list(coefficients), light))
         if index is None:
             continue

@@ -239,10 +239,10 @@ def choose_dependent_coordinates(jacobian: FloatArray, scales: FloatArray) -> tu
     rows = or_one(np.max(np.abs(jacobian * scales), axis=1, initial=0.0))
     left = jacobian * scales / rows[:, None]
     sizes = np.einsum("ij,ij->j", left, left)
-    chosen: list[int] = []
+    is_chosen = np.zeros(len(sizes), dtype=bool)
     for _ in range(count):
         best = int(np.argmax(sizes))
-        chosen.append(best)
+        is_chosen[best] = True
         if sizes[best] > 0.0:
             own = np.flatnonzero((left[:, best] != 0.0) | (count <= _ALL))
             columns = np.flatnonzero(np.any(left[own] != 0.0, axis=0) | (count <= _ALL))
@@ -251,9 +251,9 @@ def choose_dependent_coordinates(jacobian: FloatArray, scales: FloatArray) -> tu
                 part = part - direction[:, None] * (direction @ part)
             left[np.ix_(own, columns)] = np.where((np.abs(part) < _LOST) & (count > _ALL), 0.0, part)
             whole = left.take(columns, axis=1)
-            sizes[columns] = np.einsum("ij,ij->j", whole, whole)
-        sizes[chosen] = -1.0
-    return tuple(sorted(chosen))
+            sizes[columns] = np.where(is_chosen[columns], -1.0, np.einsum("ij,ij->j", whole, whole))
+        sizes[best] = -1.0
+    return tuple(np.flatnonzero(is_chosen).tolist())
 
 
 def review_partitioning(jacobian: FloatArray, scales: FloatArray, dependent: tuple[int, ...]) -> tuple[int, ...]:

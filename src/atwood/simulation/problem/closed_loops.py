@@ -56,6 +56,9 @@ _AMPLE = 0.5
 _LARGEST = 4000
 """With more products of freedoms and speeds constraints are kept: formulas know of no entry that is zero."""
 
+_FEW_FREEDOMS = 3
+"""Of so few freedoms the products are as many as the speeds, however many these are."""
+
 _MOST, _FEWEST, _WORK = 60, 3, 120
 """So many choices of independent coordinates are tried at most; of mechanisms of many coordinates fewer, down to the
 second number: the third divided by the number of coordinates. Each costs formulas for the whole mechanism."""
@@ -201,9 +204,13 @@ def can_be_solved(plan: SceneProblem) -> bool:
         and len(equations.speeds) > plan.finding.rank
         and all(one.is_homogeneous for one in equations.orientation_coordinates)
         and _freedoms_besides(plan) >= 0
-        and (len(equations.speeds) - plan.finding.rank) * len(equations.speeds) <= _LARGEST
+        and _is_short(len(equations.speeds) - plan.finding.rank, len(equations.speeds))
         and all(one.value is not None for one in equations.constraints)
     )
+
+
+def _is_short(freedoms: int, speeds: int) -> bool:
+    return freedoms <= _FEW_FREEDOMS or freedoms * speeds <= _LARGEST
 
 
 def _freedoms_besides(plan: SceneProblem) -> int:

@@ -403,8 +403,8 @@ def dependent_speeds_of(
     balance: Balance, finding: RankFinding, constraint_jacobian: FloatArray, sizes: FloatArray
 ) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Return the speeds whose displacements follow from constraints on positions, and those that follow from all."""
-    places, speeds = (
-        choose_dependent_coordinates(constraint_jacobian[list(one)], sizes)
-        for one in (balance.holding(finding.kept), finding.kept)
-    )
-    return places, speeds
+    holding = balance.holding(finding.kept)
+    speeds = choose_dependent_coordinates(constraint_jacobian[list(finding.kept)], sizes)
+    if holding == list(finding.kept):
+        return speeds, speeds
+    return choose_dependent_coordinates(constraint_jacobian[list(holding)], sizes), speeds
