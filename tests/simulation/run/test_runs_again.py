@@ -14,6 +14,7 @@ from tests.calls import calls
 
 from atwood import Model, Result, assemble, simulate
 from atwood.forms.assembly import Assembly
+from atwood.simulation.problem import projection
 from atwood_library.scenes import (
     BouncingBall,
     CartPole,
@@ -128,3 +129,19 @@ def test_a_run_again_makes_few_calls_whatever_happens_in_it(
     with calls() as made:
         simulate(assembly, **options)
     assert made.count < most
+
+
+def test_states_that_formulas_give_are_compared_with_the_constraints_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The last was compared by itself, though none of them is changed; where it is matters to what follows alone."""
+    assembly, looked = assemble(FourBar()), list[int]()
+    ran(assembly, {})
+    miss = projection.misses_of
+
+    def note(plan: Any, t: np.ndarray, *more: Any) -> np.ndarray:
+        looked.append(len(t))
+        return miss(plan, t, *more)
+
+    monkeypatch.setattr(projection, "misses_of", note)
+    ends = [ran(assembly, {"outputs": outputs}).run.segments[-1] for outputs in (2, 30)]
+    assert len(looked) == 2
+    assert_array_equal(ends[0].coordinates[:, -1], ends[1].coordinates[:, -1])

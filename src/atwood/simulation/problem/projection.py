@@ -147,6 +147,20 @@ def project_rows(plan: SceneProblem, t: FloatArray, y: FloatArray, nearest: Take
     return _in_chunks(plan, len(t), lambda one: _project_rows(plan, t[one], y[one], nearest))
 
 
+def left_alone(plan: SceneProblem, t: FloatArray, y: FloatArray) -> Projected | None:
+    """Return states of an explicit method, one row each, as they are; None where not all of them meet the constraints.
+
+    What formulas give does; then it makes no difference which states are looked at together.
+    """
+    if plan.balance.kinematic_map.has_homogeneous or len(t) > _chunk(plan):
+        return None
+    q, u = plan.program.split(y.T)
+    held = misses_of(plan, t, q, u, y)
+    if not _are_exact(plan, held):
+        return None
+    return Projected(q.copy(), u.copy(), lambda: held, np.zeros(len(t), dtype=bool))
+
+
 def _in_chunks(plan: SceneProblem, states: int, project: Callable[[slice], Projected]) -> Projected:
     """Return states that are projected so many at a time."""
     chunk = _chunk(plan)

@@ -17,7 +17,15 @@ from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, made_of
 from atwood.simulation.events.time_events import Schedule
 from atwood.simulation.problem.problem import SceneProblem
-from atwood.simulation.problem.projection import Misses, TakesNearest, misses_of, once, project_rows, project_safely
+from atwood.simulation.problem.projection import (
+    Misses,
+    TakesNearest,
+    left_alone,
+    misses_of,
+    once,
+    project_rows,
+    project_safely,
+)
 
 if TYPE_CHECKING:
     from atwood.integrators.time_stepping.session import Change
@@ -197,12 +205,15 @@ class Recorder:
     ----------
     nearest
         How the session projects states, if it can.
+    by_formulas
+        Whether formulas put its states onto the constraints.
     """
 
     def __init__(self, plan: SceneProblem) -> None:
         self.plan = plan
         self.singular_crossings: list[SingularCrossing] = []
         self.nearest: TakesNearest | None = None
+        self.by_formulas = False
         self._jumps: list[FloatArray] = []
         self._passed: list[PassedCrossing] = []
         self._changes: list[Callable[[], Sequence[Change]]] = []
@@ -342,9 +353,19 @@ class Recorder:
         if not pending:
             return
         count = _count(pending) if self.plan.is_projected else 0
-        if count > 1:
+        if count > 1 and not (self.by_formulas and self._settle_exact()):
             self._settle(count - 1)
         self._settle(None)
+
+    def _settle_exact(self) -> bool:
+        """Take all that waits as it is; return whether it could be."""
+        if self._passed:
+            return False
+        t, y, shown = _joined(self._samples[1])
+        made = left_alone(self.plan, t, y)
+        if made is not None:
+            self._add(_Block(t, made.coordinates, made.speeds, shown, made.misses))
+        return made is not None
 
     def _settle(self, count: int | None) -> None:
         """Project so many of what waits, the first; all if that is None."""

@@ -366,7 +366,7 @@ class _Runner:
             if not choice.method.is_implicit:
                 pack_state(segment.plan, t, *segment.plan.program.split(y))  # says what has no value, if it can
             raise
-        self.recorder.nearest = self.session.nearest
+        self.recorder.nearest, self.recorder.by_formulas = self.session.nearest, self.session.solves_loops
         self._watch(self.session)
         return self.session
 
