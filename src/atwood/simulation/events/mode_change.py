@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -33,6 +33,7 @@ from atwood.tolerances import tolerances
 _REACTION_EVENTS: Key[tuple[EventFunction, ...]] = Key("event functions that read reactions")
 
 
+_READ: Key[tuple[list[int], Program | None]] = Key("generalized coordinates of another mode")
 _MAXIMAL: Key[tuple[Program, tuple[int, ...], tuple[int, ...]]] = Key("maximal coordinates and their Jacobian")
 
 
@@ -203,15 +204,12 @@ def generalized_state(
     reduced_map, maximal_map = kinematic_map_of(after, "regular"), kinematic_map_of(after, "dae")
     program, rows, columns = maximal_places(after)
     kernel = after.kernel(program)
-    names = tuple(c.name for c in equations.names)
-    known = [name for name in names if name in before.observables]
+    names = tuple([one.name for one in equations.names])
+    places, reading = before.shared.get(_READ, lambda: _read_of(before, names), names)
     q, still = reference_coordinates(equations), np.zeros(len(equations.speeds))
-    if known:
-        read = before.kernel(observer(before, tuple(known)))
+    if reading is not None:
         idle = [0.0] * len(before.reactions)
-        values = read([t], *own, np.zeros_like(own[1]), idle)[0]
-        for name, value in zip(known, values, strict=True):
-            q[names.index(name)] = value
+        q[places] = before.kernel(reading)([t], *own, np.zeros_like(own[1]), idle)[0]
     turned = {orientation.body: list(orientation.coordinates) for orientation in after.maximal.orientation_coordinates}
     for orientation in equations.orientation_coordinates:
         if orientation.body in turned:
@@ -231,6 +229,12 @@ def generalized_state(
     far = _STILL * float(np.max(np.abs(q) / coordinate_scales(equations, length), initial=1.0))
     q, now = newton(look, partial(reduced_map.moved, t), q, own_scales, steps=_STEPS, still=far)
     return q, generalized_speeds(after, t, q, maximal[1], scales), now.value / scales
+
+
+def _read_of(before: Assembly, names: Sequence[str]) -> tuple[list[int], Program | None]:
+    """Return which generalized coordinates can be read in the mode before, and the program that does."""
+    known = {i: name for i, name in enumerate(names) if name in before.observables}
+    return list(known), observer(before, tuple(known.values())) if known else None
 
 
 def generalized_speeds(after: Assembly, t: float, q: FloatArray, speeds: FloatArray, sizes: FloatArray) -> FloatArray:
