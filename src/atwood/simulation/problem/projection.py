@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import numpy as np
 
-from atwood.arrays import BoolArray, FloatArray
+from atwood.arrays import BoolArray, FloatArray, IndexArray
 from atwood.forms.caches import Key
 from atwood.forms.loose import has_touched
 from atwood.lazy_dataclasses import dataclass
@@ -108,6 +108,11 @@ class ConstraintsAt:
         full = np.zeros((len(self.value), *self.pattern.shape))
         full[:, self.pattern.rows, self.pattern.columns] = self.entries.T
         return full
+
+    def some(self, which: BoolArray) -> ConstraintsAt:
+        """Return the same at some of the states."""
+        own = self.value[which], self.entries[:, which], self.explicit_rate[which]
+        return ConstraintsAt(*own, self.kept, self.pattern, self.normal, self.rows[which])
 
     def rate(self, speeds: FloatArray) -> FloatArray:
         """Return the constraints on velocity for speeds in units of the scales, shape (states, number)."""
@@ -308,8 +313,10 @@ def _largest(now: ConstraintsAt, speeds: FloatArray) -> FloatArray:
     return np.stack([_largest_entry(now.value), _largest_entry(now.rate(speeds))])
 
 
-def constraints_at(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray) -> ConstraintsAt:
-    """Return the constraints at states, of shape (states,) and (number, states)."""
+def constraints_at(
+    plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray, errors: FloatArray | None = None
+) -> ConstraintsAt:
+    """Return the constraints at states, of shape (states,) and (number, states); with errors, if they are known."""
     program, count = plan.balance.program.constraints_alone, len(t)
     if count == 1:  # numbers one by one take a tenth of the time of arrays with one number each
         alone = plan.assembly.kernel(program)(t, q[:, 0], u[:, 0])
@@ -317,7 +324,7 @@ def constraints_at(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArr
     else:
         value, entries, explicit_rate = plan.columns(program, count)(t[None, :], q, u)
     kept, pattern = list(plan.finding.kept), _pattern(plan)
-    errors = errors_at(plan, t, q)
+    errors = errors_at(plan, t, q) if errors is None else errors
     entries = entries * plan.sizes[pattern.columns, None]
     rows = trusted_sizes(pattern.largest(entries).T, errors)
     entries /= rows.T[pattern.rows]
@@ -347,24 +354,38 @@ def _project(
         return Projected(q, u.copy(), lambda: held, np.zeros(len(t), dtype=bool))
     sizes, holding = plan.sizes[:, None], plan.balance.holding(list(plan.finding.kept))
     speeds = (u / sizes).T
-    now = constraints_at(plan, t, q, u)
-    last = np.full(len(t), np.inf)
-    active = np.ones(len(t), dtype=bool)
-    for _ in range(_STEPS):
-        miss = _largest_entry(now.value)
-        active &= (miss > _LEAST) & ((miss >= tolerances.MET) | (miss < 0.5 * last))
-        if not active.any():
-            break
-        last = miss
-        step = now.step(now.value, holding)
-        q = kinematic_map.moved_each(t, q, -sizes * np.where(active[:, None], step, 0.0).T)
-        now = constraints_at(plan, t, q, u)
+    q, now, active = _onto_places(plan, t, q, u, holding)
     solve = now.solver()
     for _ in range(2):  # the second pass takes out the rounding of the first
         speeds = speeds - solve(now.rate(speeds))
     left = _largest(now, speeds) * np.array([[1.0], [plan.scales.time]])
-    doubtful = active | ~np.all(left <= 10.0 * tolerances.MET, axis=0)
+    doubtful = ~np.all(left <= 10.0 * tolerances.MET, axis=0)
+    doubtful[active] = True
     return Projected(q, sizes * speeds.T, lambda: held, doubtful)
+
+
+def _onto_places(
+    plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArray, holding: Sequence[int] | None
+) -> tuple[FloatArray, ConstraintsAt, IndexArray]:
+    """Return coordinates on the constraints, these there, and numbers of the states that have come to no end.
+
+    Those that have are left out: of most, one step later nothing but rounding is left, which now and then is halved.
+    """
+    kinematic_map, sizes = plan.balance.kinematic_map, plan.sizes[:, None]
+    now, active, last = constraints_at(plan, t, q, u), np.arange(len(t)), np.full(len(t), np.inf)
+    for _ in range(_STEPS):
+        miss = _largest_entry(now.value)
+        going = (miss > _LEAST) & ((miss >= tolerances.MET) | (miss < 0.5 * last))
+        if not going.all():
+            active, miss, now = active[going], miss[going], now.some(going)
+        if not len(active):
+            break
+        last, step = miss, now.step(now.value, holding)
+        moved = kinematic_map.moved_each(t[active], q[:, active], -sizes * step.T)
+        q = kinematic_map.normalized(q)
+        q[:, active] = moved
+        now = constraints_at(plan, t[active], q[:, active], u[:, active], errors_at(plan, t, q))
+    return q, now if len(now.value) == len(t) else constraints_at(plan, t, q, u), active
 
 
 def _are_exact(plan: SceneProblem, held: FloatArray) -> bool:
