@@ -531,6 +531,7 @@ class _Runner:
         while True:
             crossing = None if self.monitor is None else self.monitor.ahead_of_start()
             if crossing is not None:
+                self._sample_until(session, done, crossing)  # it may begin at an output
                 done, stopped = self._pass_over(session, crossing)
                 if stopped is not None:
                     return done, stopped
