@@ -56,7 +56,7 @@ def first_step(
     longest = min(options.horizon, options.max_step or np.inf)
     if options.first_step is not None:
         return min(options.first_step, options.max_step or np.inf)
-    weights = 1.0 / (absolute + options.relative_tolerance * np.abs(y))
+    weights = 1.0 / np.maximum(absolute, 1e-6 * options.relative_tolerance * np.abs(y))
 
     def size(values: FloatArray) -> float:
         scaled = values * weights
@@ -65,15 +65,16 @@ def first_step(
     with np.errstate(all="ignore"):
         d0, d1 = size(y), size(yp)
         told = 1e4 * ROUNDING * abs(t)
-        h0 = 0.01 * max(d0, 1.0) / d1 if d1 * longest > 1.0 else 1e-6 * longest
-        h0 = min(max(h0, told), longest)
+        moves, whole = d1 * longest > 1.0, max(d0, 1.0)
+        h0 = min(max(min(0.01 * whole, 100.0) / d1 if moves else 1e-6 * longest, told), longest)
+        reach = max(whole / d1, told) if moves else 100.0 * h0
         change = size(rates(t + h0, y + h0 * yp) - yp) / h0
         d2 = max(change, d1 * ROUNDING / h0)
     if not 0.0 < d2 < np.inf:
         return h0
     span = max(d1 / d2, 1.0 / sqrt(d2))
     h1 = span * float((0.01 / (d2 * span * span)) ** (int(256 / order) / 256))
-    return min(100.0 * h0, max(h1, told), longest)
+    return min(reach, max(h1, told), longest)
 
 
 def estimate(h: float, fifth: float, third: float, size: int) -> float:

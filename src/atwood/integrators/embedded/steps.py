@@ -35,8 +35,12 @@ the estimate is taken to be no smaller than the ratio in the step before makes i
 RETREAT = 0.25
 """The share of a step that is tried where a step had no finite value."""
 
-_PROBE = 1e-6
-"""The share of a run that is tried first where the slope at its begin leads less far in it than is allowed."""
+_PROBE, _TRIED = 1e-6, 100.0
+"""Before the first step the share of a run is tried, where the slope at its begin leads less far in it than is allowed,
+else so many times what is allowed: how large values are far from the origin says nothing of when slopes change."""
+
+_AWAY = 1e-6
+"""The share of what is allowed at a value that counts as allowed at the origin, if less than that is."""
 
 _BEHIND, _ROUGH = 1.001, 0.01
 """A step is taken anew with so many times the length up to an event, where the last term of its dense output is there
@@ -96,13 +100,27 @@ def _squares(r: Routine, m: Memory, weights: Mapping[int, float]) -> Value:
     return _sum(r, m, square)
 
 
-def _size(r: Routine, m: Memory, a: Value, less: Value | None = None) -> Value:
-    """Return the root of the mean square of a row, or of a difference, in units of what is allowed at y."""
+def _size(r: Routine, m: Memory, a: Value) -> Value:
+    """Return the root of the mean square of a row, in units of what is allowed at y."""
+    y, absolute, relative = m.row("y"), m.row("absolute"), m.relative
+
+    def square(j: Value) -> Value:
+        scaled = m.lanes(a, j) / (r.size(m.lanes(y, j)) * relative + m.lanes(absolute, j))
+        return scaled * scaled
+
+    return r.sqrt(_sum(r, m, square) / m.size.number())
+
+
+def _pace(r: Routine, m: Memory, a: Value, less: Value | None = None) -> Value:
+    """Return a size of a row, or of a difference, in units of what is allowed at the origin.
+
+    What is allowed far from the origin says nothing of the size of a motion there; a millionth of it counts at least.
+    """
     y, absolute, relative = m.row("y"), m.row("absolute"), m.relative
 
     def square(j: Value) -> Value:
         value = m.lanes(a, j) if less is None else m.lanes(a, j) - m.lanes(less, j)
-        scaled = value / (r.size(m.lanes(y, j)) * relative + m.lanes(absolute, j))
+        scaled = value / r.most(m.lanes(absolute, j), r.size(m.lanes(y, j)) * (relative * _AWAY))
         return scaled * scaled
 
     return r.sqrt(_sum(r, m, square) / m.size.number())
@@ -155,19 +173,21 @@ def first_step(pair: Tableau, r: Routine, m: Memory, t: Value, begin: Value) -> 
     bound = r.least(m.horizon, m.longest)
     told = r.size(t) * (1e4 * ROUNDING)
     y, trial, probe = m.row("y"), m.row("trial"), m.row("last")
-    d0, d1 = _size(r, m, y), _size(r, m, begin)
-    h0 = r.choose(d1 * bound > 1.0, r.most(d0, 1.0) * 0.01 / d1, bound * _PROBE)
+    d0, d1 = _pace(r, m, y), _pace(r, m, begin)
+    moves, size = d1 * bound > 1.0, r.most(d0, 1.0)
+    h0 = r.choose(moves, r.least(size * 0.01, _TRIED) / d1, bound * _PROBE)
     h0 = r.least(r.most(h0, told), bound)
+    reach = r.choose(moves, r.most(size / d1, told), h0 * 100.0)
     with m.parts() as j:
         trial[j] = m.lanes(y, j) + m.lanes(begin, j) * h0
     code = r.call("evaluate", m.session, t + h0, trial, probe)
-    change = _size(r, m, probe, begin) / h0
+    change = _pace(r, m, probe, begin) / h0
     d2 = r.most(change, d1 * ROUNDING / h0)
     span = r.most(d1 / d2, r.sqrt(1.0 / d2))
     h1 = span * root_of(r, 0.01 / (d2 * span * span), pair.order)
     failed = code != 0 if m.runs == 1 else code.integer().conditions(m.runs)
     known = ~failed & (change < inf) & (h1 > 0.0)
-    return r.choose(known, r.least(r.least(h0 * 100.0, r.most(h1, told)), bound), h0)
+    return r.choose(known, r.least(r.least(reach, r.most(h1, told)), bound), h0)
 
 
 def _begin(pair: Tableau) -> Routine:
