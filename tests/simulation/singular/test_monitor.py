@@ -69,8 +69,8 @@ def minimum(away: list[float], at_end: bool = False, largest: float = 1.0) -> li
 
 def test_only_a_low_minimum_is_looked_at_more_closely() -> None:
     assert minimum([0.9, 0.2, 0.9]) == [(0, 2)]
-    assert minimum([0.9, 0.31, 0.9]) == []
-    assert minimum([0.9, 0.3, 0.9]) == [(0, 2)]
+    assert minimum([0.9, 0.29, 0.9]) == []
+    assert minimum([0.9, 0.28, 0.9]) == [(0, 2)]
     assert minimum([0.9, 0.2, 0.1]) == []
     assert minimum([0.1, 0.2, 0.9]) == [(0, 1)]  # the first look is one
     assert minimum([0.9, 0.5, 0.9], largest=2.0) == [(0, 2)]  # low, relative to the largest so far

@@ -34,7 +34,7 @@ Opened: TypeAlias = Callable[[Value], tuple[dict[str, Value], Record, Record]]
 SMALL = 40
 """Up to so many rows singular values cost little."""
 
-LOW, FALLEN = 0.3, 1e-2
+LOW, FALLEN = 0.28, 1e-2
 """Shares of the largest measure so far: a least one below the first is looked at more closely, and what has fallen
 below the second at once, since the motion may stay there."""
 
