@@ -43,15 +43,15 @@ def looks(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 def test_a_limit_of_time_is_looked_at_all_along(form: str, looks: list[int]) -> None:
     scene = FourBarRow(windows=1)
     for _ in range(6):  # what pays is compiled from then on
-        simulate(scene, form=form, t_end=4.0)
+        simulate(scene, form=form, t_end=20.0)
     before = looks[0]
-    whole = simulate(scene, form=form, t_end=4.0, max_seconds=1e9)
+    whole = simulate(scene, form=form, t_end=20.0, max_seconds=1e9)
     needed = looks[0] - before
     assert whole.status == "finished", whole.message
-    assert len(whole.singular_crossings) == 4
+    assert len(whole.singular_crossings) > 10
     for share in (1e-9, 0.1, 0.3, 0.6, 0.8):
         before = looks[0]
-        found = simulate(scene, form=form, t_end=4.0, max_seconds=share * needed)
+        found = simulate(scene, form=form, t_end=20.0, max_seconds=share * needed)
         assert found.status == "time_limit"
         assert f"the limit of {share * needed:g} s was used up" in found.message
         assert looks[0] - before < share * needed + 0.05 * needed + 20
@@ -73,7 +73,7 @@ def test_a_crossing_is_left_when_the_time_is_used_up(looks: list[int]) -> None:
         with calls(after=lambda end=end: looks[0] > end) as late:
             result = simulate(assembly, max_seconds=share * needed, t_end=2.0)
         assert result.status == "time_limit"
-        assert late.count < 0.2 * crossing
+        assert late.count < 0.3 * crossing  # what is done by then is put together
 
 
 @pytest.mark.sample(1)

@@ -216,7 +216,8 @@ class Walk:
         plan, probe = self.plan, self.probe
         if plan is None or probe is None or self.ended is not None or plan.not_compilable or plan.assembly.sides:
             return False
-        return self.choice.method.kind in ("explicit", "series") and not self.sampler.updates
+        method = self.choice.method
+        return not (method.is_implicit or method.has_equal_steps or self.sampler.updates)
 
     def renewed(
         self,
