@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from atwood import UsageError, simulate
-from atwood_library.scenes import SimplePendulum
+from atwood import UsageError, assemble, simulate
+from atwood_library.scenes import FourBar, SimplePendulum
 
 
 def test_the_end_may_be_text_with_a_unit():
@@ -22,3 +22,13 @@ def test_what_is_no_end_is_refused(end):
 def test_what_are_no_outputs_is_refused(outputs):
     with pytest.raises(UsageError, match="output"):
         simulate(SimplePendulum(), t_end=1.0, outputs=outputs)
+
+
+@pytest.mark.parametrize("solver", ["taylor", "explicit"])
+def test_a_run_again_begins_with_the_first_step_that_was_given(solver):
+    assembly = assemble(FourBar())
+    runs = [simulate(assembly, t_end=0.5, solver=solver, first_step=1e-5) for _ in range(3)]
+    unasked = simulate(assembly, t_end=0.5, solver=solver)
+    assert {one.run.statistics.steps for one in runs} == {runs[0].run.statistics.steps}
+    assert runs[0].run.statistics.steps > unasked.run.statistics.steps
+    assert all(np.array_equal(one["crank.angle"], runs[0]["crank.angle"]) for one in runs)

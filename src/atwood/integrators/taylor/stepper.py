@@ -388,7 +388,7 @@ class CompiledStepper(NativeStepper):
         self._arrays[ROWS["floors"], :n] = absolute_tolerances(options, n) / options.relative_tolerance
         pairs, squares = recurrences.layout.blocks
         self._set(size=n, padded=self._arrays.shape[1], order=chosen, pair_blocks=pairs, square_blocks=squares)
-        self._set(first=options.first_step or 0.0, longest=options.max_step or inf, horizon=options.horizon)
+        self._set(longest=options.max_step or inf, horizon=options.horizon)
         self._set(stop_time=problem.stop_time, reach=problem.reach)
         if onto is not None:
             self._keep = *self._keep, onto
@@ -402,6 +402,7 @@ class CompiledStepper(NativeStepper):
     def start(self, t: float, y: FloatArray) -> bool:
         """Start anew from a state; return whether it has finite rates."""
         self._take_up(self._tiers.spend(0.0))
+        self._set(first=self._options.first_step or 0.0)  # the step that takes it forgets it
         return super().start(t, y)
 
     def _take_up(self, built: Built) -> None:
