@@ -27,7 +27,7 @@ from atwood.codegen.routines import (
     place_of,
 )
 from atwood.integrators.event_routines import do_or_return
-from atwood.numerics.contact_sets import CLEAR, GOES_ON, NOTHING, OPEN, SLACK, STICKS, STILL, TURNS
+from atwood.numerics.contact_sets import CLEAR, FIRM, GOES_ON, NOTHING, OPEN, SLACK, STICKS, STILL, TURNS
 
 FIELDS: dict[str, Kind] = {
     **dict.fromkeys(("program", "derived", "scratch", "y", "out", "units", "rows", "matrix", "left"), ADDRESS),
@@ -52,6 +52,7 @@ UNITS = {
             *("first", "width", "slip", "at", "speed", "poisson", "part", "owner", "small", "slow", "rounding"),
             *("trigger", "state", "state_x", "state_y", "next", "next_x", "next_y", "closed"),
             *("chosen", "given", "given_x", "given_y", "turned_x", "turned_y", "struck", "stopped", "acts", "series"),
+            *("found", "found_x", "found_y", "holds", "gone"),
         )
     )
 }
@@ -155,6 +156,12 @@ FAST = 1e3
 
 GAIN = 1e-9
 """Of the work of impulses: more than this is energy that an impact would make."""
+
+SHARED = 100.0
+"""Times the slack of one inequality: shares that nothing determines come from other equations."""
+
+MOST_SHARES = 500
+"""So many shares of forces that nothing determines are tried."""
 
 _SHORT = 1e-20
 """Squares of rows of length one that are no larger are rounding."""
@@ -664,6 +671,165 @@ def _is_shared_by_parts(r: Routine, m: Sets, way: Value) -> Value:
     return (more.now | less.now) & (first.now < last.now)
 
 
+def _share() -> Routine:
+    """Let all rest, or let go what need not hold, where nothing determines forces; see `find_states` and `_shared`."""
+    r, m, (rests,) = _open("share_forces", {"rests": INTEGER})
+    place, state, repeats = r.arguments[0], m.unit("next"), r.variable(m.repeats, INTEGER)
+    names, small = ("", "_x", "_y"), _small_motion(r, m)
+    goes, moves = r.variable(False, BOOLEAN), r.variable(False, BOOLEAN)
+    with _each(r, m, "chosen") as (k, row, is_pair), r.when(m.unit("given")[k] == 0.0):
+        is_moved = _size_of_slip(r, row, is_pair, m.row("motions"))[2] > small
+        goes.now, moves.now = goes.now | (state[k] != float(STICKS)), moves.now | is_moved
+    tries = r.variable(goes.now & (rests != 0), BOOLEAN)
+    with r.when(~tries.now & (repeats.now == 0)):
+        r.give(0)
+    for name in names:
+        r.copy(m.unit(f"found{name}"), m.unit(f"next{name}"), m.count)
+    with r.when(tries.now):
+        with _each(r, m, "chosen") as (k, _, _), r.when(m.unit("given")[k] == 0.0):
+            state[k], m.unit("next_x")[k], m.unit("next_y")[k] = float(STICKS), 0.0, 0.0
+        r.call("meet_states", place)
+        tries.now = m.repeats != 0
+        with r.when(tries.now):
+            m.shared = 1
+            with r.when(r.call("let_go", place) == 0):
+                r.give(0)
+        for name in names:
+            r.copy(m.unit(f"next{name}"), m.unit(f"found{name}"), m.count)
+        r.call("meet_states", place)
+    with r.when(
+        (repeats.now == 0) | (tries.now & ~moves.now)
+    ):  # friction that is at its limit says how the load is shared
+        r.give(0)
+    with _each(r, m, "chosen") as (k, row, is_pair), r.when((m.unit("given")[k] == 0.0) & (state[k] == float(GOES_ON))):
+        is_moved = _size_of_slip(r, row, is_pair, m.row("motions"))[2] > small
+        state[k] = r.choose(is_moved, float(GOES_ON), float(STICKS))
+    r.give(r.call("let_go", place) * UNDETERMINED)
+    return r
+
+
+def _small_motion(r: Routine, m: Sets) -> Value:
+    """Return how much is no motion, but rounding."""
+    moved, fallen = r.variable(0.0), r.variable(0.0)
+    with r.count(m.size) as i:
+        moved.now = r.most(moved.now, r.size(m.row("motions")[i]))
+        fallen.now = r.most(fallen.now, r.size(m.row("wanted")[i]))
+    return r.variable((moved.now + fallen.now) * SLACK).now
+
+
+def _let_go() -> Routine:
+    """Let go ever more of what holds until least forces contradict no law, slips first; 1 where none do."""
+    r, m, () = _open("let_go")
+    place, state, holds, gone = r.arguments[0], m.unit("next"), m.unit("holds"), m.unit("gone")
+    n, many, tried, last = (r.variable(0, INTEGER) for _ in range(4))
+    for is_slip in (1.0, 0.0):
+        with _each(r, m, "chosen") as (k, _, _), r.when((m.unit("slip")[k] == is_slip) & (state[k] == float(STICKS))):
+            holds[n.now] = k.number()
+            n.now = n.now + 1
+    least = r.variable(r.call("rank_of_rows", place, CLEAR, result=INTEGER), INTEGER)
+
+    def put(what: int) -> None:
+        with r.count(many.now) as i:
+            state[r.truncated(holds[r.truncated(gone[i])])] = float(what)
+
+    with r.forever() as sizes:
+        with r.when((many.now > n.now) | (tried.now >= MOST_SHARES)):
+            r.leave(sizes)
+        with r.count(many.now) as i:
+            gone[i] = i.number()
+        with r.forever() as choices:
+            put(OPEN)
+            with r.when(r.call("rank_of_rows", place, FIRM, result=INTEGER) == least.now):
+                r.call("meet_states", place)
+                with r.when(m.repeats != 0):
+                    r.call("weighted_forces", place)
+                with r.when(r.call("is_lawful", place, n.now) == 0):
+                    r.give(0)
+            put(STICKS)
+            tried.now, last.now = tried.now + 1, -1
+            with r.count(many.now) as i:
+                last.now = r.choose(gone[i] < (n.now - many.now + i).number(), i, last.now, INTEGER)
+            with r.when((last.now < 0) | (tried.now >= MOST_SHARES)):
+                r.leave(choices)
+            first = r.variable(gone[last.now] + 1.0)
+            with r.count(many.now, last.now) as i:
+                gone[i] = first.now + (i - last.now).number()
+        many.now = many.now + 1
+    r.give(1)
+    return r
+
+
+def _weighted() -> Routine:
+    """Find the least forces that are reported: squares count as much as rows move by their own forces."""
+    r, m, () = _open("weighted_forces")
+    size, acting, solution = m.size, m.row("acting"), m.row("solution")
+    response, forces, motions = m.result("response"), m.row("forces"), m.row("motions")
+    count = r.variable(r.call("contact_equations", r.arguments[0], result=INTEGER), INTEGER).now
+
+    def unit(j: Value) -> Value:
+        row = r.truncated(acting[j])
+        own = response[row * size + row]
+        return r.choose(own > 0.0, r.sqrt(r.size(own)), 1.0)
+
+    with r.count(count) as i, r.count(count) as j:
+        m.matrix[i * size + j] = m.matrix[i * size + j] / unit(j)
+    r.call("solve_forces", r.arguments[0], count)
+    with r.count(count) as j:
+        forces[r.truncated(acting[j])] = solution[j] / unit(j)
+    with r.count(size) as i:
+        motions[i] = m.row("wanted")[i] + _sum(r, size, response.at(i * size), forces)
+    r.give(0)
+    return r
+
+
+def _rank() -> Routine:
+    """Return how many rows of what sticks are independent."""
+    r, m, (least,) = _open("rank_of_rows", {"least": NUMBER}, result=INTEGER)
+    acting, response, size, n = m.row("acting"), m.result("response"), m.size, r.variable(0, INTEGER)
+    top, known = r.variable(0.0), r.variable(0, INTEGER)
+    with _each(r, m, "chosen") as (k, _, _):
+        sticks = (m.unit("next")[k] == float(STICKS)) & ~_is_loose(r, m, k)
+        with r.when(sticks), _rows(r, m, k) as (_, row):
+            acting[n.now] = row.number()
+            top.now = r.most(response[row * size + row], top.now)
+            n.now = n.now + 1
+    with r.count(n.now) as i, r.count(n.now) as j:
+        a, b = r.truncated(acting[i]), r.truncated(acting[j])
+        own, other = response[a * size + a], response[b * size + b]
+        moves = (own > top.now * NOTHING) & (other > top.now * NOTHING)
+        unit = r.sqrt(r.choose(moves, own, 1.0)) * r.sqrt(r.choose(moves, other, 1.0))
+        m.matrix[i * size + j] = r.choose(moves, response[a * size + b] / unit, 0.0)
+    with r.count(n.now), r.when(r.call("take_direction", r.arguments[0], n.now, n.now, m.left, least) == 0):
+        known.now = known.now + 1
+    r.give(known.now)
+    return r
+
+
+def _lawful() -> Routine:
+    """Tell whether forces hold what is listed, within the limits of what sticks; 1 where they do not."""
+    r, m, (n,) = _open("is_lawful", {"n": INTEGER})
+    forces, motions, free, size, most = m.row("forces"), m.row("motions"), m.row("wanted"), m.size, r.variable(0.0)
+    moves, total = r.variable(0.0), r.variable(0.0)
+    with r.count(size) as i:
+        most.now, total.now = r.most(r.size(forces[i]), most.now), r.size(free[i])
+        with r.count(size) as j:
+            total.now = total.now + r.size(m.result("response")[i * size + j] * forces[j])
+        moves.now = r.most(total.now, moves.now)
+    with r.count(n) as i:
+        k = r.truncated(m.unit("holds")[i])
+        row, is_pair, is_slip = r.truncated(m.unit("first")[k]), m.unit("width")[k] == 2.0, m.unit("slip")[k] != 0.0
+        a, _, force = _size_of_slip(r, row, is_pair, forces)
+        back = (~is_pair & is_slip & (a > 0.0)).integer() * 2
+        static = _limit(r, m, k, back + 1)
+        over = r.choose(is_slip, force - static, 0.0 - static - a)
+        sticks = (m.unit("next")[k] == float(STICKS)) & ~_is_loose(r, m, k)
+        moved = _size_of_slip(r, row, is_pair, motions)[2]
+        with r.when((moved > moves.now * (SHARED * SLACK)) | (sticks & (over > most.now * (SHARED * SLACK)))):
+            r.give(1)
+    r.give(0)
+    return r
+
+
 # -- moments --------------------------------------------------------------------------------------------------------
 
 
@@ -988,14 +1154,11 @@ def _going(r: Routine, m: Sets, some: Variable, repeated: Variable) -> None:
 
 def _look_at_begins(r: Routine, m: Sets) -> None:
     """Leave to others what begins to slip in a plane and moves otherwise than it is given, or nowhere: `_turned`."""
-    moved, fallen = r.variable(0.0), r.variable(0.0)
-    with r.count(m.size) as i:
-        moved.now = r.most(moved.now, r.size(m.row("motions")[i]))
-        fallen.now = r.most(fallen.now, r.size(m.row("wanted")[i]))
+    small = _small_motion(r, m)
     with _each(r, m, "given") as (k, row, is_pair), r.when(m.unit("trigger")[k] == float(YIELDS)):
         a, b, size = _size_of_slip(r, row, is_pair, m.row("motions"))
         is_astray = a * m.unit("given_x")[k] + b * m.unit("given_y")[k] < size * ASTRAY
-        m.shared = r.choose(is_pair & (is_astray | (size <= (moved.now + fallen.now) * SLACK)), 1, m.shared, INTEGER)
+        m.shared = r.choose(is_pair & (is_astray | (size <= small)), 1, m.shared, INTEGER)
 
 
 def _barely_rising() -> Routine:
@@ -1039,16 +1202,15 @@ def _settle() -> Routine:
     do_or_return(r, "read_contacts", t)
     r.copy(m.row("wanted"), m.result("free"), m.size)
     _going(r, m, some, repeated := r.variable(False, BOOLEAN))
+    rests = r.variable(True, BOOLEAN)  # it starts, or has just come to touch or to rest: what can rest does
+    with r.count(m.count) as k:
+        trigger = m.unit("trigger")[k]
+        rests.now = rests.now & (trigger != float(OPENS)) & (trigger != float(YIELDS))
     with r.when(some.now):
         with r.when(r.call("find_states", r.arguments[0]) != 0):
             r.give(NO_SET)
         do_or_return(r, "determined")
-    rests = r.variable(True, BOOLEAN)  # it starts, or has just come to touch: what can rest does, with some share
-    with r.count(m.count) as k:
-        trigger = m.unit("trigger")[k]
-        rests.now = rests.now & ((trigger == 0.0) | (trigger == float(CLOSES)))
-    with _each(r, m, "chosen") as (k, _, _), r.when(rests.now & (state[k] == float(GOES_ON))):
-        m.shared = r.choose(m.unit("given")[k] == 0.0, 1, m.shared, INTEGER)
+        do_or_return(r, "share_forces", rests.now.integer())
     with r.when(repeated.now):
         _look_at_begins(r, m)
     with r.count(m.count) as k:
@@ -1253,6 +1415,7 @@ def _resolve() -> Routine:
 def write_sets() -> list[Routine]:
     """Return the routines; they take the address of the memory of sets, and ``resolve`` is the one to be called."""
     sets = (_solve, _least, _equations, _moved, _met, _contradiction, _improved, _find, _direction, _determined)
+    shares = (_share, _let_go, _weighted, _rank, _lawful)
     impacts = (_impulses, _strike, _account, _collide, _stop, _end_impacts, _series)
     moments = (_read, _push, _touch, _hold, _barely_rising, _settle, _check)
-    return [_resolve(), *(write() for write in (*sets, *impacts, *moments))]
+    return [_resolve(), *(write() for write in (*sets, *shares, *impacts, *moments))]

@@ -19,7 +19,7 @@ from itertools import compress, product
 import numpy as np
 
 from atwood.arrays import BoolArray, FloatArray
-from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.numerics.matrices import least_norm, or_one
 from atwood.numerics.rank import decompose, null_space
 
@@ -128,6 +128,8 @@ class Found:
         Whether other forces make the same of what holds, so that nothing determines how it is shared.
     moving
         The gaps among whose units forces could be shared otherwise with another motion, as friction can make it.
+    at_limits
+        The same rest with the forces of some slips at their limits, where such a set was found first.
     """
 
     states: tuple[State, ...]
@@ -135,6 +137,7 @@ class Found:
     motions: FloatArray
     is_redundant: bool = False
     moving: tuple[tuple[int, ...], ...] = ()
+    at_limits: Found | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,8 +176,16 @@ def find_states(contacts: Contacts, states: Sequence[State], rests: bool = False
     found = _found(contacts, states)
     is_free = [not unit.is_given for unit in contacts.units]
     if found is None or (rests and any(one[0] != STICKS for one in compress(found.states, is_free))):
-        found = _at_rest(contacts) or found
+        is_idle = found is not None and not any(compress(_is_moved(contacts, found), is_free))
+        resting = _at_rest(contacts)
+        found = found if resting is None else replace(resting, at_limits=found if is_idle else None)
     return None if found is None else _judged(contacts, found)
+
+
+def _is_moved(contacts: Contacts, found: Found) -> list[bool]:
+    """Return which units move, by more than rounding."""
+    small = SLACK * float(np.max(np.abs(found.motions), initial=0.0) + np.max(np.abs(contacts.free), initial=0.0))
+    return [math.hypot(*found.motions[list(unit.rows)]) > small for unit in contacts.units]
 
 
 def _at_rest(contacts: Contacts) -> Found | None:
@@ -268,12 +279,9 @@ def _judged(contacts: Contacts, found: Found) -> Found:
     null = null_space(matrix, CLEAR)
     if not null.size:
         return found
-    small = SLACK * float(np.max(np.abs(found.motions), initial=0.0) + np.max(np.abs(contacts.free)))
     states = tuple(
-        (STICKS, (0.0,) * len(unit.rows))
-        if state[0] == GOES_ON and not unit.is_given and math.hypot(*found.motions[list(unit.rows)]) <= small
-        else state
-        for unit, state in zip(contacts.units, found.states, strict=True)
+        (STICKS, (0.0,) * len(unit.rows)) if state[0] == GOES_ON and not unit.is_given and not is_moved else state
+        for unit, state, is_moved in zip(contacts.units, found.states, _is_moved(contacts, found), strict=True)
     )
     by_springs = _by_springs(listed, acting, _sticking(contacts.units, found.states)) / size
     if len(by_springs):
@@ -283,7 +291,7 @@ def _judged(contacts: Contacts, found: Found) -> Found:
                 np.abs(by_springs) @ np.abs(size * found.forces[acting])
             )
             is_other = states != found.states or not np.all(is_met)
-            return Found(states, found.forces, found.motions, is_redundant=is_other)
+            return replace(found, states=states, is_redundant=is_other)
     moved = contacts.response[:, acting] / size @ null / every[:, None]
     kinds = decompose(moved, math.sqrt(CLEAR))
     moving = null @ kinds.right[: kinds.rank].T
@@ -293,7 +301,7 @@ def _judged(contacts: Contacts, found: Found) -> Found:
     open_ways = [way for way in moving.T if any(np.all(sign * way[bare] >= -CLEAR) for sign in (1.0, -1.0))]
     shared = [np.flatnonzero(np.abs(way) > math.sqrt(CLEAR)) for way in open_ways]
     units = tuple(tuple(gaps[acting[i]] for i in some if acting[i] in gaps) for some in shared)
-    return Found(states, found.forces, found.motions, True, units)
+    return replace(found, states=states, is_redundant=True, moving=units)
 
 
 def _found(contacts: Contacts, states: Sequence[State]) -> Found | None:

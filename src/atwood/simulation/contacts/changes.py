@@ -28,12 +28,14 @@ from atwood.integrators.set_routines import (
     LEVEL,
     LONG,
     LOSSLESS,
+    MOST_SHARES,
     NEAR_REST,
     OFTEN,
     RECENT,
     REFUSED,
     ROUNDED,
     SEEN,
+    SHARED,
     SHORT,
     SPANS,
     SQUEEZED,
@@ -90,12 +92,6 @@ _SHARES = "Give each of them a stiffness, as a place that gives way a little has
 
 _HELD = "friction is at its limit where other places hold what would slip, so that nothing says which way it rubs"
 _TOGETHER = "With static friction above that of slipping all begin to slip together."
-
-_SHARED = 100.0
-"""Times the slack of one inequality: shares that nothing determines come from other equations."""
-
-_MOST_SHARES = 500
-"""So many shares of forces that nothing determines are tried."""
 
 _ALONG = 1e-3
 """Of what is slow: by so much goes what is moved along."""
@@ -545,21 +541,23 @@ class _Moment:
         )
         some = (gone for count in range(len(loosable) + 1) for gone in combinations(loosable, count))
         least = self._rank(states)
-        for gone in islice(some, _MOST_SHARES):
+        for gone in islice(some, MOST_SHARES):
             tried = self._without(states, gone)
             if self._rank(tried, FIRM) == least and self._is_shared(tried, holding, turned):
                 return replace(found, states=tuple(tried[k] for k in chosen))
+        if found.at_limits is not None:  # friction that is at its limit says how the load is shared
+            return found.at_limits
         raise self._contradiction(REFUSED[UNDETERMINED], chosen, _SHARES)
 
     def _is_shared(self, states: list[State], holding: list[int], turned: Collection[int]) -> bool:
         """Return whether the forces that are reported contradict no law, and hold what has to stay."""
         values = self.values
         forces = forces_in(values, states)
-        limits, small = values.limits_at(forces)[0], _SHARED * SLACK * float(np.max(np.abs(forces)))
+        limits, small = values.limits_at(forces)[0], SHARED * SLACK * float(np.max(np.abs(forces)))
         free = values.accelerations()
         moved, moves = free + values.response @ forces, np.abs(free) + np.abs(values.response) @ np.abs(forces)
         held = [row for k in holding for row in self.units[k]]
-        if np.max(np.abs(moved[held]), initial=0.0) > _SHARED * SLACK * np.max(moves):
+        if np.max(np.abs(moved[held]), initial=0.0) > SHARED * SLACK * np.max(moves):
             return False
         for k, (rows, one) in enumerate(zip(self.units, states, strict=True)):
             own, most = forces[list(rows)], float(limits.static_free[k] + limits.static_shares[k] @ forces)
@@ -632,7 +630,8 @@ class _Moment:
         """Return states that contradict nothing at accelerations; limits may be curved in the forces."""
         values, free = self.values, self.values.accelerations()
         forces, found = np.zeros(len(self.contacts)), None
-        rests = all(target == CLOSES for target in self.triggers.values())  # it starts, or has just come to touch
+        # It starts, or has just come to touch or to rest.
+        rests = all(target in (CLOSES, STOPS, RESTS) for target in self.triggers.values())
         for _ in range(MOST_TURNS):
             found = find_states(values.chosen(chosen, free, given, values.limits_at(forces)), states, rests)
             if found is None:
@@ -652,7 +651,7 @@ class _Moment:
         if not yields:
             return {}
         values, forces = self.values, forces_in(self.values, self.before)
-        limits, small = values.limits_at(forces)[0], _SHARED * SLACK * float(np.max(np.abs(forces)))
+        limits, small = values.limits_at(forces)[0], SHARED * SLACK * float(np.max(np.abs(forces)))
         for k in [one for one in yields if len(self.units[one]) == 2 and self._repeats(self._held_with(one))]:
             for j in (one for one in self._held_with(k) if one in slips and one not in yields):
                 most = float(limits.static_free[j] + limits.static_shares[j] @ forces)
@@ -668,7 +667,7 @@ class _Moment:
         every = all_states(values.chosen(chosen, rates, {}, limits))
         best = max(every, key=lambda one: float(np.sum(np.abs(one.forces))), default=None)
         push = np.zeros(len(rates)) if best is None else self._on_all(chosen, best)
-        if not np.max(np.abs(values.response @ push)) > _SHARED * SLACK * np.max(np.abs(rates)):
+        if not np.max(np.abs(values.response @ push)) > SHARED * SLACK * np.max(np.abs(rates)):
             raise self._contradiction("no accelerations and no impulses are found that satisfy friction", chosen)
         self.u = self.u + values.speeds_by(push)
         self.values = self.values.with_speeds(self.u)

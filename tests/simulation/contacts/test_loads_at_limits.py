@@ -1,0 +1,92 @@
+"""What rests though the least forces would not hold it: some share of the load does, and C has the same one."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from atwood import Scene, assemble, simulate
+from atwood_library import BallContact, Disc, Force, Ground, PointContact, PointMass, RigidBody, Slider
+
+from ...exported_scenes import FLAGS, apart, built, compiler, printed
+
+G = 9.81
+FORMS = pytest.mark.parametrize("form", ["reduced", "dae"])
+needs_a_compiler = pytest.mark.skipif(compiler() is None, reason="there is no C compiler")
+
+
+def disc_in_a_groove(left: float, right: float, friction: float, spin: float) -> Scene:
+    """Return a disc between two planes that lean by some angles."""
+    scene = Scene()
+    ground, disc = scene.add("ground", Ground()), scene.add("d", Disc(mass=1.0, radius=0.1))
+    normals = [(-math.sin(left), 0.0, math.cos(left)), (math.sin(right), 0.0, math.cos(right))]
+    for k, normal in enumerate(normals):
+        side = scene.add(f"c{k}", BallContact(radius=0.1, friction=friction, normal=normal))
+        scene.connect(ground.frame, side.plane)
+        scene.connect(disc.frame, side.ball)
+    x, z = np.linalg.solve([[one[0], one[2]] for one in normals], [0.1, 0.1])
+    scene.start.update({"d.position.x": float(x), "d.position.z": float(z), "d.velocity.x": 0.0, "d.velocity.z": 0.0})
+    scene.start.update({"d.angle": 0.0, "d.angular_velocity.y": spin})
+    return scene
+
+
+@needs_a_compiler
+@pytest.mark.parametrize(
+    ("scene", "states"),
+    [
+        (disc_in_a_groove(0.4, 0.4, 0.2, 0.0), (2.0, 2.0)),
+        (disc_in_a_groove(0.6, 0.9, 0.3, 0.0), (0.0, 2.0)),
+        (disc_in_a_groove(0.6, 0.9, 0.5, -5.0), (2.0, 2.0)),
+    ],
+)
+def test_c_shares_what_rests_as_runs_do(scene: Scene, states: tuple[float, float], tmp_path: Path) -> None:
+    """It slipped without speed by C, and by runs once it had come to rest."""
+    result = simulate(scene, t_end=0.1, rtol=1e-11, outputs=np.linspace(0.0, 0.1, 3), solver="explicit")
+    assert tuple(result[f"c{k}.slip_state"][-1] for k in (0, 1)) == states
+    assert {one.kind for one in result.events} <= {"sticks"}
+    assert abs(float(result["d.angular_velocity.y"][-1])) < 1e-12
+    found = printed(built(scene, tmp_path, "reduced", ["-O0", *FLAGS[1:]]), 0.1, 1e-11, 3)
+    worst, where, _ = apart(found, result, assemble(scene))
+    assert worst <= 1e-9, where
+    for k in (0, 1):
+        assert np.array_equal(found[f"c{k}.slip_state"], result[f"c{k}.slip_state"])
+
+
+@FORMS
+@pytest.mark.parametrize(("angle", "upper"), [(0.5, 0.3), (0.57, 0.3), (0.5, 0.2)])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_wedge_locks_itself_until_it_is_pushed_out_or_in(form: str, angle: float, upper: float, way: float) -> None:
+    """It was refused: neither the least forces hold it, nor those without friction at one of its faces."""
+    lower, wedge, load, rate = 0.3, 0.5, 5.0, 5.0
+    s, c = math.sin(angle), math.cos(angle)
+    scene = Scene()
+    ground, mass = scene.add("ground", Ground()), scene.add("m", PointMass(mass=wedge))
+    below = scene.add("below", PointContact(friction=lower))
+    above = scene.add("above", PointContact(friction=upper, normal=(s, 0.0, -c)))
+    block, guide = scene.add("block", RigidBody(mass=load)), scene.add("guide", Slider(axis=(0, 0, 1)))
+    push = scene.add("push", Force(value=f"{way * rate}*t"))
+    for a, b in (
+        (ground.frame, below.plane),
+        (mass.point, below.point),
+        (ground.frame, guide.a),
+        (guide.b, block.frame),
+        (block.frame, above.plane),
+        (mass.point, above.point),
+        (mass.point, push.point),
+    ):
+        scene.connect(a, b)
+    scene.start.update({f"m.{what}.{axis}": 0.0 for what in ("position", "velocity") for axis in "xz"})
+    scene.start.update({"guide.displacement": 0.0, "guide.speed": 0.0})
+    pressed = load * G / (c + way * upper * s)  # both faces are at their limits when it moves
+    begins = (lower * (wedge + load) * G - way * pressed * (s - way * upper * c)) / rate
+    result = simulate(scene, form=form, t_end=begins + 0.1, rtol=1e-10, outputs=[0.0, begins - 1e-6, begins + 0.1])
+    moving = [one.time for one in result.events if one.kind == "slips"]
+    assert moving[-1] == pytest.approx(begins, abs=1e-9)
+    x, speed = result["m.position.x"], result["m.velocity.x"]
+    assert abs(x[result.time < begins]).max() < 1e-12
+    slope = (s - way * upper * c) / (c + way * upper * s)
+    inertia = wedge + load * s / c * (slope - way * lower)
+    assert float(speed[-1]) == pytest.approx(way * 0.5 * rate * 0.01 / inertia, abs=1e-7)
