@@ -6,8 +6,8 @@ from atwood.codegen.routines import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER, Rec
 from atwood.integrators.compiled_location import FIELDS as LOCATOR
 from atwood.integrators.event_location import ALIKE, LONGEST, PASSED, SHORT, TINY
 from atwood.integrators.event_routines import Search
-from atwood.integrators.set_jumps import EVENTS, HEAD, JUMP, MOST_IMPACTS, PAST
-from atwood.integrators.set_routines import CLOSES, ENTRY, FIELDS, Sets, write_sets
+from atwood.integrators.set_jumps import EVENTS, HEAD, JUMP, MOST_IMPACTS
+from atwood.integrators.set_routines import CLOSES, ENTRY, FIELDS, LONG, Sets, write_sets
 from atwood.numerics.contact_sets import OPEN
 
 
@@ -196,10 +196,10 @@ def _log() -> Routine:
     m.logged = m.logged + 1
     with r.count(sets.logged) as i:
         struck = r.truncated(sets.log[i * (sets.size + len(ENTRY))])
-        with r.when(sets.known == PAST):
-            with r.count((PAST - 1) * 2) as j:
+        with r.when(sets.known == LONG):
+            with r.count((LONG - 1) * 2) as j:
                 past[j] = past[j + 2]
-            sets.known = PAST - 1
+            sets.known = LONG - 1
         last = past.at(sets.known * 2)
         last[0], last[1] = m.then, sets.unit("part")[struck]
         sets.known = sets.known + 1

@@ -21,7 +21,7 @@ from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Kind
 from atwood.expr.core.program import Program
 from atwood.integrators.jumps import ROOM, JumpLog, Jumps
 from atwood.integrators.protocol import RATES, CompiledRates
-from atwood.integrators.set_routines import CAPACITY, ENTRY, FIELDS, ROWS, UNITS
+from atwood.integrators.set_routines import CAPACITY, ENTRY, FIELDS, LONG, ROWS, UNITS
 
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventData
@@ -60,8 +60,8 @@ LIMITS = ("ahead", "rough", "later")
 EVENTS = ("unit", "code", "small", "placed")
 """Of each event: whose it is, what happens, what is zero but for errors, and whether it is that of a gap on places."""
 
-HEAD, PAST, MOST_IMPACTS = 4, 64, 8
-"""Numbers that begin an entry of the log, impacts that are remembered, and how many there may be in an entry."""
+HEAD, MOST_IMPACTS = 4, 8
+"""Numbers that begin an entry of the log, and how many impacts there may be in one."""
 
 
 class SetJump(NamedTuple):
@@ -186,7 +186,7 @@ class SetSolver:
             "left": size * (size + 1),
             "shares": 4 * number * size,
             "pattern": 2 * len(pattern),
-            "past": 2 * PAST,
+            "past": 2 * LONG,
             "struck": CAPACITY * self._each,
             **(more or {}),
         }
@@ -228,7 +228,7 @@ class SetSolver:
         for name in ("small", "slow"):
             units[UNITS[name]] = near * self._units[UNITS[name]]
         units[UNITS["state"] : UNITS["state"] + 3] = states
-        known = past[-PAST:]
+        known = past[-LONG:]
         if known:
             self._pieces["past"][: 2 * len(known)] = np.ravel(known)
         self._put("sets", {"known": len(known)})

@@ -343,25 +343,40 @@ def test_stops_that_mean_nothing_are_refused(settings: dict[str, float], what: s
         aw.assemble(scene)
 
 
-def block_on_floor(height: float) -> Scene:
+def block_on_floor(height: float, length: float = 0.5, angle: float = 0.15) -> Scene:
     """Return Housner's block on a floor somewhere, on its corner."""
     scene = Scene()
     ground = scene.add("ground", Ground(position=(0.0, 0.0, height)))
-    m = scene.add("m", Box(length_x=0.5, length_z=2.0))
-    contact = scene.add("c", BoxContact(length=0.5, height=2.0, friction=10.0))
+    m = scene.add("m", Box(length_x=length, length_z=2.0))
+    contact = scene.add("c", BoxContact(length=length, height=2.0, friction=10.0))
     scene.connect(ground.frame, contact.plane)
     scene.connect(m.frame, contact.box)
-    scene.start.update({"m.angle": 0.15, "m.angular_velocity.y": 0.0, "c.corner[0].gap": 0.0, "c.corner[0].slip": 0.0})
+    scene.start.update({"m.angle": angle, "m.angular_velocity.y": 0.0, "c.corner[0].gap": 0.0, "c.corner[0].slip": 0.0})
     return scene
 
 
 @pytest.mark.parametrize(
-    ("height", "rtol", "off"), [(0.0, 1e-11, 2e-9), (0.0, 1e-12, 1e-9), (0.0, 1e-13, 1e-8), (1e4, 1e-10, 1e-5)]
+    ("height", "rtol", "off"), [(0.0, 1e-11, 1e-10), (0.0, 1e-12, 1e-10), (0.0, 1e-13, 1e-10), (1e4, 1e-10, 1e-5)]
 )
 def test_impacts_come_to_an_end_where_rounding_tells_in_their_intervals(height: float, rtol: float, off: float) -> None:
     """A block hops by 1e-14 m at last; rounding would have it go on for ever. The sum is that of earlier intervals."""
     result = simulate(block_on_floor(height), t_end=9.0, rtol=rtol, outputs=[0.0, 9.0])
     assert times(result, "rests") == [pytest.approx(8.690777316623845, abs=off)]
+
+
+@pytest.mark.parametrize(("length", "angle", "rests"), [(0.3, 0.1, 24.446796526006732), (0.25, 0.05, 27.92141675027858)])
+@pytest.mark.parametrize(("rtol", "off"), [(1e-6, 3e-5), (1e-9, 3e-8), (1.42e-13, 5e-9)])
+def test_the_sum_of_impacts_that_lose_little_is_that_of_long_intervals(
+    length: float, angle: float, rests: float, rtol: float, off: float
+) -> None:
+    """Slender blocks keep 0.967 and 0.977 of their rate, so that the sum has a thousand times the errors of intervals.
+
+    At 1e-6 what rises is as slow as what rests before the end of the series is near: the sum is told all the same.
+    Known times are sums of elliptic integrals, with 40 digits.
+    """
+    end = 1.02 * rests
+    result = simulate(block_on_floor(0.0, length, angle), t_end=end, rtol=rtol, outputs=[0.0, end])
+    assert times(result, "rests") == [pytest.approx(rests, abs=off)]
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 /* Gaps and slips: which hold from a moment on, and margins of the events that tell when this changes. */
 
-#define PAST 64 /* impacts that are remembered */
-
 static word *unit(scene *s, int name)
 {
     return s->units + CONTACTS * name;

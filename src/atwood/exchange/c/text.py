@@ -42,9 +42,6 @@ _ASKED = "constraints", "quantities", "loads", "contacts", "sides", "maximal", "
 _LOGGED = 64
 """Events that are remembered."""
 
-_PAST = 64
-"""Impacts that are remembered."""
-
 _POINTS = STACK + MOST + 2
 """Points that a search for events remembers."""
 
@@ -214,7 +211,7 @@ def _sizes_of_changes(data: dict[str, Any], programs: dict[str, Program]) -> dic
     found["HELD_VALUES"] = len(data["held"])
     if contacts:
         found |= {"CONTACT_ROWS": contacts["size"], "PATTERN": len(contacts["pattern"]) // 2}
-        found |= {"UNITS": len(sets.UNITS), "ENTRY": len(sets.ENTRY)}
+        found |= {"PAST": sets.LONG, "UNITS": len(sets.UNITS), "ENTRY": len(sets.ENTRY)}
         found |= {"WATCH_GAP": 1, "WATCH_REST": 2, "WATCH_RUN": 3}
     if passage:
         n, m = passage["counts"]
@@ -281,7 +278,7 @@ def _memory(programs: dict[str, Program], sizes: dict[str, int]) -> list[str]:
         count, rows = sizes["CONTACTS"], sizes["CONTACT_ROWS"]
         words |= {"sets": len(sets.FIELDS), "units": len(sets.UNITS) * count, "set_rows": len(sets.ROWS) * rows}
         words |= {"matrix": rows * rows, "left": rows * (rows + 1), "shares": 4 * count * rows}
-        words |= {"pattern": 2 * sizes["PATTERN"], "impacts": 2 * _PAST}
+        words |= {"pattern": 2 * sizes["PATTERN"], "impacts": 2 * sets.LONG}
         words |= {"log_of_sets": sets.CAPACITY * (rows + len(sets.ENTRY))}
     if sizes["PASSAGE"]:
         words["body"] = max(size, sizes["BODY_COORDINATES"] + sizes["BODY_SPEEDS"])

@@ -2,7 +2,7 @@
 // each request. FIELD, ROW, SOUGHT, SEARCHED, POINTS, steps and searches are printed before it.
 
 const STACK = 4096;                             // words for arrays of calls
-const PAST = 64, INSIDE = 2, GAINS = 4;          // impacts that are remembered, and how sets are refused that name a part
+const PAST = 512, INSIDE = 2, GAINS = 4;          // impacts that are remembered, and how sets are refused that name a part
 const TOO_SMALL = 2, FOUND = 1, HAPPENED = 2;   // how steps and searches end, and what a search is told of the start
 const HELD = 1e-6;                              // what constraints may miss, in the scene's sizes
 const MET = 1e-7;                               // the same of what a start is to fulfil

@@ -254,7 +254,8 @@ class _Moment:
             if share > LEVEL and spans[0] < SHORT * longest[2]:  # rounding makes each bounce from the one before
                 left = spans[0]
             flattens = 1.0 - ratios[0] < FLATTENS * (1.0 - share)
-            is_over = left < (longest[1 if flattens else 0] if long >= min(count, RECENT) else longest[2])
+            stays = share * speed <= self.slow[closing[0]] and math.isfinite(left)  # it would rest untold
+            is_over = stays or left < (longest[1 if flattens else 0] if long >= min(count, RECENT) else longest[2])
         if not is_over or (is_elastic and (share <= LEVEL or spans[0] > LOSSLESS * longest[2])):
             return None
         self._series = self._accumulating(closing, impacts, self.t - lasted)
