@@ -104,7 +104,7 @@ LONG, BEND = 512, 0.9
 """A sum is looked for among so many intervals, and extrapolated where changes shrink to less than this share.
 
 Rounding makes each interval longer by what a unit of the last digit of a gap takes: the shorter it is the more, and
-where intervals shrink by little each, the sum has much of it. At factors of 0.977 the last 256 of 620 are all too short.
+where intervals shrink by little each, the sum has much of it. At factors of 0.977 the last 256 of 620 come too late.
 """
 
 EVEN = 4.0
@@ -1352,7 +1352,8 @@ def _end_series(r: Routine, m: Sets, spans: Value, number: Value, closing: tuple
         m.stops = r.choose(left > m.ahead * WAITS, 1, 2, INTEGER)
         m.ahead, m.blur, m.pace, m.lasted = left, NEAR_REST, NEAR_REST, lasted.now
         sum_ = _sum_of_series(r, spans, long.now)
-        with r.when(r.size(sum_ - left) <= left):
+        most = r.choose(is_level, spans[0] * r.choose(is_elastic, 1.0, float(LONG)), left * 2.0)
+        with r.when((sum_ >= 0.0) & (sum_ <= most)):
             m.ahead = sum_
 
 

@@ -243,6 +243,7 @@ class _Moment:
             return None
         share = float(np.exp(np.mean(np.log(ratios[:count]))))
         left: float = spans[0] * share / (1.0 - share) if share < 1.0 else math.inf
+        most = 2.0 * left
         lasted = float(np.sum(spans[: count + 1]))
         is_elastic, pull = self._bouncing(
             closing[0], moved, {part for time, part in impacts if time >= self.t - lasted}
@@ -252,7 +253,7 @@ class _Moment:
             is_over = math.isfinite(left) and spans[0] * speed < SQUEEZED * self.small[closing[0]]
         else:
             if share > LEVEL and spans[0] < SHORT * longest[2]:  # rounding makes each bounce from the one before
-                left = spans[0]
+                left, most = spans[0], spans[0] * (1 if is_elastic else LONG)
             flattens = 1.0 - ratios[0] < FLATTENS * (1.0 - share)
             stays = share * speed <= self.slow[closing[0]] and math.isfinite(left)  # it would rest untold
             is_over = stays or left < (longest[1 if flattens else 0] if long >= min(count, RECENT) else longest[2])
@@ -261,7 +262,7 @@ class _Moment:
         self._series = self._accumulating(closing, impacts, self.t - lasted)
         self.small, self.slow = (self._blurred(one, NEAR_REST) for one in (self.small, self.slow))
         found = sum_of_series(np.array(spans[: long + 1]))
-        return found if abs(found - left) <= left else left
+        return found if 0.0 <= found <= most else left
 
     def _bouncing(self, closes: int, moved: BoolArray, parts: Collection[str]) -> tuple[bool, float]:
         """Return whether impacts of some parts lose nothing, and how fast what they move falls, at most."""
