@@ -305,7 +305,7 @@ def find_origin(mechanism: Mechanism) -> Connector | None:
     """Return the fixed connector that positions are counted from; None for the world's origin, if that is near."""
     nodes = _attached(mechanism)
     size = extent(mechanism)
-    if not nodes or nodes[0] == WORLD:
+    if not nodes or nodes[0] == WORLD or size == 0.0:
         return None
     offsets = body_offsets(mechanism.bodies.bodies[0], mechanism.space)[0]
     graph = mechanism.table.graph
