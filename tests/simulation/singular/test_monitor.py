@@ -61,7 +61,7 @@ def minimum(away: list[float], at_end: bool = False, largest: float = 1.0) -> li
     """Return between which looks it is looked closer."""
     one = given(away, largest=largest)
     between: list[tuple[int, int]] = []
-    one._closest = lambda *looks: between.append(looks)  # type: ignore[method-assign,assignment,func-returns-value]
+    one._closest = lambda *looks: between.append(looks) or []  # type: ignore[method-assign,assignment,func-returns-value]
     one._heading = lambda i: None  # type: ignore[method-assign,assignment]
     assert one._first_minimum(at_end, False) is None
     return between
@@ -85,7 +85,7 @@ def test_the_last_look_is_judged_when_what_comes_behind_is_known() -> None:
 def test_each_look_is_judged_once() -> None:
     one = given([0.9, 0.2, 0.9])
     asked = Asked()
-    one._closest = lambda first, last: (1.1, 0.01)  # type: ignore[method-assign]
+    one._closest = lambda first, last: [(1.1, 0.01)]  # type: ignore[method-assign]
     one._heading = lambda i: None  # type: ignore[method-assign,assignment]
     one._pass = asked  # type: ignore[method-assign]
     assert one._first_minimum(False, True) is None
@@ -98,7 +98,7 @@ def test_each_look_is_judged_once() -> None:
 def test_a_crossing_that_the_solver_missed_is_returned_and_one_that_it_made_is_noted() -> None:
     for went_along in (False, True):
         one, found = given([0.9, 0.2, 0.9]), crossing(1.1)
-        one._closest = lambda first, last: (1.1, 0.01)  # type: ignore[method-assign]
+        one._closest = lambda first, last: [(1.1, 0.01)]  # type: ignore[method-assign]
         one._pass = Asked(found)  # type: ignore[method-assign]
         one._went_along = lambda _, answer=went_along: answer  # type: ignore[method-assign,misc]
         assert one._first_minimum(False, False) is (None if went_along else found)
@@ -108,7 +108,7 @@ def test_a_crossing_that_the_solver_missed_is_returned_and_one_that_it_made_is_n
 def test_where_the_measure_has_fallen_to_nothing_it_is_where_the_motion_was_heading() -> None:
     """It stays low behind: the solver has leapt into another way to move, or moves along the singular place."""
     one, found = given([0.9, 0.005, 0.001, 0.001]), crossing(1.0)
-    one._closest = lambda first, last: None  # type: ignore[method-assign,assignment]
+    one._closest = lambda first, last: []  # type: ignore[method-assign]
     headings: list[int] = []
     one._heading = lambda i: headings.append(i) or (1.05, 0.005)  # type: ignore[method-assign,func-returns-value]
     one._pass = Asked(found)  # type: ignore[method-assign]
@@ -119,7 +119,7 @@ def test_where_the_measure_has_fallen_to_nothing_it_is_where_the_motion_was_head
     for away in ([0.02, 0.019, 0.018], [0.9, 0.02, 0.018, 0.017]):
         one = given(away)
         one._heading = lambda i: pytest.fail("nothing has fallen")  # type: ignore[method-assign,misc]
-        one._closest = lambda first, last: None  # type: ignore[method-assign,assignment]
+        one._closest = lambda first, last: []  # type: ignore[method-assign]
         assert one._first_minimum(False, False) is None
 
 
@@ -316,3 +316,14 @@ def test_no_output_is_lost_where_a_way_begins_with_half_of_it(solver: str, monke
     result = simulate(FourBarRow(), form="dae", rtol=1e-11, outputs=2001, t_end=0.9, solver=solver)
     assert [len(one.path.arcs) > 1 for one in result.singular_crossings if one.path] == [True]
     assert len(result.time) == 2001
+
+
+def test_of_two_places_that_one_look_sees_both_are_passed() -> None:
+    """The second only if the way over the first one does not lead over it."""
+    for end, count in ((1.05, 2), (1.2, 1)):
+        one, path = given([0.9, 0.2, 0.9]), SimpleNamespace(end=end)
+        one._closest = lambda first, last: [(1.0, 0.01), (1.1, 0.01)]  # type: ignore[method-assign]
+        one._pass = lambda *_, path=path: SimpleNamespace(time=1.0, path=path)  # type: ignore[method-assign]
+        one._went_along = lambda _: True  # type: ignore[method-assign]
+        assert one._first_minimum(False, False) is None
+        assert len(one.agreed) == count

@@ -35,42 +35,40 @@ def measured(one: SingularityMonitor, at: float, floor: float = 0.0) -> Singular
 
 
 def test_the_motion_between_looks_is_seen_from_their_speeds() -> None:
-    found = measured(moving([2.0, 4.0, 6.0]), 9.0)._closest(0, 2)
-    assert found is not None
+    [found] = measured(moving([2.0, 4.0, 6.0]), 9.0)._closest(0, 2)
     assert found == (pytest.approx(3.0, abs=1e-9), pytest.approx(0.0, abs=1e-9))
     one = measured(moving([2.0, 4.0, 6.0], largest=20.0), 27.0)  # between two of the places that are looked at
-    time, away = one._closest(0, 2) or (0.0, 0.0)
+    [(time, away)] = one._closest(0, 2)
     assert time == pytest.approx(27.0**0.5, abs=0.07)
     assert away == pytest.approx(abs(time * time - 27.0), abs=1e-9)
 
 
 def test_only_looks_between_the_given_ones_are_looked_at() -> None:
     one = measured(moving([2.0, 4.0, 6.0, 8.0]), 9.0)
-    assert one._closest(1, 3) is None  # the least is at the first of these looks
-    assert one._closest(0, 1) is not None
-    assert one._closest(1, 1) is None
+    assert not one._closest(1, 3)  # the least is at the first of these looks
+    assert len(one._closest(0, 1)) == 1
+    assert not one._closest(1, 1)
 
 
 def test_a_minimum_that_is_not_low_or_not_inside_is_none() -> None:
-    assert measured(moving([2.0, 4.0, 6.0]), 9.0, floor=0.04)._closest(0, 2) is not None
-    assert measured(moving([2.0, 4.0, 6.0]), 9.0, floor=0.06)._closest(0, 2) is None
-    assert measured(moving([2.0, 4.0, 6.0], largest=2.0), 9.0, floor=0.06)._closest(0, 2) is not None
-    assert measured(moving([2.0, 4.0, 6.0]), 36.0)._closest(0, 2) is None
-    assert measured(moving([2.0, 4.0, 6.0]), 4.0)._closest(0, 2) is None
+    assert len(measured(moving([2.0, 4.0, 6.0]), 9.0, floor=0.04)._closest(0, 2)) == 1
+    assert not measured(moving([2.0, 4.0, 6.0]), 9.0, floor=0.06)._closest(0, 2)
+    assert len(measured(moving([2.0, 4.0, 6.0], largest=2.0), 9.0, floor=0.06)._closest(0, 2)) == 1
+    assert not measured(moving([2.0, 4.0, 6.0]), 36.0)._closest(0, 2)
+    assert not measured(moving([2.0, 4.0, 6.0]), 4.0)._closest(0, 2)
 
 
 def test_right_behind_the_first_look_it_is_looked_more_closely() -> None:
     near = 2.0 + 1e-3
-    found = measured(moving([2.0, 4.0, 6.0]), near * near)._closest(0, 2)
-    assert found is not None
+    [found] = measured(moving([2.0, 4.0, 6.0]), near * near)._closest(0, 2)
     assert found[0] == pytest.approx(near, abs=1e-3)
-    assert measured(moving([1.0, 2.0, 4.0, 6.0]), near * near)._closest(1, 3) is None
+    assert not measured(moving([1.0, 2.0, 4.0, 6.0]), near * near)._closest(1, 3)
 
 
 def test_where_the_measure_has_no_value_nothing_is_said() -> None:
     one = moving([2.0, 4.0, 6.0])
     one._measures = SimpleNamespace(at=lambda t, q: np.where(q[0] > 30.0, np.nan, np.abs(q[0] - 9.0)))
-    assert one._closest(0, 2) is None
+    assert not one._closest(0, 2)
 
 
 def test_states_between_looks_follow_the_motion() -> None:

@@ -242,8 +242,8 @@ class Branches:
         speeds = slice(self._n, self._n + self._m)
         return max(float(np.max(np.abs(one.y[speeds]) / self.plan.sizes)) for one in self._samples)
 
-    def _closest(self, first: int, last: int) -> tuple[float, float] | None:
-        """Return when the motion between some looks is closest to a singular position, and how close; if it is."""
+    def _closest(self, first: int, last: int) -> list[tuple[float, float]]:
+        """Return when the motion between some looks is closest to singular positions, and how close, in order."""
         times, places = [], []
         for one, other in zip(self._samples[first:last], self._samples[first + 1 : last + 1], strict=True):
             h = other.t - one.t
@@ -254,15 +254,13 @@ class Branches:
             places.append(cubic(s, (a, b), (v, w)))
             times.append(one.t + h * s)
         if not times:
-            return None
+            return []
         t, q = np.concatenate(times), np.concatenate(places, axis=1)
         away = self._measures.at(t, q)
         if not np.all(np.isfinite(away)):
-            return None
-        least = int(np.argmin(away))
-        if away[least] > _CLOSE * self._largest or least in (0, len(t) - 1):
-            return None
-        return float(t[least]), float(away[least])
+            return []
+        least = (away[1:-1] <= np.minimum(away[:-2], away[2:])) & (away[1:-1] <= _CLOSE * self._largest)
+        return [(float(t[k]), float(away[k])) for k in np.nonzero(least)[0] + 1]
 
     def _pass(self, near: float, away: float = 0.0, failed: bool = False) -> SingularCrossing | None:
         """Return the singular crossing near a time; None where the motion is as anywhere else."""

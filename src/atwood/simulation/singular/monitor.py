@@ -354,11 +354,18 @@ class SingularityMonitor(Branches):
             if rest is not None:
                 self.agreed.append(rest)
                 continue
-            near = self._closest(max(i - 1, 0), min(i + 1, len(away) - 1)) if is_least else None
-            found = None if near is None else self._pass(*near, failed)
+            places = self._closest(max(i - 1, 0), min(i + 1, len(away) - 1)) if is_least else []
+            found, passed = None, -np.inf
+            for near, least in places:  # of places close to each other one look may see several
+                one = self._pass(near, least, failed) if near > passed else None
+                if one is None:
+                    continue
+                if not self._went_along(one):
+                    return one
+                found, passed = one, near if one.path is None else one.path.end
+                self.agreed.append(one)
             heading = self._heading(i) if found is None else None
-            if heading is not None:
-                found = self._pass(*heading, failed)
+            found = None if heading is None else self._pass(*heading, failed)
             if found is None:
                 continue
             if not self._went_along(found):
