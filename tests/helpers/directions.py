@@ -118,4 +118,5 @@ def turn_directed(assembly: Assembly) -> Assembly:
     program = Program(placing.name, state_groups(reduced), placing.parameters, outputs)
     made = {REDUCED: reduced, MAXIMAL: directions_of(maximal)[0], (TO_MAXIMAL, True): program}
     assembly.shared._made.update(made)
+    vars(assembly).pop("own_equations", None)  # known since it was assembled
     return assembly

@@ -79,7 +79,7 @@ def test_a_projection_in_the_middle_of_a_run(form: str, break_down: Break, monke
 
     monkeypatch.setattr(record, "project_rows", doubtful)
     with pytest.raises(SolveError, match="its numbers could not be worked with") as caught:
-        simulate(SliderCrank(), form=form, t_end=1.0)
+        simulate(SliderCrank(), form=form, t_end=1.0, solver="ida")  # formulas put states onto the constraints
     assert "what moves fastest there is" in caught.value.message
     assert caught.value.where
 
