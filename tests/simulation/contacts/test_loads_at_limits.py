@@ -9,7 +9,20 @@ import numpy as np
 import pytest
 
 from atwood import Scene, assemble, simulate
-from atwood_library import BallContact, Disc, Force, Ground, PointContact, PointMass, RigidBody, Slider
+from atwood_library import (
+    BallContact,
+    BallPairContact,
+    Disc,
+    Force,
+    Ground,
+    Link,
+    PointContact,
+    PointMass,
+    RigidBody,
+    RotaryDrive,
+    Slider,
+    TranslationalSpringDamper,
+)
 
 from ...exported_scenes import FLAGS, apart, built, compiler, printed
 
@@ -90,3 +103,36 @@ def test_a_wedge_locks_itself_until_it_is_pushed_out_or_in(form: str, angle: flo
     slope = (s - way * upper * c) / (c + way * upper * s)
     inertia = wedge + load * s / c * (slope - way * lower)
     assert float(speed[-1]) == pytest.approx(way * 0.5 * rate * 0.01 / inertia, abs=1e-7)
+
+
+@needs_a_compiler
+def test_c_decides_an_impact_where_slip_and_gap_move_each_other(tmp_path: Path) -> None:
+    """A follower has one freedom, along which its gap and its slip on the cam both move; it was refused."""
+    scene = Scene()
+    ground, drive, cam = (
+        scene.add("ground", Ground()),
+        scene.add("drive", RotaryDrive(rotation="40*t")),
+        Link(length=0.05),
+    )
+    scene.add("offset", cam)
+    disc, guide = scene.add("disc", RigidBody(mass=1.0)), scene.add("guide", Slider(axis=(0, 0, 1)))
+    follower = scene.add("follower", RigidBody(mass=0.5))
+    touch = scene.add("touch", BallPairContact(radius_a=0.2, radius_b=0.05, restitution=0.4, friction=0.1))
+    spring = scene.add("spring", TranslationalSpringDamper(stiffness=50.0, natural=0.1, against="ground"))
+    for a, b in (
+        (ground.frame, drive.a),
+        (drive.b, cam.a),
+        (cam.b, disc.frame),
+        (ground.frame, guide.a),
+        (guide.b, follower.frame),
+        (disc.frame, touch.a),
+        (follower.frame, touch.b),
+        (guide.carriage, spring.b),
+    ):
+        scene.connect(a, b)
+    scene.start.update({"guide.displacement": math.sqrt(0.06) + 1e-9, "guide.speed": 2.0})
+    result = simulate(scene, t_end=0.5, rtol=1e-11, outputs=np.linspace(0.0, 0.5, 3), solver="explicit")
+    assert sum(one.kind == "impact" for one in result.events) >= 6
+    found = printed(built(scene, tmp_path, "reduced", ["-O0", *FLAGS[1:]]), 0.5, 1e-11, 3)
+    worst, where, _ = apart(found, result, assemble(scene))
+    assert worst <= 1e-9, where
