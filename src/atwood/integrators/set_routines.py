@@ -1,7 +1,8 @@
 """The routine of a set of contacts: impacts of gaps, and which gaps and slips hold from a moment on.
 
-The rules are those of `atwood.numerics.contact_sets` and `atwood.simulation.contacts.changes`, word by word, without
-what these do where a set that contradicts nothing is not found by changing the worst state: then the routine says so.
+The rules are those of `atwood.numerics.contact_sets` and `atwood.simulation.contacts.changes`, word by word. Where a
+set that contradicts nothing is not found by changing the worst state, all that slips is tried both ways; else the
+routine says so. That rest has a share is seen from the least forces alone, with ever more of what holds let go.
 A program gives rates, accelerations, responses and limits, and the speeds change in place.
 """
 
