@@ -54,7 +54,7 @@ def test_series_and_the_explicit_method_agree_where_constraints_are_left(name: s
     assert [series.run.solver, explicit.run.solver, series.status] == ["taylor", "explicit", "finished"]
     for path in explicit.paths:
         one, other = series.array(path), explicit.array(path)
-        assert np.max(np.abs(one - other)) <= 1e-9 * max(1.0, np.max(np.abs(other))), path
+        assert np.max(np.abs(one - other)) <= 2e-9 * max(1.0, np.max(np.abs(other))), path
 
 
 def test_a_rope_is_watched_by_the_explicit_method_too() -> None:

@@ -193,6 +193,9 @@ _RUNS = 1000.0
 _BLUR = 8.0
 """Times rounding: a gap that opens at zero has closed again when it has passed zero by so much."""
 
+_MOVED = 1e-6
+"""Relative to themselves or to their scales, coordinates are moved by so much to see what reads them."""
+
 _MOMENT = 1e-12
 """In units of the scene's time: so much later it is seen whether something slows down."""
 
@@ -308,7 +311,7 @@ class EventProbe:
         self.shift = np.where(sided & (values <= 0.0), 2.0 * np.abs(values) + TINY, self.shift)
         opening = self._opening(t, q, u, small) & (np.abs(values) <= small)
         if opening.any():
-            blur = _BLUR * self._rounding(q)
+            blur = _BLUR * self._rounding(t, q, u, values)
             self.shift = np.where(opening, np.where(values > blur, 0.0, 2.0 * np.abs(values) + blur), self.shift)
         happened &= ~opening
         self._arm(values, small, happened, (t, q, u))
@@ -337,11 +340,13 @@ class EventProbe:
         accelerations, _ = self.plan.balance.accelerate(t, q, u, self.plan.kept)
         return self.values(t + moment, q + moment * rates, u + moment * accelerations) - self.shift
 
-    def _rounding(self, q: FloatArray) -> FloatArray:
-        """Return by how much rounding of the coordinates, and of what is formed from them, moves each event."""
+    def _rounding(self, t: float, q: FloatArray, u: FloatArray, values: FloatArray) -> FloatArray:
+        """Return by how much rounding of the coordinates that an event reads moves it."""
         scales = self.plan.scales
-        far = np.max(np.abs(q) / coordinate_scales(self.assembly.own_equations, scales.length), initial=1.0)
-        return np.array([ROUNDING * float(far) * scales.of(one.unit) for one in self.event_functions])
+        far = np.maximum(np.abs(q), coordinate_scales(self.assembly.own_equations, scales.length))
+        moved = np.array([self.values(t, q + step, u) - values for step in np.diag(_MOVED * far)])
+        found: FloatArray = ROUNDING / _MOVED * np.sum(np.abs(moved), axis=0)
+        return found
 
     def _opening(self, t: float, q: FloatArray, u: FloatArray, small: FloatArray) -> BoolArray:
         """Return which gaps are at zero and open with a speed: they need no margin."""
