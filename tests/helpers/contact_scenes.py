@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from atwood import Scene
-from atwood_library import Ground, Link, Pivot, PointContact, PointMass, RotationalFriction
+from atwood_library import Ground, Link, Pivot, PointContact, PointMass, RigidBody, RotationalFriction, Slider
 
 
 def box_of_walls(restitution: float = 1.0, lean: float = 0.0, gravity: float = 0.0, mass: float = 1.0) -> Scene:
@@ -42,4 +42,25 @@ def rough_pendulum(angle: float | None = None) -> Scene:
         scene.connect(*ends)
     if angle is not None:
         scene.start.update({"pivot.angle": angle - 0.5 * math.pi, "pivot.angular_velocity": 0.0})
+    return scene
+
+
+def wedge_between(angle: float, upper: float, lower: float, wedge: float, load: float) -> Scene:
+    """Return a wedge `m` between a floor and a block in a vertical guide that lies on it, at rest; both faces rub."""
+    scene = Scene()
+    ground, mass = scene.add("ground", Ground()), scene.add("m", PointMass(mass=wedge))
+    below = scene.add("below", PointContact(friction=lower))
+    above = scene.add("above", PointContact(friction=upper, normal=(math.sin(angle), 0.0, -math.cos(angle))))
+    block, guide = scene.add("block", RigidBody(mass=load)), scene.add("guide", Slider(axis=(0, 0, 1)))
+    for a, b in (
+        (ground.frame, below.plane),
+        (mass.point, below.point),
+        (ground.frame, guide.a),
+        (guide.b, block.frame),
+        (block.frame, above.plane),
+        (mass.point, above.point),
+    ):
+        scene.connect(a, b)
+    scene.start.update({f"m.{what}.{axis}": 0.0 for what in ("position", "velocity") for axis in "xz"})
+    scene.start.update({"guide.displacement": 0.0, "guide.speed": 0.0})
     return scene

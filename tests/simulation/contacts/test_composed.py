@@ -34,6 +34,8 @@ from atwood_library import (
     VertexContact,
 )
 
+from ...helpers.contact_scenes import wedge_between
+
 G = 9.81
 FORMS = pytest.mark.parametrize("form", ["reduced", "dae"])
 
@@ -190,22 +192,7 @@ def test_jaws_close_on_a_box_and_hold_it_until_it_is_pulled_too_hard(form: str) 
 def test_a_wedge_is_pressed_out_by_what_lies_on_it(form: str) -> None:
     """Friction of 0.3 on both faces holds an angle of up to 2 atan(0.3) = 0.583 rad."""
     angle, friction, wedge, load = 0.62, 0.3, 0.5, 5.0
-    scene = Scene()
-    ground, mass = scene.add("ground", Ground()), scene.add("m", PointMass(mass=wedge))
-    below = scene.add("below", PointContact(friction=friction))
-    above = scene.add("above", PointContact(friction=friction, normal=(math.sin(angle), 0.0, -math.cos(angle))))
-    block, guide = scene.add("block", RigidBody(mass=load)), scene.add("guide", Slider(axis=(0, 0, 1)))
-    for a, b in (
-        (ground.frame, below.plane),
-        (mass.point, below.point),
-        (ground.frame, guide.a),
-        (guide.b, block.frame),
-        (block.frame, above.plane),
-        (mass.point, above.point),
-    ):
-        scene.connect(a, b)
-    scene.start.update({f"m.{what}.{axis}": 0.0 for what in ("position", "velocity") for axis in "xz"})
-    scene.start.update({"guide.displacement": 0.0, "guide.speed": 0.0})
+    scene = wedge_between(angle, friction, friction, wedge, load)
     s, c = math.sin(angle), math.cos(angle)
     rows = [
         [wedge, friction * c - s, friction],

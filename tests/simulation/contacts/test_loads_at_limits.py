@@ -16,8 +16,6 @@ from atwood_library import (
     Force,
     Ground,
     Link,
-    PointContact,
-    PointMass,
     RigidBody,
     RotaryDrive,
     Slider,
@@ -25,6 +23,7 @@ from atwood_library import (
 )
 
 from ...exported_scenes import FLAGS, apart, built, compiler, printed
+from ...helpers.contact_scenes import wedge_between
 
 G = 9.81
 FORMS = pytest.mark.parametrize("form", ["reduced", "dae"])
@@ -75,24 +74,9 @@ def test_a_wedge_locks_itself_until_it_is_pushed_out_or_in(form: str, angle: flo
     """It was refused: neither the least forces hold it, nor those without friction at one of its faces."""
     lower, wedge, load, rate = 0.3, 0.5, 5.0, 5.0
     s, c = math.sin(angle), math.cos(angle)
-    scene = Scene()
-    ground, mass = scene.add("ground", Ground()), scene.add("m", PointMass(mass=wedge))
-    below = scene.add("below", PointContact(friction=lower))
-    above = scene.add("above", PointContact(friction=upper, normal=(s, 0.0, -c)))
-    block, guide = scene.add("block", RigidBody(mass=load)), scene.add("guide", Slider(axis=(0, 0, 1)))
+    scene = wedge_between(angle, upper, lower, wedge, load)
     push = scene.add("push", Force(value=f"{way * rate}*t"))
-    for a, b in (
-        (ground.frame, below.plane),
-        (mass.point, below.point),
-        (ground.frame, guide.a),
-        (guide.b, block.frame),
-        (block.frame, above.plane),
-        (mass.point, above.point),
-        (mass.point, push.point),
-    ):
-        scene.connect(a, b)
-    scene.start.update({f"m.{what}.{axis}": 0.0 for what in ("position", "velocity") for axis in "xz"})
-    scene.start.update({"guide.displacement": 0.0, "guide.speed": 0.0})
+    scene.connect(scene.m.point, push.point)
     pressed = load * G / (c + way * upper * s)  # both faces are at their limits when it moves
     begins = (lower * (wedge + load) * G - way * pressed * (s - way * upper * c)) / rate
     result = simulate(scene, form=form, t_end=begins + 0.1, rtol=1e-10, outputs=[0.0, begins - 1e-6, begins + 0.1])
