@@ -127,6 +127,17 @@ def stuck_at(constraint: Constraint, t: float, message: str) -> SolveError:
     )
 
 
+def begun_at(constraint: Constraint, t: float) -> SolveError:
+    """Return the error of a run that is interrupted at a singular position, as by a time event."""
+    return SolveError(
+        f"at t = {t:.9g} the run begins anew where the mechanism is in a singular position, as far as rounding tells: "
+        f"{constraint.label} follows from the other constraints there, and how the motion continues is not determined",
+        where=constraint.key[0],
+        advice="Move what happens at this time, such as a step of a force or a sample, by a millionth of a second, or "
+        "take the reduced form.",
+    )
+
+
 def events_on(path: Path, plan: SceneProblem, probe: EventProbe) -> Root | None:
     """Return the first event on a path; None if there is none."""
     if not probe.event_functions:

@@ -27,7 +27,7 @@ from atwood.simulation.singular.branches import (
     going_on,
     stride_from,
 )
-from atwood.simulation.singular.crossing import SingularCrossing, has_few, zero_ahead
+from atwood.simulation.singular.crossing import SingularCrossing, begun_at, has_few, nearly_lost, zero_ahead
 from atwood.simulation.singular.passing import Passages, PassedCrossing
 from atwood.tolerances import tolerances
 
@@ -40,6 +40,9 @@ _LOOKED_AHEAD: Key[tuple[SingularCrossing | None, list[float]]] = Key("first loo
 
 _REVIEW = 8
 """So many looks are judged together where they are not compiled."""
+
+_ON_A_PLACE = 5e-7
+"""A start whose least share is below this is on a singular position, as far as rounding tells: some 30 roots of it."""
 
 _AT_START = 0.7
 """Where less than this share is left at a start of what constraints are around it, it is looked ahead from there."""
@@ -257,6 +260,7 @@ class SingularityMonitor(Branches):
         if not self._starts_low:
             return None
         self._starts_low = False
+        self._check_start()
         self._samples, self._away = [Sample(self._start.t, self._start.y, self._start.yp)], []
         if self._about is None:
             self._measure()
@@ -265,6 +269,17 @@ class SingularityMonitor(Branches):
         found, self._away = self.plan.assembly.kept.get(_LOOKED_AHEAD, self._first_ahead, *about)
         self._largest = max(self._largest, self._away[0]) if np.isfinite(self._away[0]) else self._largest
         return found
+
+    def _check_start(self) -> None:
+        """Raise an error where a run goes on from a state that rounding does not tell from a singular position.
+
+        Rounding e of maximal coordinates moves what is nearly free by e/s, and its speed by e/s^2 of itself, at a
+        measure s. Reduced coordinates of a loop are one another's functions there, and keep their digits.
+        """
+        compiled, start = self._compiled, self._start
+        if self.plan.assembly.form == "dae" and compiled is not None and compiled.least_share < _ON_A_PLACE:
+            lost = nearly_lost(self._measures, start.t, start.y[: self._n])
+            raise begun_at(self.plan.assembly.own_equations.constraints[lost], start.t)
 
     def _first_ahead(self) -> tuple[SingularCrossing | None, list[float]]:
         """Return what is just ahead of the start of a run, and the measure there."""
