@@ -721,10 +721,16 @@ def _share() -> Routine:
         for name in names:
             r.copy(m.unit(f"next{name}"), m.unit(f"found{name}"), m.count)
         r.call("meet_states", place)
-    with r.when(
-        (repeats.now == 0) | (tries.now & ~moves.now)
-    ):  # friction that is at its limit says how the load is shared
+    with r.when(repeats.now == 0):
         r.give(0)
+    with r.when(tries.now & ~moves.now):  # friction that is at its limit may say how the load is shared
+        n = r.variable(0, INTEGER)
+        with _each(r, m, "chosen") as (k, _, _), r.when(m.unit("given")[k] == 0.0):
+            m.unit("holds")[n.now] = k.number()
+            n.now = n.now + 1
+        r.call("weighted_forces", place)
+        with r.when(r.call("is_lawful", place, n.now) == 0):
+            r.give(0)
     with _each(r, m, "chosen") as (k, row, is_pair), r.when((m.unit("given")[k] == 0.0) & (state[k] == float(GOES_ON))):
         is_moved = _size_of_slip(r, row, is_pair, m.row("motions"))[2] > small
         state[k] = r.choose(is_moved, float(GOES_ON), float(STICKS))

@@ -547,8 +547,9 @@ class _Moment:
             tried = self._without(states, gone)
             if self._rank(tried, FIRM) == least and self._is_shared(tried, holding, turned):
                 return replace(found, states=tuple(tried[k] for k in chosen))
-        if found.at_limits is not None:  # friction that is at its limit says how the load is shared
-            return found.at_limits
+        at_limits = found.at_limits  # friction that is at its limit may say how the load is shared
+        if at_limits is not None and self._is_shared(self._on_every(chosen, at_limits), holding, turned):
+            return at_limits
         raise self._contradiction(REFUSED[UNDETERMINED], chosen, _SHARES)
 
     def _is_shared(self, states: list[State], holding: list[int], turned: Collection[int]) -> bool:
