@@ -305,6 +305,11 @@ def test_a_share_that_only_rows_nearly_alike_hold_is_none() -> None:
     assert run_trial("sets", 990300129)[0].findings == ()
 
 
+def test_a_share_by_friction_at_its_limit_is_none_where_another_place_rubs_too_much() -> None:
+    """With one of two at its limit the least forces let the other rub by 14 % of the weight more than it may."""
+    assert run_trial("sets", 786000407)[0].findings == ()
+
+
 @FORMS
 def test_a_crate_that_a_growing_force_pushes_off_its_middle_rests_until_no_share_is_known(form: str) -> None:
     """Its corners, all of one part, reach their limits one by one: each slipped and stuck again without end."""
