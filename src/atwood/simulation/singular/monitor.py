@@ -9,6 +9,7 @@ another way the run goes on from their end.
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -369,24 +370,24 @@ class SingularityMonitor(Branches):
             if rest is not None:
                 self.agreed.append(rest)
                 continue
-            places = self._closest(max(i - 1, 0), min(i + 1, len(away) - 1)) if is_least else []
-            found, passed = None, -np.inf
-            for near, least in places:  # of places close to each other one look may see several
-                one = self._pass(near, least, failed) if near > passed else None
-                if one is None:
-                    continue
-                if not self._went_along(one):
-                    return one
-                found, passed = one, near if one.path is None else one.path.end
-                self.agreed.append(one)
-            heading = self._heading(i) if found is None else None
-            found = None if heading is None else self._pass(*heading, failed)
-            if found is None:
-                continue
-            if not self._went_along(found):
-                return found
-            self.agreed.append(found)
+            for found in self._crossings_at(i, is_least, failed):
+                if not self._went_along(found):
+                    return found
+                self.agreed.append(found)
         return None
+
+    def _crossings_at(self, i: int, is_least: bool, failed: bool) -> Iterator[SingularCrossing]:
+        """Yield the crossings that a look sees, of places close to each other several, or the one that was ahead."""
+        passed = -np.inf
+        for near, least in self._closest(max(i - 1, 0), min(i + 1, len(self._away) - 1)) if is_least else []:
+            found = self._pass(near, least, failed) if near > passed else None
+            if found is not None:
+                passed = near if found.path is None else found.path.end
+                yield found
+        heading = self._heading(i) if passed == -np.inf else None
+        found = None if heading is None else self._pass(*heading, failed)
+        if found is not None:
+            yield found
 
     def _heading(self, i: int) -> tuple[float, float] | None:
         """Return when the motion before a look would have come to a singular position about then; None if not.
