@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from atwood import Component, Point, Scalar, Scene, connector, event, parameter, simulate
-from atwood.integrators.event_location import Point as Reading, find_dip
+from atwood.integrators.compiled_location import EventLocator
+from atwood.integrators.event_location import Root
+from atwood.integrators.protocol import ExplicitProblem
 from atwood_library import Ground, Pivot, PointMass, RigidBody, Spring, TorsionSpring
 
 from ..helpers.runs import FORMS
@@ -84,18 +86,25 @@ def test_looking_for_dips_costs_little(form: str) -> None:
     assert result.statistics.event_evaluations < 2 * result.statistics.steps + 20
 
 
-def read(t: float, _: float = 0.0) -> Reading:
+def dips(t: float, *_: object) -> list[float]:
     """Return two dips of one function, and one that touches nothing."""
     bumps = [(0.3, 0.05), (0.8, 0.01)]
-    value = 1.0 - sum(1.001 * math.exp(-(((t - c) / w) ** 2)) for c, w in bumps)
-    slope = sum(2.002 * (t - c) / w**2 * math.exp(-(((t - c) / w) ** 2)) for c, w in bumps)
-    return Reading(t, np.array([value, 2.0]), np.array([slope, 0.0]))
+    return [1.0 - sum(1.001 * math.exp(-(((t - c) / w) ** 2)) for c, w in bumps), 2.0]
 
 
-@pytest.mark.parametrize(("begin", "end", "dips"), [(0.2, 0.36, 0.3), (0.78, 0.815, 0.8), (0.31, 0.78, None)])
-def test_a_narrow_dip_is_found_from_its_slopes(begin: float, end: float, dips: float | None) -> None:
-    found = find_dip(read(begin), read(end), np.array([1.0, 1.0]), read)
-    assert found == (None if dips is None else pytest.approx(dips, abs=0.02))
+def root_between(begin: float, end: float, rough: tuple[int, ...] = ()) -> Root | None:
+    problem = ExplicitProblem(1, lambda t, y: [0.0], events=dips, event_count=2, event_rough=rough)
+    locator = EventLocator(problem, horizon=1.0)
+    locator.restart((begin, np.zeros(1), np.zeros(1)))
+    return locator.search(begin, end, lambda t: (t, np.zeros(1), np.zeros(1)))
+
+
+@pytest.mark.parametrize(("begin", "end", "dip"), [(0.2, 0.36, 0.3), (0.78, 0.815, 0.8), (0.31, 0.78, None)])
+def test_a_narrow_dip_is_found_from_its_slopes(begin: float, end: float, dip: float | None) -> None:
+    found = root_between(begin, end)
+    assert (found is None) == (dip is None)
     if found is not None:
-        assert read(found).values[0] <= 0.0
-    assert find_dip(read(begin), read(end), np.array([0.0, 1.0]), read) is None
+        assert found.events == (-1, 0)
+        assert found.state[0] == pytest.approx(dip, abs=0.02)
+        assert abs(dips(found.state[0])[0]) < 1e-12
+    assert root_between(begin, end, rough=(0,)) is None

@@ -302,7 +302,7 @@ def test_ctrl_c_just_as_compiled_steps_call_python_is_not_lost(sampled: bool) ->
 
     def send(frame: Any, event: str, _: Any) -> None:
         nonlocal sent
-        if event == "call" and frame.f_code.co_name == "call" and frame.f_code.co_filename.endswith("stepper.py"):
+        if event == "call" and frame.f_code.co_name == "call" and frame.f_code.co_filename.endswith("python_calls.py"):
             sent += 1
             if sent == 200:
                 signal.raise_signal(signal.SIGINT)

@@ -1,8 +1,9 @@
-"""Events of compiled functions, located by routines on the dense output: nothing of a search runs in Python."""
+"""Events, located by routines on the dense output: of a search only functions run in Python that are no others."""
 
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from ctypes import c_double, c_int, c_void_p
 from math import inf, nan
 from typing import TYPE_CHECKING
@@ -13,9 +14,11 @@ from atwood.arrays import FloatArray
 from atwood.codegen.llvm.build import RoutineSource, build_code, once
 from atwood.codegen.llvm.module import CodeOptions
 from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Kind
+from atwood.codegen.sundials.events import EVENTS
 from atwood.errors import KernelEvaluationError
-from atwood.integrators.event_location import MOST, ROUNDING, EventLocator, Interpolant, Root
-from atwood.integrators.protocol import ExplicitProblem, ImplicitProblem, State
+from atwood.integrators.event_location import MOST, ROUNDING, Interpolant, Root
+from atwood.integrators.protocol import JUST_HAPPENED, ExplicitProblem, ImplicitProblem, State
+from atwood.integrators.python_calls import PythonCalls
 
 if TYPE_CHECKING:
     from atwood.codegen.llvm.build import Built
@@ -53,6 +56,7 @@ FOUND, NO_STATE, NO_VALUE = 1, 2, 3
 _PLACES = {name: k for k, name in enumerate(FIELDS)}
 _OWN = ("compiled_location", "event_location", "protocol")
 _FILES = ("codegen/tangents.py", *(f"integrators/{name}.py" for name in _OWN))
+_INTERPOLATE = ctypes.CFUNCTYPE(c_int, c_void_p, c_double, c_void_p, c_void_p)
 _SEARCH = ctypes.CFUNCTYPE(c_int, c_void_p, c_double, c_double)
 _RESTART = ctypes.CFUNCTYPE(c_int, c_void_p, c_double)
 
@@ -63,19 +67,22 @@ def _routines() -> Built:
     return build_code([], CodeOptions(level=2), exports=("search", "restart"), routines=source)
 
 
-class CompiledLocator(EventLocator):
-    """The same as an `EventLocator`, by routines.
+class EventLocator:
+    """The signs of a problem's event functions along a solution.
 
     Parameters
     ----------
     problem
         The problem, with its events and their directions.
+    horizon
+        A typical length of the run: what is shorter by the rounding of the arithmetic counts as one moment.
+    signs
+        What is known of each event before the first start; None for what the problem says.
     events
-        The compiled events.
+        The compiled events; None if they are a function in Python.
     interpolation
-        The addresses of a function ``int (void *session, double t, double *y, double *yp)`` and of its session.
-    horizon, signs
-        As of `EventLocator`.
+        With these, the addresses of a function ``int (void *session, double t, double *y, double *yp)`` and of its
+        session.
 
     Attributes
     ----------
@@ -86,12 +93,20 @@ class CompiledLocator(EventLocator):
     def __init__(
         self,
         problem: ImplicitProblem | ExplicitProblem,
-        events: EventData,
-        interpolation: tuple[int, int],
         horizon: float,
-        signs: tuple[int, ...] | None,
+        signs: tuple[int, ...] | None = None,
+        events: EventData | None = None,
+        interpolation: tuple[int, int] = (0, 0),
     ) -> None:
-        count, size = events.count, problem.size
+        count, size, calls = problem.event_count, problem.size, PythonCalls()
+        self._at: Interpolant | None = None  # what a function in Python reads
+        self._calls = calls if events is None else None
+        if events is None:
+            assert problem.events is not None
+            interpolation = calls.address(_INTERPOLATE, self._read, {2: size, 3: size}), 0
+            function, data = calls.address(EVENTS, problem.events, {1: size, 2: size}, (3, count)), 0
+        else:
+            function, data = events.plain, events.address
         self._own = problem.event_signs
         turns, rows, points = len(FIELDS) + 3 * size, len(FIELDS) + 5 * size, (STACK + MOST + 2) * (1 + 2 * count)
         kept = rows + len(ROWS) * count + points
@@ -105,7 +120,7 @@ class CompiledLocator(EventLocator):
         self._row("rough")[list(problem.event_rough)] = 1.0
         self.place = begin = memory.ctypes.data
         arrays = {name: begin + 8 * (len(FIELDS) + k * size) for k, name in enumerate(("y", "yp", "shifted", "turns"))}
-        self._set(interpolate=interpolation[0], session=interpolation[1], events=events.plain, data=events.address)
+        self._set(interpolate=interpolation[0], session=interpolation[1], events=function, data=data)
         self._set(**arrays, rows=begin + 8 * rows, kept=begin + 8 * kept, size=size, count=count)
         self._keep = events
         addresses = _routines().code.addresses
@@ -154,24 +169,34 @@ class CompiledLocator(EventLocator):
         """Know that nothing happened in the first step after the last start."""
         self._set(settling=0)
 
+    def _read(self, _: int | None, t: float, y: FloatArray, yp: FloatArray) -> bool:
+        assert self._at is not None
+        y[:], yp[:] = self._at(t)[1:]
+        return True
+
     def restart(self, state: State) -> None:
         """Take the signs from a new start of the solution."""
+        self._at = lambda _: state
         given, self._given = self._given, ()
         self._row("given")[:] = given or self.handed_on(state[0])
         self._set(is_first=int(bool(given)))
-        self._checked(self._restart(self.place, state[0]))
+        self._run(self._restart, state[0])
 
     def handed_on(self, t: float, ahead: Root | None = None) -> tuple[int, ...]:
         """Return what a start at a time is to know of each event: its sign, or that it has just happened."""
         has_fired = t == self._numbers[_PLACES["fired_at"]]
-        self._signs = _whole(self._row("sign"))
-        self._fired, self._fired_at = [has_fired and one != 0.0 for one in self._row("fired").tolist()], t
-        return super().handed_on(t, ahead)
+        found = _whole(self._row("sign"))
+        if has_fired:
+            found = [JUST_HAPPENED if one else sign for one, sign in zip(self._row("fired"), found, strict=True)]
+        return tuple(found if ahead is None else (-one or sign for one, sign in zip(ahead.events, found, strict=True)))
 
     def search(self, begin: float, end: float, at: Interpolant) -> Root | None:
-        """Return the first root between two times of the last step, or `None`."""
-        self._kept_rows[:] = self._rows
-        return self.found(self._search(self.place, begin, end))
+        """Return the first root between two times of the last step, or `None`.
+
+        After a root the search can go on from the root's time.  Functions in Python read the interpolant `at`.
+        """
+        self._kept_rows[:], self._at = self._rows, at
+        return self.found(self._run(self._search, begin, end))
 
     def forget_search(self) -> None:
         """Know what was known before the last search, as the step in which it searched is another one now."""
@@ -190,10 +215,20 @@ class CompiledLocator(EventLocator):
         state = self.last, y.copy(), yp.copy()
         return Root(state, tuple(_whole(self._row("found"))))
 
+    def _run(self, function: Callable[..., int], *times: float) -> int:
+        """Return the code with which a routine ends, or raise what it says."""
+        calls = self._calls
+        return self._checked(function(self.place, *times) if calls is None else calls.run(function, self.place, *times))
+
     def _checked(self, code: int) -> int:
         """Return a code, or raise what it says."""
         if code in (NO_STATE, NO_VALUE):
             time, bad = self._numbers[_PLACES["root"]], int(self._integers[_PLACES["bad"]])
+            why = None if self._calls is None else self._calls.complaint
+            if why is not None and code == NO_STATE:
+                raise why
+            if why is not None:
+                raise KernelEvaluationError(f"the event functions have no value at t = {time:.9g}: {why}") from why
             what = (
                 "the right-hand side has no value within a step,"
                 if code == NO_STATE

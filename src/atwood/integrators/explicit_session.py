@@ -15,8 +15,8 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, StartError, UsageError
-from atwood.integrators.compiled_location import FOUND, CompiledLocator
-from atwood.integrators.event_location import ROUNDING, EventLocator, Root
+from atwood.integrators.compiled_location import FOUND, EventLocator
+from atwood.integrators.event_location import ROUNDING, Root
 from atwood.integrators.jumps import JumpLog
 from atwood.integrators.protocol import (
     Budget,
@@ -77,7 +77,7 @@ class ExplicitSession(SteppingSession):
     """
 
     _problem: ExplicitProblem
-    _compiled: CompiledLocator | None
+    _compiled: EventLocator | None
 
     def __init__(
         self,
@@ -221,7 +221,7 @@ class ExplicitSession(SteppingSession):
         if self._compiled is not None:
             self._compiled.begin(horizon, signs)
         elif events is not None and (read := self._stepper.interpolation()) is not None:
-            self._compiled = CompiledLocator(problem, events, read, horizon, signs)
+            self._compiled = EventLocator(problem, horizon, signs, events, read)
         return self._compiled or super()._new_locator(horizon, signs)
 
     def nearest(self, t: FloatArray, y: FloatArray, sizes: FloatArray) -> Nearest | None:

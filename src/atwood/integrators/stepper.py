@@ -27,7 +27,7 @@ from atwood.lazy_dataclasses import dataclass, names_of
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventData
     from atwood.integrators.batch import BatchPlaces
-    from atwood.integrators.compiled_location import CompiledLocator
+    from atwood.integrators.compiled_location import EventLocator
     from atwood.integrators.jumps import Jumps
     from atwood.integrators.moments import Changes, Moments
 
@@ -112,7 +112,7 @@ class Stepper(ABC):
         """
         return None
 
-    def leap(self, locator: CompiledLocator, jumps: Jumps, last: float) -> bool:
+    def leap(self, locator: EventLocator, jumps: Jumps, last: float) -> bool:
         """Locate events without Python, up to a last time, and make the jumps that can be made so; whether it can."""
         return False
 

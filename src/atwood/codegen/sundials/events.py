@@ -41,7 +41,7 @@ from atwood.lazy_dataclasses import dataclass
 EVENTS_PLACE = 31
 """Which of the pointers of IDA's user data leads to the data of the events."""
 
-_EVENTS = ctypes.CFUNCTYPE(c_int, c_double, *[c_void_p] * 4)
+EVENTS = ctypes.CFUNCTYPE(c_int, c_double, *[c_void_p] * 4)
 _ARGUMENTS = {"t": NUMBER} | dict.fromkeys(("y", "yp", "values", "data"), ADDRESS)
 
 
@@ -104,7 +104,7 @@ class EventData:
 
     def function(self) -> Callable[[float, NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]:
         """Return the values as a function of (t, y, y')."""
-        call, found, address = _EVENTS(self.plain), np.empty(self.count), self.address
+        call, found, address = EVENTS(self.plain), np.empty(self.count), self.address
         place = found.ctypes.data
 
         def values(

@@ -14,14 +14,13 @@ from collections.abc import Callable, Mapping
 from ctypes import c_double, c_int, c_int64, c_void_p
 from functools import partial
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from atwood.arrays import FloatArray, address_of
 from atwood.codegen.llvm.build import RoutineSource, once
 from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Kind, Routine, Value
-from atwood.errors import KernelEvaluationError
 from atwood.integrators.embedded.tableau import Tableau
 from atwood.integrators.protocol import (
     PROJECTION,
@@ -34,6 +33,7 @@ from atwood.integrators.protocol import (
     StepMonitor,
     absolute_tolerances,
 )
+from atwood.integrators.python_calls import PythonCalls
 from atwood.integrators.stepper import (
     COUNTED,
     LANE_FIELDS,
@@ -50,7 +50,7 @@ from atwood.integrators.stepper import (
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventData
     from atwood.integrators.batch import BatchPlaces
-    from atwood.integrators.compiled_location import CompiledLocator
+    from atwood.integrators.compiled_location import EventLocator
     from atwood.integrators.jumps import Jumps
     from atwood.integrators.moments import Changes, Moments
 
@@ -116,9 +116,7 @@ class CompiledStepper(NativeStepper):
 
     def __init__(self, problem: ExplicitProblem, options: SolverOptions, pair: Tableau) -> None:
         self._size, self._options, self._rows = problem.size, options, pair.rows
-        self._failure: BaseException | None = None
-        self._callbacks: list[object] = []
-        self.interrupted = False
+        self._calls = PythonCalls()
         self._restart: Callable[[float], None] | None = None
         self._faster_events: Callable[[float], int | None] | None = None
         self._jumps: Jumps | None = None
@@ -142,7 +140,9 @@ class CompiledStepper(NativeStepper):
         self._set(longest=options.max_step or inf, horizon=options.horizon)
         if guard is not None:
             self._keep = (self._keep, guard)
-            function = guard.function or self._called(_GUARDS, guard.passes, (1, 2, 4, 5))
+            function = guard.function or self._calls.address(
+                _GUARDS, guard.passes, dict.fromkeys((1, 2, 4, 5), problem.size)
+            )
             self._set(guard=function, guard_data=guard.data)
         first = self._session + 8 * len(FIELDS)
         self._outputs = first, first + 8 * n
@@ -199,7 +199,7 @@ class CompiledStepper(NativeStepper):
         """Say which sign each event has; where it is zero, every step is noticed."""
         self._signs[:] = signs
 
-    def leap(self, locator: CompiledLocator, jumps: Jumps, last: float) -> bool:
+    def leap(self, locator: EventLocator, jumps: Jumps, last: float) -> bool:
         """Locate events without Python, up to a last time, and make the jumps that can be made so."""
         if self._count("locator") != locator.place:
             self._keep, self._jumps = (self._keep, locator), jumps
@@ -282,55 +282,15 @@ class CompiledStepper(NativeStepper):
 
     def _call(self, function: str, *arguments: float) -> int:
         """Call a function of the steps and return its code, or raise what Python functions raised in it."""
-        if not self._calls_python:
-            return super()._call(function, *arguments)
-        from atwood.interrupts import InterruptLater
-
-        with InterruptLater(self):
-            code = super()._call(function, *arguments)
-        failure, self._failure = self._failure, None
-        interrupted, self.interrupted = self.interrupted, False
-        if failure is not None:
-            raise failure
-        if interrupted:
-            raise KeyboardInterrupt
-        return code
+        own = super()._call
+        return self._calls.run(own, function, *arguments) if self._calls_python else own(function, *arguments)
 
     def _in_python(self, problem: ExplicitProblem) -> CompiledRates:
         """Return rates and projection that call Python."""
-        rates = self._called(RATES, problem.rates, (1,), 2)
-        project = 0 if problem.project is None else self._called(PROJECTION, problem.project, (1,), 1)
-        return CompiledRates(rates, project=project, keep=self._callbacks)
-
-    def _called(
-        self, kind: Callable[..., Any], function: Callable[..., Any], arrays: tuple[int, ...], target: int | None = None
-    ) -> int:
-        """Return the address of a function in C that calls one in Python."""
-        size = self._size
-        count = max(arrays) + 1
-
-        def array(place: int) -> FloatArray:
-            return np.ctypeslib.as_array(ctypes.cast(place, ctypes.POINTER(c_double)), (size,))
-
-        def call(*given: Any) -> int:
-            if self._failure is not None or self.interrupted:
-                return 1
-            try:
-                found = function(*(array(one) if k in arrays else one for k, one in enumerate(given[:count])))
-                if target is None:
-                    return 0 if found else 1
-                values = array(given[target])
-                values[:] = found
-            except (KernelEvaluationError, ArithmeticError):
-                return 1
-            except BaseException as error:
-                self._failure = error
-                return 1
-            return 0 if np.isfinite(values).all() else 1
-
-        made = kind(call)
-        self._callbacks.append(made)
-        return ctypes.cast(made, c_void_p).value or 0
+        size, calls = problem.size, self._calls
+        rates = calls.address(RATES, problem.rates, {1: size}, (2, size))
+        project = 0 if problem.project is None else calls.address(PROJECTION, problem.project, {1: size}, (1, size))
+        return CompiledRates(rates, project=project, keep=calls)
 
 
 _FILES = (

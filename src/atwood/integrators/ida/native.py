@@ -20,7 +20,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, UsageError
-from atwood.integrators.compiled_location import CompiledLocator
+from atwood.integrators.compiled_location import EventLocator
 from atwood.integrators.event_location import Root
 from atwood.integrators.ida.callbacks import Record, explain
 from atwood.integrators.ida.library import library
@@ -99,7 +99,7 @@ class NativeSession(SteppingSession):
         events, self._reader = None if self._native is None else self._native.watched, None
         if events is not None:  # nothing of a search runs in Python
             self._reader = self._memory.reader()
-            self._locator = CompiledLocator(problem, events, self._reader.interpolation, options.horizon, None)
+            self._locator = EventLocator(problem, options.horizon, None, events, self._reader.interpolation)
         self._stop_time = None if tuning is None else tuning.stop_time
         self._guard = self._memory.library.sparse_guard if linear_solver == "sparse" else nullcontext()
         # Whether IDA itself can tell in which steps something happens.
