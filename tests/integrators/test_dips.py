@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from atwood import Component, Point, Scalar, Scene, connector, event, parameter, simulate
-from atwood.integrators.compiled_location import EventLocator
-from atwood.integrators.event_location import Root
+from atwood.integrators.event_location import EventLocator, Root
 from atwood.integrators.protocol import ExplicitProblem
 from atwood_library import Ground, Pivot, PointMass, RigidBody, Spring, TorsionSpring
 

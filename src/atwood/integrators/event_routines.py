@@ -23,8 +23,23 @@ from atwood.codegen.routines import (
     Variable,
 )
 from atwood.codegen.tangents import FULL, SECANT, STEEP
-from atwood.integrators.compiled_location import FIELDS, FIRST, FOUND, LAST, NO_STATE, NO_VALUE, ROWS, STACK
-from atwood.integrators.event_location import FARTHER, HALF, LARGEST, MOST, NOISE, ROUNDING, SHORTEST
+from atwood.integrators.event_location import (
+    FARTHER,
+    FIELDS,
+    FIRST,
+    FOUND,
+    HALF,
+    LARGEST,
+    LAST,
+    MOST,
+    NO_STATE,
+    NO_VALUE,
+    NOISE,
+    ROUNDING,
+    ROWS,
+    SHORTEST,
+    STACK,
+)
 from atwood.integrators.protocol import JUST_HAPPENED
 
 

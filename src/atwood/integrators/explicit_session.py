@@ -15,8 +15,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, StartError, UsageError
-from atwood.integrators.compiled_location import FOUND, EventLocator
-from atwood.integrators.event_location import ROUNDING, Root
+from atwood.integrators.event_location import FOUND, ROUNDING, EventLocator, Root
 from atwood.integrators.jumps import JumpLog
 from atwood.integrators.protocol import (
     Budget,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import nan
 
 from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Record, Routine, Value, call_kernel, place_of
-from atwood.integrators.compiled_location import FIELDS as LOCATOR
+from atwood.integrators.event_location import FIELDS as LOCATOR
 from atwood.integrators.event_routines import Search
 from atwood.integrators.jumps import ENTRY, FIELDS, TABLE
 

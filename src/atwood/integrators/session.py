@@ -12,8 +12,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, UsageError
-from atwood.integrators.compiled_location import EventLocator
-from atwood.integrators.event_location import Root
+from atwood.integrators.event_location import EventLocator, Root
 from atwood.integrators.jumps import JumpLog
 from atwood.integrators.protocol import (
     Budget,

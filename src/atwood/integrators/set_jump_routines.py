@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from atwood.codegen.routines import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER, Record, Routine, Value
-from atwood.integrators.compiled_location import FIELDS as LOCATOR
-from atwood.integrators.event_location import ALIKE, LONGEST, PASSED, SHORT, TINY
+from atwood.integrators.event_location import ALIKE, FIELDS as LOCATOR, LONGEST, PASSED, SHORT, TINY
 from atwood.integrators.event_routines import Search
 from atwood.integrators.set_jumps import EVENTS, HEAD, JUMP, MOST_IMPACTS
 from atwood.integrators.set_routines import CLOSES, ENTRY, FIELDS, LONG, Sets, write_sets

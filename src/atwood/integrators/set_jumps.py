@@ -115,7 +115,7 @@ class SetLog(JumpLog):
         return made
 
 
-_OWN = ("compiled_location", "event_location", "event_routines", "set_jumps", "set_routines")
+_OWN = ("event_location", "event_routines", "set_jumps", "set_routines")
 _FILES = (*(f"integrators/{name}.py" for name in _OWN), "numerics/contact_sets.py")
 
 

@@ -27,7 +27,7 @@ from atwood.lazy_dataclasses import dataclass, names_of
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventData
     from atwood.integrators.batch import BatchPlaces
-    from atwood.integrators.compiled_location import EventLocator
+    from atwood.integrators.event_location import EventLocator
     from atwood.integrators.jumps import Jumps
     from atwood.integrators.moments import Changes, Moments
 

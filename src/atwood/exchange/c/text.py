@@ -17,11 +17,10 @@ from atwood.exchange.c.tables import ENDS, LEADS, NOTED, PASSES, SIDE_KINDS, UPD
 from atwood.expr.core.program import Program
 from atwood.forms.assembly import Assembly
 from atwood.integrators import set_routines as sets
-from atwood.integrators.compiled_location import FIELDS as SEARCH_FIELDS, ROWS as SEARCH_ROWS, STACK
 from atwood.integrators.embedded.rates import write_routines as write_rates
 from atwood.integrators.embedded.stepper import FIELDS
 from atwood.integrators.embedded.steps import write_routines as write_steps
-from atwood.integrators.event_location import MOST
+from atwood.integrators.event_location import FIELDS as SEARCH_FIELDS, MOST, ROWS as SEARCH_ROWS, STACK
 from atwood.integrators.event_routines import write_routines as write_search
 from atwood.integrators.methods.dormand_prince import TABLEAU
 from atwood.integrators.set_routines import write_sets

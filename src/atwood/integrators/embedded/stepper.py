@@ -50,7 +50,7 @@ from atwood.integrators.stepper import (
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventData
     from atwood.integrators.batch import BatchPlaces
-    from atwood.integrators.compiled_location import EventLocator
+    from atwood.integrators.event_location import EventLocator
     from atwood.integrators.jumps import Jumps
     from atwood.integrators.moments import Changes, Moments
 
@@ -295,7 +295,7 @@ class CompiledStepper(NativeStepper):
 
 _FILES = (
     *(f"integrators/embedded/{name}.py" for name in ("dense_output", "stepper", "tableau")),
-    *(f"integrators/{name}.py" for name in ("compiled_location", "event_location", "protocol", "stepper")),
+    *(f"integrators/{name}.py" for name in ("event_location", "protocol", "stepper")),
 )
 
 

@@ -11,11 +11,10 @@ from collections.abc import Callable, Mapping
 from math import inf, nan, prod
 
 from atwood.codegen.routines import ADDRESS, BOOLEAN, INTEGER, NUMBER, Kind, Record, Routine, Value
-from atwood.integrators.compiled_location import FIELDS as LOCATOR, FOUND, NO_STATE, ROWS
 from atwood.integrators.embedded.dense_output import slopes, weighted, write_dense_output, write_polynomial
 from atwood.integrators.embedded.stepper import open_routine
 from atwood.integrators.embedded.tableau import Tableau
-from atwood.integrators.event_location import ROUNDING
+from atwood.integrators.event_location import FIELDS as LOCATOR, FOUND, NO_STATE, ROUNDING, ROWS
 from atwood.integrators.protocol import CROSSED
 from atwood.integrators.stepper import CALM, SAMPLE_ARGUMENTS, STIFF, WIDTH, Memory, write_sample
 

@@ -20,8 +20,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import KernelEvaluationError, UsageError
-from atwood.integrators.compiled_location import EventLocator
-from atwood.integrators.event_location import Root
+from atwood.integrators.event_location import EventLocator, Root
 from atwood.integrators.ida.callbacks import Record, explain
 from atwood.integrators.ida.library import library
 from atwood.integrators.ida.memory import ONE_STEP, ROOT_RETURN, STOPPED_BY_WEIGHTS, TO_TIME, TOO_MUCH_WORK, Counts

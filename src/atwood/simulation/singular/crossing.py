@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray, uneven
 from atwood.codegen.sundials.rank_looks import SMALL, UNEVEN
 from atwood.errors import SolveError
-from atwood.integrators.compiled_location import EventLocator
-from atwood.integrators.event_location import Root
+from atwood.integrators.event_location import EventLocator, Root
 from atwood.integrators.protocol import State
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Constraint
