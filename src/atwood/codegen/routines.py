@@ -397,6 +397,11 @@ class Routine:
         """Return from the routine."""
         self.do("return", *(() if value is None or self.result is None else (self.value(value, self.result),)))
 
+    def give_if(self, condition: Value, value: Operand | None = None) -> None:
+        """Return where a condition holds, with a value that is known before."""
+        with self.when(condition):
+            self.give(value)
+
     @contextmanager
     def when(self, condition: Value) -> Iterator[None]:
         """Do what follows only where a condition holds."""

@@ -274,11 +274,9 @@ def write_routines() -> list[Routine]:
     call_limit = steps.read(0, INTEGER) + job.budget
     with r.forever():
         k = job.run
-        with r.when(k >= job.runs):
-            r.give(0)
+        r.give_if(k >= job.runs, 0)
         taken = steps.read(0, INTEGER)
-        with r.when(taken >= call_limit):
-            r.give(1)
+        r.give_if(taken >= call_limit, 1)
         ended = r.variable(0, CODE)
         with r.when(job.done < 0):
             _begin(r, job, k, taken, ended)
@@ -307,6 +305,5 @@ def _go_on(r: Routine, job: Record, k: Value, call_limit: Value) -> Value:
     values = job.values.at(k * (job.wanted * job.size) + first * job.size)
     code = r.call(job.sample, job.session, job.times.at(first), job.wanted - first, values, job.rates)
     job.done = first + job.filled.read(0, INTEGER)
-    with r.when((code == 1) & (job.steps.read(0, INTEGER) < run_limit)):
-        r.give(1)
+    r.give_if((code == 1) & (job.steps.read(0, INTEGER) < run_limit), 1)
     return code

@@ -72,8 +72,7 @@ def _open(
 def do_or_return(r: Routine, name: str, *arguments: Operand) -> None:
     """Call a routine with the first argument and others, and return with its code where that is not zero."""
     code = r.call(name, r.arguments[0], *arguments)
-    with r.when(code != 0):
-        r.give(code)
+    r.give_if(code != 0, code)
 
 
 def _sign(r: Routine, value: Value) -> Value:
@@ -92,8 +91,7 @@ def _values(r: Routine, m: Search, time: Value, state: Value, target: str) -> No
 def _read() -> Routine:
     """Read state and values at a time, unless they are there."""
     r, m, (time,) = _open("read", {"time": NUMBER})
-    with r.when(time == m.here):
-        r.give(0)
+    r.give_if(time == m.here, 0)
     m.here = nan
     code = r.call(m.interpolate, m.session, time, m.y, m.yp)
     y, yp, known = m.y, m.yp, m.row("known")
@@ -101,8 +99,7 @@ def _read() -> Routine:
     with r.count(m.size) as i:
         is_bad.now = is_bad.now | ~(r.is_finite(y[i]) & r.is_finite(yp[i]))
     m.root = time
-    with r.when(is_bad.now):
-        r.give(NO_STATE)
+    r.give_if(is_bad.now, NO_STATE)
     _values(r, m, time, y, "known")
     with r.count(m.count) as i, r.when(known[i] != known[i]):
         m.bad = i
@@ -185,8 +182,7 @@ def _dip() -> Routine:
         one = r.choose((rough[i] != 0.0) | (begin < blind[i]), 0.0, sign[i])
         dipping[i] = one
         some.now = some.now | (one != 0.0)
-    with r.when(~(some.now & (begin < end))):
-        r.give(0)
+    r.give_if(~(some.now & (begin < end)), 0)
     a, last, stride, whole = m.point(FIRST), m.point(LAST), m.stride, end - begin
     r.copy(a, last, stride)
     with r.when(last[0] != begin):
@@ -196,8 +192,7 @@ def _dip() -> Routine:
     depth, count, share = r.variable(0, INTEGER), r.variable(0, INTEGER), r.variable(FULL)
     with r.forever() as loop:
         deep = depth.now
-        with r.when((deep < 0) | (count.now >= MOST)):
-            r.give(0)
+        r.give_if((deep < 0) | (count.now >= MOST), 0)
         b = m.point(deep + STACK)
         width = b[0] - a[0]
         low = r.call("lowest", r.arguments[0], a, b, share.now, result=NUMBER)
@@ -334,8 +329,7 @@ def _happening() -> Routine:
         passed = (crossed[i] != 0.0) & (sign[i] != old[i]) & ((carried[i] != 0.0) | ~is_start)
         later[i] = _flag(r, passed)
         some.now = some.now | passed
-    with r.when(~some.now):
-        r.give(0)
+    r.give_if(~some.now, 0)
     m.fired_at = time
     with r.count(m.count) as i:
         fired[i], found[i] = later[i], (0.0 - old[i]) * later[i]
@@ -363,8 +357,7 @@ def _first_root() -> Routine:
     changed = r.variable(False, BOOLEAN)
     with r.count(m.count) as i:
         changed.now = changed.now | ~(known[i] * sign[i] > 0.0)
-    with r.when(~changed.now):
-        r.give(0)
+    r.give_if(~changed.now, 0)
     tolerance = (r.size(end) + (end - begin)) * (4 * ROUNDING)
     moment = r.most(tolerance * 25.0, m.moment)
     with r.forever():
@@ -384,8 +377,7 @@ def _first_root() -> Routine:
         divide(m.before)
         after = r.least(time + moment, end)  # what follows within rounding belongs to the same moment
         do_or_return(r, "happening", time, after, moment)
-        with r.when(after >= end):
-            r.give(0)
+        r.give_if(after >= end, 0)
         from_.now = after
     return r
 

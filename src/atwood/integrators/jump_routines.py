@@ -30,8 +30,7 @@ def write_routines() -> list[Routine]:
     size = m.coordinates + m.speeds
     one = _alone(r, m, search)
     row = r.truncated(m.table[one])
-    with r.when(row < 0):
-        r.give(1)
+    r.give_if(row < 0, 1)
     gaps, y, room = m.gaps, search.y, m.room
     picks = room.at(size + gaps * 3 + 1)
     with r.count(gaps) as i:
@@ -40,8 +39,7 @@ def write_routines() -> list[Routine]:
     _strike(r, m, t, y, picks)
     before, after, response, impulse = (room.at(size + gaps * k) for k in range(4))
     slow, gains = m.table[search.count * TABLE.index("slow") + one], before[row] + after[row] > after[row] * _MORE
-    with r.when(~((before[row] + slow < 0.0) & (after[row] > slow)) | gains):
-        r.give(1)
+    r.give_if(~((before[row] + slow < 0.0) & (after[row] > slow)) | gains, 1)
     _leave_series(r, m, t, response)
     # Times are rounded, and always past the zero: the impact is made there, and what follows takes up the rest.
     late = r.least(r.most((search.row("known")[one] - m.shift[one]) / before[row], 0.0), search.after - search.before)
@@ -49,8 +47,7 @@ def write_routines() -> list[Routine]:
     with r.count(size) as i:
         there[i] = y[i] - late * search.yp[i]
     _strike(r, m, t - late, there, picks)
-    with r.when(r.call(m.rates, t, room, there, m.rates_data) != 0):
-        r.give(1)
+    r.give_if(r.call(m.rates, t, room, there, m.rates_data) != 0, 1)
     r.copy(search.yp, there, size)
     with r.count(size) as i:
         room[i] = room[i] + late * there[i]
@@ -69,8 +66,7 @@ def write_routines() -> list[Routine]:
 def _strike(r: Routine, m: Record, t: Value, y: Value, picks: Value) -> None:
     """Make an impact at a state."""
     inputs = [place_of(r, t), y, y.at(m.coordinates), picks]
-    with r.when(call_kernel(r, m.program, inputs, m.derived, m.scratch, [m.room]) != 0):
-        r.give(1)
+    r.give_if(call_kernel(r, m.program, inputs, m.derived, m.scratch, [m.room]) != 0, 1)
 
 
 def _alone(r: Routine, m: Record, search: Search) -> Value:
@@ -79,11 +75,9 @@ def _alone(r: Routine, m: Record, search: Search) -> Value:
     one, many = r.variable(0, INTEGER), r.variable(0, INTEGER)
     with r.count(search.count) as i, r.when(found[i] != 0.0):
         one.now, many.now = i, many.now + 1
-    with r.when((many.now != 1) | (m.logged >= m.capacity)):
-        r.give(1)
+    r.give_if((many.now != 1) | (m.logged >= m.capacity), 1)
     which, small = one.now, m.table.at(search.count * TABLE.index("small"))
-    with r.when(shift[which] * 2.0 > small[which]):
-        r.give(1)
+    r.give_if(shift[which] * 2.0 > small[which], 1)
     with r.count(search.count) as i, r.when((i != which) & ~(known[i] - shift[i] > small[i])):
         r.give(1)
     return which
@@ -118,8 +112,7 @@ def _leave_series(r: Routine, m: Record, t: Value, response: Value) -> None:
     with r.count(spans.now - 1):
         power.now = power.now * share
     ends_soon = newest.now < oldest.now * power.now
-    with r.when((spans.now >= SPANS[0]) & (newest.now > 0.0) & ends_soon):
-        r.give(1)
+    r.give_if((spans.now >= SPANS[0]) & (newest.now > 0.0) & ends_soon, 1)
 
 
 def _watch_again(r: Routine, m: Record, search: Search, one: Value, t: Value) -> None:

@@ -239,8 +239,7 @@ def write_batch(runs: int, memory: Callable[[Value], Memory], tolerances: str, l
         with r.when(due != 0):
             r.call("show", r.arguments[0], due, result=None)
             r.repeat(turns)
-        with r.when(m.active == 0):
-            r.give(0)
+        r.give_if(m.active == 0, 0)
         with r.when(turn.now >= job.budget):
             r.give(1)
         turn.now = turn.now + 1

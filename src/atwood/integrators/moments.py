@@ -215,8 +215,7 @@ def write_routines() -> list[Routine]:
         with r.when(job.changes == 0):
             _sample(r, job, most)
         _change(r, job)
-        with r.when((job.steps.read(0, INTEGER) >= most) | (job.now >= job.pause)):
-            r.give(PAUSES)
+        r.give_if((job.steps.read(0, INTEGER) >= most) | (job.now >= job.pause), PAUSES)
     return [r]
 
 
@@ -227,8 +226,7 @@ def _sample(r: Routine, job: Record, most: object) -> None:
     job.limit.write(0, most, INTEGER)  # type: ignore[arg-type]
     code = r.call(job.sample, job.session, job.times.at(row), end - row, job.values.at(row * size), job.rates)
     job.row = row + job.filled.read(0, INTEGER)
-    with r.when(code != 0):
-        r.give(code)
+    r.give_if(code != 0, code)
     with r.when(k + 1 == job.count):
         r.give(DONE)
     r.copy(job.saved, job.steps, job.counts)
@@ -240,8 +238,7 @@ def _sample(r: Routine, job: Record, most: object) -> None:
         r.when(r.call(job.project, job.moments[k + 1], state, job.project_data) != 0),
     ):
         r.give(REFUSED)
-    with r.when(job.which.read(k + 1, INTEGER) < 0):
-        r.give(ASKS)
+    r.give_if(job.which.read(k + 1, INTEGER) < 0, ASKS)
 
 
 def _change(r: Routine, job: Record) -> None:
@@ -262,6 +259,5 @@ def _change(r: Routine, job: Record) -> None:
         with r.when(~r.is_null(prologue)):
             r.call(prologue, parameters, derived, job.scratch, result=None)
     job.horizon.write(0, job.end - t)
-    with r.when(r.call(job.begin, job.session, t, state) != 0):
-        r.give(REFUSED)
+    r.give_if(r.call(job.begin, job.session, t, state) != 0, REFUSED)
     job.changes, job.row = 0, row + 1

@@ -46,8 +46,7 @@ def _sharpen() -> Routine:
     time, y, yp, found, shift, size = search.root, search.y, search.yp, search.row("found"), m.shift, search.size
     now, before, since = search.row("lower"), search.row("upper"), time - m.began
     m.late, m.now, m.then = 0.0, time, time
-    with r.when(~(since > 0.0)):
-        r.give(0)
+    r.give_if(~(since > 0.0), 0)
     short, shifted = since * SHORT, search.shifted
     with r.count(size) as j:
         shifted[j] = y[j] - short * yp[j]
@@ -141,12 +140,10 @@ def _meet() -> Routine:
     with r.count(count) as k:
         states[k], states[count + k] = closed[k] * 2.0, 0.0
         some.now = some.now | (closed[k] != 0.0)
-    with r.when(~some.now):
-        r.give(0)
+    r.give_if(~some.now, 0)
     r.call("take_states", r.arguments[0], states)
     r.copy(near, y, size)
-    with r.when(r.call(m.project, m.then, near, m.project_data) != 0):
-        r.give(1)
+    r.give_if(r.call(m.project, m.then, near, m.project_data) != 0, 1)
     r.copy(y, near, sets.coordinates)
     r.give(0)
     return r
@@ -158,8 +155,7 @@ def _arm() -> Routine:
     shift, values, small = m.shift, search.row("others"), m.event("small")
     with r.count(search.count) as i:
         shift[i] = 0.0
-    with r.when(r.call(search.events, m.now, sets.y, search.yp, values, search.data) != 0):
-        r.give(1)
+    r.give_if(r.call(search.events, m.now, sets.y, search.yp, values, search.data) != 0, 1)
     rates = sets.row("rates")
     with r.count(search.count) as i:
         value = values[i]
@@ -167,8 +163,7 @@ def _arm() -> Routine:
         is_near = r.size(value) <= small[i]
         is_gap = (m.event("code")[i] == float(CLOSES)) & (m.event("placed")[i] != 0.0)
         opens = is_gap & is_near & (rates[row] * m.time > small[i])
-        with r.when((value < small[i] * -PASSED) & ~opens):
-            r.give(1)
+        r.give_if((value < small[i] * -PASSED) & ~opens, 1)
         margin = r.choose(opens, r.choose(value > 0.0, 0.0, r.size(value) * 2.0 + TINY), small[i])
         shift[i] = r.choose(is_near, margin, 0.0)
     r.give(0)
@@ -214,8 +209,7 @@ def _jump() -> Routine:
     r, m, search, sets = _open("jump", exported=True)
     place, locator, t = r.arguments
     size, y, states, count = m.size, sets.y, sets.unit("next"), sets.count
-    with r.when((m.logged >= m.capacity) | (t - m.began <= m.shortest)):
-        r.give(1)
+    r.give_if((m.logged >= m.capacity) | (t - m.began <= m.shortest), 1)
     found, happens = search.row("found"), r.variable(False, BOOLEAN)
     with r.count(search.count) as i:
         happens.now = happens.now | (found[i] != 0.0)

@@ -69,8 +69,7 @@ def write_routines(kernel: str = "kernel") -> list[Routine]:
     arguments = {"t0": NUMBER, "y0": ADDRESS, "p0": ADDRESS, "t1": NUMBER, "y1": ADDRESS, "p1": ADDRESS}
     r = Routine("guard", arguments | {"data": ADDRESS}, exported=True)
     t0, y0, p0, t1, y1, p1, data = r.arguments
-    with r.when(t1 - t0 <= data[3]):
-        r.give(0)
+    r.give_if(t1 - t0 <= data[3], 0)
     inputs, share = [place_of(r, t0), y0, p0, place_of(r, t1), y1, p1, data.at(2)], r.array(1)
     call_kernel(r, kernel, inputs, data.read(0, ADDRESS), data.read(1, ADDRESS), [share])
     r.give((~(share[0] <= 1.0)).code())

@@ -468,17 +468,12 @@ def write_sample(r: Routine, m: Record, width: Operand) -> Routine:
     with r.forever():
         now = i.now
         m.filled = now
-        with r.when(now >= wanted):
-            r.give(0)
+        r.give_if(now >= wanted, 0)
         moment, place = times[now], now * width
         m.stop = moment
-        steps: tuple[Callable[[], Value], ...] = (
-            lambda: r.call("run", session),
-            lambda: r.call("interpolate", session, moment, ys.at(place), yps.at(place)),
-        )
-        for step in steps:
-            code = step()
-            with r.when(code != 0):
-                r.give(code)
+        code = r.call("run", session)
+        r.give_if(code != 0, code)
+        code = r.call("interpolate", session, moment, ys.at(place), yps.at(place))
+        r.give_if(code != 0, code)
         i.now = now + 1
     return r

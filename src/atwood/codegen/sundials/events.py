@@ -222,8 +222,7 @@ def _look() -> Routine:
     slopes, others, shifted = (lasts.at(count * k) for k in (1, 2, 3))
     own = Record(memory, dict.fromkeys(("last", "length", "said"), NUMBER))
     width = t - own.last
-    with r.when((width <= 0.0) | (code != 0)):
-        r.give(code)
+    r.give_if((width <= 0.0) | (code != 0), code)
     length = r.most(width, own.length * 0.5)
     own.length, own.last = length, t
     past = length * SECANT

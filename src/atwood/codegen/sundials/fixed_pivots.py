@@ -163,11 +163,9 @@ def _setup(layout: SundialsLayout) -> Routine:
         r.call("factorise_fixed", block, result=None)
         fails = r.call("fails_fixed", block)
         slots.failed = fails.integer()
-        with r.when(fails == 0):
-            r.give(0)
+        r.give_if(fails == 0, 0)
         code = r.call(slots.mend)
-        with r.when(code != AGAIN):
-            r.give(code)
+        r.give_if(code != AGAIN, code)
     return r
 
 

@@ -78,8 +78,7 @@ def _smallest() -> Routine:
     total = r.variable(0.0)
     with r.count(rows * columns) as i:
         total.now = total.now + a[i]
-    with r.when(~r.is_finite(total.now)):
-        r.give(nan)
+    r.give_if(~r.is_finite(total.now), nan)
     with r.count(rows) as k:
         row, below = a.at(k * columns), a.at((k + 1) * columns + k)
         half, square = _reflect(r, row.at(k), columns - k, 1)
@@ -284,8 +283,7 @@ def _judge(opened: Opened) -> Routine:
         with r.when(note[shape.measured] < 0.0):
             note[shape.measured] = r.call("measure", note[0], note.at(1), given, result=NUMBER)
         away = note[shape.measured]
-        with r.when(~r.is_finite(away)):
-            r.give(1)
+        r.give_if(~r.is_finite(away), 1)
         largest.now = r.most(away, largest.now)
     state.largest = largest.now
     asks, last = r.variable(0, BOOLEAN), count - 1 + at_end
@@ -304,12 +302,10 @@ def _judge(opened: Opened) -> Routine:
         is_least = is_least & (away <= behind.now)
         falls = (away <= fallen) & (fallen < before.now) & (before.now < inf)
         asks.now = asks.now | ((note[0] > state.judged) & (is_least | falls))
-    with r.when(asks.now):
-        r.give(1)
+    r.give_if(asks.now, 1)
     with r.when(last > 0):
         state.judged = notes[(last - 1) * shape.note]
-    with r.when(at_end != 0):
-        r.give(0)
+    r.give_if(at_end != 0, 0)
     _look_ahead(r, (data, state, given), shape, notes.at((count - 1) * shape.note))
     r.give(0)
     return r
@@ -345,14 +341,12 @@ def _is_clear(opened: Opened) -> Routine:
             one, other = (data["notes"].at((least - back - k) * shape.note) for k in (1, 0))
             before, away = one[shape.measured], other[shape.measured]
             there = other[0] + (other[0] - one[0]) * away / (before - away)
-            with r.when((away < before) & (there <= end)):
-                r.give(0)
+            r.give_if((away < before) & (there <= end), 0)
     limit = largest * CLEAR
-    with r.when(~(data["notes"][least * shape.note + shape.measured] > limit)):
-        r.give(0)
+    r.give_if(~(data["notes"][least * shape.note + shape.measured] > limit), 0)
     for back in (0, 1):
-        with r.when(least >= back), r.when(~(r.call("between", given, least - back, result=NUMBER) > limit)):
-            r.give(0)
+        with r.when(least >= back):
+            r.give_if(~(r.call("between", given, least - back, result=NUMBER) > limit), 0)
     r.give(1)
     return r
 
@@ -377,8 +371,7 @@ def _heads(opened: Opened) -> Routine:
     given = r.arguments[0]
     data, state, shape = opened(given)
     count = r.truncated(state.count)
-    with r.when(count < 2):
-        r.give(0)
+    r.give_if(count < 2, 0)
     one, other = (data["notes"].at((count - k) * shape.note) for k in (2, 1))
     for note in (one, other):
         with r.when(note[shape.measured] < 0.0):
@@ -394,8 +387,7 @@ def _look_ahead(r: Routine, of: tuple[dict[str, Value], Record, Value], shape: R
     data, state, given = of
     begin, end, points = AHEAD
     stride, now, rates = state.stride, note[0], note.at(shape.size + shape.coordinates + 1)
-    with r.when(~((stride < inf) & (note[shape.measured] > 0.0))):
-        r.give(0)
+    r.give_if(~((stride < inf) & (note[shape.measured] > 0.0)), 0)
     q, away, least = data["ahead"], r.array(points), r.variable(0, INTEGER)
     with r.count(points) as k:
         later = stride * (begin + k.number() * ((end - begin) / (points - 1)))
@@ -403,19 +395,16 @@ def _look_ahead(r: Routine, of: tuple[dict[str, Value], Record, Value], shape: R
             q[i] = note[1 + i] + (note[shape.coordinates + (1 + i)] + 0.5 * rates[i] * later) * later
         t = r.least(r.most(now + later, state.start), state.start + state.whole)
         away[k] = r.call("measure", t, q, given, result=NUMBER)
-        with r.when(~r.is_finite(away[k])):
-            r.give(1)
+        r.give_if(~r.is_finite(away[k]), 1)
         with r.when((state.passes != 0.0) & (now + later < state.start)):
             away[k] = inf  # what has been passed just now is not ahead
         with r.when(away[k] < away[least.now]):
             least.now = k
-    with r.when((least.now == 0) | (least.now == points - 1)):
-        r.give(0)
+    r.give_if((least.now == 0) | (least.now == points - 1), 0)
     one, here, other = (away[least.now + k] for k in (-1, 0, 1))
     higher, lower = r.most(one, other), r.least(one, other)
     uneven = r.size((higher - here) - (here + lower))
-    with r.when(~(uneven < UNEVEN * (higher - here))):
-        r.give(0)
+    r.give_if(~(uneven < UNEVEN * (higher - here)), 0)
     share = r.choose(one > other, here, 0.0 - here) / (here + lower)
     state.near = now + stride * (begin + (least.now.number() + share) * ((end - begin) / (points - 1)))
     r.give(COMES)

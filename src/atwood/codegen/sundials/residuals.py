@@ -277,8 +277,7 @@ def _copy_pattern(
     """Copy the pattern into a matrix in compressed columns; -1 where that has no room."""
     kind = index_kind(layout)
     room = matrix.read(0, ADDRESS).at(layout.sparse_room // 8).read(0, kind)
-    with r.when(room < rows[1]):
-        r.give(-1)
+    r.give_if(room < rows[1], -1)
     r.copy(array_of(matrix, layout.sparse_values), *rows, kind)
     r.copy(array_of(matrix, layout.sparse_pointers), *starts, kind)
 

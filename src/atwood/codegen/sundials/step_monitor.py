@@ -596,12 +596,10 @@ def _drive() -> Routine:
         looks = following <= t_out
         target = r.choose(looks, following, t_out)
         flag = r.call(solve, memory, target, reached, y, yp, r.value(1, CODE))
-        with r.when(~(looks & (flag == 0))):
-            r.give(flag)
+        r.give_if(~(looks & (flag == 0)), flag)
         with r.when(r.call("look", reached[0], y_at, yp_at, data) != 0):
             r.give(NOTICED)
-        with r.when(taken() >= allowed):
-            r.give(_WORKED_ENOUGH)
+        r.give_if(taken() >= allowed, _WORKED_ENOUGH)
     return r
 
 
@@ -639,23 +637,19 @@ def _fill(looks: bool) -> Routine:
     r.call(current, memory, end)
     with r.forever():
         i = filled.read(0, INTEGER)
-        with r.when(i >= wanted):
-            r.give(0)
+        r.give_if(i >= wanted, 0)
         t = times[i]
         is_read = t <= end[0]
         with r.when(is_read if state is None else is_read & (t < state.next)):
-            with r.when(r.call(dky, memory, t, r.value(0, CODE), y) != 0):
-                r.give(UNREADABLE)
+            r.give_if(r.call(dky, memory, t, r.value(0, CODE), y) != 0, UNREADABLE)
             r.copy(table.at(i * size), y_at, size)
             filled.write(0, i + 1)
-            with r.when(taken() >= allowed):
-                r.give(PAUSED)
+            r.give_if(taken() >= allowed, PAUSED)
         with r.otherwise():
             if state is None:
                 flag = r.call(solve, memory, t, reached, y, yp, r.value(1, CODE))
             else:
                 flag = r.call("drive", solve, steps, memory, t, reached, y, yp, y_at, yp_at, allowed, data)
             r.call(current, memory, end)
-            with r.when(flag != 0):
-                r.give(flag)
+            r.give_if(flag != 0, flag)
     return r

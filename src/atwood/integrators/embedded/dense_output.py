@@ -41,8 +41,7 @@ def slopes(
 def _densify(pair: Tableau) -> Routine:
     """Make the dense output of the last step, unless it is there; 1 where there is none."""
     r, m, () = open_routine(pair, "densify")
-    with r.when(m.is_dense != 0):
-        r.give(0)
+    r.give_if(m.is_dense != 0, 0)
     h = m.h
     slopes(pair, r, m, range(pair.end + 1, len(pair.nodes)), m.t_old, h, lambda: r.give(1))
     write_terms(pair, m, h)
@@ -99,8 +98,7 @@ def _interpolate(pair: Tableau) -> Routine:
             r.copy(y_out, m.row(values), m.size)
             r.copy(yp_out, m.row(rates), m.size)
             r.give(0)
-    with r.when(r.call("densify", m.session) != 0):
-        r.give(3)
+    r.give_if(r.call("densify", m.session) != 0, 3)
     r.call("polynomial", m.session, (time - m.t_old) / m.h)
     trial = m.row("trial")
     r.copy(y_out, trial, m.size)

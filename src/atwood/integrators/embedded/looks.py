@@ -143,8 +143,7 @@ def _look(pair: Tableau, runs: int) -> Routine:
     """Return the lanes in whose last step an event may have happened, of those whose step was kept."""
     r, m, own, tables, _ = _open(pair, runs, "look", {}, INTEGER)
     kept, width = m.arrived & m.active, m.t - m.t_old
-    with r.when(kept == 0):
-        r.give(0)
+    r.give_if(kept == 0, 0)
     found, fresh = r.variable(0, INTEGER), kept & (m.taken == 1.0).integer()
     with r.when(fresh != 0):
         found.now = r.call("begin_looks", m.session, fresh, width, result=INTEGER) & fresh

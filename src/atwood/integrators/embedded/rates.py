@@ -68,14 +68,12 @@ def _project(coordinates: int | None, speeds: int | None) -> Routine:
     time = place_of(r, t)
     with r.count(STEPS):
         inputs, outputs = [time, y, y.at(first)], [room, room.at(first), moved]
-        with r.when(call_kernel(r, "nearer", inputs, derived, scratch, outputs) != 0):
-            r.give(1)
+        r.give_if(call_kernel(r, "nearer", inputs, derived, scratch, outputs) != 0, 1)
         r.copy(y, room, total)
         largest = r.variable(0.0)
         with r.count(last) as i:
             largest.now = r.most(r.size(moved[i]), largest.now)
-        with r.when(largest.now <= MET):
-            r.give(0)
+        r.give_if(largest.now <= MET, 0)
     r.give(r.value(1, CODE))
     return r
 

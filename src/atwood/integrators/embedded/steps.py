@@ -196,8 +196,7 @@ def _begin(pair: Tableau) -> Routine:
     m.edgy, m.calm, m.looks, m.waits, m.crossed = 0, 0, m.steps, 0, 0
     r.copy(m.row("y"), start, m.size)
     r.copy(m.row("y_old"), start, m.size)
-    with r.when(r.call("evaluate", m.session, t, m.row("y"), m.row("end slope")) != 0):
-        r.give(_NO_RATES)
+    r.give_if(r.call("evaluate", m.session, t, m.row("y"), m.row("end slope")) != 0, _NO_RATES)
     given = m.first
     with r.when(given > 0.0):
         m.next = r.least(given, m.longest)
@@ -213,8 +212,7 @@ def _look(pair: Tableau) -> Routine:
     count, values, signs = m.event_count, m.values, m.signs
     with r.when(count > 0):
         code = r.call(m.events, t, m.row("y"), m.row("end slope"), values, m.events_data)
-        with r.when(code != 0):
-            r.give(1)
+        r.give_if(code != 0, 1)
         with r.count(count) as i, r.when(~(values[i] * signs[i] > 0.0)):
             r.give(1)
     r.give(0)
@@ -230,16 +228,14 @@ def _watched(pair: Tableau) -> Routine:
     """
     r, m, (t_new,) = open_routine(pair, "watched", {"t_new": NUMBER})
     watch, t, steps = m.watch, m.t_old, m.steps
-    with r.when(r.is_null(watch)):
-        r.give(0)
+    r.give_if(r.is_null(watch), 0)
     with r.when(~(t < t_new)):
         r.give(0)
     y, end, trial, last = m.row("y"), m.row("end slope"), m.row("trial"), m.row("last")
     with r.forever():
         due = m.due[0]
         is_within = due <= t_new
-        with r.when(~is_within & (steps - m.looks < _PATIENCE)):
-            r.give(0)
+        r.give_if(~is_within & (steps - m.looks < _PATIENCE), 0)
         looked, inside = m.looked, r.variable(False, BOOLEAN)
         with r.when(is_within & ~(t_new - looked <= (due - looked) * _STRETCH)):
             is_dense = r.call("densify", m.session) == 0
@@ -270,8 +266,7 @@ def _project(pair: Tableau) -> Routine:
     """
     r, m, (t,) = open_routine(pair, "held", {"t": NUMBER})
     project = m.project
-    with r.when(r.is_null(project)):
-        r.give(0)
+    r.give_if(r.is_null(project), 0)
     r.give(r.call(project, t, m.row("trial"), m.project_data))
     return r
 
@@ -280,8 +275,7 @@ def _guarded(pair: Tableau) -> Routine:
     """Ask what judges steps about one that is good enough otherwise; 0 where it is good."""
     r, m, (t, t_new) = open_routine(pair, "guarded", {"t": NUMBER, "t_new": NUMBER})
     guard = m.guard
-    with r.when(r.is_null(guard)):
-        r.give(0)
+    r.give_if(r.is_null(guard), 0)
     ends = (t, m.row("y"), m.row(0), t_new, m.row("trial"), m.row("end slope"))
     r.give(r.call(guard, *ends, m.guard_data))
     return r
@@ -338,8 +332,7 @@ def _attempt(pair: Tableau) -> Routine:
     with r.forever() as attempts:
         h.now = r.least(h.now, longest)
         step = h.now
-        with r.when(~((step > least) & (step >= 1e-300))):
-            r.give(_TOO_SMALL)
+        r.give_if(~((step > least) & (step >= 1e-300)), _TOO_SMALL)
 
         def retreat() -> None:
             h.now, shortened.now = step * RETREAT, True
@@ -389,12 +382,10 @@ def _run(pair: Tableau) -> Routine:
             with r.when((m.waits == 1) & (m.stop < own.root)):
                 own.told = m.stop
                 r.give(_REACHED)
-            with r.when(r.call("leap", m.session) != 0):
-                r.give(_NOTICED)
+            r.give_if(r.call("leap", m.session) != 0, _NOTICED)
             r.repeat(steps)
         with r.when(m.crossed != 0):
-            with r.when(m.stop <= m.behind[0]):
-                r.give(_REACHED)
+            r.give_if(m.stop <= m.behind[0], _REACHED)
             with r.when(r.call("begin", m.session, m.behind[1], m.behind.at(2)) != 0):
                 r.give(_TOO_SMALL)
         t = m.t
@@ -402,8 +393,7 @@ def _run(pair: Tableau) -> Routine:
             with r.when(locates):
                 own.told = m.stop
             r.give(_REACHED)
-        with r.when(m.steps >= m.limit):
-            r.give(_USED_UP)
+        r.give_if(m.steps >= m.limit, _USED_UP)
         with r.when(r.call("watched", m.session, t) != 0):
             r.give(_NOTICED)
         with r.when(m.crossed != 0):
@@ -422,16 +412,14 @@ def _run(pair: Tableau) -> Routine:
         happens = r.call("look", m.session, t_new) != 0
         with r.when(locates & (happens | (r.call("settles", m.session) != 0))):
             r.call("seek", m.session)
-        with r.when((happens & ~locates) | stiffens | is_seen | (m.waits == 2)):
-            r.give(_NOTICED)
+        r.give_if((happens & ~locates) | stiffens | is_seen | (m.waits == 2), _NOTICED)
     return r
 
 
 def _settles(pair: Tableau) -> Routine:
     """Tell whether nothing is known yet of the first step after a start, or parameters change in the last step."""
     r, m, () = open_routine(pair, "settles")
-    with r.when(r.is_null(m.jump)):
-        r.give(0)
+    r.give_if(r.is_null(m.jump), 0)
     own = Record(m.locator, LOCATOR)
     r.give(((own.settling != 0) | (m.t >= own.change)).code())
     return r
@@ -472,15 +460,13 @@ def _shorten(pair: Tableau) -> Routine:
     """
     r, m, (event,) = open_routine(pair, "shorten", {"event": NUMBER}, exported=True)
     h, short = m.h, (event - m.t_old) * _BEHIND
-    with r.when(~((short < h) & (short > 0.0))):
-        r.give(0)
+    r.give_if(~((short < h) & (short > 0.0)), 0)
     with r.when(r.call("densify", m.session) != 0):
         r.give(0)
     x, term = short / h, _size(r, m, m.row("dense").at(m.padded * (pair.terms - 1)))
     for power in range(pair.terms):
         term = term * (1.0 - x if power % 2 else x)
-    with r.when(~(term > _ROUGH)):
-        r.give(0)
+    r.give_if(~(term > _ROUGH), 0)
     with r.when(r.call("retake", m.session, short) != 0):
         r.call("retake", m.session, h)
     r.give(1)
@@ -494,8 +480,7 @@ def _retake(pair: Tableau) -> Routine:
     r.copy(m.row("y"), m.row("y_old"), m.padded)
     slopes(pair, r, m, range(1, pair.end), m.t_old, h, lambda: r.give(1))
     r.call(f"stage{pair.end}", m.session, h)
-    with r.when(r.call("held", m.session, t) != 0):
-        r.give(1)
+    r.give_if(r.call("held", m.session, t) != 0, 1)
     with r.when(r.call("evaluate", m.session, t, m.row("trial"), m.row("end slope")) != 0):
         r.give(1)
     r.copy(m.row("y"), m.row("trial"), m.padded)
@@ -507,22 +492,18 @@ def _retake(pair: Tableau) -> Routine:
 def _leap(pair: Tableau) -> Routine:
     """Make the jump at the event that waits, and start anew behind it; 1 where Python is to see to it."""
     r, m, () = open_routine(pair, "leap")
-    with r.when(m.waits == 2):
-        r.give(1)
+    r.give_if(m.waits == 2, 1)
     own = Record(m.locator, LOCATOR)
     m.waits = 2
-    with r.when(r.call(m.jump, m.jump_data, m.locator, own.root) != 0):
-        r.give(1)
+    r.give_if(r.call(m.jump, m.jump_data, m.locator, own.root) != 0, 1)
     root = own.root  # it may have become earlier
     horizon = r.choose(m.finish > root, m.finish - root, 1.0)
     m.horizon, own.moment = horizon, horizon * (100.0 * ROUNDING)
     m.found = NO_STATE
-    with r.when(r.call("begin", m.session, root, own.y) != 0):
-        r.give(1)
+    r.give_if(r.call("begin", m.session, root, own.y) != 0, 1)
     code = r.call(m.restart, m.locator, root)
     m.found = code.integer()
-    with r.when(code != 0):
-        r.give(1)
+    r.give_if(code != 0, 1)
     m.waits = 0
     r.give(0)
     return r

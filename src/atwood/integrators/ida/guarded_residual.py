@@ -45,16 +45,15 @@ def write_routines(layout: SundialsLayout) -> list[Routine]:
     values, rates = (array_of(one, layout.vector_data) for one in (y, yp))
     size, kept, tried, verdict = own.size, own.kept, own.tried, own.verdict
     before = tried[0]
-    with r.when(t == before), r.when(verdict.read(0, INTEGER) != 0):
-        r.give(1)
+    with r.when(t == before):
+        r.give_if(verdict.read(0, INTEGER) != 0, 1)
     with r.when(~(t == before)):
         with r.when(t > before):
             r.copy(kept, tried, size * 2 + 1)
         tried[0] = t
         code = r.call(own.guard, kept[0], kept.at(1), kept.at(size + 1), t, values, rates, own.guard_data)
         verdict.write(0, code.integer())
-        with r.when(code != 0):
-            r.give(1)
+        r.give_if(code != 0, 1)
     r.copy(tried.at(1), values, size)
     r.copy(tried.at(size + 1), rates, size)
     r.give(r.call(own.residual, t, y, yp, found, user))

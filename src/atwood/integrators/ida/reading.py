@@ -34,8 +34,7 @@ def write_routines() -> list[Routine]:
         r.give(0)
     read, memory, size = m.read, m.memory, m.size
     for order, (target, vector, place) in enumerate(zip(out, (m.y, m.yp), (m.y_at, m.yp_at), strict=True)):
-        with r.when(r.call(read, memory, time, r.value(order, CODE), vector) != 0):
-            r.give(3)
+        r.give_if(r.call(read, memory, time, r.value(order, CODE), vector) != 0, 3)
         r.copy(target, place, size)
     r.give(0)
     return [r]

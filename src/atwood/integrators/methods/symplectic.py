@@ -18,13 +18,13 @@ _ORDER = 8
 
 
 def _gauss(given: Hamiltonian, order: int) -> CompiledMethod:
-    from atwood.integrators.symplectic.stepper import CompiledGauss
+    from atwood.integrators.symplectic.stepper import compiled_gauss
 
-    return CompiledGauss(given.equations, given.speeds, order)
+    return compiled_gauss(given.equations, given.speeds, order)
 
 
 def _composition(given: Hamiltonian, order: int) -> CompiledMethod:
-    from atwood.integrators.symplectic.composition import CompiledComposition
+    from atwood.integrators.symplectic.composition import compiled_composition
 
     if order not in COMPOSITION.orders:
         raise UsageError(
@@ -39,7 +39,7 @@ def _composition(given: Hamiltonian, order: int) -> CompiledMethod:
             where=given.name,
             advice="Use the solver 'gauss', which is symplectic for any H.",
         )
-    return CompiledComposition(*found, order)
+    return compiled_composition(*found, order)
 
 
 def _open(task: Task, is_split: bool) -> ExplicitSession:

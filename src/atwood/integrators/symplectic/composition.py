@@ -10,40 +10,27 @@ from __future__ import annotations
 
 from typing import Final
 
-import numpy as np
-
-from atwood.arrays import FloatArray
-from atwood.codegen.llvm.build import RoutineSource, build_code
-from atwood.codegen.llvm.module import CodeOptions, Part
+from atwood.codegen.llvm.build import RoutineSource
 from atwood.codegen.routines import ADDRESS, NUMBER, Routine, Value, call_kernel, place_of
 from atwood.expr import Program
 from atwood.integrators.symplectic.fixed_steps import (
-    FIELDS,
     FILES,
     Layout,
     Memory,
-    copy_numbers,
     interpolate,
     judge,
     open_routine,
     run,
     sample,
-    unless_found,
 )
-from atwood.integrators.symplectic.gauss import FUNCTIONS
-from atwood.integrators.symplectic.stepper import bind_steps
-
-
-def composition_source(layout: Layout, order: int) -> RoutineSource:
-    """Return what writes the routines, for a module with forces as ``kernel`` and velocities as ``flow``.
-
-    They are those of `atwood.integrators.symplectic.gauss`, on the same memory.
-    """
-    return RoutineSource("integrators.symplectic.composition", FILES, (layout, order))
+from atwood.integrators.symplectic.stepper import CompiledMethod
 
 
 def write_routines(layout: Layout, order: int) -> list[Routine]:
-    """Write the routines; see `composition_source`."""
+    """Write the routines, for a module with forces as ``kernel`` and velocities as ``flow``.
+
+    They are those of `atwood.integrators.symplectic.gauss`, on the same memory.
+    """
     parts = [_drift(layout), _kick(layout), _compose(layout, steps_of(order)), _begin(layout)]
     return [*parts, judge(layout), _run(layout), _trial(layout), _speeds(layout), interpolate(layout), sample(layout)]
 
@@ -67,7 +54,7 @@ def _add(r: Routine, m: Memory, y: Value, rest: Value, amount: Value, count: int
 def _drift(layout: Layout) -> Routine:
     """Move the coordinates along the velocities."""
     r, m, (y, rest, amount) = open_routine(layout, "drift", {"y": ADDRESS, "rest": ADDRESS, "amount": NUMBER})
-    unless_found(r, _velocities(r, m, y.at(layout.coordinates)))
+    r.give_if(_velocities(r, m, y.at(layout.coordinates)) != 0, 1)
     _add(r, m, y, rest, amount, layout.coordinates)
     r.give(0)
     return r
@@ -80,7 +67,7 @@ def _kick(layout: Layout) -> Routine:
     n, time = layout.coordinates, place_of(r, t)
     m.evaluations = m.evaluations + 1
     derived, scratch = m.derived, m.scratch
-    unless_found(r, call_kernel(r, "kernel", [time, y], derived, scratch, [m.at("main.F")]))
+    r.give_if(call_kernel(r, "kernel", [time, y], derived, scratch, [m.at("main.F")]) != 0, 1)
     _add(r, m, y.at(n), rest.at(n), amount, n)
     r.give(0)
     return r
@@ -93,11 +80,11 @@ def _compose(layout: Layout, steps: tuple[float, ...]) -> Routine:
     before, done = 0.0, 0.0
     for step in (*steps, 0.0):
         share = 0.5 * (before + step)
-        unless_found(r, r.call("drift", m.session, y, rest, h * share))
+        r.give_if(r.call("drift", m.session, y, rest, h * share) != 0, 1)
         done, before = done + share, step
         if step == 0.0:
             break
-        unless_found(r, r.call("kick", m.session, y, rest, t + h * done, h * step))
+        r.give_if(r.call("kick", m.session, y, rest, t + h * done, h * step) != 0, 1)
     r.give(0)
     return r
 
@@ -115,11 +102,11 @@ def _begin(layout: Layout) -> Routine:
 
 def _run(layout: Layout) -> Routine:
     def attempt(r: Routine, m: Memory, t: Value, h: Value) -> Value:
-        copy_numbers(r, m.at("y_old"), m.at("y"), layout.size)
+        r.copy(m.at("y_old"), m.at("y"), layout.size)
         return r.call("compose", m.session, m.at("y"), m.at("rest"), t, h)
 
     def failed(r: Routine, m: Memory) -> None:
-        copy_numbers(r, m.at("y"), m.at("y_old"), layout.size)
+        r.copy(m.at("y"), m.at("y_old"), layout.size)
 
     return run(layout, attempt, failed=failed)
 
@@ -131,7 +118,7 @@ def _trial(layout: Layout) -> Routine:
     rest = m.at("aside.L")
     with r.count(layout.size) as i:
         target[i], rest[i] = source[i], 0.0
-    unless_found(r, r.call("compose", m.session, target, rest, t, h), 3)
+    r.give_if(r.call("compose", m.session, target, rest, t, h) != 0, 3)
     r.give(0)
     return r
 
@@ -140,9 +127,9 @@ def _speeds(layout: Layout) -> Routine:
     """Write coordinates and velocities; 1 where there are none."""
     r, m, (_, y, out) = open_routine(layout, "speeds", {"t": NUMBER, "y": ADDRESS, "out": ADDRESS}, exported=True)
     n = layout.coordinates
-    unless_found(r, _velocities(r, m, y.at(n)))
-    copy_numbers(r, out, y, n)
-    copy_numbers(r, out.at(n), m.at("main.F"), n)
+    r.give_if(_velocities(r, m, y.at(n)) != 0, 1)
+    r.copy(out, y, n)
+    r.copy(out.at(n), m.at("main.F"), n)
     r.give(0)
     return r
 
@@ -170,8 +157,8 @@ def steps_of(order: int) -> tuple[float, ...]:
     return (*half, 1.0 - 2.0 * sum(half), *half[::-1])
 
 
-class CompiledComposition:
-    """The equations of a separable H with the steps of a composition, for any parameter values and any step.
+def compiled_composition(forces: Program, velocities: Program, order: int) -> CompiledMethod:
+    """Return the equations of a separable H with the steps of a composition.
 
     Parameters
     ----------
@@ -182,23 +169,7 @@ class CompiledComposition:
     order
         Of the method, one of `atwood.integrators.symplectic.composition.ORDERS`.
     """
-
-    def __init__(self, forces: Program, velocities: Program, order: int) -> None:
-        n = len(forces.inputs[1].symbols)
-        self.order, self.layout = order, Layout(n, n, 1, False, False)
-        parts = [Part("kernel", forces), Part("flow", velocities)]
-        options = CodeOptions(level=2)
-        routines = composition_source(self.layout, order)
-        self._built = build_code(parts, options, exports=FUNCTIONS, routines=routines)
-        self.functions = bind_steps(self._built)
-        self._programs = {"kernel": forces, "flow": velocities}
-
-    def memory(self, parameter_values: FloatArray) -> tuple[FloatArray, tuple[object, ...]]:
-        """Return the array of a session, and what it leads to."""
-        found = [self._built.derive(name, one, parameter_values) for name, one in self._programs.items()]
-        memory = np.zeros(self.layout.places["end"])
-        addresses, places = memory.view(np.int64), list(FIELDS)
-        for name, (derived, scratch) in zip(("derived", "derived_2"), found, strict=True):
-            addresses[places.index(name)] = derived.ctypes.data
-            addresses[places.index("scratch")] = scratch.ctypes.data
-        return memory, (self._built, found)
+    n = len(forces.inputs[1].symbols)
+    layout = Layout(n, n, 1, False, False)
+    routines = RoutineSource("integrators.symplectic.composition", FILES, (layout, order))
+    return CompiledMethod(routines, {"kernel": forces, "flow": velocities}, order, layout)

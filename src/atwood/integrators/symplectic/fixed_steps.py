@@ -17,18 +17,6 @@ FILES = ("integrators/symplectic/fixed_steps.py", "integrators/stepper.py")
 """On these the routines here depend."""
 
 
-def unless_found(r: Routine, code: Value, given: int = 1) -> None:
-    """Return a code from the routine that is being written if a call has failed."""
-    with r.when(code != 0):
-        r.give(given)
-
-
-def copy_numbers(r: Routine, target: Value, source: Value, count: int) -> None:
-    """Copy numbers one by one: the arrays may be one."""
-    with r.count(count) as i:
-        target[i] = source[i]
-
-
 def run(
     layout: Layout,
     attempt: Callable[[Routine, Memory, Value, Value], Value],
@@ -44,8 +32,7 @@ def run(
     stop, h, origin, limit = m.stop, m.step, m.origin, m.limit
     with r.forever():
         t, steps = m.t, m.steps
-        with r.when(t >= stop):
-            r.give(0)
+        r.give_if(t >= stop, 0)
         with r.when(steps >= limit):
             r.give(1)
         with r.when(attempt(r, m, t, h) != 0):
@@ -56,8 +43,7 @@ def run(
         following = m.since + 1
         m.since, m.steps = following, steps + 1
         m.t_old, m.t = t, origin + h * following.number()
-        with r.when(r.call("judge", m.session) != 0):
-            r.give(4)
+        r.give_if(r.call("judge", m.session) != 0, 4)
     return r
 
 
@@ -68,26 +54,23 @@ def judge(layout: Layout) -> Routine:
     """
     r, m, _ = open_routine(layout, "judge")
     guard, data, width = m.guard, m.guard_data, layout.width
-    with r.when(r.is_null(guard)):
-        r.give(0)
+    r.give_if(r.is_null(guard), 0)
     t, t_old, h = m.t, m.t_old, m.step
     begin, begin_rates, end, end_rates = (m.at("ends").at(k * width) for k in range(4))
     before, after = (m.at("around").at(k * width) for k in range(2))
 
     def ask(*ends: Operand) -> None:
-        with r.when(r.call(guard, *ends, data) != 0):
-            r.give(4)
+        r.give_if(r.call(guard, *ends, data) != 0, 4)
 
     def read(time: Value, state: str, values: Value, rates: Value) -> None:
-        with r.when(r.call("speeds", m.session, time, m.at(state), values) != 0):
-            r.give(4)
+        r.give_if(r.call("speeds", m.session, time, m.at(state), values) != 0, 4)
         with r.when(r.call(m.rates, time, values, rates, m.rates_data) != 0):
             r.give(4)
 
     with r.when(m.since == 1):
         read(t_old, "y_old", begin, begin_rates)
     with r.otherwise():
-        copy_numbers(r, begin, end, 2 * width)
+        r.copy(begin, end, 2 * width)
     with r.count(width) as i:
         before[i] = begin[i] - h * begin_rates[i]
         after[i] = begin[i] + 2.0 * h * begin_rates[i]
@@ -104,17 +87,13 @@ def interpolate(layout: Layout) -> Routine:
     r, m, (time, out, yps) = open_routine(layout, "interpolate", arguments, exported=True)
     there = r.array(layout.size)
 
-    def unless_found(code: Value) -> None:
-        with r.when(code != 0):
-            r.give(3)
-
     t, t_old = m.t, m.t_old
     with r.when(time == t):
-        unless_found(r.call("speeds", m.session, time, m.at("y"), out))
+        r.give_if(r.call("speeds", m.session, time, m.at("y"), out) != 0, 3)
     with r.otherwise():
-        unless_found(r.call("trial", m.session, t_old, time - t_old, m.at("y_old"), there))
-        unless_found(r.call("speeds", m.session, time, there, out))
-    unless_found(r.call(m.rates, time, out, yps, m.rates_data))
+        r.give_if(r.call("trial", m.session, t_old, time - t_old, m.at("y_old"), there) != 0, 3)
+        r.give_if(r.call("speeds", m.session, time, there, out) != 0, 3)
+    r.give_if(r.call(m.rates, time, out, yps, m.rates_data) != 0, 3)
     r.give(0)
     return r
 

@@ -23,22 +23,16 @@ from math import inf
 from operator import add
 from typing import NamedTuple
 
-from atwood.codegen.llvm.build import RoutineSource
 from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Routine, Value, call_kernel, place_of
 from atwood.integrators.symplectic.fixed_steps import (
-    FILES,
     Layout,
     Memory,
-    copy_numbers,
     interpolate,
     judge,
     open_routine,
     run,
     sample,
-    unless_found,
 )
-
-FUNCTIONS = ("run", "interpolate", "sample", "begin", "trial", "speeds")
 
 _ULP = 2.0**-53
 _ROUNDING, _IDLE, _SWEEPS = 1e-11, 3, 200
@@ -50,16 +44,11 @@ _NEWTON = 6
 _STEP = {"w": ADDRESS, "y": ADDRESS, "t": NUMBER, "h": NUMBER}
 
 
-def gauss_source(layout: Layout, order: int) -> RoutineSource:
-    """Return what writes the routines of a method, for a module with the equations as ``kernel``.
+def write_routines(layout: Layout, order: int) -> list[Routine]:
+    """Write the routines of a method, for a module with the equations as ``kernel``.
 
     They take a session's array, which `atwood.integrators.symplectic.fixed_steps` lays out.
     """
-    return RoutineSource("integrators.symplectic.gauss", FILES, (layout, order))
-
-
-def write_routines(layout: Layout, order: int) -> list[Routine]:
-    """Write the routines; see `gauss_source`."""
     method = tableau(order)
     parts = [_evaluate(layout), *(_stage(layout, method, j) for j in range(layout.stages)), _solve(layout)]
     parts += [_flat(layout, method), _ahead(layout, method), _advance(layout), _speeds(layout), _begin(layout)]
@@ -94,7 +83,7 @@ def _stage(layout: Layout, method: Tableau, j: int) -> Routine:
     guess, per_size = w.at(layout.within("U") + j * layout.speeds), m.at("per_size")
     with r.count(n) as i:
         place[i] = y[i] + _weighted(method.shares[j], [w[i + k * n] for k in range(layout.stages)])
-    unless_found(r, r.call("evaluate", m.session, w, t + h * method.nodes[j], guess))
+    r.give_if(r.call("evaluate", m.session, w, t + h * method.nodes[j], guess) != 0, 1)
     weight = h * method.weights[j]
     with r.count(n) as i:
         new, old = weight * f[i], increments[i]
@@ -104,7 +93,7 @@ def _stage(layout: Layout, method: Tableau, j: int) -> Routine:
         delta[0] = r.most(r.choose(change == 0.0, 0.0, change / scale), delta[0])
         coarse[0] = r.most(change * per_size[i], coarse[0])
     if layout.takes_speeds:
-        copy_numbers(r, guess, w.at(layout.within("V")), layout.speeds)
+        r.copy(guess, w.at(layout.within("V")), layout.speeds)
     r.give(0)
     return r
 
@@ -116,15 +105,13 @@ def _solve(layout: Layout) -> Routine:
     with r.count(_SWEEPS):
         delta[0], coarse[0] = 0.0, 0.0
         for j in range(layout.stages):
-            unless_found(r, r.call(f"stage{j}", m.session, w, y, t, h, delta, coarse))
+            r.give_if(r.call(f"stage{j}", m.session, w, y, t, h, delta, coarse) != 0, 1)
         now = delta[0]
-        with r.when(now <= _ULP):
-            r.give(0)
+        r.give_if(now <= _ULP, 0)
         better = now < best.now
         idle.now = r.choose(better, 0, idle.now + 1, INTEGER)
         best.now = r.choose(better, now, best.now)
-        with r.when((idle.now >= _IDLE) & (coarse[0] <= _ROUNDING)):
-            r.give(0)
+        r.give_if((idle.now >= _IDLE) & (coarse[0] <= _ROUNDING), 0)
     r.give(1)
     return r
 
@@ -133,9 +120,9 @@ def _flat(layout: Layout, method: Tableau) -> Routine:
     """Set all stages to the rates at `y`; 1 where there are none."""
     r, m, (w, y, t, h) = open_routine(layout, "flat", _STEP)
     f = w.at(layout.within("F"))
-    copy_numbers(r, w.at(layout.within("Y")), y, layout.size)
+    r.copy(w.at(layout.within("Y")), y, layout.size)
     last = w.at(layout.within("U") + (layout.stages - 1) * layout.speeds)
-    unless_found(r, r.call("evaluate", m.session, w, t, last))
+    r.give_if(r.call("evaluate", m.session, w, t, last) != 0, 1)
     with r.count(layout.size) as i:
         increment = h * f[i]
         for j, weight in enumerate(method.weights):
@@ -175,13 +162,13 @@ def _speeds(layout: Layout) -> Routine:
     r, m, (t, y, out) = open_routine(layout, "speeds", {"t": NUMBER, "y": ADDRESS, "out": ADDRESS}, exported=True)
     n, w = layout.coordinates, m.at("aside.L")
     guess, speeds = w.at(layout.within("U")), w.at(layout.within("V" if layout.has_speeds else "F"))
-    copy_numbers(r, w.at(layout.within("Y")), y, 2 * n)
+    r.copy(w.at(layout.within("Y")), y, 2 * n)
     for _ in range(_NEWTON if layout.takes_speeds else 1):
-        unless_found(r, r.call("evaluate", m.session, w, t, guess))
+        r.give_if(r.call("evaluate", m.session, w, t, guess) != 0, 1)
         if layout.takes_speeds:
-            copy_numbers(r, guess, w.at(layout.within("V")), layout.speeds)
-    copy_numbers(r, out, y, n)
-    copy_numbers(r, out.at(n), speeds, layout.speeds)
+            r.copy(guess, w.at(layout.within("V")), layout.speeds)
+    r.copy(out, y, n)
+    r.copy(out.at(n), speeds, layout.speeds)
     r.give(0)
     return r
 
@@ -191,7 +178,7 @@ def _begin(layout: Layout) -> Routine:
     r, m, _ = open_routine(layout, "begin", exported=True)
     y, w, t = m.at("y"), m.at("main.L"), m.t
     rest, y_old, scales = m.at("rest"), m.at("y_old"), w.at(layout.within("scale"))
-    unless_found(r, r.call("flat", m.session, w, y, t, m.step))
+    r.give_if(r.call("flat", m.session, w, y, t, m.step) != 0, 1)
     with r.count(layout.size) as i:
         rest[i], y_old[i] = 0.0, y[i]
         scale = r.size(y[i])
@@ -210,12 +197,12 @@ def _run(layout: Layout) -> Routine:
             r.call("ahead", w, result=None)
         code = r.variable(r.call("solve", m.session, w, y, t, h), CODE)
         with r.when(code.now != 0):  # from a poor guess the iteration may lead where the equations have no value
-            unless_found(r, r.call("flat", m.session, w, y, t, h), 2)
+            r.give_if(r.call("flat", m.session, w, y, t, h) != 0, 2)
             code.now = r.call("solve", m.session, w, y, t, h)
         return code.now
 
     def good(r: Routine, m: Memory) -> None:
-        copy_numbers(r, m.at("y_old"), m.at("y"), layout.size)
+        r.copy(m.at("y_old"), m.at("y"), layout.size)
         r.call("advance", m.at("main.L"), m.at("y"), m.at("rest"), result=None)
 
     return run(layout, attempt, good=good)
@@ -226,13 +213,13 @@ def _trial(layout: Layout) -> Routine:
     arguments = {"t": NUMBER, "h": NUMBER, "source": ADDRESS, "target": ADDRESS}
     r, m, (t, h, source, target) = open_routine(layout, "trial", arguments, exported=True)
     w, own = m.at("aside.L"), m.at("main.L")
-    copy_numbers(r, w.at(layout.within("scale")), own.at(layout.within("scale")), layout.size)
+    r.copy(w.at(layout.within("scale")), own.at(layout.within("scale")), layout.size)
     if layout.takes_speeds:
         begin, count = layout.within("U"), layout.speeds
         for j in range(layout.stages):
-            copy_numbers(r, w.at(begin + j * count), own.at(begin + (layout.stages - 1) * count), count)
+            r.copy(w.at(begin + j * count), own.at(begin + (layout.stages - 1) * count), count)
     for name in ("flat", "solve"):
-        unless_found(r, r.call(name, m.session, w, source, t, h), 3)
+        r.give_if(r.call(name, m.session, w, source, t, h) != 0, 3)
     with r.count(layout.size) as i:
         total = w[i]
         for j in range(1, layout.stages):

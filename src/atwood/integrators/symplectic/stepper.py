@@ -6,21 +6,20 @@ Hamilton's equations of a scene, as methods of equal steps are given them.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from ctypes import c_double, c_void_p
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from atwood.arrays import FloatArray
-from atwood.codegen.llvm.build import Built, build_code, default_options
+from atwood.codegen.llvm.build import RoutineSource, build_code, default_options
 from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.errors import KernelEvaluationError, SolveError
 from atwood.expr import Program
 from atwood.integrators.protocol import CompiledRates, SolverOptions, State, StepGuard
-from atwood.integrators.stepper import Functions, NativeStepper, Outcome, bind_functions
-from atwood.integrators.symplectic.fixed_steps import FIELDS, Layout
-from atwood.integrators.symplectic.gauss import FUNCTIONS, gauss_source
+from atwood.integrators.stepper import NativeStepper, Outcome, bind_functions
+from atwood.integrators.symplectic.fixed_steps import FIELDS, FILES, Layout
 from atwood.lazy_dataclasses import dataclass
 
 _CALM, _SHORTEST = 8, 1e-12
@@ -30,14 +29,60 @@ _HALVINGS, _LOOKED_AT, _CLOSE = 60, 40, 0.2
 """So many steps are tried, on so many steps of the motion each, until an error is so near to what is allowed."""
 
 
-def bind_steps(built: Built) -> Functions:
-    """Return the functions of a method by name, to be called from Python."""
-    trial = c_double, c_double, c_void_p, c_void_p
-    return bind_functions(built, begin=(), trial=trial, speeds=(c_double, c_void_p, c_void_p))
+_SHAPES: dict[str, tuple[Any, ...]] = {
+    "begin": (),
+    "trial": (c_double, c_double, c_void_p, c_void_p),
+    "speeds": (c_double, c_void_p, c_void_p),
+}
+
+_LARGE = 3_000
+"""Equations of more nodes are compiled with less effort."""
 
 
-class CompiledGauss:
-    """Hamilton's equations with the steps of a method, for any parameter values and any step.
+class CompiledMethod:
+    """Hamilton's equations with the fixed steps of a method, for any parameter values and any step.
+
+    Parameters
+    ----------
+    routines
+        What writes the steps.
+    programs
+        What they call, by its name there.
+    order
+        Of the method.
+    layout
+        Of a session's array.
+    level
+        How much effort the compiler takes.
+    """
+
+    def __init__(
+        self,
+        routines: RoutineSource,
+        programs: Mapping[str, Program],
+        order: int,
+        layout: Layout,
+        level: int = 2,
+    ) -> None:
+        self.order, self.layout, self._programs = order, layout, programs
+        parts = [Part(part, one) for part, one in programs.items()]
+        exports = ("run", "interpolate", "sample", *_SHAPES)
+        self._built = build_code(parts, CodeOptions(level=level), exports=exports, routines=routines)
+        self.functions = bind_functions(self._built, **_SHAPES)
+
+    def memory(self, parameter_values: FloatArray) -> tuple[FloatArray, tuple[object, ...]]:
+        """Return the array of a session, and what it leads to."""
+        found = [self._built.derive(name, one, parameter_values) for name, one in self._programs.items()]
+        memory = np.zeros(self.layout.places["end"])
+        addresses, places = memory.view(np.int64), list(FIELDS)
+        for name, (derived, scratch) in zip(("derived", "derived_2"), found, strict=False):
+            addresses[places.index(name)] = derived.ctypes.data
+            addresses[places.index("scratch")] = scratch.ctypes.data
+        return memory, (self._built, found)
+
+
+def compiled_gauss(equations: Program, speeds: int, order: int) -> CompiledMethod:
+    """Return Hamilton's equations with the steps of a method of Gauss.
 
     Parameters
     ----------
@@ -48,28 +93,11 @@ class CompiledGauss:
     order
         Of the method, one of `atwood.integrators.symplectic.gauss.ORDERS`.
     """
-
-    def __init__(self, equations: Program, speeds: int, order: int) -> None:
-        n = len(equations.inputs[1].symbols)
-        self.order = order
-        self.layout = Layout(n, speeds, order // 2, len(equations.outputs) > 2, len(equations.inputs) > 3)
-        part = Part("kernel", equations)
-        level = max(2, default_options([part]).level) if equations.size < _LARGE else default_options([part]).level
-        options = CodeOptions(level=level)
-        self._built = build_code([part], options, exports=FUNCTIONS, routines=gauss_source(self.layout, order))
-        self.functions = bind_steps(self._built)
-        self._equations = equations
-
-    def memory(self, parameter_values: FloatArray) -> tuple[FloatArray, tuple[object, ...]]:
-        """Return the array of a session, and what it leads to."""
-        derived, scratch = self._built.derive("kernel", self._equations, parameter_values)
-        memory = np.zeros(self.layout.places["end"])
-        memory[:2].view(np.int64)[:] = derived.ctypes.data, scratch.ctypes.data
-        return memory, (self._built, derived, scratch)
-
-
-_LARGE = 3_000
-"""Equations of more nodes are compiled with less effort."""
+    n, usual = len(equations.inputs[1].symbols), default_options([Part("kernel", equations)]).level
+    layout = Layout(n, speeds, order // 2, len(equations.outputs) > 2, len(equations.inputs) > 3)
+    level = max(2, usual) if equations.size < _LARGE else usual
+    routines = RoutineSource("integrators.symplectic.gauss", FILES, (layout, order))
+    return CompiledMethod(routines, {"kernel": equations}, order, layout, level)
 
 
 class GaussStepper(NativeStepper):
@@ -256,18 +284,6 @@ class GaussStepper(NativeStepper):
             worst = max(worst, float(np.max(np.abs(ends[0] - ends[1]) / allowed)))
             here = other.copy()
         return worst
-
-
-class CompiledMethod(Protocol):
-    """A method with fixed steps, for any parameter values and any step."""
-
-    order: int
-    layout: Layout
-    functions: Functions
-
-    def memory(self, parameter_values: FloatArray) -> tuple[FloatArray, tuple[object, ...]]:
-        """Return the array of a session, and what it leads to."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)

@@ -81,8 +81,7 @@ def _expand(runs: int) -> Routine:
                     with r.when(m.order == k + 1):
                         r.leave(orders)
             r.leave(orders)
-        with r.when(failed.now == 0):
-            r.give(0)
+        r.give_if(failed.now == 0, 0)
         m.unit = r.choose(failed.now.conditions(runs), now * SMALLER, now)
     r.give(failed.now)
     return r

@@ -63,8 +63,7 @@ def _begin() -> Routine:
     r.clear(m.row("y_low"), m.row("new"))
     for row in ("y", "new", "x"):
         r.copy(m.row(row), state, m.size)
-    with r.when(r.call("evaluate", m.session, m.new_in, m.new_out) != 0):
-        r.give(_NO_RATES)
+    r.give_if(r.call("evaluate", m.session, m.new_in, m.new_out) != 0, _NO_RATES)
     rates, floors, steepest = m.row("rates"), m.row("floors"), r.variable(0.0)
     r.copy(rates, m.row("new_rates"), m.padded)
     with r.count(m.size) as i:
@@ -99,8 +98,7 @@ def _expand() -> Routine:
                     with r.when(m.order == k + 1):
                         r.leave(orders)
             r.leave(orders)
-        with r.when(~failed.now):
-            r.give(0)
+        r.give_if(~failed.now, 0)
         m.undefined = m.undefined + 1
         tries.now = tries.now + 1
         with r.when(tries.now >= RETRIES):
@@ -249,8 +247,7 @@ def _guarded() -> Routine:
     """Ask what judges steps about each part of one; 0 where all are good."""
     r, m, (t, h) = open_routine(1, "guarded", {"t": NUMBER, "h": NUMBER})
     guard, unit = m.guard, m.unit
-    with r.when(r.is_null(guard)):
-        r.give(0)
+    r.give_if(r.is_null(guard), 0)
     first, pace = m.row(0), 1.0 / unit
     trial, slopes, kept, kept_slopes = (m.row(name) for name in ("trial", "trial_rates", "kept", "kept_rates"))
     r.copy(kept, m.row("y"), m.size)
@@ -267,8 +264,7 @@ def _guarded() -> Routine:
 
         m.each(states)
         code = r.call(guard, begin.now, kept, kept_slopes, end, trial, slopes, m.guard_data)
-        with r.when(code != 0):
-            r.give(1)
+        r.give_if(code != 0, 1)
         r.copy(kept, trial, m.size)
         r.copy(kept_slopes, slopes, m.size)
         begin.now = end
@@ -280,8 +276,7 @@ def _held() -> Routine:
     """Take the end of a step onto the constraints, if there are any, with the rates there; 0 where that can be done."""
     r, m, (t,) = open_routine(1, "held", {"t": NUMBER})
     project = m.project
-    with r.when(r.is_null(project)):
-        r.give(0)
+    r.give_if(r.is_null(project), 0)
     with r.when(r.call(project, t, m.row("new"), m.project_data) != 0):
         r.give(1)
     r.give(r.call("evaluate", m.session, m.new_in, m.new_out))
@@ -294,20 +289,17 @@ def _run() -> Routine:
     h, t_new = r.variable(0.0), r.variable(0.0)
     with r.forever():
         t = m.t
-        with r.when(t >= m.stop):
-            r.give(_REACHED)
+        r.give_if(t >= m.stop, _REACHED)
         with r.when(m.steps >= m.limit):
             r.give(_USED_UP)
-        with r.when(r.call("expand", m.session) != 0):
-            r.give(_TOO_SMALL)
+        r.give_if(r.call("expand", m.session) != 0, _TOO_SMALL)
         h.now = r.least(r.call("choose", m.session, result=NUMBER), m.longest)
         least, stop = r.size(t) * (10.0 * 2.0**-52), m.stop_time
         with r.forever() as attempts:
             ends = t + h.now >= stop
             t_new.now = r.choose(ends, stop, t + h.now)
             step = t_new.now - t
-            with r.when(~(((step > least) & (step >= 1e-300)) | (ends & (step > 0.0)))):
-                r.give(_TOO_SMALL)
+            r.give_if(~(((step > least) & (step >= 1e-300)) | (ends & (step > 0.0))), _TOO_SMALL)
             m.t_new = t_new.now
             r.call("move", m.session, step / m.unit, result=None)
             fits = r.variable(r.call("evaluate", m.session, m.new_in, m.new_out) == 0, BOOLEAN)
@@ -348,8 +340,7 @@ def _interpolate() -> Routine:
     code = r.call("evaluate", m.session, m.trial_in, m.trial_out)
     r.copy(y_out, trial, m.size)
     r.copy(yp_out, m.row("trial_rates"), m.size)
-    with r.when(code != 0):
-        r.give(_NO_VALUE)
+    r.give_if(code != 0, _NO_VALUE)
     r.give(_REACHED)
     return r
 

@@ -31,11 +31,9 @@ def write_routines(
 
     def call(number: int) -> None:
         given: list[Value] = [time, y, y.at(coordinates), states]
-        with r.when(call_kernel(r, "inputs", given, read, scratch, [rest]) != 0):
-            r.give(1)
+        r.give_if(call_kernel(r, "inputs", given, read, scratch, [rest]) != 0, 1)
         given = [time, rest, states, y]
-        with r.when(call_kernel(r, f"update_{number}", given, data.read(3 + number, ADDRESS), scratch, [found]) != 0):
-            r.give(1)
+        r.give_if(call_kernel(r, f"update_{number}", given, data.read(3 + number, ADDRESS), scratch, [found]) != 0, 1)
         for k, (place, coordinate) in enumerate(places[number]):
             if place >= 0:
                 states[place] = found[k]
