@@ -9,7 +9,7 @@ import numpy as np
 from atwood.arguments import FILE, TEXT, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import UsageError
-from atwood.plotting.canvas import COLOURS, GREY, INK, Axes, Figure, finished, headed, new_figure
+from atwood.plotting.canvas import COLOURS, GREY, INK, Figure, finished, headed, new_figure
 from atwood.plotting.sphere import SEEN, draw_on_sphere, draw_sphere
 from atwood.result.result import Result
 from atwood.theory.rigid.bodies import principal_body
@@ -120,14 +120,14 @@ def plot_free_rotation(rotation: FreeRotation, file: str | os.PathLike[str] | No
     size = 1.0 / np.sqrt(rotation.moments)
     around = np.linspace(0.0, 2.0 * np.pi, 300)
     for k in range(3):
-        section = np.insert(np.stack([np.cos(around), np.sin(around)]), k, 0.0, axis=0) * size[:, None]
-        _on_ellipsoid(left, section, rotation.moments, GREY, 0.9)
+        section = size * np.insert(np.stack([np.cos(around), np.sin(around)], axis=1), k, 0.0, axis=1)
+        draw_on_sphere(left, section, GREY, 0.9, rotation.moments * section)
         end = 1.25 * size[k] * SEEN[:2, k]
         left.text(float(end[0]), float(end[1]), f"{k + 1}", color=INK, fontsize=9)
     shadow = np.linalg.cholesky((SEEN[:2] * size**2) @ SEEN[:2].T) @ np.stack([np.cos(around), np.sin(around)])
     left.plot(*shadow, color=GREY, linewidth=1.2)
-    polhode_ = rotation.at(times) / np.sqrt(2.0 * rotation.energy)
-    _on_ellipsoid(left, polhode_, rotation.moments, COLOURS[0], 2.2)
+    polhode_ = rotation.at(times).T / np.sqrt(2.0 * rotation.energy)
+    draw_on_sphere(left, polhode_, COLOURS[0], 2.2, rotation.moments * polhode_)
     left.set_title("ellipsoid of inertia and polhode", loc="left", fontsize=10, color=INK)
     rho, chi = rotation.herpolhode(times)
     right.plot(rho * np.cos(chi), rho * np.sin(chi), color=COLOURS[0], linewidth=1.4)
@@ -139,14 +139,6 @@ def plot_free_rotation(rotation: FreeRotation, file: str | os.PathLike[str] | No
         axes.set_axis_off()
     figure.suptitle(f"{rotation.name}: {rotation.kind}", x=0.02, ha="left", fontsize=11, fontweight="bold", color=INK)
     return finished(figure, file)
-
-
-def _on_ellipsoid(axes: Axes, curve: FloatArray, moments: FloatArray, colour: str, width: float) -> None:
-    """Draw a curve on the ellipsoid of inertia, faint where it is behind."""
-    x, y = SEEN[:2] @ curve
-    front = SEEN[2] @ (moments[:, None] * curve) >= 0.0
-    for shown, alpha in ((front, 1.0), (~front, 0.25)):
-        axes.plot(np.where(shown, x, np.nan), np.where(shown, y, np.nan), color=colour, linewidth=width, alpha=alpha)
 
 
 def _principal(result: Result, body: str | None) -> tuple[str, FloatArray, FloatArray]:

@@ -21,9 +21,12 @@ def draw_sphere(axes: Axes) -> None:
     axes.plot(np.cos(around), np.sin(around), color=GREY, linewidth=1.2)
 
 
-def draw_on_sphere(axes: Axes, curve: FloatArray, colour: str, width: float) -> None:
-    """Draw a curve on the sphere, faint where it is behind."""
+def draw_on_sphere(
+    axes: Axes, curve: FloatArray, colour: str, width: float, outwards: FloatArray | None = None
+) -> None:
+    """Draw a curve on the sphere, or on a surface with normals of its own, faint where it is behind."""
     x, y, depth = SEEN @ curve.T
-    for shown, alpha in ((depth >= 0.0, 1.0), (depth < 0.0, 0.22)):
+    front = (depth if outwards is None else SEEN[2] @ outwards.T) >= 0.0
+    for shown, alpha in ((front, 1.0), (~front, 0.22)):
         wide = shown | np.roll(shown, 1)
         axes.plot(np.where(wide, x, np.nan), np.where(wide, y, np.nan), color=colour, linewidth=width, alpha=alpha)

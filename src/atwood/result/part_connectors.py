@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
+from itertools import pairwise
 
 from atwood.arrays import FloatArray
 from atwood.mechanics.kinematics.mechanism import Mechanism
@@ -148,14 +149,10 @@ class Connectors:
 
 def _way(body: Body, joint: Joint) -> Iterable[str]:
     """Return the parts whose rigid joints lead from one end of a joint to the other."""
-    above = {step.child: step for step in body.steps}
+    from networkx import Graph, shortest_path
 
-    def up(node: int) -> dict[int, str]:
-        found: dict[int, str] = {}
-        while node in above:
-            found[node] = above[node].joint.part
-            node = above[node].parent
-        return found
-
-    a, b = up(joint.a), up(joint.b)
-    return [*(part for node, part in a.items() if node not in b), *(p for node, p in b.items() if node not in a)]
+    graph = Graph()
+    graph.add_nodes_from((joint.a, joint.b))
+    for step in body.steps:
+        graph.add_edge(step.child, step.parent, part=step.joint.part)
+    return (graph.edges[ends]["part"] for ends in pairwise(shortest_path(graph, joint.a, joint.b)))

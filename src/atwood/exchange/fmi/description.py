@@ -118,81 +118,75 @@ def units_xml(variables: Iterable[Variable]) -> list[str]:
     return [*lines, "</UnitDefinitions>"]
 
 
-def description_2(text: SceneText, token: str, variables: Sequence[Variable], depends: Depends, both: bool) -> str:
-    """Return the modelDescription.xml of FMI 2.0."""
-    place = {one.reference: k for k, one in enumerate(variables, 1)}
-    can = {"modelIdentifier": text.name, "canGetAndSetFMUstate": "true", "canSerializeFMUstate": "true"}
-    derives = {"providesDirectionalDerivative": "true"} if both else {}
-    units = ["fmi2.c", *(one for one in text.modes if one.endswith(".c"))]
-    named = "".join(f"<File{_attributes({'name': one})}/>" for one in units)
-    sources = f"<SourceFiles>{named}</SourceFiles>"
-    steps = {"canHandleVariableCommunicationStepSize": "true"}
-    lines = ['<?xml version="1.0" encoding="UTF-8"?>']
-    events = len(text.mode.data["events"]) if both else None
-    head = {"fmiVersion": "2.0", "modelName": text.mode.flat.name, "guid": token, "generationTool": "Atwood"}
-    more = {"variableNamingConvention": "flat", "numberOfEventIndicators": events}
-    lines.append(f"<fmiModelDescription{_attributes({**head, **more})}>")
-    if both:
-        lines.append(f"<ModelExchange{_attributes({**can, **derives})}>{sources}</ModelExchange>")
-    lines.append(f"<CoSimulation{_attributes({**can, **steps})}>{sources}</CoSimulation>")
+def description(
+    text: SceneText, token: str, variables: Sequence[Variable], depends: Depends, both: bool, fmi: int
+) -> str:
+    """Return the file modelDescription.xml of FMI 2.0 or 3.0; `both` with model exchange beside co-simulation."""
+    first, s = fmi == 2, "s" if fmi == 3 else ""
+    state = "FMUstate" if first else "FMUState"
+    can = {"modelIdentifier": text.name, f"canGetAndSet{state}": "true", f"canSerialize{state}": "true"}
+    derives = [f"provides{kind}Derivative{s}" for kind in ("Directional", "Adjoint")[: fmi - 1]]
+    head: dict[str, object] = {"fmiVersion": f"{fmi}.0", "modelName": text.mode.flat.name}
+    head |= {"guid" if first else "instantiationToken": token, "generationTool": "Atwood"}
+    head |= {"variableNamingConvention": "flat"}
+    sources = ""
+    if first:
+        head["numberOfEventIndicators"] = len(text.mode.data["events"]) if both else None
+        units = ["fmi2.c", *(one for one in text.modes if one.endswith(".c"))]
+        named = "".join(f"<File{_attributes({'name': one})}/>" for one in units)
+        sources = f"<SourceFiles>{named}</SourceFiles>"
+    kinds = {"ModelExchange": dict.fromkeys(derives, "true")} if both else {}
+    kinds["CoSimulation"] = {"canHandleVariableCommunicationStepSize": "true"}
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', f"<fmiModelDescription{_attributes(head)}>"]
+    lines += [f"<{kind}{_attributes({**can, **more})}>{sources}</{kind}>" for kind, more in kinds.items()]
     lines += units_xml(variables)
-    lines += ['<LogCategories><Category name="logStatusError"/></LogCategories>', _experiment(text), "<ModelVariables>"]
-    for one in variables:
-        initial = _initial(one)
-        own = {"name": one.name, "valueReference": one.reference, "causality": one.causality}
-        own |= {"variability": one.variability, "initial": initial}
-        derivative = None if one.derivative is None else place[one.derivative]
-        real = {"unit": one.unit or None, "min": one.low, "max": one.high, "nominal": one.nominal, "start": one.start}
-        real |= {"derivative": derivative}
-        lines.append(f"<ScalarVariable{_attributes(own)}><Real{_attributes(real)}/></ScalarVariable>")
-    lines += ["</ModelVariables>", "<ModelStructure>"]
-    unknowns = [(place[one.reference], _named(depends, one, place)) for one in variables if one.causality == "output"]
-    rates = [(place[one.reference], _named(depends, one, place)) for one in variables if one.derivative is not None]
-    initial_unknowns = sorted({i for i, _ in unknowns if variables[i - 1].start is None} | {i for i, _ in rates})
-    for name, ones in (("Outputs", unknowns), ("Derivatives", rates)):
-        rows = [f"<Unknown{_attributes({'index': i, 'dependencies': found})}/>" for i, found in ones]
-        lines += [f"<{name}>", *rows, f"</{name}>"] if rows else []
-    if initial_unknowns:
-        rows = [f'<Unknown index="{i}"/>' for i in initial_unknowns]
-        lines += ["<InitialUnknowns>", *rows, "</InitialUnknowns>"]
+    lines += ['<LogCategories><Category name="logStatusError"/></LogCategories>', _experiment(text)]
+    place = {one.reference: k if first else one.reference for k, one in enumerate(variables, 1)}
+    lines += ["<ModelVariables>", *(_variable(one, place, first) for one in variables), "</ModelVariables>"]
+    lines += ["<ModelStructure>", *(_structure_2 if first else _structure_3)(variables, depends, place)]
     return "\n".join([*lines, "</ModelStructure>", "</fmiModelDescription>"]) + "\n"
 
 
-def description_3(text: SceneText, token: str, variables: Sequence[Variable], depends: Depends, both: bool) -> str:
-    """Return the modelDescription.xml of FMI 3.0."""
-    same = {one.reference: one.reference for one in variables}
-    can = {"modelIdentifier": text.name, "canGetAndSetFMUState": "true", "canSerializeFMUState": "true"}
-    derives = {f"provides{kind}Derivatives": "true" for kind in ("Directional", "Adjoint")} if both else {}
-    lines = ['<?xml version="1.0" encoding="UTF-8"?>']
-    head = {"fmiVersion": "3.0", "modelName": text.mode.flat.name, "instantiationToken": token}
-    more = {"generationTool": "Atwood", "variableNamingConvention": "flat"}
-    lines.append(f"<fmiModelDescription{_attributes({**head, **more})}>")
-    if both:
-        lines.append(f"<ModelExchange{_attributes({**can, **derives})}/>")
-    steps = {"canHandleVariableCommunicationStepSize": "true"}
-    lines.append(f"<CoSimulation{_attributes({**can, **steps})}/>")
-    lines += units_xml(variables)
-    lines += ['<LogCategories><Category name="logStatusError"/></LogCategories>', _experiment(text), "<ModelVariables>"]
-    for one in variables:
-        own = {"name": one.name, "valueReference": one.reference, "causality": one.causality}
-        own |= {"variability": one.variability, "initial": _initial(one), "unit": one.unit or None}
-        own |= {"min": one.low, "max": one.high, "nominal": one.nominal, "start": one.start}
-        lines.append(f"<Float64{_attributes({**own, 'derivative': one.derivative})}/>")
-    lines += ["</ModelVariables>", "<ModelStructure>"]
+def _variable(one: Variable, place: Mapping[int, int], first: bool) -> str:
+    own = {"name": one.name, "valueReference": one.reference, "causality": one.causality}
+    own |= {"variability": one.variability, "initial": _initial(one)}
+    real = {"unit": one.unit or None, "min": one.low, "max": one.high, "nominal": one.nominal, "start": one.start}
+    real |= {"derivative": None if one.derivative is None else place[one.derivative]}
+    if first:
+        return f"<ScalarVariable{_attributes(own)}><Real{_attributes(real)}/></ScalarVariable>"
+    return f"<Float64{_attributes({**own, **real})}/>"
+
+
+def _structure_2(variables: Sequence[Variable], depends: Depends, place: Mapping[int, int]) -> list[str]:
+    unknowns = [(place[one.reference], _named(depends, one, place)) for one in variables if one.causality == "output"]
+    rates = [(place[one.reference], _named(depends, one, place)) for one in variables if one.derivative is not None]
+    starting = sorted({i for i, _ in unknowns if variables[i - 1].start is None} | {i for i, _ in rates})
+    lines = []
+    for name, ones in (
+        ("Outputs", unknowns),
+        ("Derivatives", rates),
+        ("InitialUnknowns", [(i, None) for i in starting]),
+    ):
+        rows = [f"<Unknown{_attributes({'index': i, 'dependencies': found})}/>" for i, found in ones]
+        lines += [f"<{name}>", *rows, f"</{name}>"] if rows else []
+    return lines
+
+
+def _structure_3(variables: Sequence[Variable], depends: Depends, place: Mapping[int, int]) -> list[str]:
     outputs = [one for one in variables if one.causality == "output"]
     rates = [one for one in variables if one.derivative is not None]
+    lines = []
     for name, ones in (("Output", outputs), ("ContinuousStateDerivative", rates)):
         for one in ones:
-            own = {"valueReference": one.reference, "dependencies": _named(depends, one, same)}
+            own = {"valueReference": one.reference, "dependencies": _named(depends, one, place)}
             lines.append(f"<{name}{_attributes(own)}/>")
     starting = [one for one in (*outputs, *rates) if one.start is None]
     lines += [f'<InitialUnknown valueReference="{one.reference}"/>' for one in starting]
     watching = [one for one in variables if one.name.startswith("event ")]
-    lines += [f'<EventIndicator valueReference="{one.reference}"/>' for one in watching]
-    return "\n".join([*lines, "</ModelStructure>", "</fmiModelDescription>"]) + "\n"
+    return [*lines, *(f'<EventIndicator valueReference="{one.reference}"/>' for one in watching)]
 
 
-def _named(depends: Depends, one: Variable, place: dict[int, int]) -> str | None:
+def _named(depends: Depends, one: Variable, place: Mapping[int, int]) -> str | None:
     """Return the list of what a variable depends on, where it is known; a state depends on itself."""
     if depends is None:
         return None

@@ -16,7 +16,7 @@ from atwood.exchange.c.export import exported
 from atwood.exchange.c.tables import quoted
 from atwood.exchange.c.text import SceneText, with_name
 from atwood.exchange.fmi.build import PLATFORMS, compiled, own_platform, place_of
-from atwood.exchange.fmi.description import build_xml, description_2, description_3, structure, variables_of
+from atwood.exchange.fmi.description import build_xml, description, structure, variables_of
 from atwood.exchange.fmi.equations import dependencies, tangent_programs
 from atwood.expr import Program
 from atwood.files import check_directory, write_atomically
@@ -129,8 +129,8 @@ def export_fmu(
     sources[main] = f'#define TOKEN "{token}"\n{sources[main]}'
     variables = variables_of(text, both and fmi == 3)
     depends = None if text.modes else structure(text, dependencies(text.mode, inputs), inputs)
-    description = (description_3 if fmi == 3 else description_2)(text, token, variables, depends, both)
-    content: dict[str, str | bytes] = {"modelDescription.xml": description}
+    said = description(text, token, variables, depends, both, fmi)
+    content: dict[str, str | bytes] = {"modelDescription.xml": said}
     content |= {f"sources/{name}": one for name, one in sources.items()}
     if fmi == 3:
         content["sources/buildDescription.xml"] = build_xml(text)

@@ -9,6 +9,7 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.lazy_dataclasses import dataclass, replace
+from atwood.lazy_modules import scipy
 from atwood.plotting.scene3d.reading import Lump
 from atwood.plotting.shapes.meshes import Mesh, box, cylinder, frame_along, outline_mesh
 
@@ -154,7 +155,7 @@ def shape_of(lump: Lump) -> BodyShape:
         frame = frame_along(axis, lump.axes[:, 0])
         return BodyShape(lump, "round", frame, np.array([diameter, diameter, height]))
     # In the order and the sense of the frame's axes, where they are along these.
-    order = _matched(lump.axes.T @ axes)
+    order = scipy.optimize.linear_sum_assignment(-np.abs(lump.axes.T @ axes))[1]
     axes = np.column_stack([axes[:, i] * _sign(lump.axes.T @ axes[:, i]) for i in order])
     axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
     a, b, c = (moments[i] for i in order)
@@ -164,14 +165,3 @@ def shape_of(lump: Lump) -> BodyShape:
 
 def _sign(components: FloatArray) -> float:
     return -1.0 if components[int(np.argmax(np.abs(components)))] < 0.0 else 1.0
-
-
-def _matched(seen: FloatArray) -> list[int]:
-    """Return for each axis of the frame the principal axis that is nearest to it, each once."""
-    sizes = np.abs(seen)
-    found = [-1, -1, -1]
-    for _ in range(3):
-        axis, principal = np.unravel_index(int(np.argmax(sizes)), sizes.shape)
-        found[int(axis)] = int(principal)
-        sizes[axis, :], sizes[:, principal] = -1.0, -1.0
-    return found

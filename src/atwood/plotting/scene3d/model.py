@@ -116,14 +116,9 @@ def _pairs(reading: Reading) -> list[tuple[int, int]]:
 
 def _depths(reading: Reading) -> dict[int, int]:
     """Return how many joints each body is away from the world."""
-    pairs, found, bodies = _pairs(reading), {0: 0}, [0]
-    for body in bodies:  # to which those are added that are found meanwhile
-        for pair in pairs:
-            other = pair[1] if pair[0] == body else pair[0]
-            if body in pair and other not in found:
-                found[other] = found[body] + 1
-                bodies.append(other)
-    return found
+    from networkx import Graph, single_source_shortest_path_length
+
+    return dict(single_source_shortest_path_length(Graph([(0, 0), *_pairs(reading)]), 0))
 
 
 # -- bodies ---------------------------------------------------------------------------------------------------------

@@ -117,31 +117,17 @@ def box(sides: Sequence[float], cells: int = 4) -> Mesh:
     """Return a box about the origin."""
     half = 0.5 * np.asarray(sides, dtype=float)
     counts = np.maximum(1, np.round(cells * half / np.max(half)).astype(int))
-    vertices: list[FloatArray] = []
-    faces: list[list[int]] = []
-    known: dict[tuple[int, int, int], int] = {}
-
-    def corner(place: tuple[int, int, int]) -> int:
-        if place not in known:
-            known[place] = len(vertices)
-            vertices.append((2.0 * np.array(place) / counts - 1.0) * half)
-        return known[place]
-
+    faces = []
     for axis in range(3):
         u, v = (axis + 1) % 3, (axis + 2) % 3
+        i, j = (one.reshape(-1, 1) for one in np.indices((counts[u], counts[v])))
         for end in (0, counts[axis]):
-            for i in range(counts[u]):
-                for j in range(counts[v]):
-                    square = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
-                    if end == 0:
-                        square.reverse()
-                    places = []
-                    for p, q in square:
-                        place = [0, 0, 0]
-                        place[axis], place[u], place[v] = int(end), p, q
-                        places.append((place[0], place[1], place[2]))
-                    faces.append([corner(place) for place in places])
-    return Mesh(np.array(vertices), np.array(faces, dtype=np.intp), np.zeros(len(faces), dtype=bool))
+            corners = np.full((i.size, 4, 3), end)
+            corners[..., u], corners[..., v] = i + np.array([0, 1, 1, 0]), j + np.array([0, 0, 1, 1])
+            faces.append(corners if end else corners[:, ::-1])
+    places, numbers = np.unique(np.concatenate(faces).reshape(-1, 3), axis=0, return_inverse=True)
+    made = numbers.reshape(-1, 4).astype(np.intp)
+    return Mesh((2.0 * places / counts - 1.0) * half, made, np.zeros(len(made), dtype=bool))
 
 
 def revolved(profile: ArrayLike, around: int = 36, marks: bool = False, closed: bool = False) -> Mesh:
