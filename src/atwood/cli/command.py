@@ -9,16 +9,19 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import click
 
-from atwood.arguments import FILE, FLAG, TEXT, Kind, Refused, check
+from atwood.arguments import FILE, TEXT, Kind, Refused, check
 from atwood.cli.errors import reporting_errors
 from atwood.cli.scenes import pairs
 from atwood.docstrings import documented, first_sentence, without_marks
 from atwood.errors import UsageError
+from atwood.lazy_dataclasses import replace
+from atwood.plotting.canvas import check_picture
 
 SCENE_HELP = """SCENE is the name of a scene of an installed library (see `atwood list`), or FILE.py:NAME, where NAME
 is a Scene class, a scene, or a function that returns one."""
@@ -30,8 +33,19 @@ _COMMON = {
 """Options of all commands that take a scene."""
 
 
-OUTPUT: Mapping[str, tuple[Kind, Any]] = {"plot": (FILE, None), "save": (FILE, None), "progress": (FLAG, True)}
-"""Options of all commands that make runs: a picture, a file of results, and a progress bar."""
+def written_as(check_file: Callable[[Path], object], word: str = "FILE") -> tuple[Kind, Any]:
+    """Return an option that names a file, which is refused before any work is done where it could not be written."""
+
+    def read(value: Any) -> Any:
+        file: Path = FILE.read(value)
+        check_file(file)
+        return file
+
+    return replace(FILE, read=read, word=word), None
+
+
+PICTURE = written_as(check_picture)
+"""The option of a picture."""
 
 _OR_NONE = ", or None."
 """What an argument may be in Python alone."""

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from atwood.arguments import FILE, FLAG, number, optional, whole
-from atwood.cli.command import OUTPUT, Request, command
-from atwood.cli.output import print_json, progress_bar, warn, writer
+from atwood.arguments import FLAG, number, optional, whole
+from atwood.cli.command import PICTURE, Request, command, written_as
+from atwood.cli.output import answer, print_json, progress_bar, warn, writer
 from atwood.cli.scenes import bundled_scenes, prepare
 from atwood.errors import AtwoodError, UsageError
 from atwood.lazy_dataclasses import replace
 from atwood.model.compose.composite import Model
-from atwood.plotting.canvas import check_picture
 from atwood.plotting.comparison_page import check_page, write_page
 from atwood.study import Comparison
 from atwood.study.comparison.compare import TOLERANCES, compare
@@ -39,12 +38,8 @@ def compare_scene(request: Request) -> None:
         found.save(request.save)
     if request.html is not None:
         write_page([found], {}, request.html)
-    if request.as_json:
-        print_json(found.to_dict())
-        return
-    out = writer()
-    out.show(*found.tables())
-    out.files(plotted=request.plot, saved=request.save, written=request.html)
+    files = {"plotted": request.plot, "saved": request.save, "written": request.html}
+    answer(request.as_json, found.to_dict(), found.tables(), **files)
 
 
 def _compare_long(request: Request, scene: Model, name: str) -> None:
@@ -52,10 +47,7 @@ def _compare_long(request: Request, scene: Model, name: str) -> None:
     with progress_bar(request.progress, "", _share) as progress:
         limit = request.max_seconds or _LONG_RUN
         found = compare_long(scene, periods=request.long or 1, max_seconds=limit, name=name, progress=progress)
-    if request.as_json:
-        print_json(found.to_dict())
-        return
-    writer().show(*found.tables())
+    answer(request.as_json, found.to_dict(), found.tables())
 
 
 _LONG_RUN = 20.0
@@ -84,12 +76,6 @@ def _compared(
 
 def _check_files(request: Request) -> None:
     """Refuse what contradicts, and files that could not be written, before any work is done."""
-    if request.plot is not None:
-        check_picture(request.plot)
-    if request.save is not None:
-        check_rows_file(request.save)
-    if request.html is not None:
-        check_page(request.html)
     if request.long is not None:
         idle = {"--all": request.all, "--rtol": request.rtols, "--t-end": request.t_end}
         idle |= {"--plot": request.plot, "--save": request.save, "--html": request.html}
@@ -151,10 +137,12 @@ def _within(
 
 _MORE = {
     "max_seconds": (optional(number("a number of seconds above 0", above=0.0)), None),
-    **OUTPUT,
+    "plot": PICTURE,
+    "save": written_as(check_rows_file),
+    "progress": (FLAG, True),
     "long": (replace(whole("a whole number of periods, 10 to 1,000,000", 10, 1_000_000), word="PERIODS"), None),
     "all": (FLAG, False),
-    "html": (replace(FILE, word="DIRECTORY"), None),
+    "html": written_as(check_page, "DIRECTORY"),
 }
 _NOT_ASKED = ("forms", "levels", "outputs", "max_seconds", "total_seconds", "name")
 COMMAND = command("compare", compare_scene, compare, is_required=False, leave=_NOT_ASKED, more=_MORE)

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import click
 
-from atwood.arguments import FILE
-from atwood.cli.command import Request, command
-from atwood.cli.output import print_json, writer
+from atwood.cli.command import PICTURE, Request, command
+from atwood.cli.output import answer
 from atwood.cli.scenes import check_applies, prepare
 from atwood.errors import UsageError
-from atwood.plotting.canvas import check_picture
 from atwood.study.sensitivities.fit import fit
 
 
@@ -21,20 +19,13 @@ def fit_scene(request: Request) -> None:
     """
     if not request.vary and not request.start:
         raise UsageError("nothing is varied", advice="Write --vary PATH or --vary PATH=LOW:HIGH.")
-    if request.plot is not None:
-        check_picture(request.plot)
     scene, _ = prepare(request.scene, request.settings, request.start_values)
     check_applies(scene, request.form or "reduced", "ggl")
     found = fit(scene, list(request.data), **request.of(fit, leave=("data",)))
     if request.plot is not None:
         found.plot(file=request.plot)
-    if request.as_json:
-        print_json(found.to_data())
-        return
-    out = writer()
-    out.show(*found.tables())
-    out.files(plotted=request.plot)
+    answer(request.as_json, found.to_data(), found.tables(), plotted=request.plot)
 
 
-COMMAND = command("fit", fit_scene, fit, more={"plot": (FILE, None)}, names={"start": "--vary-start"})
+COMMAND = command("fit", fit_scene, fit, more={"plot": PICTURE}, names={"start": "--vary-start"})
 COMMAND.params.insert(1, click.Argument(["data"], nargs=-1, required=True))

@@ -6,7 +6,7 @@ import contextlib
 import math
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -76,6 +76,16 @@ def writer() -> Writer:
 
         return ColourWriter()
     return Writer()
+
+
+def answer(as_json: bool, data: Mapping[str, Any], tables: Iterable[Table], **files: Path | None) -> None:
+    """Write what was found: as JSON, or as tables and the names of files that were written."""
+    if as_json:
+        print_json(data)
+        return
+    out = writer()
+    out.show(*tables)
+    out.files(**files)
 
 
 def warn(text: str) -> None:

@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
-from atwood.arguments import FILE, FLAG, TEXT, one_of
-from atwood.cli.command import OUTPUT, Request, command
+from atwood.arguments import FLAG, TEXT, one_of
+from atwood.cli.command import PICTURE, Request, command, written_as
 from atwood.cli.errors import INTERRUPTED
 from atwood.cli.output import print_json, progress_bar, warn
 from atwood.cli.scenes import check_applies, prepare
@@ -16,6 +16,7 @@ from atwood.errors import AtwoodError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import replace
 from atwood.pipeline import assemble, simulate
+from atwood.plotting.canvas import ANIMATED, SUFFIXES, check_picture
 from atwood.result.result import Result
 from atwood.stages import watching
 
@@ -24,7 +25,12 @@ _OF_ASSEMBLY = ("form", "level", "orientation")
 
 def run_scene(request: Request) -> None:
     """Simulate SCENE, and show where it ends and how accurate that is."""
-    _check_files(request)
+    if request.view is not None:
+        from atwood.plotting.camera import as_camera
+
+        as_camera(request.view)
+        if request.draw is None:
+            raise UsageError("there is nothing to draw", where="--view", advice="Say where to with --draw FILE.")
     with watching():  # from the scene on
         result = run_of(request)
     _keep(result, request)
@@ -112,32 +118,21 @@ def _keep_what_came_before(error: AtwoodError, request: Request) -> None:
     warn(f"What came before, up to t = {result.time[-1]:.6g} s, is in {' and '.join(files)}.")
 
 
-def _check_files(request: Request) -> None:
-    """Refuse files that could not be written before any work is done."""
-    if request.save is not None:
-        from atwood.result.files import check_target
+def _check_results(file: Path) -> None:
+    from atwood.result.files import check_target
 
-        check_target(request.save)
-    if request.plot is not None:
-        from atwood.plotting.canvas import check_picture
+    check_target(file)
 
-        check_picture(request.plot)
-    if request.view is not None and request.draw is None:
-        raise UsageError("there is nothing to draw", where="--view", advice="Say where to with --draw FILE.")
-    if request.draw is not None:
-        from atwood.plotting.camera import as_camera
-        from atwood.plotting.canvas import ANIMATED, SUFFIXES, check_picture
-        from atwood.plotting.moving import check_moving
 
-        moves = request.draw.suffix.lower() in ANIMATED
-        check_moving(request.draw) if moves else check_picture(request.draw, (*SUFFIXES, *ANIMATED))
-        as_camera(request.view)
+def _check_drawing(file: Path) -> None:
+    from atwood.plotting.moving import check_moving
+
+    check_moving(file) if file.suffix.lower() in ANIMATED else check_picture(file, (*SUFFIXES, *ANIMATED))
 
 
 def _draw(result: Result, file: Path, view: str | None) -> None:
     """Draw the mechanism at a few times, or moving; the suffix says which."""
     from atwood.plotting import animate, plot_mechanism
-    from atwood.plotting.canvas import ANIMATED
 
     if file.suffix.lower() in ANIMATED:
         animate(result, file, view=view)
@@ -196,8 +191,10 @@ _MORE = {
     "conserved": (FLAG, False),
     "energy": (one_of(("total", "parts")), "total"),
     "timings": (FLAG, False),
-    **OUTPUT,
-    "draw": (FILE, None),
+    "plot": PICTURE,
+    "save": written_as(_check_results),
+    "progress": (FLAG, True),
+    "draw": written_as(_check_drawing),
     "view": (replace(TEXT, word="AZ,EL"), None),
 }
 COMMAND = command("run", run_scene, simulate, assemble, leave=("name", "samples"), more=_MORE)

@@ -8,14 +8,14 @@ from typing import Any
 import click
 import numpy as np
 
-from atwood.cli.command import OUTPUT, Request, command
+from atwood.arguments import FLAG
+from atwood.cli.command import PICTURE, Request, command, written_as
 from atwood.cli.errors import INTERRUPTED
 from atwood.cli.output import print_json, progress_bar, warn, writer
 from atwood.cli.scenes import check_applies, pairs, prepare, warn_of_radians
 from atwood.errors import UsageError
 from atwood.lazy_dataclasses import replace
 from atwood.pipeline import assemble
-from atwood.plotting.canvas import check_picture
 from atwood.study import Sweep, sweep
 from atwood.study.sweeps.files import check_sweep_target
 from atwood.table import Table, facts, table
@@ -26,7 +26,6 @@ _ROWS, _COLUMNS, _REASONS = 16, 8, 5
 
 def sweep_scene(request: Request) -> None:
     """Simulate SCENE with many parameters and starts, and show where the runs end."""
-    _check_files(request)
     varied = {"--vary": request.vary or {}, "--vary-start": request.start or {}}
     if not any(varied.values()):
         raise UsageError("nothing is varied", advice="Write --vary PATH=FROM:TO:COUNT or --vary-start PATH=A,B,C.")
@@ -52,17 +51,6 @@ def sweep_scene(request: Request) -> None:
     if "interrupted" in found.status:
         warn("Interrupted.")
         click.get_current_context().exit(INTERRUPTED)
-
-
-def _check_files(request: Request) -> None:
-    """Refuse files that could not be written before any work is done."""
-    if request.save is not None:
-        check_sweep_target(request.save)
-    if request.plot is not None:
-        check_picture(request.plot)
-
-
-# -- what is shown -----------------------------------------------------------------------------------------------------
 
 
 def _print(found: Sweep, request: Request) -> None:
@@ -135,6 +123,6 @@ COMMAND = command(
     sweep,
     assemble,
     leave=("name", "orientation"),
-    more=OUTPUT,
+    more={"plot": PICTURE, "save": written_as(check_sweep_target), "progress": (FLAG, True)},
     names={"start": "--vary-start"},
 )

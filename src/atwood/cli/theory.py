@@ -11,8 +11,8 @@ from typing import Any
 
 import click
 
-from atwood.arguments import FILE, FLAG, TEXT, Kind
-from atwood.cli.command import Request, command, kinds_of
+from atwood.arguments import FLAG, TEXT, Kind
+from atwood.cli.command import PICTURE, Request, command, kinds_of
 from atwood.cli.output import print_json, warn, writer
 from atwood.cli.scenes import pairs, prepare, warn_of_radians
 from atwood.display import plain
@@ -21,7 +21,6 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import lagrangian_of
 from atwood.lazy_dataclasses import replace
 from atwood.pipeline import assemble
-from atwood.plotting.canvas import check_picture
 from atwood.ranges import range_of
 from atwood.table import Shown
 from atwood.theory.formulas.described import Described, Page, Paged, attributes, is_formula, is_theory, page_of
@@ -72,7 +71,7 @@ def theory_command(name: str, module: str, function: str) -> click.Command:
     made = [vars(importlib.import_module(module)).get(one) for one in of]
     written = [one for one in _WRITTEN if one != "python" or any(hasattr(kind, one) for kind in made)]
     more: dict[str, tuple[Kind, Any]] = dict.fromkeys(written, (FLAG, False))
-    more |= {"plot": (FILE, None), "named": (NAMED, None)}
+    more |= {"plot": PICTURE, "named": (NAMED, None)}
     special, own = _SPECIAL.get(name, (None, {}))
 
     def run(request: Request) -> None:
@@ -84,8 +83,6 @@ def theory_command(name: str, module: str, function: str) -> click.Command:
             raise UsageError(
                 "there names stand as they are", where="--named", advice="Give --latex or --html, or none."
             )
-        if request.plot is not None:
-            check_picture(request.plot)
         asked, scene = _read(found, request)
         value = _called(found, scene, asked) if special is None else special(found, scene, asked, request)
         if request.plot is not None:

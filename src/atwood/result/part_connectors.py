@@ -151,7 +151,7 @@ def _way(body: Body, joint: Joint) -> Iterable[str]:
     """Return the parts whose rigid joints lead from one end of a joint to the other."""
     from networkx import Graph, shortest_path
 
-    graph = Graph()
+    graph: Graph[int] = Graph()
     graph.add_nodes_from((joint.a, joint.b))
     for step in body.steps:
         graph.add_edge(step.child, step.parent, part=step.joint.part)
