@@ -37,7 +37,7 @@ _OWN = SingularityMonitor.pass_in_steps
 
 def once(assembly: Assembly, end: float, in_python: bool = False) -> tuple[float, float]:
     """Return what a run takes, and its compiled calls, ms."""
-    plain: Any = (lambda self, end: None) if in_python else _OWN
+    plain: Any = (lambda *_: None) if in_python else _OWN
     SingularityMonitor.pass_in_steps = plain  # type: ignore[method-assign]
     surroundings._spent[0], began = 0.0, time.process_time()
     simulate(assembly, t_end=end, outputs=201)

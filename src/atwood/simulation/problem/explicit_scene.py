@@ -229,10 +229,12 @@ def nearest_state(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) ->
     return found[: len(q)], found[len(q) :]
 
 
-def project_quickly(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-    """Return the same by machine code; None where there is none yet, or it does not come to such a state."""
+def project_quickly(
+    plan: SceneProblem, t: float, q: FloatArray, u: FloatArray, rates: CompiledRates | None = None
+) -> tuple[FloatArray, FloatArray] | None:
+    """Return the same by machine code, that of a session if given; None where none is there, or leads to no state."""
     y = np.concatenate([q, u])
-    rates = compiled_on_constraints(plan, t, y) if plan.has_rates else None
+    rates = rates or (compiled_on_constraints(plan, t, y) if plan.has_rates else None)
     if rates is None or not rates.project or PROJECTION(rates.project)(t, y.ctypes.data, rates.project_data):
         return None
     return (y[: len(q)], y[len(q) :]) if np.isfinite(y).all() else None

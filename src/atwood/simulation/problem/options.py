@@ -179,6 +179,8 @@ class Samples:
         """Return where to cut them into so many blocks, which are the same whatever lies between."""
         if count == 1:
             return np.array([len(self.times)])
+        if not self.between.any():
+            return np.array([*range(size := -(-len(self.times) // count), len(self.times), size), len(self.times)])
         own = np.flatnonzero(~self.between)
         size = -(-len(own) // count)
         return np.append(own[size - 1 : -1 : size] + 1, len(self.times))

@@ -140,16 +140,23 @@ def project_states(plan: SceneProblem, t: FloatArray, q: FloatArray, u: FloatArr
     return _in_chunks(plan, len(t), lambda one: _project(plan, t[one], q[:, one], u[:, one]))
 
 
-def project_rows(plan: SceneProblem, t: FloatArray, y: FloatArray, nearest: TakesNearest | None) -> Projected:
+def project_rows(
+    plan: SceneProblem, t: FloatArray, y: FloatArray, nearest: TakesNearest | None, is_apart: bool = False
+) -> Projected:
     """Return the same of states of a solver, one row each, in C order.
 
-    What machine code finds, if it is given, is taken where it misses nothing.
+    What machine code finds, if it is given, is taken where it misses nothing. The last state comes out as by itself if
+    that is asked for: what is projected together rounds as the number of states has it.
     """
     normalized = plan.balance.kinematic_map.normalized
     if plan.balance.kinematic_map.has_homogeneous:
         q, u = plan.program.split(y.T)
         y = np.ascontiguousarray(np.concatenate([normalized(normalized(q)), u]).T)
-    return _in_chunks(plan, len(t), lambda one: _project_rows(plan, t[one], y[one], nearest))
+    if is_apart and nearest is not None and len(t) <= _chunk(plan):
+        taken = _taken(plan, t, y, nearest, _APART)
+        if taken is not None:
+            return taken
+    return _in_chunks(plan, len(t), lambda one: _project_rows(plan, t[one], y[one], nearest), is_apart)
 
 
 def left_alone(plan: SceneProblem, t: FloatArray, y: FloatArray) -> Projected | None:
@@ -166,10 +173,13 @@ def left_alone(plan: SceneProblem, t: FloatArray, y: FloatArray) -> Projected | 
     return Projected(q.copy(), u.copy(), lambda: held, np.zeros(len(t), dtype=bool))
 
 
-def _in_chunks(plan: SceneProblem, states: int, project: Callable[[slice], Projected]) -> Projected:
-    """Return states that are projected so many at a time."""
-    chunk = _chunk(plan)
-    parts = [project(slice(i, i + chunk)) for i in range(0, states, chunk)]
+def _in_chunks(
+    plan: SceneProblem, states: int, project: Callable[[slice], Projected], is_apart: bool = False
+) -> Projected:
+    """Return states that are projected so many at a time, the last apart from the others if that is asked for."""
+    chunk, last = _chunk(plan), states - 1 if is_apart else states
+    parts = [project(slice(i, min(i + chunk, last))) for i in range(0, last, chunk)]
+    parts += [project(slice(last, states))] if is_apart else []
     if len(parts) == 1:
         return parts[0]
     joined = (
@@ -332,16 +342,11 @@ def constraints_at(
 
 
 def _project_rows(plan: SceneProblem, t: FloatArray, y: FloatArray, nearest: TakesNearest | None) -> Projected:
-    q, u = plan.program.split(y.T)
     taken = None if nearest is None else _taken(plan, t, y, nearest)
-    if taken is None:
-        return _project(plan, t, q, u, y if y.shape[1] == len(q) + len(u) else None)
-    found, done = taken
-    if not done.all():
-        rest = _project(plan, t[~done], q[:, ~done], u[:, ~done])
-        found.coordinates[:, ~done], found.speeds[:, ~done] = rest.coordinates, rest.speeds
-        found.doubtful[~done] = rest.doubtful
-    return found
+    if taken is not None:
+        return taken
+    q, u = plan.program.split(y.T)
+    return _project(plan, t, q, u, y if y.shape[1] == len(q) + len(u) else None)
 
 
 def _project(
@@ -393,40 +398,75 @@ def _are_exact(plan: SceneProblem, held: FloatArray) -> bool:
     return bool(np.all(held[0] <= _EXACT) and np.all(held[1] * plan.scales.time <= _EXACT))
 
 
+_TOGETHER = (slice(None),)
+
+_APART = (slice(-1), slice(-1, None))
+
+
 def _taken(
-    plan: SceneProblem, t: FloatArray, y: FloatArray, nearest: TakesNearest
-) -> tuple[Projected, BoolArray] | None:
-    """Return what machine code finds, and which of it meets all constraints; None where it finds nothing."""
+    plan: SceneProblem, t: FloatArray, y: FloatArray, nearest: TakesNearest, parts: Sequence[slice] = _TOGETHER
+) -> Projected | None:
+    """Return what machine code finds, the rest projected; None where it finds nothing. Parts are judged one by one."""
     sizes = np.concatenate([plan.coordinate_sizes, plan.sizes / plan.scales.time])
     made = nearest(t, y, sizes)
     if made is None:
         return None
     q, u = plan.program.split(y.T)
-    misses = once(partial(misses_of, plan, t, q, u, y))
-    free, contacts = np.zeros(len(t), dtype=bool), has_touched(plan.assembly)
-    has_more, met, moved = contacts or bool(plan.finding.redundant), made.met, float(made.moved.max())
-    # A row in units of its largest entry misses no more than the sum of what its unknowns move by to meet it.
-    meets = not has_more and len(sizes) * moved <= _EXACT
-    if met.all() and (meets or ((contacts or moved <= _FAR) and _are_exact(plan, misses()))):
-        return Projected(q.copy(), u.copy(), misses, free), met
+    own = [once(partial(misses_of, plan, t[one], q[:, one], u[:, one], y[one])) for one in parts]
+    misses = own[0] if len(own) == 1 else once(lambda: np.concatenate([one() for one in own], axis=1))
+    contacts = has_touched(plan.assembly)
+    has_more = contacts or bool(plan.finding.redundant)
+    leaves, free = [], np.zeros(len(t), dtype=bool)
+    for one, held in zip(parts, own, strict=True):
+        moved = float(made.moved[one].max())
+        # A row in units of its largest entry misses no more than the sum of what its unknowns move by to meet it.
+        meets = not has_more and len(sizes) * moved <= _EXACT
+        is_near = contacts or moved <= _FAR
+        leaves.append(bool(made.met[one].all()) and (meets or (is_near and _are_exact(plan, held()))))
+    if all(leaves):
+        return Projected(q.copy(), u.copy(), misses, free)
     near, moving = (part.copy() for part in plan.program.split(made.states.T))
     found = Projected(plan.balance.kinematic_map.normalized(near), moving, misses, free)
-    if has_more or not _stays(t, made, sizes, nearest):
-        rows = made.states if found.coordinates is near else None
-        left = misses_of(plan, t, found.coordinates, moving, rows) * np.array([[1.0], [plan.scales.time]])
-        met = met & np.all(left <= tolerances.MET, axis=0)
-    return found, met
+    stays = [False for _ in parts] if has_more else _stay(t, made, sizes, nearest, parts)
+    for one, is_left, stay in zip(parts, leaves, stays, strict=True):
+        if is_left:
+            found.coordinates[:, one], found.speeds[:, one] = q[:, one], u[:, one]
+            continue
+        met = made.met[one]
+        if not stay:
+            rows = made.states[one] if found.coordinates is near else None
+            left = misses_of(plan, t[one], found.coordinates[:, one], moving[:, one], rows)
+            met = met & np.all(left * np.array([[1.0], [plan.scales.time]]) <= tolerances.MET, axis=0)
+        if not met.all():
+            rest = np.arange(len(t))[one][~met]
+            again = _project(plan, t[rest], q[:, rest], u[:, rest])
+            found.coordinates[:, rest], found.speeds[:, rest] = again.coordinates, again.speeds
+            free[rest] = again.doubtful
+    return found
 
 
-def _stays(t: FloatArray, made: Nearest, sizes: FloatArray, nearest: TakesNearest) -> bool:
-    """Return whether states move by next to nothing where they are taken onto the constraints again.
+def _stay(
+    t: FloatArray, made: Nearest, sizes: FloatArray, nearest: TakesNearest, parts: Sequence[slice]
+) -> list[bool]:
+    """Return of which parts states move by next to nothing where they are taken onto the constraints again.
 
     What is left is of second order in how far they were taken: those that moved most are looked at.
     """
-    most = np.argpartition(made.moved, -_LOOKED_AT)[-_LOOKED_AT:] if len(t) > _LOOKED_AT else slice(None)
-    again = nearest(t[most], made.states[most], sizes)
-    is_met = again is not None and made.met.all() and again.met.all()
-    return again is not None and bool(is_met and 2 * len(sizes) * again.moved.max() <= tolerances.MET)
+    rows = [np.arange(len(t))[one] for one in parts]
+    most = [
+        one[np.argpartition(made.moved[one], -_LOOKED_AT)[-_LOOKED_AT:]] if len(one) > _LOOKED_AT else one
+        for one in rows
+    ]
+    every = np.concatenate(most)
+    again = nearest(t[every], made.states[every], sizes)
+    if again is None:
+        return [False for _ in parts]
+    stays, first = [], 0
+    for one, looked in zip(parts, map(len, most), strict=True):
+        which, first = slice(first, first + looked), first + looked
+        is_met = made.met[one].all() and again.met[which].all()
+        stays.append(bool(is_met and 2 * len(sizes) * again.moved[which].max() <= tolerances.MET))
+    return stays
 
 
 def _least_norm(jacobian: FloatArray) -> Callable[[FloatArray], FloatArray]:

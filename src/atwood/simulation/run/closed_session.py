@@ -127,16 +127,16 @@ class ClosedLoopSession(Session):
             is_often = self._request.plan.pays(self._solved.form.states, len(y))
             parts.append(self._solved.states(times[done : done + len(y)], y, is_often))
             done += len(y)
-            found = self._handed_out(result)
+            found = self._handed_out(result, parts[-1][-1] if len(y) and result.status is Status.REACHED else None)
             if found is not None:
                 values = np.concatenate(parts)
                 return values, np.zeros_like(values), found
 
     # -- choices --------------------------------------------------------------------------------------------------
 
-    def _handed_out(self, result: StepResult) -> StepResult | None:
+    def _handed_out(self, result: StepResult, known: FloatArray | None = None) -> StepResult | None:
         """Return what is handed out; None where only a choice or a count has changed and the run goes on."""
-        y = self._solved.state(result.t, result.y)
+        y = self._solved.state(result.t, result.y) if known is None else known
         full = replace(result, y=y, yp=self._rates(result, y), events=tuple(result.events[: self._count]))
         if result.status is not Status.EVENT:
             return full
@@ -206,7 +206,8 @@ class ClosedLoopSession(Session):
 
         asked, longest = None if given is None else on_stiff, np.inf
         if not solved.is_clear:
-            longest = self._longest_step(solved, t, y)
+            about = solved, t, y.tobytes()
+            longest = assembly.kept.get(_LONGEST, lambda: self._longest_step(solved, t, y), *about)
         can_go_on = self._method.tableau is not None or self._method.kind == "series"
         # What dead centres and counts are looked out for with has the values of these loops; events of parts have more.
         is_kept = can_go_on and not (probe.directions or self._before.steps) and guard is None
@@ -308,6 +309,8 @@ class ClosedLoopSession(Session):
 
 
 _CODE: Key[tuple[Program, EventCode] | None] = Key("event functions with dead centres")
+
+_LONGEST: Key[float] = Key("the longest step where dead centres are looked out for, at the state last asked about")
 
 
 def _event_code(request: SolverRequest, solved: Solved) -> tuple[Program, EventCode] | None:

@@ -345,17 +345,14 @@ class Recorder:
         self._samples = (tuple(one for one in kept if len(one.time)), [one for one in waiting if len(one[0])])
 
     def settle(self) -> None:
-        """Project all that waits; the last by itself, since a run goes on from it, whatever samples are before it.
-
-        What is projected together rounds as the number of states has it.
-        """
+        """Project all that waits; the last by itself, since a run goes on from it, whatever samples are before it."""
         pending = self._samples[1]
-        if not pending:
+        is_apart = self.plan.is_projected and _count(pending) > 1
+        if is_apart and self.by_formulas and self._settle_exact():
             return
-        count = _count(pending) if self.plan.is_projected else 0
-        if count > 1 and not (self.by_formulas and self._settle_exact()):
-            self._settle(count - 1)
-        self._settle(None)
+        if is_apart and self._passed:
+            self._settle(_count(pending) - 1)
+        self._settle(None, is_apart and not self._passed)
 
     def _settle_exact(self) -> bool:
         """Take all that waits as it is; return whether it could be."""
@@ -367,13 +364,13 @@ class Recorder:
             self._add(_Block(t, made.coordinates, made.speeds, shown, made.misses))
         return made is not None
 
-    def _settle(self, count: int | None) -> None:
-        """Project so many of what waits, the first; all if that is None."""
+    def _settle(self, count: int | None, is_apart: bool = False) -> None:
+        """Project so many of what waits, the first; all if that is None, of which the last may come apart."""
         pending = self._samples[1]
         if pending:
             waiting = _joined(pending)
             if count is None or count >= len(waiting[0]):
-                self._finish(*waiting)
+                self._finish(*waiting, is_apart=is_apart)
             else:
                 self._finish(*_cut(waiting, stop=count), [_cut(waiting, count)])
 
@@ -420,14 +417,21 @@ class Recorder:
         rest = crossings, starts, tuple(self._changes), lost, rests, self._plan_at, self.pieces
         return Stretch(self.plan, impact, after_time_event, time, q, u, shown, misses, *rest)
 
-    def _finish(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_], waiting: Sequence[_States] = ()) -> None:
+    def _finish(
+        self,
+        t: FloatArray,
+        y: FloatArray,
+        shown: NDArray[np.bool_],
+        waiting: Sequence[_States] = (),
+        is_apart: bool = False,
+    ) -> None:
         arcs = [arc for one in self._passed for arc in one.arcs if arc.end > t[0]]
         if arcs:
             from atwood.simulation.singular.collocation import states_on  # few runs come to such a position
 
             self._finish_around(t, y, shown, waiting, states_on(arcs, t))
         else:
-            self._add(self._projected(t, y, shown), waiting)
+            self._add(self._projected(t, y, shown, is_apart), waiting)
 
     def _finish_around(
         self,
@@ -445,9 +449,10 @@ class Recorder:
             all_of[:, ~inside], all_of[:, inside] = rest, own
         self._add(_Block(t, q, u, shown, partial(misses_of, self.plan, t, q, u)), waiting)
 
-    def _projected(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_]) -> _Block:
+    def _projected(self, t: FloatArray, y: FloatArray, shown: NDArray[np.bool_], is_apart: bool = False) -> _Block:
         """Return states on the constraints; those before one that cannot be projected are kept where there is one."""
-        made = project_rows(self.plan, t, y, self.nearest) if len(t) and self.plan.balance.constraints else None
+        projects = len(t) and self.plan.balance.constraints
+        made = project_rows(self.plan, t, y, self.nearest, is_apart) if projects else None
         if made is None or not self.plan.is_projected:
             q, u = (part.copy() for part in self.plan.program.split(y.T))
             q = self.plan.balance.kinematic_map.normalized(q)

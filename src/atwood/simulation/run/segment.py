@@ -380,7 +380,7 @@ class _Runner:
         monitor = singularity_monitor_of(segment.plan, segment.options.relative_tolerance, segment.end, session.here)
         self.monitor = monitor
         if monitor is not None and not (self.method.is_implicit or session.budget.poll or segment.probe.directions):
-            monitor.pass_in_steps(segment.end)
+            monitor.pass_in_steps(segment.end, segment.kept.rates_of(session))
         looks = None if monitor is None else monitor.step_monitor
         if monitor is not None and (looks is None or not session.set_monitor(looks)):
             monitor.look_in_python()
@@ -409,7 +409,7 @@ class _Runner:
         segment, plan = self.segment, self.segment.plan
         if self.pieces is not None and (limit := self.pieces.next(self.began, segment.end)) < segment.end:
             self.segment = replace(segment, samples=segment.samples.until(-np.inf, limit).without_last_shown())
-        return step_result.t, *pack_state(plan, step_result.t, *plan.program.split(step_result.y))
+        return step_result.t, *self._packed(step_result.t, *plan.program.split(step_result.y))
 
     def _sample(self, session: Session, done: int) -> tuple[int, StepResult | None]:
         """Let an explicit method fill tables; return how many samples are done, and why it stopped early."""
@@ -661,8 +661,10 @@ class _Runner:
             return done, StepResult(*root.state, Status.EVENT, root.events)
         if done < len(times):
             q, u, _ = (one[:, 0] for one in path.at(np.array([path.end])))
-            q, u = project_quickly(plan, path.end, q, u) or project_safely(plan, path.end, q, u)
-            plan.review_partitioning(path.end, q)
+            rates = segment.kept.rates_of(session)
+            q, u = project_quickly(plan, path.end, q, u, rates) or project_safely(plan, path.end, q, u)
+            if self.method.is_implicit:
+                plan.review_partitioning(path.end, q)
             session.reinitialize(path.end, *self._packed(path.end, q, u))
             assert self.monitor is not None
             self.monitor.restart(session.here, is_behind=True)

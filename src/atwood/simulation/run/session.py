@@ -47,6 +47,7 @@ from atwood.simulation.run.choice import solved_loops
 if TYPE_CHECKING:
     from atwood.forms.loops.closed_form import ClosedForm
     from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
+    from atwood.integrators.protocol import CompiledRates
     from atwood.integrators.set_jumps import SetSolver
     from atwood.integrators.symplectic.stepper import Hamiltonian
     from atwood.integrators.taylor.stepper import TaylorProblem
@@ -329,6 +330,11 @@ class KeptSession:
         """Return what gives a session its parameters; None where it is not kept."""
         found = next((one.fill for one in self.kept if one.session is session), None)
         return found if isinstance(found, Filling) else None
+
+    def rates_of(self, session: Session) -> CompiledRates | None:
+        """Return the rates of a session, which has them alone; None where it is not kept, or formulas solve loops."""
+        filling = self.filling_of(session)
+        return None if filling is None else filling.own.rates
 
     def sets(
         self, plan: SceneProblem, state: tuple[float, FloatArray, FloatArray], method: Method | None

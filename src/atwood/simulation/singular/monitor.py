@@ -18,6 +18,7 @@ from atwood.arrays import FloatArray
 from atwood.codegen.sundials.rank_looks import AHEAD, FALLEN, LOW
 from atwood.forms.caches import Key
 from atwood.integrators.protocol import Status, StepMonitor, StepResult
+from atwood.simulation.problem.explicit_scene import compiled_on_constraints
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.singular.branches import (
     ACCURATE,
@@ -34,6 +35,7 @@ from atwood.tolerances import tolerances
 
 if TYPE_CHECKING:
     from atwood.codegen.sundials.step_monitor import MonitorData
+    from atwood.integrators.protocol import CompiledRates
 
 _BEGUN: Key[tuple[MonitorData, bool] | None] = Key("first looks for singular positions")
 
@@ -147,13 +149,15 @@ class SingularityMonitor(Branches):
         found = None if self._compiled is None else as_step_monitor(self._compiled)
         return found if found is None or self._passages is None else self._passages.watched(found)
 
-    def pass_in_steps(self, end: float) -> None:
-        """Let explicit steps up to a time pass singular positions by themselves, if they can."""
+    def pass_in_steps(self, end: float, rates: CompiledRates | None) -> None:
+        """Let explicit steps up to a time pass singular positions by themselves, if they can, with their own rates."""
         compiled, plan = self._compiled, self.plan
         is_plain = plan.has_rates and has_few(plan) and len(plan.balance.holonomic) == plan.balance.constraints
         if compiled is not None and compiled.judges and is_plain:
             start = self._start.t, self._start.y
-            self._passages = Passages(plan, compiled, start, self.tolerance, max(self.tolerance, ACCURATE), end)
+            rates = rates or compiled_on_constraints(plan, *start)
+            assert rates is not None
+            self._passages = Passages(plan, compiled, rates, self.tolerance, max(self.tolerance, ACCURATE), end)
 
     def take_passed(self) -> list[PassedCrossing]:
         """Return what steps have passed by themselves since this was last asked."""

@@ -9,9 +9,8 @@ import numpy as np
 
 from atwood.arrays import FloatArray, address_of
 from atwood.codegen.routines import NUMBER
-from atwood.integrators.protocol import StepMonitor
+from atwood.integrators.protocol import CompiledRates, StepMonitor
 from atwood.lazy_dataclasses import replace
-from atwood.simulation.problem.explicit_scene import compiled_on_constraints
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.simulation.singular.arc_routine import SETTLED
 from atwood.simulation.singular.collocation import Arc, Path, points, sweeps_of
@@ -102,8 +101,8 @@ class Passages:
         The scene in its mode, whose constraints are all on positions.
     monitor
         What looks at the motion; it judges by itself.
-    state
-        Time, coordinates and speeds at the start.
+    rates
+        Rates and projections on the constraints.
     tolerance, accurate
         The relative tolerance of the run, and how large the estimate of an arc's error may be.
     end
@@ -114,17 +113,15 @@ class Passages:
         self,
         plan: SceneProblem,
         monitor: MonitorData,
-        state: tuple[float, FloatArray],
+        rates: CompiledRates,
         tolerance: float,
         accurate: float,
         end: float,
     ) -> None:
-        width, conditions = len(state[1]), monitor.code.shape.conditions
-        code = compiled_on_constraints(plan, *state)
-        assert code is not None
+        width, conditions = plan.program.coordinates + plan.program.speeds, monitor.code.shape.conditions
         self._plan, self._monitor, self._width, self._conditions = plan, monitor, width, conditions
         states, settled = np.empty((POINTS, width)), max(SETTLED, _SETTLED * tolerance)
-        self._sweeps = sweeps_of(plan, code, np.empty(width), 0.0, np.empty(POINTS), states, settled)
+        self._sweeps = sweeps_of(plan, rates, np.empty(width), 0.0, np.empty(POINTS), states, settled)
         size = len(PASSED) + conditions + (POINTS + 1) * width
         self._log, self._behind = np.empty((min(_MOST, 1 + _ROOM // size), size)), np.empty(2 + width)
         self._look = singular_routines().code.addresses["watch"]
