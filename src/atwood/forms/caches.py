@@ -40,6 +40,10 @@ _AGED = count(1)
 """How often what was made counted as old at once."""
 
 
+_REMEMBERED = 16
+"""Of so many values it is known what was made of them: a run begins anew at its start, and comes to the same events."""
+
+
 class without_collection:
     """Leave cycles of objects alone: graphs of expressions have none, and to look for them is a sixth of deriving.
 
@@ -96,6 +100,17 @@ class Kept:
         made = make()
         self._made[key] = about, made
         return made
+
+    def recall(self, key: Key[dict[tuple[Hashable, ...], T]], make: Callable[[], T], *about: Hashable) -> T:
+        """Return what was made of some values, making it if that is not known any more; so much is of the last ones."""
+        known = self.get(key, dict)
+        if about not in known:
+            made = make()
+            for oldest in [*known][: len(known) - _REMEMBERED + 1]:
+                known.pop(oldest, None)
+            known[about] = made
+            return made
+        return known[about]
 
     def take(self, key: Key[T]) -> T | None:
         """Return what was last made under a key, which then is the caller's alone; None if nothing was."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -34,6 +34,7 @@ _REACTION_EVENTS: Key[tuple[EventFunction, ...]] = Key("event functions that rea
 
 
 _READ: Key[tuple[list[int], Program | None]] = Key("generalized coordinates of another mode")
+_ENTERED: Key[dict[tuple[Hashable, ...], tuple[FloatArray, FloatArray]]] = Key("states on entering a mode")
 _MAXIMAL: Key[tuple[Program, tuple[int, ...], tuple[int, ...]]] = Key("maximal coordinates and their Jacobian")
 
 
@@ -59,9 +60,23 @@ def enter_mode(
 ) -> tuple[Assembly, FloatArray, FloatArray]:
     """Return the scene in the mode that an event leads to, with its state."""
     t, q, u = state
-    big_q, big_u = (x[:, 0] for x in maximal_state(assembly, np.array([t]), q[:, None], u[:, None]))
     line_signs = actual_line_signs(assembly, t, q, u, assembly.form)
     after = reassemble({**assembly.modes, event.part: event.target, **(also or {})}, line_signs, assembly.orientation)
+    about = assembly, event.part, event.law, event.message, event.impact, t, q.tobytes(), u.tobytes(), length
+    if "external" in after.maximal.graph.operations:  # functions in Python are asked again
+        q, u = _entered(state, assembly, after, event, length)
+    else:
+        entered = after.kept.recall(_ENTERED, lambda: _entered(state, assembly, after, event, length), *about)
+        q, u = (one.copy() for one in entered)
+    return (after, q, u) if after.form == "dae" else (*switch_coordinates(after, q, reassemble), u)
+
+
+def _entered(
+    state: tuple[float, FloatArray, FloatArray], assembly: Assembly, after: Assembly, event: EventRecord, length: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return the state of the scene in another mode, with quaternions."""
+    t, q, u = state
+    big_q, big_u = (x[:, 0] for x in maximal_state(assembly, np.array([t]), q[:, None], u[:, None]))
     sizes = motion_scales(after.maximal, length)
     balance = balance_of(after, "dae")
     if event.impact:
@@ -70,10 +85,10 @@ def enter_mode(
         big_u = plastic_impact(after, balance, event, (t, met, big_u), sizes)
         big_q = met
     if after.form == "dae":
-        return after, big_q, big_u
+        return big_q, big_u
     q, u, miss = generalized_state(assembly, after, t, (q, u), (big_q, big_u), length)
     _check_in_place(event, miss)
-    return *switch_coordinates(after, q, reassemble), u
+    return q, u
 
 
 def _check_in_place(event: EventRecord, moved: FloatArray) -> None:

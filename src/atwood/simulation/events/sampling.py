@@ -7,7 +7,7 @@ any Python; what they read is one program.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -27,6 +27,10 @@ from atwood.model.declare.laws import Law, numbers_in
 from atwood.simulation.events.time_events import MOMENT
 
 _SAMPLER: Key[Sampler] = Key("sample times")
+
+_UPDATED: Key[dict[tuple[Hashable, ...], Updated]] = Key("what updates have made of states")
+
+TRACED: Key[set[str]] = Key("updates that are known to be formulas")
 
 _MOST = 10_000_000
 """More sample times than these are no run."""
@@ -128,7 +132,15 @@ class Sampler:
         return tuple(i for i, one in enumerate(self.updates) if one.path == part and one.law.options.at == event)
 
     def call(self, chosen: Iterable[int], assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> Updated:
-        """Return what updates make of a state, one after the other."""
+        """Return what updates make of a state, one after the other; those that are formulas are not asked twice."""
+        chosen, traced = tuple(chosen), assembly.shared.known(TRACED) or ()
+        if not all(self.updates[i].label in traced for i in chosen):
+            return self._call(chosen, assembly, t, q, u)
+        about = chosen, t, q.tobytes(), u.tobytes()
+        found = assembly.kept.recall(_UPDATED, lambda: self._call(chosen, assembly, t, q, u), *about)
+        return Updated(found.held, found.coordinates.copy())
+
+    def _call(self, chosen: Iterable[int], assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> Updated:
         reading = update_inputs_of(assembly)
         held = list(assembly.held_now)
         q, values = q.copy(), None

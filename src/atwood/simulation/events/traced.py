@@ -20,7 +20,15 @@ from atwood.expr import Expression, Graph, InputGroup, OutputGroup, Program
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.model.declare.laws import numbers_in
-from atwood.simulation.events.sampling import Sampler, Update, UpdateInputs, in_order, update_inputs_of, with_states
+from atwood.simulation.events.sampling import (
+    TRACED,
+    Sampler,
+    Update,
+    UpdateInputs,
+    in_order,
+    update_inputs_of,
+    with_states,
+)
 
 _CODE: Key[UpdateCode | None] = Key("machine code of updates")
 
@@ -210,6 +218,7 @@ def update_code(assembly: Assembly, sampler: Sampler) -> tuple[UpdateCode, dict[
         numbers = [[updates.index(one) for one in order] for order in orders]
         equations, first = assembly.own_equations, len(assembly.mechanism.table.values)
         sizes = len(equations.coordinates), len(equations.speeds), len(assembly.discrete_states), first
+        assembly.shared.get(TRACED, set).update(one.label for one in updates)
         return UpdateCode(laws, numbers, reading, sizes)
 
     made = assembly.shared.get(_CODE, make, tuple(chains))

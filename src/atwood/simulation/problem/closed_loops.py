@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import field
 from functools import cached_property
@@ -222,9 +222,9 @@ def _freedoms_besides(plan: SceneProblem) -> int:
 
 def solve_at(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> Solved | None:
     """Return the loops of a mechanism solved by formulas on the branch of a position, with the best choice there."""
-    if not can_be_solved(plan):
+    if plan.assembly.form != "reduced":
         return None
-    return _remembered(plan, (t, q, u), None, lambda: _solve_at(plan, t, q, u))
+    return _remembered(plan, (t, q, u), None, lambda: _solve_at(plan, t, q, u) if can_be_solved(plan) else None)
 
 
 def stay_at(plan: SceneProblem, form: ClosedForm, t: float, q: FloatArray, u: FloatArray) -> Solved | None:
@@ -239,19 +239,12 @@ def _remembered(
     solve: Callable[[], Solved | None],
 ) -> Solved | None:
     """Return how loops are solved at a place where it has been asked before, else solve them."""
-    (t, q, u), known = state, plan.assembly.kept.get(_SOLVED, dict)
+    t, q, u = state
     about = t, q.tobytes(), u.tobytes(), plan.finding.kept, plan.scales.length, form
-    if about not in known:
-        known[about] = solve()
-        for oldest in [*known][:-_REMEMBERED]:
-            del known[oldest]
-    return known[about]
+    return plan.assembly.kept.recall(_SOLVED, solve, *about)
 
 
-_SOLVED: Key[dict[tuple[object, ...], Solved | None]] = Key("solved loops")
-
-_REMEMBERED = 16
-"""At so many places it is known how loops are solved: a run begins anew at its start, and where dead centres are."""
+_SOLVED: Key[dict[tuple[Hashable, ...], Solved | None]] = Key("solved loops")
 
 
 def _solve_at(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> Solved | None:

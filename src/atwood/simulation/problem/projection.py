@@ -445,9 +445,7 @@ def _taken(
     return found
 
 
-def _stay(
-    t: FloatArray, made: Nearest, sizes: FloatArray, nearest: TakesNearest, parts: Sequence[slice]
-) -> list[bool]:
+def _stay(t: FloatArray, made: Nearest, sizes: FloatArray, nearest: TakesNearest, parts: Sequence[slice]) -> list[bool]:
     """Return of which parts states move by next to nothing where they are taken onto the constraints again.
 
     What is left is of second order in how far they were taken: those that moved most are looked at.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import partial
 from operator import attrgetter
 from typing import TYPE_CHECKING, TypeVar, cast
@@ -64,6 +64,8 @@ _Walk = TypeVar("_Walk", bound="Walk")
 
 _AT_START: Key[Changed] = Key("what becomes of gaps and slips at the start")
 _FIRST_EVENT: Key[list[float]] = Key("until when what touches nothing at the start is disturbed")
+
+_ON_ENTERING: Key[dict[tuple[Hashable, ...], tuple[FloatArray, FloatArray]]] = Key("states on constraints of a mode")
 
 _READY: Key[tuple[tuple[object, ...], Walk]] = Key("a run that is ready to go, and what it was asked for")
 
@@ -164,6 +166,15 @@ def begun(assembly: Assembly, start: Start, options: RunOptions, kind: type[_Wal
     return _prepared(kind, assembly, start, assembly.other_mode, allowed(options), np.zeros(0))
 
 
+def _on_entering(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a state on the constraints of a mode that is entered; a run again comes to the same."""
+    if plan.not_compilable:  # functions in Python are asked again
+        return project_safely(plan, t, q, u)
+    about = t, q.tobytes(), u.tobytes(), plan.finding.kept, plan.sizes.tobytes(), plan.scales.time
+    found = plan.assembly.kept.recall(_ON_ENTERING, lambda: project_safely(plan, t, q, u), *about)
+    return found[0].copy(), found[1].copy()
+
+
 class Walk:
     """The way of a run through its modes."""
 
@@ -217,7 +228,7 @@ class Walk:
         if plan is None or probe is None or self.ended is not None or plan.not_compilable or plan.assembly.sides:
             return False
         method = self.choice.method
-        return not (method.is_implicit or method.has_equal_steps or self.sampler.updates)
+        return not (method.is_implicit or method.has_equal_steps) and self.sampler.is_pure
 
     def renewed(
         self,
@@ -484,7 +495,7 @@ class Walk:
                 refuse_immobile(self.assembly, len(plan.assembly.own_equations.speeds) - plan.finding.rank, self.start)
             self._plans, self.probe, self._handed = {}, None, ()
         if is_new and self.segments and plan.is_projected:  # what has no mass has the speed that the new mode holds
-            self.q, self.u = project_safely(plan, self.t, self.q, self.u)
+            self.q, self.u = _on_entering(plan, self.t, self.q, self.u)
         plan = self._settled(plan)
         t, q, u = self.t, self.q, self.u
         if self.segments:

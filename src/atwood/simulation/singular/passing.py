@@ -159,10 +159,10 @@ class Passages:
         count = int(self._way[self._count])
         self._way[self._count] = 0
         rows, n, arcs, found = self._log[:count].copy(), self._plan.program.coordinates, list[Arc](), []
+        behind = len(PASSED) + self._conditions
         for row in rows:
             time, start, end, error, away = row[: len(PASSED)].tolist()
-            sizes, integrated = np.split(row[len(PASSED) :], [self._conditions])
-            integrated = integrated.reshape(-1, self._width)
+            sizes, integrated = row[len(PASSED) : behind], row[behind:].reshape(-1, self._width)
             arcs.append(Arc(start, end, integrated[:, :n], integrated[:, n:], error))
             if time == time:  # else one before the place
                 found.append(PassedCrossing(self._plan, time, Path(tuple(arcs)), away, sizes))
