@@ -21,7 +21,8 @@ compile_ida = partial(compile_ida_callbacks, cache=False)
 
 def made_of(scene, form="reduced"):
     assembly = assemble(scene, form=form)
-    return assembly.form_program(None, ()), assembly.parameter_values
+    program, values = assembly.form_program(None, ()), assembly.parameter_values
+    return program, np.append(values, [1.0] * (len(program.residual.parameters) - len(values)))
 
 
 def callbacks_of(program, sparse=False, step=1):

@@ -15,7 +15,7 @@ EVERY_SCENE_AND_FORM = [(name, form, level) for name in GENERAL for form, level 
 def test_jacobian_is_the_derivative_of_the_residual(name: str, form: str, level: str) -> None:
     prepared = prepare(SCENES[name](), form, level)
     program = prepared.plan.program
-    residual, jacobian = (prepared.assembly.kernel(p) for p in (program.residual, program.jacobian))
+    residual, jacobian = (prepared.bound(p) for p in (program.residual, program.jacobian))
     random = np.random.default_rng(7)
     for q, u in nearby_states(prepared, 2):
         y, yp = packed(prepared, q, u)
@@ -35,7 +35,7 @@ def test_residual_vanishes_at_consistent_states(name: str, form: str, level: str
     # states packed from the balance of forces, which the residual is not made of
     prepared = prepare(SCENES[name](), form, level)
     program = prepared.plan.program
-    residual = prepared.assembly.kernel(program.residual)
+    residual = prepared.bound(program.residual)
     for q, u in [(prepared.q, prepared.u), *nearby_states(prepared, 3)]:
         y, yp = packed(prepared, q, u)
         size = max(1.0, float(np.max(np.abs(yp))), float(np.max(np.abs(y))))
@@ -47,7 +47,7 @@ def test_residual_vanishes_at_consistent_states(name: str, form: str, level: str
 def test_algebraic_unknowns_are_those_without_a_derivative(name: str, form: str, level: str) -> None:
     prepared = prepare(SCENES[name](), form, level)
     program = prepared.plan.program
-    residual = prepared.assembly.kernel(program.residual)
+    residual = prepared.bound(program.residual)
     (q, u), *_ = nearby_states(prepared, 1)
     y, yp = packed(prepared, q, u)
     y, yp = y + 0.01, yp + 0.01
@@ -59,7 +59,7 @@ def test_algebraic_unknowns_are_those_without_a_derivative(name: str, form: str,
         whole = dense(
             program.rows,
             program.columns,
-            prepared.assembly.kernel(program.jacobian)([0.3], y, yp, [1e4])[0],
+            prepared.bound(program.jacobian)([0.3], y, yp, [1e4])[0],
             slope.shape,
         )
         assert np.linalg.matrix_rank(whole / np.max(np.abs(whole), axis=1)[:, None]) == program.size

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from atwood import Model, Result, Scene
 from atwood.arrays import FloatArray
+from atwood.codegen import BoundKernel
+from atwood.expr import Program
 from atwood.forms.assembly import Assembly
 from atwood.forms.quantities import to_maximal
 from atwood.pipeline import assemble, simulate
@@ -90,6 +92,10 @@ class Prepared:
     @property
     def time(self) -> float:
         return self.start.time
+
+    def bound(self, program: Program) -> BoundKernel:
+        """Return a program of the form with its parameters."""
+        return self.assembly.compiled(program).bind(self.plan.values)
 
 
 def prepare(scene: Model, form: str, level: str = "ggl") -> Prepared:

@@ -34,7 +34,7 @@ class Bench:
     def __init__(self, choose: ChoosePivots, size: int) -> None:
         self.sundials, self.context, self.record = library(), c_void_p(), Record()
         self.sundials.SUNContext_Create(0, self.context)
-        self.solver = FixedSolver(self.sundials, choose, self.context, self.record)
+        self.solver = FixedSolver(self.sundials, choose, self.context, self.record, np.ones(size))
         self.size = size
 
     def solve(self, matrix: Any, right: Any) -> Any:

@@ -217,7 +217,7 @@ def test_consistent_rates_of_coordinates_are_packed() -> None:
     assembly, t, q, u = states("four-bar", "dae")
     plan = make_problem(assembly, t, q, u, 1.0, 1.0)
     y, yp = pack_state(plan, t, q, u)
-    residual = assembly.kernel(plan.program.residual)([t], y, yp)[0]
+    residual = assembly.compiled(plan.program.residual).bind(plan.values)([t], y, yp)[0]
     assert np.max(np.abs(residual)) < 1e-12
 
 

@@ -209,7 +209,8 @@ def dae_form(
     """Return the dae form of a scene at a level.
 
     ``ggl``, the stabilised index-2 form of Gear, Gupta and Leimkuhler (J. Comput. Appl. Math. 12, 1985), holds
-    position and velocity constraints, with a second set of multipliers that shifts positions onto the constraints.
+    position and velocity constraints, with a second set of multipliers that shifts positions onto the constraints. One
+    over the square of the scene's size follows the parameters there: shifts in metres and in radians are compared.
     ``index1`` holds the constraints' second derivative and drifts; ``index1-projected`` is the same, with what comes
     out of it projected.
     """
@@ -223,11 +224,13 @@ def dae_form(
         if one.value is not None
     }
 
+    lever = equations.graph.symbol("one over the square of the scene's size")
+
     def residual() -> list[Expression]:
         rows, pulled = _smooth_at_zero(equations.rows_with_multipliers, multipliers) or equations.rows, pull()
         dynamic = pulled.of_motion([r - f for r, f in zip(rows, equations.constraint_rows, strict=True)])
         if chosen == "ggl":
-            kinematic = _shifted(equations, extra) if multipliers else kinematic_rows(equations)
+            kinematic = _shifted(equations, extra, lever) if multipliers else kinematic_rows(equations)
             values = [one.value for one in constraints if one.value is not None]
             held = values + [one.rate for one in constraints]
         else:
@@ -235,7 +238,8 @@ def dae_form(
             held = [one.second for one in constraints]
         return tidy(pulled.of_rates(kinematic) + dynamic + [either_sign(one) for one in held])
 
-    return make_form_program(name, "dae", chosen, equations, parameters, residual, multipliers, tuple(extra.values()))
+    known = (*parameters, lever) if extra else parameters
+    return make_form_program(name, "dae", chosen, equations, known, residual, multipliers, tuple(extra.values()))
 
 
 def _smooth_at_zero(rows: Sequence[Expression], multipliers: Sequence[Expression]) -> list[Expression]:
@@ -251,10 +255,15 @@ def _smooth_at_zero(rows: Sequence[Expression], multipliers: Sequence[Expression
     return substitute(list(rows), guarded) if guarded else list(rows)
 
 
-def _shifted(equations: Equations, extra: Mapping[Expression, Expression]) -> list[Expression]:
-    """Return the kinematic rows that keep positions on the constraints by multipliers in the place of others."""
+def _shifted(equations: Equations, extra: Mapping[Expression, Expression], lever: Expression) -> list[Expression]:
+    """Return the kinematic rows that keep positions on the constraints by multipliers in the place of others.
+
+    What turns is shifted as a point at the scene's size from the axis is, so that no unit of length counts.
+    """
     symbols = {one.multiplier: extra.get(one.multiplier, equations.graph.zero) for one in equations.constraints}
-    return kinematic_rows(equations, shift=substitute(list(equations.constraint_rows), symbols))
+    along = substitute(list(equations.constraint_rows), symbols)
+    shift = [by if one.unit == "m/s" else by * lever for by, one in zip(along, equations.speed_names, strict=True)]
+    return kinematic_rows(equations, shift=shift)
 
 
 def keep_constraints(equations: Equations, kept: Sequence[int]) -> Equations:

@@ -73,6 +73,17 @@ def test_steps_do_not_depend_on_units(name: str, form: str) -> None:
         assert counts[0].residual_evaluations == counts[1].residual_evaluations
 
 
+@pytest.mark.parametrize("level", ["ggl", "index1"])
+@pytest.mark.parametrize("name", ["heavy-top", "four-bar", "slider-crank", "gyroscope", "spatial-slider-crank"])
+def test_steps_of_ida_do_not_depend_on_units(name: str, level: str) -> None:
+    counts = []
+    for units in ((1.0, 1.0, 1.0), *UNITS, (2.0**20, 2.0**-20, 2.0**-20)):
+        scene = in_units(name, *units)
+        done = simulate(scene, form="dae", level=level, solver="ida", outputs=2, t_end=0.1 * scene.t_end).statistics
+        counts.append((done.steps, done.residual_evaluations))
+    assert counts[1:] == counts[:1] * 4
+
+
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 @pytest.mark.parametrize("row", CONTACTS)
 def test_steps_between_contacts_do_not_depend_on_the_size(row: str, form: str, monkeypatch: pytest.MonkeyPatch) -> None:

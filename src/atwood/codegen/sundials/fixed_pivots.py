@@ -2,8 +2,8 @@
 
 The routines are the same for all patterns, with lists of places. The factors have the reciprocal of each pivot in its
 place, and the column below it divided by it. A probe says whether these are good: a system with a right-hand side of
-all signs is solved, and each equation compared with the sizes of its terms (the componentwise backward error of W.
-Oettli and W. Prager, Numer. Math. 6, 1964).
+all signs, as large as unknowns of their sizes make it, is solved, and each equation compared with the sizes of its
+terms (the componentwise backward error of W. Oettli and W. Prager, Numer. Math. 6, 1964).
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from atwood.codegen.sundials.residuals import array_of
 SLOTS = (
     *("starts", "middles", "indices", "targets", "target_starts", "rows", "columns"),
     *("positions", "by_row", "row_starts", "row_columns"),
-    *("size", "count", "room", "values", "probe", "right", "work", "found"),
+    *("size", "count", "room", "values", "probe", "sizes", "right", "work", "found"),
     *("entries", "failed", "mend", "solve"),
 )
 """What a block of 64-bit numbers and addresses holds, in this order.
 
 First the lists of `atwood.numerics.fixed_pivots.FixedPivots`; how many unknowns, entries and places there are; the
-factors, signs for the right-hand side of the probe, and room for three vectors; the entries of the present matrix;
-whether its factors are no good; and what is then done: a function that either returns `AGAIN`, with other lists in the
-block, or factorises in another way and returns 0, or else something other; and one that then solves, given right-hand
-side and solution.
+factors, signs for the right-hand side of the probe, sizes of the unknowns, and room for three vectors; the entries of
+the present matrix; whether its factors are no good; and what is then done: a function that either returns `AGAIN`, with
+other lists in the block, or factorises in another way and returns 0, or else something other; and one that then solves,
+given right-hand side and solution.
 """
 
 AGAIN = 77
@@ -137,7 +137,8 @@ def _probe() -> Routine:
     with r.count(block.size) as row:
         largest = r.variable(0.0)
         with r.count(*block.run("row_starts", row)) as entry:
-            largest.now = r.most(r.size(entries[block.listed("by_row", entry)]), largest.now)
+            size = block.slots.sizes[block.listed("row_columns", entry)]
+            largest.now = r.most(r.size(entries[block.listed("by_row", entry)]) * size, largest.now)
         side[row] = largest.now * probe[row]
     r.call("solve_fixed", *r.arguments, side, found, result=None)
     fails = r.variable(0, BOOLEAN)

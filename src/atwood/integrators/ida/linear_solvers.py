@@ -105,6 +105,8 @@ class FixedSolver:
         SUNDIALS' context.
     record
         Takes up what goes wrong in Python.
+    sizes
+        Of the unknowns, so that no unit decides whether pivots are good.
 
     Attributes
     ----------
@@ -114,7 +116,9 @@ class FixedSolver:
         How often fixed pivots were no good.
     """
 
-    def __init__(self, library: SundialsLibrary, choose: ChoosePivots, context: c_void_p, record: Record) -> None:
+    def __init__(
+        self, library: SundialsLibrary, choose: ChoosePivots, context: c_void_p, record: Record, sizes: FloatArray
+    ) -> None:
         pivots = choose(())
         if pivots is None:
             raise LookupError("there are no pivots")
@@ -124,7 +128,8 @@ class FixedSolver:
         self._factors: Any = None
         self._functions = _MEND(self._mend), _SOLVE(self._solve)
         signs = np.where(np.random.default_rng(pivots.size).integers(0, 2, pivots.size), 1.0, -1.0)
-        self._vectors = {name: np.zeros(pivots.size) for name in ("right", "work", "found")} | {"probe": signs}
+        self._vectors = {name: np.zeros(pivots.size) for name in ("right", "work", "found")}
+        self._vectors |= {"probe": signs, "sizes": np.array(sizes, dtype=float)}
         self._block = (c_int64 * len(SLOTS))()
         self._put({name: one.ctypes.data for name, one in self._vectors.items()})
         self._put({name: address(one) for name, one in zip(("mend", "solve"), self._functions, strict=True)})

@@ -195,12 +195,18 @@ class IdaMemory:
         self.call("IDAReInit", t, self._y, self._yp)
 
     def set_linear_solver(
-        self, entries: int, jacobian: int, is_sparse: bool, pivots: ChoosePivots | None, record: Record
+        self,
+        entries: int,
+        jacobian: int,
+        is_sparse: bool,
+        pivots: ChoosePivots | None,
+        record: Record,
+        sizes: FloatArray,
     ) -> None:
         """Make the matrix and the linear solver; a record takes up what goes wrong in Python there."""
         library, parts, n = self.library, self._parts, self.size
         if pivots is not None:
-            parts.fixed = fixed = FixedSolver(library, pivots, parts.context, record)
+            parts.fixed = fixed = FixedSolver(library, pivots, parts.context, record, sizes)
             matrix, solver = fixed.matrix, fixed.solver
         elif is_sparse:
             parts.sparse = sparse = SparseSolver(library, n, entries, self._y, parts.context)

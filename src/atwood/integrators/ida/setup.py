@@ -18,6 +18,7 @@ from atwood.integrators.protocol import (
     absolute_tolerances,
 )
 from atwood.lazy_dataclasses import dataclass
+from atwood.numerics.matrices import or_one
 
 LOOSE_NEWTON, TIGHT_NEWTON, FIXED_NEWTON = 0.33, 0.01, 0.1
 """IDA's own choice of the Newton coefficient, that for problems with multipliers, and for large ones of them."""
@@ -110,7 +111,10 @@ def prepare(
     memory.begin(native.residual, state[0], native.user_data)
     _set_weights(memory, problem, options, tuning, native, record)
     pivots = problem.pivots if linear_solver == "fixed" else None
-    memory.set_linear_solver(len(problem.pattern[0]), native.jacobian, linear_solver == "sparse", pivots, record)
+    sizes = or_one(absolute_tolerances(options, problem.size, least=0.0))
+    sizes[list(problem.algebraic)] *= options.relative_tolerance  # theirs are not small
+    is_sparse = linear_solver == "sparse"
+    memory.set_linear_solver(len(problem.pattern[0]), native.jacobian, is_sparse, pivots, record, sizes)
     if problem.algebraic:
         kinds = np.ones(problem.size)
         kinds[list(problem.algebraic)] = 0.0

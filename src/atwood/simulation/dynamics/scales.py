@@ -119,10 +119,10 @@ def motion_scales(equations: Equations, length: Sizes) -> FloatArray:
 
 def is_length(equations: Equations, key: tuple[str, str, int]) -> bool:
     """Return whether a constraint misses by a length: then its multiplier is a force, else a torque."""
-    return _unit(equations, key) == "N"
+    return multiplier_unit(equations, key) == "N"
 
 
-def _unit(equations: Equations, key: tuple[str, str, int]) -> str:
+def multiplier_unit(equations: Equations, key: tuple[str, str, int]) -> str:
     """Return the unit of a constraint's multiplier."""
     if key[1] in BALANCES:
         return BALANCES[key[1]]
@@ -138,7 +138,7 @@ def multiplier_sizes(assembly: Assembly, form: FormName) -> FloatArray:
     """
     length = extent(assembly.mechanism) or scene_length(assembly)
     equations = assembly.in_coordinates(form)
-    found = [_unit(equations, one.key) for one in equations.constraints]
+    found = [multiplier_unit(equations, one.key) for one in equations.constraints]
     # A force is of one power of a length.
     return np.array([length ** (parse_unit(unit).exponents[1] - 1) for unit in found])
 

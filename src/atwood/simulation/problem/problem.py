@@ -29,7 +29,7 @@ from atwood.simulation.dynamics.redundancy import (
     review_kept,
     review_partitioning,
 )
-from atwood.simulation.dynamics.scales import Scales
+from atwood.simulation.dynamics.scales import Scales, multiplier_unit
 from atwood.simulation.problem.options import with_nominal
 from atwood.tolerances import tolerances
 
@@ -141,7 +141,7 @@ class SceneProblem:
             assembly, program = self.assembly, self._present
             many = program.derivative.by_columns
             made = assembly.compiled(program.residual), assembly.compiled(program.jacobian, many)
-            self._kernels = made[0].bind(self._values), made[1].bind(self._values)
+            self._kernels = made[0].bind(self.values), made[1].bind(self.values)
         return self._kernels
 
     def columns(self, program: Program, states: int = 0) -> Callable[..., tuple[FloatArray, ...]]:
@@ -167,10 +167,12 @@ class SceneProblem:
         return self.assembly.form_program(*chosen) if self.dependent_speeds else self.program
 
     @property
-    def _values(self) -> FloatArray:
-        """The parameters of these."""
+    def values(self) -> FloatArray:
+        """The parameters of the form's programs: those of the scene, and of what keeps to constraints."""
         own = self.assembly.parameter_values
-        return np.concatenate([own, [_PULL / self.scales.time], self.sizes]) if has_touched(self.assembly) else own
+        more = [_PULL / self.scales.time, *self.sizes] if has_touched(self.assembly) else []
+        lever = [1.0 / self.scales.length**2] if self.program.extra else []
+        return np.concatenate([own, more, lever])
 
     def review_partitioning(self, t: float, q: FloatArray) -> bool:
         """Choose other dependent coordinates if the present ones have become a poor choice; return whether it did."""
@@ -309,7 +311,7 @@ class SceneProblem:
         about = kept, has_touched(self.assembly)
         if self._null_space is None:
             program = shared.get(_NULL_SPACE, lambda: _null_space_program(self.assembly, kept), *about)
-            self._null_space = CompiledNullSpace(program, self._values, self.sizes)
+            self._null_space = CompiledNullSpace(program, self.values, self.sizes)
         made = self._null_space.program
         code = shared.get(_NULL_SPACE_CODE, lambda: compile_null_space(made, linear_solver), *about, linear_solver)
         coordinates = self.program.coordinates
@@ -337,7 +339,7 @@ class SceneProblem:
             program,
             linear_solver,
         )
-        data = code.bind(self._values)
+        data = code.bind(self.values)
         return NativeCallbacks(
             code.residual_address,
             code.jacobian_address,
@@ -356,15 +358,18 @@ class SceneProblem:
     def tolerances(self, relative: float, nominal: Mapping[str, float]) -> FloatArray:
         """Return the absolute tolerance of each unknown; multipliers are kept out of the error test.
 
-        Those of the stabilised form move points by speeds, and turn bodies by speeds over arms.
+        Those of the stabilised form move points by the scene's size in its time.
         """
-        program, scales = self.program, self.scales
-        forces = np.full(program.multipliers, 1e3 * scales.force)
-        shifts = np.full(program.extra, 1e3 * max(scales.length, 1.0 / scales.length) / scales.time)
+        program, scales, equations = self.program, self.scales, self.assembly.own_equations
+        kept = [equations.constraints[i] for i in self.finding.kept]
+        forces = np.array([1e3 * scales.of(multiplier_unit(equations, one.key)) for one in kept])
+        shifts = forces[[one.value is not None for one in kept]] * (scales.length / (scales.time * scales.force))
         motion = self.coordinate_sizes, self.sizes / scales.time
         if nominal:
             motion = with_nominal(self.assembly, self.assembly.own_equations, motion, nominal)
-        return np.concatenate([*(relative * one for one in motion), forces, shifts])
+        return np.concatenate(
+            [*(relative * one for one in motion), forces[: program.multipliers], shifts[: program.extra]]
+        )
 
 
 def _restored(

@@ -102,7 +102,7 @@ def _linear_algebra(plan: SceneProblem, jacobian: Sequence[float]) -> tuple[floa
     x, b = (sundials.N_VMake_Serial(n, one.ctypes.data, context) for one in values)
     fixed = None
     if kind == "fixed" and problem.pivots is not None:
-        fixed = FixedSolver(sundials, problem.pivots, context, Record())
+        fixed = FixedSolver(sundials, problem.pivots, context, Record(), np.ones(n))
         solver, matrix, entries = fixed.solver, fixed.matrix, np.asarray(jacobian)
     else:  # ones on and above the diagonal are their own factors, and can be factorised again and again
         matrix = sundials.SUNDenseMatrix(n, n, context)
@@ -142,14 +142,14 @@ def _implicit(
     plan: SceneProblem, done: Statistics, rtol: float, t: float, q: FloatArray, u: FloatArray
 ) -> dict[str, float]:
     """Return what residuals, Jacobians and SUNDIALS' linear algebra take, in steps that are short beside the motion."""
-    assembly, program, values = plan.assembly, plan.program, plan.assembly.parameter_values
+    assembly, program, values = plan.assembly, plan.program, plan.values
     y, still, rate = np.zeros(program.size), np.zeros(program.size), [_SHORT / plan.scales.time]
     y[: len(q) + len(u)] = np.concatenate([q, u])
     more = [still] * program.derivative.by_columns
     one = _evaluation(assembly, program.jacobian, values, [t], y, still, rate, *more)
     found = {"equations_s": done.residual_evaluations * _evaluation(assembly, program.residual, values, [t], y, still)}
     found["jacobians_s"] = done.jacobian_evaluations * one * (program.size if more else 1)
-    linear = _linear_algebra(plan, assembly.kernel(program.jacobian)([t], y, still, rate, *more)[0])
+    linear = _linear_algebra(plan, assembly.compiled(program.jacobian).bind(values)([t], y, still, rate, *more)[0])
     if linear is not None:
         found["linear_s"] = done.jacobian_evaluations * linear[0] + done.residual_evaluations * linear[1]
     return found
