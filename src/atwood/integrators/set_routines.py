@@ -36,7 +36,7 @@ FIELDS: dict[str, Kind] = {
     **dict.fromkeys(("finite", "blur", "pace", "tolerance", "inside", "ahead", "rough", "later"), NUMBER),
     **dict.fromkeys(("better_x", "better_y", "lasted"), NUMBER),
     **dict.fromkeys(("count", "size", "entries", "coordinates", "speeds", "number", "better"), INTEGER),
-    **dict.fromkeys(("logged", "known", "stops", "repeats", "shared"), INTEGER),
+    **dict.fromkeys(("logged", "known", "stops", "repeats", "shared", "tried"), INTEGER),
 }
 """The memory of sets. `finite` is 0 where limits are of impulses, which finite forces do not have; `blur` and `pace`
 are multiples of what is small and slow; `inside` is how deep a gap may be, in multiples of what is small; `ahead` is
@@ -44,7 +44,8 @@ how long impacts may still go on that are summed, and then how long they do, `ro
 length of their intervals, `later` how long where these are uneven, `lasted` how long these have gone on; `stops` is 1
 where these come to an end and may still wait for one more, 2 where they come to an end; `shared` is 1 where forces of a
 set that was found are not determined, as rows repeat each other, or where another share might let rest what begins to
-slip, and `repeats` where those solved for last are not."""
+slip, and `repeats` where those solved for last are not. `tried` is 0, or which share that holds everything is taken
+whatever its forces are here: joints have a part in those that are reported."""
 
 UNITS = {
     name: k
@@ -752,6 +753,14 @@ def _let_go() -> Routine:
     r, m, () = _open("let_go")
     place, state, holds, gone = r.arguments[0], m.unit("next"), m.unit("holds"), m.unit("gone")
     n, many, tried, last = (r.variable(0, INTEGER) for _ in range(4))
+    response, top, most = m.result("response"), r.variable(0.0), r.variable(0.0)
+    with r.count(m.size) as i:
+        top.now = r.most(response[i * m.size + i], top.now)
+    with _each(r, m, "chosen") as (k, _, _), r.when((m.unit("slip")[k] == 1.0) & (state[k] == float(STICKS))):
+        most.now = 0.0
+        with _rows(r, m, k) as (_, i):
+            most.now = r.most(response[i * m.size + i], most.now)
+        state[k] = r.choose(most.now > top.now * NOTHING, float(STICKS), float(OPEN))  # joints hold it
     for is_slip in (1.0, 0.0):
         with _each(r, m, "chosen") as (k, _, _), r.when((m.unit("slip")[k] == is_slip) & (state[k] == float(STICKS))):
             holds[n.now] = k.number()
@@ -854,8 +863,13 @@ def _lawful() -> Routine:
         over = r.choose(is_slip, force - static, 0.0 - static - a)
         sticks = (m.unit("next")[k] == float(STICKS)) & ~_is_loose(r, m, k)
         moved = _size_of_slip(r, row, is_pair, motions)[2]
-        with r.when((moved > moves.now * (SHARED * SLACK)) | (sticks & (over > most.now * (SHARED * SLACK)))):
+        is_beyond = sticks & (over > most.now * (SHARED * SLACK)) & (m.tried == 0)
+        with r.when((moved > moves.now * (SHARED * SLACK)) | is_beyond):
             r.give(1)
+    with r.when(m.tried > 1):
+        m.tried = m.tried - 1
+        r.give(1)
+    m.tried = 0
     r.give(0)
     return r
 

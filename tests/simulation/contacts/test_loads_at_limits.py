@@ -24,6 +24,7 @@ from atwood_library import (
 
 from ...exported_scenes import FLAGS, apart, built, compiler, printed
 from ...helpers.contact_scenes import wedge_between
+from ...soak.sets import draw, make
 
 G = 9.81
 FORMS = pytest.mark.parametrize("form", ["reduced", "dae"])
@@ -87,6 +88,24 @@ def test_a_wedge_locks_itself_until_it_is_pushed_out_or_in(form: str, angle: flo
     slope = (s - way * upper * c) / (c + way * upper * s)
     inertia = wedge + load * s / c * (slope - way * lower)
     assert float(speed[-1]) == pytest.approx(way * 0.5 * rate * 0.01 / inertia, abs=1e-7)
+
+
+@needs_a_compiler
+@pytest.mark.parametrize(("seed", "form"), [(787000159, "reduced"), (787000161, "dae")])
+def test_c_takes_a_share_whose_forces_beside_those_of_hinges_contradict_nothing(
+    seed: int, form: str, tmp_path: Path
+) -> None:
+    """Least forces were judged without those of hinges: what is reported pulled, and it changed without end."""
+    draft = draw(seed)
+    scene = make(draft)
+    result = simulate(scene, form=form, t_end=0.03, rtol=1e-9, outputs=np.linspace(0.0, 0.03, 3))
+    found = printed(built(scene, tmp_path, form, ["-O0", *FLAGS[1:]]), 0.03, 1e-9, 3)
+    worst, where, _ = apart(found, result, assemble(scene))
+    assert worst <= 1e-9, where
+    for k, one in enumerate(draft.touches):
+        pressed, rubs = found[f"c{k}.normal_force"], abs(found.get(f"c{k}.friction_force", np.zeros(3)))
+        assert min(pressed) >= -1e-9
+        assert max(rubs - one.most * pressed) <= 1e-9
 
 
 @needs_a_compiler

@@ -64,30 +64,84 @@ static void tell_change(scene *s, double t, int k, const double *was, const doub
     }
 }
 
+/* States of gaps and slips after a moment, three numbers for each. */
+static void states_after(scene *s, double *after)
+{
+    int k;
+    for (k = 0; k < CONTACTS; k++) {
+        const double next = unit(s, UNIT_next)[k].f;
+        after[3 * k] = is_slip(k) ? next : 0.5 * next;
+        after[3 * k + 1] = contact_places[3 * k + 1] >= 0 ? unit(s, UNIT_next_x)[k].f : 0.0;
+        after[3 * k + 2] = contact_places[3 * k + 2] >= 0 ? unit(s, UNIT_next_y)[k].f : 0.0;
+    }
+}
+
+/* Whether a force that is reported contradicts the states that are taken: how joints share it the routine does not know. */
+static int contradicts(scene *s, double t)
+{
+    word values[EVENTS], kept[EVENTS];
+    int i, found = 0;
+    memcpy(kept, s->shifts, sizeof kept);
+    memset(s->shifts, 0, sizeof s->shifts);
+    if (events_at(t, s->y, NULL, values, s->self) == 0) {
+        for (i = 0; i < EVENTS; i++) {
+            if (event_contact[i] < 0 || (event_code[i] != OPENS && event_code[i] != YIELDS)) continue;
+            found |= event_direction[i] * values[i].f > 0.9 * event_small[i] * s->rtol;
+        }
+    }
+    memcpy(s->shifts, kept, sizeof kept);
+    return found;
+}
+
+/* Find the set of a moment; where nothing determines how forces are shared, one whose forces contradict nothing. */
+static int32_t find_set(scene *s, double t, const double *before, int is_start)
+{
+    const double near = 10.0 * (s->rtol > 1e-13 ? s->rtol : 1e-13), ahead = 10.0 * sqrt(s->rtol) * time_scale;
+    const double bounce = 1.1920928955078125e-7 * time_scale; /* two that rounding makes */
+    double after[3 * CONTACTS];
+    word speeds[SPEEDS];
+    int32_t code;
+    int i, k, tried;
+    for (i = 0; i < SPEEDS; i++) speeds[i] = s->y[COORDINATES + i];
+    for (tried = 0;; tried++) {
+        for (i = 0; i < UNITS * CONTACTS; i++) s->units[i].f = contact_units[i];
+        for (k = 0; k < CONTACTS; k++) {
+            unit(s, UNIT_small)[k].f *= near;
+            unit(s, UNIT_slow)[k].f *= near;
+            unit(s, UNIT_trigger)[k].f = s->triggers[k];
+            unit(s, UNIT_state)[k].f = is_slip(k) ? before[3 * k] : 2.0 * before[3 * k];
+            unit(s, UNIT_state_x)[k].f = before[3 * k + 1];
+            unit(s, UNIT_state_y)[k].f = before[3 * k + 2];
+        }
+        s->sets[SET_inside].f = is_start || HELD / near < 1.0 ? 1.0 : HELD / near;
+        s->sets[SET_ahead].f = ahead;
+        s->sets[SET_rough].f = ahead > 0.01 * time_scale ? ahead : 0.01 * time_scale;
+        s->sets[SET_later].f = 0.001 * ahead > bounce ? 0.001 * ahead : bounce;
+        s->sets[SET_tried].i = tried;
+        code = resolve(s->sets, t, 1, 1);
+        if (code != 0 && (code != UNDETERMINED || tried > 0)) return code;
+        if (code == 0) {
+            if (s->sets[SET_shared].i == 0 || s->sets[SET_tried].i != 0) return code;
+            states_after(s, after);
+            take_states(s, after);
+            if (!contradicts(s, t)) return code;
+        }
+        take_states(s, before);
+        for (i = 0; i < SPEEDS; i++) s->y[COORDINATES + i] = speeds[i];
+    }
+}
+
 /* What becomes of gaps and slips at a moment and in a state, which are in s; s->triggers says what has happened. */
 static int resolve_contacts(scene *s, double t, int is_start)
 {
-    const double near = 10.0 * (s->rtol > 1e-13 ? s->rtol : 1e-13), ahead = 10.0 * sqrt(s->rtol) * time_scale;
     double before[3 * CONTACTS], after[3 * CONTACTS], closed[3 * CONTACTS], speeds[SPEEDS], approach[CONTACTS];
     const double *struck[CONTACTS];
     int32_t code;
     int i, k, meets = 0, ends = -1;
-    for (i = 0; i < UNITS * CONTACTS; i++) s->units[i].f = contact_units[i];
     for (i = 0; i < 3 * CONTACTS; i++) before[i] = contact_places[i] >= 0 ? s->values[contact_places[i]].f : 0.0;
-    for (k = 0; k < CONTACTS; k++) {
-        unit(s, UNIT_small)[k].f *= near;
-        unit(s, UNIT_slow)[k].f *= near;
-        unit(s, UNIT_trigger)[k].f = s->triggers[k];
-        unit(s, UNIT_state)[k].f = is_slip(k) ? before[3 * k] : 2.0 * before[3 * k];
-        unit(s, UNIT_state_x)[k].f = before[3 * k + 1];
-        unit(s, UNIT_state_y)[k].f = before[3 * k + 2];
-        s->triggers[k] = 0.0;
-    }
     if (is_start) s->sets[SET_known].i = 0;
-    s->sets[SET_inside].f = is_start || HELD / near < 1.0 ? 1.0 : HELD / near;
-    s->sets[SET_ahead].f = ahead;
-    s->sets[SET_rough].f = ahead > 0.01 * time_scale ? ahead : 0.01 * time_scale;
-    code = resolve(s->sets, t, 1, 1);
+    code = find_set(s, t, before, is_start);
+    for (k = 0; k < CONTACTS; k++) s->triggers[k] = 0.0;
     if (code != 0) return say(s, FAILED, refused[code]);
     for (k = 0; k < CONTACTS && s->sets[SET_stops].i != 0 && !is_start; k++) {
         if (unit(s, UNIT_stopped)[k].f == 0.0) continue;
@@ -95,6 +149,7 @@ static int resolve_contacts(scene *s, double t, int is_start)
         break;
     }
     for (k = 0; k < CONTACTS; k++) struck[k] = NULL;
+    states_after(s, after);
     for (i = 0; i < s->sets[SET_logged].i; i++) {
         const word *const entry = s->log_of_sets + i * (CONTACT_ROWS + ENTRY);
         k = (int)entry[0].f;
@@ -107,10 +162,7 @@ static int resolve_contacts(scene *s, double t, int is_start)
         remember_impact(s, t, contact_units[UNIT_part * CONTACTS + k]);
     }
     for (k = 0; k < CONTACTS; k++) {
-        const double next = unit(s, UNIT_next)[k].f, touches = unit(s, UNIT_closed)[k].f;
-        after[3 * k] = is_slip(k) ? next : 0.5 * next;
-        after[3 * k + 1] = contact_places[3 * k + 1] >= 0 ? unit(s, UNIT_next_x)[k].f : 0.0;
-        after[3 * k + 2] = contact_places[3 * k + 2] >= 0 ? unit(s, UNIT_next_y)[k].f : 0.0;
+        const double touches = unit(s, UNIT_closed)[k].f;
         closed[3 * k] = closed[3 * k + 1] = closed[3 * k + 2] = touches;
         if (touches == 1.0) meets = !is_start;
     }

@@ -212,6 +212,7 @@ def _sizes_of_changes(data: dict[str, Any], programs: dict[str, Program]) -> dic
         found |= {"CONTACT_ROWS": contacts["size"], "PATTERN": len(contacts["pattern"]) // 2}
         found |= {"PAST": sets.LONG, "UNITS": len(sets.UNITS), "ENTRY": len(sets.ENTRY)}
         found |= {"WATCH_GAP": 1, "WATCH_REST": 2, "WATCH_RUN": 3}
+        found |= {"OPENS": sets.OPENS, "YIELDS": sets.YIELDS, "UNDETERMINED": sets.UNDETERMINED}
     if passage:
         n, m = passage["counts"]
         found |= {"BODY_COORDINATES": n, "BODY_SPEEDS": m, "BODY_CONSTRAINTS": len(passage["labels"])}
