@@ -16,16 +16,11 @@ from atwood.model.values.rotation import normals, turn
 from atwood.model.values.space import Vector, as_vector, dot
 
 
-class Ball(Component):
-    """A point mass."""
+class Weight(Component):
+    """What has a mass, and one end."""
 
     mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass.")
     end: Point = connector(Point, "The point.")
-
-    @inertia
-    def material_point(self) -> Iterable[PointInertia]:
-        """Return the inertia."""
-        yield PointInertia((self.end,), ((self.mass,),))
 
     @observable(unit="m", doc="Position.")
     def position(self) -> Vector:
@@ -38,16 +33,24 @@ class Ball(Component):
         return self.end.velocity
 
 
+class Ball(Weight):
+    """A point mass."""
+
+    @inertia
+    def material_point(self) -> Iterable[PointInertia]:
+        """Return the inertia."""
+        yield PointInertia((self.end,), ((self.mass,),))
+
+
 class PulleyBall(Ball):
     """A point mass that carries the groove of a pulley."""
 
     end: Groove = connector(Groove, "The groove.")
 
 
-class Block(Component):
+class Block(Weight):
     """A rigid body."""
 
-    mass: float = parameter(1.0, unit="kg", above=0.0, doc="Mass.")
     size: float = parameter(1.0, unit="m", above=0.0, doc="Radius of gyration, about.")
     end: Frame = connector(Frame, "The frame.")
 
@@ -57,16 +60,6 @@ class Block(Component):
         j = self.mass * self.size * self.size
         tensor = ((1.1 * j, 0.1 * j, 0.0), (0.1 * j, 0.9 * j, 0.05 * j), (0.0, 0.05 * j, 1.2 * j))
         yield BodyInertia(self.end, self.mass, Vector(0.1 * self.size, 0.0, -0.2 * self.size), 0.9 * j, tensor)
-
-    @observable(unit="m", doc="Position of the frame.")
-    def position(self) -> Vector:
-        """Return the position."""
-        return self.end.position
-
-    @observable(unit="m/s", doc="Velocity of the frame.")
-    def velocity(self) -> Vector:
-        """Return the velocity."""
-        return self.end.velocity
 
     @observable(unit="rad", doc="Angle.", spaces=("plane",))
     def angle(self) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
+from itertools import cycle
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,7 +76,7 @@ def plot_bode(
     response = model.frequency_response(omega)
     figure = new_figure(7.0, 5.4)
     above, below = figure.subplots(2, 1, sharex=True)
-    for (i, j, label), colour in zip(pairs, _colours(len(pairs)), strict=True):
+    for (i, j, label), colour in zip(pairs, cycle(COLOURS), strict=False):
         own = response[:, i, j]
         above.plot(omega, 20.0 * np.log10(np.maximum(np.abs(own), 1e-300)), color=colour, linewidth=1.6, label=label)
         below.plot(*_phase(omega, own), color=colour, linewidth=1.6)
@@ -110,7 +111,7 @@ def plot_nyquist(
     response = model.frequency_response(omega)
     figure = new_figure(5.6, 5.2)
     axes = figure.subplots()
-    for (i, j, label), colour in zip(pairs, _colours(len(pairs)), strict=True):
+    for (i, j, label), colour in zip(pairs, cycle(COLOURS), strict=False):
         own = response[:, i, j]
         axes.plot(own.real, own.imag, color=colour, linewidth=1.6, label=label)
         axes.plot(own.real, -own.imag, color=colour, linewidth=1.0, linestyle=":")
@@ -195,7 +196,7 @@ def plot_branches(
     check_known(path, known, "there is no such coordinate")
     figure = new_figure(6.4, 4.6)
     axes = figure.subplots()
-    for branch, colour in zip(branches.branches, _colours(len(branches.branches)), strict=True):
+    for branch, colour in zip(branches.branches, cycle(COLOURS), strict=False):
         values = branch.values[path]
         for shown, style in ((branch.stable, "-"), (~branch.stable, "--")):
             near = shown | np.roll(shown, 1) & np.roll(shown, -1)
@@ -212,7 +213,3 @@ def plot_branches(
     polish(axes, branches.path, path)
     headed(axes, f"{branches.scene}: equilibria, stable with full lines")
     return finished(figure, file)
-
-
-def _colours(count: int) -> list[str]:
-    return [COLOURS[k % len(COLOURS)] for k in range(count)]

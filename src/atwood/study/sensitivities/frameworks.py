@@ -45,19 +45,19 @@ class RunFunction:
         self,
         make: Callable[[RunFunction], Callable[[Any], Any]],
         assembly: Assembly,
-        quantities: tuple[str, ...],
-        parameters: tuple[str, ...],
-        start: tuple[str, ...],
+        quantities: Iterable[str],
+        parameters: Iterable[str],
+        start: Iterable[str],
         inputs: Mapping[str, Any] | Iterable[str],
         between: str,
-        t_end: float | None,
+        t_end: float | str | None,
         outputs: Any,
         rtol: float,
     ) -> None:
-        begin, end = assembly.flat.t_start, assembly.flat.t_end if t_end is None else t_end
-        self.assembly, self.parameters, self.start = assembly, parameters, start
+        begin, end = assembly.flat.t_start, assembly.flat.t_end if t_end is None else float(t_end)
+        self.assembly, self.parameters, self.start = assembly, tuple(parameters), tuple(start)
         self.between, self.end, self.rtol = between, end, rtol
-        self.quantities = quantities
+        self.quantities = tuple(quantities)
         self.time = np.linspace(begin, end, outputs) if isinstance(outputs, int) else np.asarray(outputs, dtype=float)
         driven, self.driven = with_inputs(assembly, inputs, between, end)
         self._last: tuple[bytes, Result, tuple[Driven, ...]] | None = None
@@ -232,10 +232,8 @@ def as_jax(
     AtwoodError
         If JAX is not installed (``pip install jax``), or something has no derivative.
     """
-    assembly = assembly_of(scene, form=form)
-    end = None if t_end is None else float(t_end)
-    about = tuple(quantities), tuple(parameters), tuple(start), inputs, between, end, outputs, rtol
-    return RunFunction(_with_jax, assembly, *about)
+    about = quantities, parameters, start, inputs, between, t_end, outputs, rtol
+    return RunFunction(_with_jax, assembly_of(scene, form=form), *about)
 
 
 @takes(**_KINDS)
@@ -272,7 +270,5 @@ def as_torch(
     AtwoodError
         If PyTorch is not installed (``pip install torch``), or something has no derivative.
     """
-    assembly = assembly_of(scene, form=form)
-    end = None if t_end is None else float(t_end)
-    about = tuple(quantities), tuple(parameters), tuple(start), inputs, between, end, outputs, rtol
-    return RunFunction(_with_torch, assembly, *about)
+    about = quantities, parameters, start, inputs, between, t_end, outputs, rtol
+    return RunFunction(_with_torch, assembly_of(scene, form=form), *about)

@@ -249,16 +249,7 @@ def canonical_transformation(
             )
     else:
         by = _solved([value - one for value, one in zip(values, new, strict=True)], old)
-    return CanonicalTransformation(
-        space,
-        tuple(new[:n]),
-        tuple(new[n:]),
-        tuple(space.shown(one) for one in values[:n]),
-        tuple(space.shown(one) for one in values[n:]),
-        by,
-        _old_hamiltonian(hamiltonian, space),
-        _added(values, new, by),
-    )
+    return _transformation(hamiltonian, space, new, values, by, _added(values, new, by))
 
 
 @takes(
@@ -321,17 +312,22 @@ def generated_transformation(
     added = f.diff(sympy.Symbol("t"))
     if inverse:
         added = added.xreplace(inverse)
-    values = [forward[one] for one in new]
-    return CanonicalTransformation(
-        space,
-        new_q,
-        new_p,
-        tuple(space.shown(short(one)) for one in values[:n]),
-        tuple(space.shown(short(one)) for one in values[n:]),
-        inverse,
-        _old_hamiltonian(hamiltonian, space),
-        added if inverse or added == 0 else None,
-    )
+    values = [short(forward[one]) for one in new]
+    return _transformation(hamiltonian, space, new, values, inverse, added if inverse or added == 0 else None)
+
+
+def _transformation(
+    hamiltonian: Space,
+    space: PhaseSpace,
+    new: Sequence[Sympy],
+    values: Sequence[Sympy],
+    solved: Mapping[Sympy, Sympy],
+    added: Sympy | None,
+) -> CanonicalTransformation:
+    """Return the transformation to new symbols, coordinates first, with the values that they have."""
+    n, shown = len(space.coordinates), tuple(space.shown(one) for one in values)
+    old = None if isinstance(hamiltonian, (tuple, list)) else space.read(hamiltonian.expression)
+    return CanonicalTransformation(space, tuple(new[:n]), tuple(new[n:]), shown[:n], shown[n:], solved, old, added)
 
 
 def _not_as_many(n: int, coordinates: Iterable[Sympy], momenta: Iterable[Sympy]) -> UsageError:
@@ -340,10 +336,6 @@ def _not_as_many(n: int, coordinates: Iterable[Sympy], momenta: Iterable[Sympy])
     )
     advice = f"Give as many of each as the old ones, {n}, all different."
     return UsageError(f"{n} new coordinates and {n} new momenta are needed", where=given[:80], advice=advice)
-
-
-def _old_hamiltonian(given: Space, space: PhaseSpace) -> Sympy | None:
-    return None if isinstance(given, (tuple, list)) else space.read(given.expression)
 
 
 def _solved(equations: Sequence[Sympy], unknowns: Sequence[Sympy], any_branch: bool = False) -> dict[Sympy, Sympy]:
