@@ -16,15 +16,12 @@ from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.kinematics.mechanism import Mechanism
 from atwood.mechanics.kinematics.orientation import body_offsets, plain
 from atwood.plotting.camera import DEFAULT_VIEW, as_camera
-from atwood.plotting.canvas import COLOURS, GREY, INK, PALE
+from atwood.plotting.canvas import COLOURS, GREY
 from atwood.plotting.planar.geometry import Picture, Shape, make_picture
-from atwood.plotting.planar.strokes import Pen, seen_from_front
+from atwood.plotting.planar.strokes import TIES, Item, Pen, line_of
 from atwood.plotting.scene3d.picture import SpacePicture, make_space_picture
 from atwood.plotting.shapes.meshes import Mesh
 from atwood.result.result import Result
-
-Item = dict[str, Any]
-"""Something to draw: its `kind`, the `part` that it shows, its `frame` and what the kind needs."""
 
 FLAT, SPATIAL = 3, 12
 """Numbers of a frame: x, z and angle in a plane; its origin and its axes, the columns of a matrix by rows, in space."""
@@ -180,7 +177,7 @@ def _in_plane(result: Result, picture: Picture) -> Stage:
     number = {key: k for k, key in enumerate(keys)}
     zeros = np.zeros(len(picture.time))
     poses = [np.column_stack([picture.points[key], picture.angles.get(key, zeros)]) for key in keys]
-    items = [item for shape in picture.shapes for item in _flat_items(picture, pen, shape, number)]
+    items = [item for shape, marks in pen.marks for item in _flat_items(pen, shape, marks, number)]
     free = [one for one in pen.heavy if one.nodes[0] not in pen.sliding and not picture.direction]
     origin = np.zeros(3)
     trails = [{"frame": number[one.nodes[0]], "point": origin, "colour": pen.colour(one)} for one in free]
@@ -207,69 +204,30 @@ def _turned(mechanism: Mechanism, keys: Sequence[int]) -> tuple[tuple[int, ...],
     return tuple(body_of[key] for key in keys), tuple(turns)
 
 
-def _flat(points: FloatArray) -> FloatArray:
-    """Return places on the page as places in space."""
-    return np.asarray(np.column_stack([points[:, 0], np.zeros(len(points)), points[:, 1]]))
-
-
-def _flat_items(picture: Picture, pen: Pen, shape: Shape, number: Mapping[int, int]) -> Iterable[Item]:
+def _flat_items(pen: Pen, shape: Shape, marks: Sequence[Item], number: Mapping[int, int]) -> Iterable[Item]:
     """Return what a part in a plane looks like, as its pen draws it."""
-    told: Item = {"part": shape.part, "frame": number[shape.nodes[0]]}
-    place = picture.points[shape.nodes[0]][0]
-    if shape.kind == "ground":
-        lines = pen.ground_lines(shape, place)
-        return [{**told, **_line(line - place, width, INK)} for line, width in lines]
-    if shape.kind == "rail" and pen.rails[shape.part] is not None:
-        return [{"part": shape.part, "frame": -1, **_line(pen.rails[shape.part], 1.2, GREY)}]  # fixed in the world
-    if shape.kind == "rail" and shape.size:
-        return []
-    if shape.kind == "solid":
-        return _flat_solid(shape, told)
-    if shape.kind == "curve" and shape.line is not None:
-        return [{**told, **_line(shape.line, 1.6, GREY)}]
-    if shape.kind == "spiral":
-        return [{**told, **_line(pen.spiral(), 1.1, INK)}]
-    if shape.kind == "pivot":
-        return [{**told, "kind": "disc", "size": 0.8 * pen.unit, "colour": "#ffffff", "edge": INK}]
-    if shape.kind == "pulley":
-        return [
-            {**told, "kind": "disc", "size": size, "colour": colour, "edge": INK}
-            for size, colour in zip(pen.wheel(shape), (PALE, INK), strict=True)
-        ]
-    if shape.kind == "mass":
-        return _flat_mass(pen, shape, told)
-    ends: list[Item] = [{"frame": number[node], "radius": picture.radii.get(node, 0.0)} for node in shape.nodes]
+    ends: list[Item] = [{"frame": number[node], "radius": pen.picture.radii.get(node, 0.0)} for node in shape.nodes]
+    if shape.kind not in TIES:
+        return [{"part": shape.part, "frame": ends[0]["frame"], **_as_seen(one)} for one in marks]
+    if shape.kind == "rail":
+        fixed = pen.rails[shape.part]
+        if fixed is not None:
+            return [{"part": shape.part, "frame": -1, **line_of(fixed, 1.2, GREY)}]
+        if shape.size:
+            return []
     item: Item = {"kind": shape.kind, "part": shape.part, "ends": ends}
     if shape.kind == "rope":
-        spare = [pen.picture.spare(shape, moment) for moment in range(len(picture.time))]
+        spare = [pen.picture.spare(shape, moment) for moment in range(len(pen.picture.time))]
         item |= {"spare": np.array(spare)} if np.any(spare) else {}
     return [item]
 
 
-def _line(points: FloatArray | None, width: float, colour: str) -> Item:
-    assert points is not None
-    return {"kind": "line", "points": _flat(points), "width": width, "colour": colour}
-
-
-def _flat_solid(shape: Shape, told: Item) -> list[Item]:
-    assert shape.surface is not None
-    mesh = shape.surface
-    faces, borders = seen_from_front(mesh)
-    page = _flat(mesh.vertices[:, [0, 2]]).astype(np.float32)
-    found: list[Item] = [
-        {**told, "kind": "mesh", "vertices": page, "faces": _triangles(seen), "colour": colour}
-        for colour, seen in faces.items()
-        if len(seen)
-    ]
-    return [*found, {**told, "kind": "edges", "points": page[borders].reshape(-1, 3), "width": 1.3, "colour": INK}]
-
-
-def _flat_mass(pen: Pen, shape: Shape, told: Item) -> list[Item]:
-    if shape.size <= 0.0:
-        return []
-    half, corners = pen.mass_outline(shape)
-    look: Item = {**told, "colour": pen.colour(shape)}
-    if corners is None:
-        return [{**look, "kind": "disc", "size": half, "edge": "#ffffff"}]
-    faces: Sequence[Sequence[int]] = [[0, 1, 2], [0, 2, 3]]
-    return [{**look, "kind": "mesh", "vertices": _flat(corners), "faces": np.array(faces, dtype=np.int32)}]
+def _as_seen(mark: Item) -> Item:
+    """Return a mark as pages take it: triangles, and places in single precision."""
+    told = {key: one for key, one in mark.items() if key not in ("points", "is_pin")}
+    if mark["kind"] == "disc":
+        return told
+    if mark["kind"] == "mesh":
+        told.pop("edge", None)  # pages draw no borders
+        return {**told, "vertices": mark["points"].astype(np.float32), "faces": _triangles(mark["faces"])}
+    return {**told, "points": mark["points"].astype(np.float32) if mark["kind"] == "edges" else mark["points"]}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,21 @@ from atwood.plotting.canvas import COLOURS, GREY, INK, PALE, ROPE, SHADE, STEEL
 from atwood.plotting.planar.geometry import Picture, Shape, hanging
 from atwood.plotting.shapes.meshes import Mesh
 from atwood.plotting.sheet import Sheet
+
+WHITE = "#ffffff"
+
+TIES = ("rail", "rod", "link", "rope", "spring", "damper")
+"""Kinds that go from one node to others."""
+
+
+Item = dict[str, Any]
+"""Something to draw: its `kind`, the `part` that it shows, its `frame`, places in the axes of that, and its colour."""
+
+_BORDERS = {INK: 1.3, WHITE: 0.9}
+"""Widths of borders by their colour, points."""
+
+_FRONT = {"pivot": 0.3, "mass": 0.5}
+"""By how many layers some kinds are in front of others."""
 
 
 class Pen:
@@ -41,11 +57,40 @@ class Pen:
 
     def draw(self, sheet: Sheet, moment: int, alpha: float, depth: int) -> None:
         """Draw everything at one time."""
-        for shape in self.picture.shapes:
+        for shape, marks in self.marks:
             points = np.array([self.picture.points[node][moment] for node in shape.nodes])
             self.share = 1.0 if shape.kind == "ground" else alpha
-            look = {"zorder": depth}
-            getattr(self, f"_{shape.kind}")(sheet, shape, points, look, moment)
+            layer = 2.0 if shape.kind == "ground" else depth + _FRONT.get(shape.kind, 0.0)
+            turn = np.eye(2)
+            if shape.kind in ("solid", "curve"):
+                angle = float(self.picture.angles[shape.nodes[0]][moment])
+                turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+            for mark in marks:
+                self._draw_mark(sheet, mark, points[0] + mark["points"][..., [0, 2]] @ turn, layer)
+            if shape.kind in TIES:
+                getattr(self, f"_{shape.kind}")(sheet, shape, points, {"zorder": layer}, moment)
+
+    def _draw_mark(self, sheet: Sheet, mark: Item, page: FloatArray, layer: float) -> None:
+        kind, tone, size, edge = mark["kind"], self._tone(mark["colour"]), mark.get("size", 0.0), mark.get("edge", INK)
+        width = 0.0 if edge == mark["colour"] else _BORDERS[edge]
+        border: dict[str, Any] = {"facecolor": tone, "edgecolor": self._tone(edge), "linewidth": width}
+        if kind == "line":
+            sheet.line(page, color=tone, linewidth=mark["width"], solid_joinstyle="round", zorder=layer)
+        elif kind == "edges":
+            sheet.lines(page.reshape(-1, 2, 2), [tone], mark["width"], capstyle="round", zorder=layer)
+        elif kind == "mesh" and "edge" not in mark:
+            sheet.polygons(list(page[mark["faces"]]), [tone], [tone], linewidth=0.4, zorder=layer)
+        elif kind == "mesh":
+            sheet.polygon(page, **border, zorder=layer)
+        elif mark.get("is_pin"):
+            style: dict[str, Any] = {
+                "markerfacecolor": tone,
+                "markeredgecolor": border["edgecolor"],
+                "markeredgewidth": 1.4,
+            }
+            sheet.line(page, marker="o", markersize=5.5, linestyle="none", zorder=layer, **style)
+        else:
+            sheet.circle(page[0], size, **border, zorder=layer)
 
     def _tone(self, colour: str) -> tuple[float, float, float]:
         """Return a colour as strongly as is being drawn."""
@@ -54,13 +99,45 @@ class Pen:
         r, g, b = (self.share * part + 1.0 - self.share for part in to_rgb(colour))
         return r, g, b
 
-    # -- what is fixed ---------------------------------------------------------------------------------------------
+    # -- what is fixed to a node ------------------------------------------------------------------------------------
 
-    def _ground(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
-        for line, width in self.ground_lines(shape, points[0]):
-            sheet.line(line, color=INK, linewidth=width, **{**look, "zorder": 2})
+    @cached_property
+    def marks(self) -> list[tuple[Shape, list[Item]]]:
+        """What is fixed to the first node of each shape, first what is behind."""
+        return [(shape, self._marks_of(shape)) for shape in self.picture.shapes]
 
-    def ground_lines(self, shape: Shape, place: FloatArray) -> list[tuple[FloatArray, float]]:
+    def _marks_of(self, shape: Shape) -> list[Item]:
+        here = {"kind": "disc", "points": np.zeros((1, 3))}
+        if shape.kind == "ground":
+            place = self.picture.points[shape.nodes[0]][0]
+            return [line_of(line - place, width, INK) for line, width in self._ground_lines(shape, place)]
+        if shape.surface is not None:
+            page = shape.surface.vertices * [1.0, 0.0, 1.0]
+            faces, borders = seen_from_front(shape.surface)
+            solid = {"kind": "mesh", "points": page}
+            found = [{**solid, "faces": seen, "colour": colour} for colour, seen in faces.items() if len(seen)]
+            return [*found, {"kind": "edges", "points": page[borders].reshape(-1, 3), "width": 1.3, "colour": INK}]
+        if shape.line is not None:
+            return [line_of(shape.line, 1.6, GREY)]
+        if shape.kind == "spiral":
+            turn = np.linspace(0.0, 5.0 * np.pi, 80)
+            out = self.unit * (0.6 + 2.2 * turn / turn[-1])
+            return [line_of(np.column_stack([out * np.cos(turn), out * np.sin(turn)]), 1.1, INK)]
+        if shape.kind == "pivot":
+            return [{**here, "size": 0.8 * self.unit, "colour": WHITE, "edge": INK, "is_pin": True}]
+        if shape.kind == "pulley":
+            radius = self.picture.radii.get(shape.nodes[0], 2.2 * self.unit)
+            sizes = {PALE: 0.97 * radius, INK: min(0.16 * radius, self.unit)}
+            return [{**here, "size": size, "colour": colour, "edge": INK} for colour, size in sizes.items()]
+        if shape.kind == "mass" and shape.size > 0.0:
+            half, corners = self._mass_outline(shape)
+            look = {"colour": self.colour(shape), "edge": WHITE}
+            if corners is None:
+                return [{**here, "size": half, **look}]
+            return [{"kind": "mesh", "points": flat(corners), "faces": np.array([[0, 1, 2, 3]]), **look}]
+        return []
+
+    def _ground_lines(self, shape: Shape, place: FloatArray) -> list[tuple[FloatArray, float]]:
         """Return the lines that stand for what is fixed at a place, m, and their widths, points."""
         x, z = place
         u = self.unit
@@ -87,6 +164,21 @@ class Pen:
         """Return the grooves of the pulleys that a ground carries."""
         return [s.nodes[0] for s in self.picture.shapes if s.kind == "pulley" and s.nodes[-1] in shape.nodes]
 
+    def _mass_outline(self, shape: Shape) -> tuple[float, FloatArray | None]:
+        """Return half the size of a mass as it is drawn, m, and its corners from its place where it is no disc, m."""
+        half = 3.4 * self.unit * (shape.size / self.heaviest) ** (1.0 / 3.0)
+        half = max(half, 1.1 * self.unit)
+        half *= min(1.0, 8.0 / len(self.heavy))
+        if self.picture.direction == "up":
+            low, high = (-half, -2.0 * half), (half, 0.0)
+        elif self.picture.direction or shape.nodes[0] in self.sliding:
+            low, high = (-1.4 * half, -half), (1.4 * half, half)
+        else:
+            return half, None
+        return half, np.array([low, (high[0], low[1]), high, (low[0], high[1])])
+
+    # -- what goes between nodes ------------------------------------------------------------------------------------
+
     def _rail_ends(self, shape: Shape) -> FloatArray | None:
         """Return the ends of the straight line along which something slides in the world; None if the line moves."""
         base, rider = (self.picture.points[node] for node in shape.nodes)
@@ -111,8 +203,6 @@ class Pen:
         elif ends is not None:
             sheet.line(ends, color=GREY, linewidth=1.2, zorder=1.5, solid_capstyle="round")
 
-    # -- what moves ------------------------------------------------------------------------------------------------
-
     def _rod(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
         sheet.line(points, color=self._tone(INK), linewidth=2.0, solid_capstyle="round", **look)
 
@@ -121,39 +211,6 @@ class Pen:
         for colour, width in ((INK, 8.0), (STEEL, 5.6)):
             tone = self._tone(colour)
             sheet.line(points, color=tone, linewidth=width, solid_capstyle="round", zorder=front)
-
-    def _solid(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
-        """Draw what a surface shows from the front, and the lines where it ends."""
-        assert shape.surface is not None
-        mesh, angle = shape.surface, float(self.picture.angles[shape.nodes[0]][moment])
-        c, s = np.cos(angle), np.sin(angle)
-        page = points[0] + mesh.vertices[:, [0, 2]] @ np.array([[c, s], [-s, c]])
-        faces, borders = seen_from_front(mesh)
-        for tone, seen in faces.items():
-            colour = self._tone(tone)
-            sheet.polygons(page[seen], [colour], [colour], linewidth=0.4, **look)
-        sheet.lines(page[borders], [self._tone(INK)], 1.3, capstyle="round", **look)
-
-    def _curve(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
-        assert shape.line is not None
-        angle = float(self.picture.angles[shape.nodes[0]][moment])
-        c, s = np.cos(angle), np.sin(angle)
-        line = points[0] + shape.line @ np.array([[c, s], [-s, c]])
-        sheet.line(line, color=self._tone(GREY), linewidth=1.6, solid_joinstyle="round", **look)
-
-    def _spiral(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
-        sheet.line(points[0] + self.spiral(), color=self._tone(INK), linewidth=1.1, **look)
-
-    def spiral(self) -> FloatArray:
-        """Return the line of a spiral spring about its middle, m."""
-        turn = np.linspace(0.0, 5.0 * np.pi, 80)
-        out = self.unit * (0.6 + 2.2 * turn / turn[-1])
-        return np.column_stack([out * np.cos(turn), out * np.sin(turn)])
-
-    def _pivot(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
-        style: dict[str, Any] = {"markerfacecolor": "white", "markeredgecolor": self._tone(INK), "markeredgewidth": 1.4}
-        style |= {"marker": "o", "markersize": 5.5, "linestyle": "none", "zorder": look["zorder"] + 0.3}
-        sheet.line(points[:1], **style)
 
     def _spring(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
         line = _zigzag(points[0], points[1], 1.6 * self.unit)
@@ -182,41 +239,15 @@ class Pen:
         line = _rope_line(points, [self.picture.radii.get(node, 0.0) for node in shape.nodes])
         sheet.line(line, color=self._tone(ROPE), linewidth=1.6, solid_joinstyle="round", **look)
 
-    def _pulley(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
-        rim, hub = self.wheel(shape)
-        style = {"facecolor": self._tone(PALE), "edgecolor": self._tone(INK), "linewidth": 1.3}
-        sheet.circle(points[0], rim, **style, **look)
-        style = {"facecolor": self._tone(INK), "edgecolor": "none"}
-        sheet.circle(points[0], hub, **style, **look)
 
-    def wheel(self, shape: Shape) -> tuple[float, float]:
-        """Return the radii of a pulley and of its hub as they are drawn, m."""
-        radius = self.picture.radii.get(shape.nodes[0], 2.2 * self.unit)
-        return 0.97 * radius, min(0.16 * radius, self.unit)
+def flat(points: FloatArray) -> FloatArray:
+    """Return places on the page as places in space."""
+    return np.asarray(np.insert(points, 1, 0.0, axis=1))
 
-    def _mass(self, sheet: Sheet, shape: Shape, points: FloatArray, look: dict[str, Any], moment: int) -> None:
-        if shape.size <= 0.0:
-            return
-        style: dict[str, Any] = {"facecolor": self._tone(self.colour(shape)), "edgecolor": "white", "linewidth": 0.9}
-        style.update({**look, "zorder": look["zorder"] + 0.5})
-        half, corners = self.mass_outline(shape)
-        if corners is None:
-            sheet.circle(points[0], half, **style)
-        else:
-            sheet.polygon(points[0] + corners, **style)
 
-    def mass_outline(self, shape: Shape) -> tuple[float, FloatArray | None]:
-        """Return half the size of a mass as it is drawn, m, and its corners from its place where it is no disc, m."""
-        half = 3.4 * self.unit * (shape.size / self.heaviest) ** (1.0 / 3.0)
-        half = max(half, 1.1 * self.unit)
-        half *= min(1.0, 8.0 / len(self.heavy))
-        if self.picture.direction == "up":
-            low, high = (-half, -2.0 * half), (half, 0.0)
-        elif self.picture.direction or shape.nodes[0] in self.sliding:
-            low, high = (-1.4 * half, -half), (1.4 * half, half)
-        else:
-            return half, None
-        return half, np.array([low, (high[0], low[1]), high, (low[0], high[1])])
+def line_of(points: FloatArray, width: float, colour: str) -> Item:
+    """Return a line on the page."""
+    return {"kind": "line", "points": flat(points), "width": width, "colour": colour}
 
 
 def seen_from_front(mesh: Mesh) -> tuple[dict[str, IndexArray], IndexArray]:
