@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import struct
 from dataclasses import field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +20,8 @@ from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.files import write_atomically
 from atwood.lazy_dataclasses import dataclass
-from atwood.plotting.scene3d.model import SpaceModel, build_model
-from atwood.plotting.scene3d.pieces import Piece
-from atwood.plotting.scene3d.reading import read_scene
-from atwood.plotting.shapes.meshes import Mesh, cylinder, frame_along, revolved
+from atwood.plotting.pages.stage import Item, Stage, set_stage, triangles
+from atwood.plotting.shapes.meshes import cylinder, frame_along, revolved
 from atwood.result.result import Result
 
 _FLOAT, _ARRAY_BUFFER, _LINE_STRIP, _TRIANGLES = 5126, 34962, 3, 4
@@ -46,12 +45,12 @@ def write_gltf(result: Result, file: Path) -> Path:
     """
     if result.assembly.mechanism.space.name != "space":
         raise UsageError("only scenes in space have shapes with a thickness", where=str(file), advice="Use to_html.")
-    model = build_model(read_scene(result))
-    if not model.pieces and not model.ties and not model.heavy:
+    stage = set_stage(result)
+    if not stage.items:
         raise UsageError("nothing of it has a place to be drawn", where=str(file))
     book = _Book(_times(result.time))
-    _add_bodies(book, model)
-    _add_ties(book, model)
+    _add_bodies(book, stage, result.time)
+    _add_ties(book, stage)
     data = book.packed()
     write_atomically(file, lambda part: part.write_bytes(data))
     return file
@@ -154,21 +153,20 @@ def _material(colour: str) -> dict[str, Any]:
     return {"name": colour, "pbrMetallicRoughness": pbr, "doubleSided": True}
 
 
-def _triangles(mesh: Mesh) -> tuple[FloatArray, FloatArray]:
-    """Return the corners of the triangles of a mesh, each with its own, and the normals there."""
-    faces = np.concatenate([mesh.faces[:, [0, 1, 2]], mesh.faces[:, [0, 2, 3]]])
-    corners = mesh.vertices[faces]
+def _shape(item: Item) -> tuple[FloatArray, ...]:
+    """Return the points of a line, or the corners of triangles with their normals."""
+    if item["kind"] == "line":
+        return (item["points"],)
+    vertices, faces = item.get("vertices"), item.get("faces")
+    if item["kind"] == "ball":
+        arc = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 13)
+        ball = revolved(item["size"] * np.stack([np.abs(np.cos(arc)), np.sin(arc)], axis=1))
+        vertices, faces = item["point"] + ball.vertices, triangles(ball.faces)
+    corners = np.asarray(vertices)[faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     sizes = np.linalg.norm(normals, axis=1)
     seen = sizes > 0.0
-    each = np.repeat(normals[seen] / sizes[seen, None], 3, axis=0)
-    return corners[seen].reshape(-1, 3), each
-
-
-def _ball(centre: FloatArray, radius: float) -> Mesh:
-    arc = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 13)
-    ball = revolved(radius * np.stack([np.abs(np.cos(arc)), np.sin(arc)], axis=1))
-    return ball.placed(centre, np.eye(3))
+    return corners[seen].reshape(-1, 3), np.repeat(normals[seen] / sizes[seen, None], 3, axis=0)
 
 
 def _quaternions(axes: FloatArray) -> FloatArray:
@@ -179,42 +177,33 @@ def _quaternions(axes: FloatArray) -> FloatArray:
     return np.asarray(found)
 
 
-def _add_bodies(book: _Book, model: SpaceModel) -> None:
-    """Add what is fixed in each body, and how it moves."""
-    time = model.reading.time[book.kept]
-    book.clock = book.add(time - time[0], bounds=True)
-    pieces: dict[int, list[Piece]] = {}
-    for piece in model.pieces:
-        pieces.setdefault(piece.body, []).append(piece)
-    for node, colour in model.heavy:
-        centre = np.asarray(model.reading.offsets[node]).reshape(1, 3)
-        body = model.reading.body_of[node]
-        pieces.setdefault(body, []).append(Piece(body, colour, points=centre, size=2.0 * model.unit))
-    for body, held in pieces.items():
-        primitives = []
-        for piece in held:
-            if piece.mesh is None and piece.points is not None and len(piece.points) > 1:
-                primitives.append(book.primitive(piece.colour, piece.points))
-                continue
-            mesh = piece.mesh if piece.mesh is not None else _ball(np.asarray(piece.points)[0], piece.size)
-            points, normals = _triangles(mesh)
-            if len(points):
-                primitives.append(book.primitive(piece.colour, points, normals))
-        pose = model.reading.poses[body]
-        count = len(model.reading.time)
-        axes = np.broadcast_to(pose.axes, (count, 3, 3))
-        motion = {"translation": np.broadcast_to(pose.origin, (count, 3)), "rotation": _quaternions(axes)}
-        name = next((piece.part for piece in held if piece.part), "world" if body == 0 else f"body {body}")
-        if primitives:
-            book.node(name, primitives, motion)
+def _add_bodies(book: _Book, stage: Stage, time: FloatArray) -> None:
+    """Add all that is fixed in bodies, one node a body, which moves as the body does."""
+    book.clock = book.add((time - time[0])[book.kept], bounds=True)
+    fixed: dict[int, list[Item]] = {}
+    for item in stage.items:
+        if "frame" in item and item["kind"] != "edges":
+            fixed.setdefault(item["frame"], []).append(item)
+    for frame, items in fixed.items():
+        origin, axes = _pose(stage, frame)
+        primitives = [book.primitive(item["colour"], *_shape(item)) for item in items]
+        body = stage.keys[frame]
+        name = next((item["part"] for item in items if item["part"]), f"body {body}" if body else "world")
+        book.node(name, primitives, {"translation": origin, "rotation": _quaternions(axes)})
 
 
-def _add_ties(book: _Book, model: SpaceModel) -> None:
+def _pose(stage: Stage, frame: int) -> tuple[FloatArray, FloatArray]:
+    """Return the origin of a frame along the run, m, and its axes as columns."""
+    return stage.poses[:, frame, :3], stage.poses[:, frame, 3:].reshape(-1, 3, 3)
+
+
+def _add_ties(book: _Book, stage: Stage) -> None:
     """Add rods, ropes, springs and dampers as bars between nodes, whose lengths change."""
-    points, normals = _triangles(cylinder(0.4 * model.unit, 1.0, 12))
-    for tie in model.ties:
-        for a, b in zip(tie.nodes, tie.nodes[1:], strict=False):
-            begin, end = model.reading.place(a), model.reading.place(b)
+    bar = cylinder(0.4 * stage.unit, 1.0, 12)
+    points, normals = _shape({"kind": "mesh", "vertices": bar.vertices, "faces": triangles(bar.faces)})
+    for tie in (one for one in stage.items if "ends" in one):
+        poses = [(*_pose(stage, end["frame"]), end["point"]) for end in tie["ends"]]
+        for begin, end in pairwise([origin + axes @ point for origin, axes, point in poses]):
             lengths = np.linalg.norm(end - begin, axis=1)
             ways = [
                 way if length else np.array((0.0, 0.0, 1.0)) for way, length in zip(end - begin, lengths, strict=True)
@@ -222,4 +211,4 @@ def _add_ties(book: _Book, model: SpaceModel) -> None:
             turned = np.array([frame_along(way) for way in ways])
             scale = np.stack([np.ones_like(lengths), np.ones_like(lengths), lengths], axis=1)
             motion = {"translation": (begin + end) / 2, "rotation": _quaternions(turned), "scale": scale}
-            book.node(tie.part, [book.primitive("#5f6b7a", points, normals)], motion)
+            book.node(tie["part"], [book.primitive("#5f6b7a", points, normals)], motion)

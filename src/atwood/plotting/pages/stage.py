@@ -7,6 +7,7 @@ motion that it has computed itself.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from atwood.mechanics.kinematics.orientation import body_offsets, plain
 from atwood.plotting.camera import DEFAULT_VIEW, as_camera
 from atwood.plotting.canvas import COLOURS, GREY
 from atwood.plotting.planar.geometry import Picture, Shape, make_picture
-from atwood.plotting.planar.strokes import TIES, Item, Pen, line_of
+from atwood.plotting.planar.strokes import TIES, Item as Item, Pen, line_of
 from atwood.plotting.scene3d.picture import SpacePicture, make_space_picture
 from atwood.plotting.shapes.meshes import Mesh
 from atwood.result.result import Result
@@ -37,10 +38,6 @@ class Stage:
         Numbers of a frame: `FLAT` or `SPATIAL`.
     keys
         Of each frame its node in a plane, or its body in space.
-    bodies, turns
-        In a plane the body of each node, and by which angle the node is turned in it, rad.
-    columns
-        On a vertical line, where nodes stand across it, m.
     poses
         Frames at the output times, shape (times, frames, stride).
     items
@@ -57,13 +54,14 @@ class Stage:
         Corners of the floor and the distance between its lines, m; None where there is none.
     follows
         Whether the eye goes along with what moves.
+    bodies, turns
+        In a plane the body of each node, and by which angle the node is turned in it, rad.
+    columns
+        On a vertical line, where nodes stand across it, m.
     """
 
     stride: int
     keys: tuple[int, ...]
-    bodies: tuple[int, ...]
-    turns: tuple[float, ...]
-    columns: Mapping[int, float]
     poses: FloatArray
     items: tuple[Item, ...]
     trails: tuple[Item, ...]
@@ -72,6 +70,9 @@ class Stage:
     unit: float
     floor: Mapping[str, Any] | None = None
     follows: bool = False
+    bodies: tuple[int, ...] = ()
+    turns: tuple[float, ...] = ()
+    columns: Mapping[int, float] = field(default_factory=dict)
 
     def to_data(self) -> dict[str, Any]:
         """Return all but the poses as plain data with arrays in it."""
@@ -129,22 +130,8 @@ def _in_space(result: Result, picture: SpacePicture) -> Stage:
     cloud, floor = picture.cloud, picture.floor
     told_floor = None if floor is None else {"box": floor, "step": picture.step}
     box = np.array([cloud.min(axis=0), cloud.max(axis=0)])
-    whole = np.stack(poses, axis=1)
-    return Stage(
-        SPATIAL,
-        keys,
-        (),
-        (),
-        {},
-        whole,
-        tuple(items),
-        tuple(trails),
-        anchors,
-        box,
-        model.unit,
-        told_floor,
-        model.travels,
-    )
+    shown = np.stack(poses, axis=1), tuple(items), tuple(trails), anchors, box, model.unit
+    return Stage(SPATIAL, keys, *shown, told_floor, model.travels)
 
 
 def _surface(mesh: Mesh, told: Item) -> Iterator[Item]:
@@ -156,12 +143,12 @@ def _surface(mesh: Mesh, told: Item) -> Iterator[Item]:
                 **told,
                 "kind": "mesh",
                 "vertices": mesh.vertices.astype(np.float32),
-                "faces": _triangles(faces),
+                "faces": triangles(faces),
                 "marked": marked,
             }
 
 
-def _triangles(faces: Any) -> Any:
+def triangles(faces: Any) -> Any:
     """Return faces with four corners as triangles, without those that have no area."""
     both = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
     a, b, c = both.T
@@ -189,8 +176,8 @@ def _in_plane(result: Result, picture: Picture) -> Stage:
     margin = 4.0 * pen.unit + max(picture.radii.values(), default=0.0)
     box = np.array([[lows[0] - margin, 0.0, lows[1] - margin], [highs[0] + margin, 0.0, highs[1] + margin]])
     bodies, turns = _turned(result.assembly.mechanism, keys)
-    whole = np.stack(poses, axis=1)
-    return Stage(FLAT, keys, bodies, turns, columns, whole, tuple(items), tuple(trails), anchors, box, pen.unit)
+    shown = np.stack(poses, axis=1), tuple(items), tuple(trails), anchors, box, pen.unit
+    return Stage(FLAT, keys, *shown, bodies=bodies, turns=turns, columns=columns)
 
 
 def _turned(mechanism: Mechanism, keys: Sequence[int]) -> tuple[tuple[int, ...], tuple[float, ...]]:
@@ -229,5 +216,5 @@ def _as_seen(mark: Item) -> Item:
         return told
     if mark["kind"] == "mesh":
         told.pop("edge", None)  # pages draw no borders
-        return {**told, "vertices": mark["points"].astype(np.float32), "faces": _triangles(mark["faces"])}
+        return {**told, "vertices": mark["points"].astype(np.float32), "faces": triangles(mark["faces"])}
     return {**told, "points": mark["points"].astype(np.float32) if mark["kind"] == "edges" else mark["points"]}

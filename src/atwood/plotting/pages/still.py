@@ -11,8 +11,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.plotting.camera import DEFAULT_VIEW, Camera
 from atwood.plotting.canvas import INK
-from atwood.plotting.pages.stage import FLAT, Stage
-from atwood.plotting.planar.strokes import Item
+from atwood.plotting.pages.stage import FLAT, Item, Stage
 from atwood.plotting.scene3d.painter import to_rgb
 
 _WIDTH = 640.0
