@@ -22,7 +22,7 @@ from timing import best_of, options, print_table, save
 
 from atwood import Model, Scene, assemble, simulate
 from atwood.integrators.methods.dormand_prince import TABLEAU
-from atwood.integrators.stepper import NativeStepper
+from atwood.integrators.stepper import Stepper
 from atwood_library import Ground, PointContact, PointMass, Spring
 from atwood_library.scenes import Clutches, DoublePendulum, StickSlip
 
@@ -139,20 +139,20 @@ def seconds(function: Callable[[], object]) -> float:
 
 def compiled_seconds(function: Callable[[], object]) -> float:
     """Return the processor time that a call spends in compiled steps: all that begins and ends in machine code."""
-    plain, spent = NativeStepper._call, [0.0]
+    plain, spent = Stepper._call, [0.0]
 
-    def timed(stepper: NativeStepper, name: str, *given: float) -> int:
+    def timed(stepper: Stepper, name: str, *given: float) -> int:
         began = time.process_time()
         try:
             return plain(stepper, name, *given)
         finally:
             spent[0] += time.process_time() - began
 
-    NativeStepper._call = timed  # type: ignore[method-assign]
+    Stepper._call = timed  # type: ignore[method-assign]
     try:
         function()
     finally:
-        NativeStepper._call = plain  # type: ignore[method-assign]
+        Stepper._call = plain  # type: ignore[method-assign]
     return spent[0]
 
 

@@ -19,7 +19,7 @@ from timing import options, print_table, save
 from atwood import Assembly, AtwoodError, assemble, simulate
 from atwood.integrators.ida.memory import IdaMemory
 from atwood.integrators.moments import Moments
-from atwood.integrators.stepper import NativeStepper
+from atwood.integrators.stepper import Stepper
 from atwood_library.scenes import SCENES
 
 SPAN, OUTPUTS, ALLOWANCE, AT_MOST = 2.0, 201, 0.3, (2.0, 3.0)
@@ -50,7 +50,7 @@ def timed(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def watch_calls() -> None:
     """Let compiled calls of sessions be timed from now on."""
-    owners: list[type] = [NativeStepper]
+    owners: list[type] = [Stepper]
     while owners:
         owner = owners.pop()
         owners += owner.__subclasses__()

@@ -18,7 +18,7 @@ from atwood.integrators.embedded.steps import APART, GROWTH, RETREAT, SAFETY, SH
 from atwood.integrators.embedded.tableau import Tableau
 from atwood.integrators.event_location import ROUNDING
 from atwood.integrators.protocol import ExplicitProblem, SolverOptions, State, absolute_tolerances
-from atwood.integrators.stepper import CALM, STIFF, Counts, Outcome, Stepper, no_interpolation
+from atwood.integrators.stepper import CALM, STIFF, Counts, Outcome, Stepper
 
 
 def matrix(rows: Sequence[Mapping[int, float]], width: int) -> FloatArray:
@@ -93,7 +93,27 @@ def estimate(h: float, fifth: float, third: float, size: int) -> float:
     return h * fifth / sqrt(both * size) if both > 0.0 else (0.0 if both == 0.0 else both)
 
 
-class ReferenceStepper(Stepper):
+class StepperInPython(Stepper):
+    """A stepper that takes its steps in Python."""
+
+    _fields = {}
+
+    def interpolation(self) -> None:
+        """Return that no compiled code reads its steps."""
+
+    def sample(self, times: FloatArray, steps: int) -> tuple[FloatArray, FloatArray, Outcome]:
+        """Take steps, and return values and rates at as many of the times, one row each, as were reached."""
+        last = self.counts.steps + steps
+        y, yp = np.empty((2, len(times), len(self.state()[1])))
+        for filled, t in enumerate(times):
+            outcome = self.run(float(t), last - self.counts.steps)
+            if outcome is not Outcome.REACHED:
+                return y[:filled], yp[:filled], outcome
+            _, y[filled], yp[filled] = self.interpolate(float(t))
+        return y, yp, Outcome.REACHED
+
+
+class ReferenceStepper(StepperInPython):
     """The state of a run; see `atwood.integrators.protocol.Stepper`.
 
     Parameters
@@ -182,7 +202,7 @@ class ReferenceStepper(Stepper):
             y += self._y_old
             slope = self._slope(t, y)
         if not (np.isfinite(y).all() and np.isfinite(slope).all()):
-            raise no_interpolation(t)
+            raise self._no_interpolation(t)
         return t, y, slope
 
     def _slope(self, t: float, y: FloatArray) -> FloatArray:

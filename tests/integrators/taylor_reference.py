@@ -17,7 +17,7 @@ from atwood.arrays import FloatArray
 from atwood.codegen.python.backend import compile_program
 from atwood.errors import KernelEvaluationError
 from atwood.integrators.protocol import SolverOptions, State, StepGuard, absolute_tolerances
-from atwood.integrators.stepper import Counts, Outcome, Stepper, no_interpolation
+from atwood.integrators.stepper import Counts, Outcome
 from atwood.integrators.taylor.stepper import (
     DEFECT,
     FLOOR,
@@ -32,6 +32,8 @@ from atwood.integrators.taylor.stepper import (
     share_of_radius,
 )
 
+from .embedded_reference import StepperInPython
+
 
 def power_of_two(value: float) -> float:
     """Return a power of two, good enough for a step."""
@@ -40,7 +42,7 @@ def power_of_two(value: float) -> float:
     return ldexp(1.0 + part * (0.6602 + 0.3398 * part), whole)
 
 
-class ReferenceStepper(Stepper):
+class ReferenceStepper(StepperInPython):
     """The state of a run; see `~atwood.integrators.protocol.Stepper`.
 
     Parameters
@@ -125,7 +127,7 @@ class ReferenceStepper(Stepper):
             y = self._series[0] + self._moved((t - self._t_old) / self._unit)
             found = self._evaluate(t, y)
         if found is None or not np.isfinite(y).all():
-            raise no_interpolation(t)
+            raise self._no_interpolation(t)
         return t, y, found[0]
 
     # -- one step -------------------------------------------------------------------------------------------------

@@ -33,8 +33,7 @@ from atwood.forms.lagrangian import Lagrangian, lagrangian_along_speeds
 from atwood.forms.loops.closed_form import ClosedForm, in_terms_of_independent
 from atwood.forms.program import rates_are_speeds
 from atwood.integrators.methods import EXPLICIT, IDA, advise
-from atwood.lazy_dataclasses import dataclass
-from atwood.topology.spanning_forest import Coordinate
+from atwood.lazy_dataclasses import dataclass, replace
 
 _CANONICAL: Key[CanonicalPrograms] = Key("canonical equations")
 _CLOSED: Key[CanonicalPrograms] = Key("canonical equations with solved loops")
@@ -144,36 +143,13 @@ def _refuse(assembly: Assembly, found: Lagrangian, loops_are_solved: bool = Fals
             )
 
 
-@dataclass(frozen=True, eq=False)
-class _Terms:
-    """What Hamilton's equations are made of: L and the rates in terms of coordinates and velocities."""
-
-    time: Expression
-    coordinates: tuple[Expression, ...]
-    names: tuple[Coordinate, ...]
-    velocities: tuple[Expression, ...]
-    velocity_names: tuple[Coordinate, ...]
-    rates: tuple[Expression, ...]
-    lagrangian: Expression
-    plain: bool
-
-
 def _make(assembly: Assembly) -> CanonicalPrograms:
     equations = assembly.reduced
     found = lagrangian_along_speeds(assembly, equations)
     _refuse(assembly, found)
     (lagrangian,) = as_by_hand(equations, assembly.parameters, _in_pieces(assembly, found.lagrangian))
-    terms = _Terms(
-        found.time,
-        found.coordinates,
-        found.names,
-        found.velocities,
-        found.velocity_names,
-        found.rates,
-        lagrangian,
-        rates_are_speeds(equations),
-    )
-    return _hamilton(terms, assembly.flat.name, assembly.parameters)
+    plain = rates_are_speeds(equations)
+    return _hamilton(found, lagrangian, plain, assembly.flat.name, assembly.parameters)
 
 
 def _in_pieces(assembly: Assembly, lagrangian: Expression) -> list[Expression]:
@@ -193,21 +169,21 @@ def _make_closed(assembly: Assembly, form: ClosedForm) -> CanonicalPrograms:
         what = "an energy reads an angle of its loops otherwise than by sine and cosine"
         raise UnsupportedError(what, where=assembly.flat.name, advice=advise(EXPLICIT, IDA))
     own = tuple(u[i] for i in free)
-    terms = _Terms(
-        found.time,
-        tuple(q[i] for i in free),
-        tuple(found.names[i] for i in free),
-        own,
-        tuple(found.velocity_names[i] for i in free),
-        own,
-        lagrangian,
-        plain=True,
+    solved = replace(
+        found,
+        coordinates=tuple(q[i] for i in free),
+        names=tuple(found.names[i] for i in free),
+        velocities=own,
+        velocity_names=tuple(found.velocity_names[i] for i in free),
+        rates=own,
     )
-    return _hamilton(terms, f"{assembly.flat.name} (closed form)", (*assembly.parameters, *form.loops.branches))
+    name, parameters = f"{assembly.flat.name} (closed form)", (*assembly.parameters, *form.loops.branches)
+    return _hamilton(solved, lagrangian, True, name, parameters)
 
 
-def _hamilton(found: _Terms, name: str, parameters: tuple[Expression, ...]) -> CanonicalPrograms:
-    lagrangian, plain = found.lagrangian, found.plain
+def _hamilton(
+    found: Lagrangian, lagrangian: Expression, plain: bool, name: str, parameters: tuple[Expression, ...]
+) -> CanonicalPrograms:
     graph, q, u, rates = lagrangian.graph, list(found.coordinates), list(found.velocities), list(found.rates)
     p = [graph.symbol(f"P:{one.name}") for one in found.names]
     momenta = vjp([lagrangian], [graph.one], u)
@@ -244,18 +220,18 @@ def _hamilton(found: _Terms, name: str, parameters: tuple[Expression, ...]) -> C
         given.append(OutputGroup("speeds", tuple(solution)))
     return CanonicalPrograms(
         Program(f"{name} (Hamilton's equations)", tuple(groups), parameters, tuple(given)),
-        _momenta_program(found, momenta, f"{name} (momenta)", parameters),
+        _momenta_program(found, plain, momenta, f"{name} (momenta)", parameters),
         moving,
         plain,
     )
 
 
 def _momenta_program(
-    found: _Terms, momenta: list[Expression], name: str, parameters: tuple[Expression, ...]
+    found: Lagrangian, plain: bool, momenta: list[Expression], name: str, parameters: tuple[Expression, ...]
 ) -> Program:
     """Return the program of (t, q, u) with the momenta along the speeds, and how rates follow from speeds."""
     outputs = [OutputGroup("momenta", tuple(momenta))]
-    if not found.plain:
+    if not plain:
         outputs.append(OutputGroup("rates by speeds", tuple(jacobian_by_rows(found.rates, found.velocities))))
     groups = (
         InputGroup("t", (found.time,)),

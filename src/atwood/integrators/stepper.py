@@ -6,7 +6,6 @@ The routine of a session that goes through output times, which all explicit meth
 from __future__ import annotations
 
 import ctypes
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from ctypes import c_double, c_int, c_int64, c_void_p
@@ -63,116 +62,6 @@ class Counts:
     evaluations: int = 0
     undefined: int = 0
     stiff: int = 0
-
-
-class Stepper(ABC):
-    """Takes the steps of an explicit method; one that can do more than these says so by its answers."""
-
-    @abstractmethod
-    def start(self, t: float, y: FloatArray) -> bool:
-        """Start anew from a state; return whether it has finite rates."""
-
-    @abstractmethod
-    def run(self, t_stop: float, steps: int) -> Outcome:
-        """Take steps until one ends at or after a time, but no more than so many."""
-
-    @abstractmethod
-    def state(self) -> State:
-        """Return time, values and rates at the end of the last step, which the caller may keep."""
-
-    @abstractmethod
-    def interpolate(self, t: float) -> State:
-        """Return the state at a time within the last step."""
-
-    @property
-    @abstractmethod
-    def counts(self) -> Counts:
-        """What it has done so far, over all starts."""
-
-    def sample(self, times: FloatArray, steps: int) -> tuple[FloatArray, FloatArray, Outcome]:
-        """Take steps, and return values and rates at as many of the times, one row each, as were reached."""
-        last = self.counts.steps + steps
-        size = len(self.state()[1])
-        y, yp = np.empty((2, len(times), size))
-        for filled, t in enumerate(times):
-            outcome = self.run(float(t), last - self.counts.steps)
-            if outcome is not Outcome.REACHED:
-                return y[:filled], yp[:filled], outcome
-            _, y[filled], yp[filled] = self.interpolate(float(t))
-        return y, yp, Outcome.REACHED
-
-    def watch(self, events: EventData) -> bool:
-        """Come back with `Outcome.NOTICED` after a step in which an event may have happened; return whether it can."""
-        return False
-
-    def interpolation(self) -> tuple[int, int] | None:
-        """Return the addresses of the function that reads the last step, and of its session; None where there is none.
-
-        It calls nothing in Python.
-        """
-        return None
-
-    def leap(self, locator: EventLocator, jumps: Jumps, last: float) -> bool:
-        """Locate events without Python, up to a last time, and make the jumps that can be made so; whether it can."""
-        return False
-
-    def through(self, changes: Changes) -> Moments | None:
-        """Return a way through moments at which parameters change, from the start on; None where there is none."""
-        return None
-
-    @property
-    def waits(self) -> bool:
-        """Whether an event is located that nobody has seen to yet."""
-        return False
-
-    def take_event(self) -> int | None:
-        """Return what came of the search for an event that is left to Python, once; None where there is none."""
-        return None
-
-    def shorten(self, event: float) -> bool:
-        """Take the last step anew to just behind an event, where that finds it better; whether it was."""
-        return False
-
-    def expect(self, signs: FloatArray) -> None:
-        """Learn which sign each event has; where it is zero, every step is noticed."""
-        return
-
-    def take_over(self, handed: Handed) -> None:
-        """Stand behind a step that was taken side by side with those of other runs."""
-        raise UsageError("only embedded pairs are watched side by side")
-
-    def begin_of_step(self) -> float:
-        """Return the time at the begin of the last step."""
-        raise NotImplementedError
-
-    def watch_stiffness(self) -> None:
-        """Come back with `Outcome.NOTICED` whenever the problem seems stiff, where that can be told."""
-        return
-
-    def nearest(self, t: FloatArray, y: FloatArray, sizes: FloatArray) -> Nearest | None:
-        """Take states, one row each, onto the constraints as steps are; None where none can be taken so."""
-        return None
-
-    def set_monitor(self, monitor: StepMonitor) -> bool:
-        """Let the motion be looked at, and come back where something is seen; return whether it can."""
-        return False
-
-    def has_noticed(self) -> bool:
-        """Return whether something was seen since this was last asked."""
-        return False
-
-    def limit_steps(self, longest: float) -> None:
-        """Take no longer steps from now on than this, nor than the options allow, where they can be limited."""
-        return
-
-    def renew(self, horizon: float, absolute: FloatArray | None = None) -> None:
-        """Count from zero again, for a run of another typical length, s, and perhaps with other tolerances."""
-        raise UsageError("only compiled steps can be begun again")
-
-
-def no_interpolation(t: float) -> KernelEvaluationError:
-    """Return the error of a step within which there is no value."""
-    return KernelEvaluationError(f"the right-hand side has no value within a step, at t = {t:.9g}")
 
 
 STIFF, CALM = 15, 6
@@ -329,8 +218,10 @@ def routines_of(source: RoutineSource, **others: tuple[Any, ...]) -> Routines:
     return Routines(built, bind_functions(built, **others))
 
 
-class NativeStepper(Stepper):
-    """The state of a run whose steps are machine code.
+class Stepper:
+    """The state of a run with an explicit method, whose steps are machine code.
+
+    One that can do more than most says so by its answers.
 
     A method lays out the memory of a session and sets these:
 
@@ -437,13 +328,77 @@ class NativeStepper(Stepper):
         return y[:filled], yp[:filled], _OUTCOMES[code]
 
     def interpolation(self) -> tuple[int, int] | None:
-        """Return the addresses of the function that reads the last step, and of its session."""
+        """Return the addresses of the function that reads the last step, and of its session; None where there is none.
+
+        It calls nothing in Python.
+        """
         function: Any = self._functions["interpolate"]
         return ctypes.cast(function, c_void_p).value or 0, self._session
 
     def _no_interpolation(self, t: float) -> KernelEvaluationError:
         """Return the error of a step within which there is no value."""
-        return no_interpolation(t)
+        return KernelEvaluationError(f"the right-hand side has no value within a step, at t = {t:.9g}")
+
+    def watch(self, events: EventData) -> bool:
+        """Come back with `Outcome.NOTICED` after a step in which an event may have happened; return whether it can."""
+        return False
+
+    def leap(self, locator: EventLocator, jumps: Jumps, last: float) -> bool:
+        """Locate events without Python, up to a last time, and make the jumps that can be made so; whether it can."""
+        return False
+
+    def through(self, changes: Changes) -> Moments | None:
+        """Return a way through moments at which parameters change, from the start on; None where there is none."""
+        return None
+
+    @property
+    def waits(self) -> bool:
+        """Whether an event is located that nobody has seen to yet."""
+        return False
+
+    def take_event(self) -> int | None:
+        """Return what came of the search for an event that is left to Python, once; None where there is none."""
+        return None
+
+    def shorten(self, event: float) -> bool:
+        """Take the last step anew to just behind an event, where that finds it better; whether it was."""
+        return False
+
+    def expect(self, signs: FloatArray) -> None:
+        """Learn which sign each event has; where it is zero, every step is noticed."""
+        return
+
+    def take_over(self, handed: Handed) -> None:
+        """Stand behind a step that was taken side by side with those of other runs."""
+        raise UsageError("only embedded pairs are watched side by side")
+
+    def begin_of_step(self) -> float:
+        """Return the time at the begin of the last step."""
+        raise NotImplementedError
+
+    def watch_stiffness(self) -> None:
+        """Come back with `Outcome.NOTICED` whenever the problem seems stiff, where that can be told."""
+        return
+
+    def nearest(self, t: FloatArray, y: FloatArray, sizes: FloatArray) -> Nearest | None:
+        """Take states, one row each, onto the constraints as steps are; None where none can be taken so."""
+        return None
+
+    def set_monitor(self, monitor: StepMonitor) -> bool:
+        """Let the motion be looked at, and come back where something is seen; return whether it can."""
+        return False
+
+    def has_noticed(self) -> bool:
+        """Return whether something was seen since this was last asked."""
+        return False
+
+    def limit_steps(self, longest: float) -> None:
+        """Take no longer steps from now on than this, nor than the options allow, where they can be limited."""
+        return
+
+    def renew(self, horizon: float, absolute: FloatArray | None = None) -> None:
+        """Count from zero again, for a run of another typical length, s, and perhaps with other tolerances."""
+        raise UsageError("only compiled steps can be begun again")
 
     def _batch_places(
         self, built: Built, tolerances: FloatArray, factor: float = 1.0, parameters: tuple[int, int, int] = (0, 0, 0)

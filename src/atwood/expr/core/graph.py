@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numbers
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from sys import getrefcount
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -32,6 +32,16 @@ _LOOK = 256
 
 MANY = 200_000
 """A graph of more nodes forgets what is not needed any more, and is not kept on disk."""
+
+
+def _of_two(apply: Callable[[Expression, Expression], Expression]) -> Callable[[Expression, object], Expression]:
+    """Return a method that applies an operation to a node and to whatever can be made one."""
+
+    def method(self: Expression, other: object) -> Expression:
+        b = _operand(self, other)
+        return NotImplemented if b is None else apply(self, b)
+
+    return method
 
 
 class Expression:
@@ -126,19 +136,11 @@ class Expression:
         b = _operand(self, other)
         return NotImplemented if b is None else algebra.add(self, b)
 
-    def __radd__(self, other: object) -> Expression:
-        a = _operand(self, other)
-        return NotImplemented if a is None else algebra.add(a, self)
-
     def __sub__(self, other: object) -> Expression:
         if type(other) is Expression and other.graph is self.graph:
             return algebra.subtract(self, other)
         b = _operand(self, other)
         return NotImplemented if b is None else algebra.subtract(self, b)
-
-    def __rsub__(self, other: object) -> Expression:
-        a = _operand(self, other)
-        return NotImplemented if a is None else algebra.subtract(a, self)
 
     def __mul__(self, other: object) -> Expression:
         if type(other) is Expression and other.graph is self.graph:
@@ -146,38 +148,26 @@ class Expression:
         b = _operand(self, other)
         return NotImplemented if b is None else algebra.multiply(self, b)
 
-    def __rmul__(self, other: object) -> Expression:
-        a = _operand(self, other)
-        return NotImplemented if a is None else algebra.multiply(a, self)
-
-    def __truediv__(self, other: object) -> Expression:
-        b = _operand(self, other)
-        return NotImplemented if b is None else algebra.divide(self, b)
-
-    def __rtruediv__(self, other: object) -> Expression:
-        a = _operand(self, other)
-        return NotImplemented if a is None else algebra.divide(a, self)
-
-    def __pow__(self, other: object) -> Expression:
-        b = _operand(self, other)
-        return NotImplemented if b is None else algebra.power(self, b)
-
-    def __rpow__(self, other: object) -> Expression:
-        a = _operand(self, other)
-        return NotImplemented if a is None else algebra.power(a, self)
-
     def __floor__(self) -> Expression:
         return algebra.unary("floor", self)
 
-    def __floordiv__(self, other: object) -> Expression:
-        b = _operand(self, other)
-        return NotImplemented if b is None else algebra.unary("floor", algebra.divide(self, b))
-
-    def __mod__(self, other: object) -> Expression:
-        b = _operand(self, other)
-        if b is None:
-            return NotImplemented
-        return algebra.subtract(self, algebra.multiply(b, algebra.unary("floor", algebra.divide(self, b))))
+    __truediv__ = _of_two(lambda a, b: algebra.divide(a, b))
+    __pow__ = _of_two(lambda a, b: algebra.power(a, b))
+    __lt__ = _of_two(lambda a, b: algebra.less(a, b))
+    __le__ = _of_two(lambda a, b: algebra.less_equal(a, b))
+    __gt__ = _of_two(lambda a, b: algebra.less(b, a))
+    __ge__ = _of_two(lambda a, b: algebra.less_equal(b, a))
+    __and__ = _of_two(lambda a, b: algebra.logical("logical_and", a, b))
+    __or__ = _of_two(lambda a, b: algebra.logical("logical_or", a, b))
+    __floordiv__ = _of_two(lambda a, b: algebra.unary("floor", algebra.divide(a, b)))
+    __radd__ = _of_two(lambda a, b: algebra.add(b, a))
+    __rsub__ = _of_two(lambda a, b: algebra.subtract(b, a))
+    __rmul__ = _of_two(lambda a, b: algebra.multiply(b, a))
+    __rtruediv__ = _of_two(lambda a, b: algebra.divide(b, a))
+    __rpow__ = _of_two(lambda a, b: algebra.power(b, a))
+    __mod__ = _of_two(lambda a, b: a - b * (a // b))
+    __rand__ = __and__
+    __ror__ = __or__
 
     def __neg__(self) -> Expression:
         return algebra.negate(self)
@@ -187,34 +177,6 @@ class Expression:
 
     def __abs__(self) -> Expression:
         return algebra.unary("absolute", self)
-
-    def __lt__(self, other: object) -> Expression:
-        b = _operand(self, other)
-        return NotImplemented if b is None else algebra.less(self, b)
-
-    def __le__(self, other: object) -> Expression:
-        b = _operand(self, other)
-        return NotImplemented if b is None else algebra.less_equal(self, b)
-
-    def __gt__(self, other: object) -> Expression:
-        b = _operand(self, other)
-        return NotImplemented if b is None else algebra.less(b, self)
-
-    def __ge__(self, other: object) -> Expression:
-        b = _operand(self, other)
-        return NotImplemented if b is None else algebra.less_equal(b, self)
-
-    def __and__(self, other: object) -> Expression:
-        b = _operand(self, other)
-        return NotImplemented if b is None else algebra.logical("logical_and", self, b)
-
-    __rand__ = __and__
-
-    def __or__(self, other: object) -> Expression:
-        b = _operand(self, other)
-        return NotImplemented if b is None else algebra.logical("logical_or", self, b)
-
-    __ror__ = __or__
 
     def __invert__(self) -> Expression:
         return algebra.unary("logical_not", self)

@@ -39,8 +39,8 @@ from atwood.integrators.stepper import (
     LANE_FIELDS,
     WIDTH,
     Memory,
-    NativeStepper,
     Routines,
+    Stepper,
     fields_of,
     number_kind,
     open_routine as session_routine,
@@ -99,7 +99,7 @@ def open_routine(
 _GUARDS = ctypes.CFUNCTYPE(c_int, *[c_double, c_void_p, c_void_p] * 2, c_void_p)
 
 
-class CompiledStepper(NativeStepper):
+class CompiledStepper(Stepper):
     """The state of a run with an embedded pair.
 
     Parameters

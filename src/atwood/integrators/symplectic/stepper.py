@@ -18,7 +18,7 @@ from atwood.codegen.llvm.module import CodeOptions, Part
 from atwood.errors import KernelEvaluationError, SolveError
 from atwood.expr import Program
 from atwood.integrators.protocol import CompiledRates, SolverOptions, State, StepGuard
-from atwood.integrators.stepper import NativeStepper, Outcome, bind_functions
+from atwood.integrators.stepper import Outcome, Stepper, bind_functions
 from atwood.integrators.symplectic.fixed_steps import FIELDS, FILES, Layout
 from atwood.lazy_dataclasses import dataclass
 
@@ -100,7 +100,7 @@ def compiled_gauss(equations: Program, speeds: int, order: int) -> CompiledMetho
     return CompiledMethod(routines, {"kernel": equations}, order, layout, level)
 
 
-class GaussStepper(NativeStepper):
+class GaussStepper(Stepper):
     """Takes the steps of a method of Gauss or a composition, all equally long; outputs are steps of their own.
 
     The state that it is given and gives is (q, u); what it integrates is (q, p).

@@ -48,8 +48,8 @@ from atwood.integrators.stepper import (
     WIDTH,
     Counts,
     Memory,
-    NativeStepper,
     Routines,
+    Stepper,
     fields_of,
     in_lanes,
     open_routine as session_routine,
@@ -350,7 +350,7 @@ class _Layout:
         return memory, base
 
 
-class CompiledStepper(NativeStepper):
+class CompiledStepper(Stepper):
     """The state of a run with Taylor series.
 
     Parameters

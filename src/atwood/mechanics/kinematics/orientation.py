@@ -158,8 +158,8 @@ def node_quaternions(body: Body) -> dict[int, Quaternion]:
     return found
 
 
-def quaternion_product(p: Quaternion, q: Quaternion) -> Quaternion:
-    """Return the quaternion of the turn q within the frame p."""
+def quaternion_product(p: Sequence[Any], q: Sequence[Any]) -> tuple[Any, Any, Any, Any]:
+    """Return the quaternion of the turn q within the frame p: of terms, numbers or arrays."""
     return (
         p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
         p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],

@@ -15,7 +15,7 @@ from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
-from atwood.mechanics.kinematics.orientation import FARTHEST_COSINE, orientation_margin
+from atwood.mechanics.kinematics.orientation import FARTHEST_COSINE, orientation_margin, quaternion_product
 from atwood.mechanics.outputs.event_functions import EventFunction
 from atwood.topology.orientation_coordinates import Orientation, OrientationCoordinates
 
@@ -165,19 +165,8 @@ def _quaternion(body_orientation: OrientationCoordinates, values: FloatArray) ->
     for axis, angle in zip(body_orientation.turns, values, strict=True):
         turn = np.zeros_like(found)
         turn[0], turn[1 + axis] = np.cos(0.5 * angle), np.sin(0.5 * angle)
-        found = _product(found, turn)
+        found = np.array(quaternion_product([*found], [*turn]))
     return found
-
-
-def _product(p: FloatArray, q: FloatArray) -> FloatArray:
-    return np.array(
-        [
-            p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
-            p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
-            p[0] * q[2] + p[2] * q[0] + p[3] * q[1] - p[1] * q[3],
-            p[0] * q[3] + p[3] * q[0] + p[1] * q[2] - p[2] * q[1],
-        ]
-    )
 
 
 def _coordinates(body_orientation: OrientationCoordinates, quaternion: FloatArray) -> FloatArray:

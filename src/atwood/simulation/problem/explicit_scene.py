@@ -16,7 +16,7 @@ import numpy as np
 from atwood.arrays import FloatArray
 from atwood.codegen import BoundKernel
 from atwood.errors import KernelEvaluationError
-from atwood.expr import DivisionByExactZeroError
+from atwood.expr import DivisionByExactZeroError, Program
 from atwood.forms.accelerations import AccelerationProgram, accelerations_of
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
@@ -59,15 +59,28 @@ def explicit_problem_of(
     directions: tuple[int, ...] = (),
 ) -> ExplicitProblem:
     """Return what an explicit method is given of accelerations."""
-    _, n, m = (len(group.symbols) for group in program.program.inputs)
+    return _problem(assembly, program.program, values, _compiled(assembly, program, values), events, directions)
 
+
+def _problem(
+    assembly: Assembly,
+    program: Program,
+    values: FloatArray,
+    compiled: Callable[[], CompiledRates] | None,
+    events: Callable[[float, FloatArray, FloatArray], Values] | None,
+    directions: tuple[int, ...],
+    project: Callable[[float, FloatArray], FloatArray] | None = None,
+) -> ExplicitProblem:
+    _, n, m = (len(group.symbols) for group in program.inputs)
+    made = cache(lambda: first_order(assembly.compiled(program).bind(values), n))  # when it is asked for
     return ExplicitProblem(
         size=n + m,
-        rates=_when_asked(lambda: first_order(assembly.compiled(program.program).bind(values), n)),
+        rates=lambda t, y: made()(t, y),
         events=events,
         event_count=len(directions),
         event_directions=directions,
-        compiled=_compiled(assembly, program, values),
+        compiled=compiled,
+        project=project,
     )
 
 
@@ -80,14 +93,6 @@ def first_order(kernel: BoundKernel, coordinates: int) -> Callable[[float, Float
         return [*(u if len(found) == 1 else found[0]), *found[-1]]
 
     return rates
-
-
-def _when_asked(
-    make: Callable[[], Callable[[float, FloatArray], Sequence[float]]],
-) -> Callable[[float, FloatArray], Sequence[float]]:
-    """Return a function that is made at its first call: compiled steps make none."""
-    made = cache(make)
-    return lambda t, y: made()(t, y)
 
 
 def first_order_rows(
@@ -180,22 +185,15 @@ def constrained_problem(
 ) -> ExplicitProblem:
     """Return the equations of a scene for an explicit method, with ``y = (q, u)`` on its constraints."""
     assembly, program = plan.assembly, program_on_constraints(plan, t, y)
-    n, m = plan.program.coordinates, plan.program.speeds
     values = values_on_constraints(plan)
     nearer = cache(lambda: assembly.compiled(program.projection).bind(values))
 
     def project(t: float, y: FloatArray) -> FloatArray:
-        return _projected(nearer(), t, y, n)
+        return _projected(nearer(), t, y, plan.program.coordinates)
 
-    return ExplicitProblem(
-        size=n + m,
-        rates=_when_asked(lambda: first_order(assembly.compiled(program.accelerations).bind(values), n)),
-        events=events,
-        event_count=len(directions),
-        event_directions=directions,
-        compiled=_compiled_on_constraints(plan, program, values),
-        project=project if plan.holds else None,
-    )
+    compiled = _compiled_on_constraints(plan, program, values)
+    onto = project if plan.holds else None
+    return _problem(assembly, program.accelerations, values, compiled, events, directions, onto)
 
 
 def impact_code(plan: SceneProblem, t: float, y: FloatArray, gaps: Sequence[ContactRow]) -> JumpCode | None:
