@@ -14,7 +14,6 @@ A state is projected by the shortest displacement along the speeds, each measure
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import pairwise
 
@@ -25,6 +24,7 @@ from atwood.forms.residuals import keep_constraints
 from atwood.lazy_dataclasses import dataclass, names_of
 from atwood.mechanics.dynamics.augmented import Step, SymmetricSystem, eliminate, fill_of, solution_of, with_right
 from atwood.mechanics.dynamics.equations import Constraint, ContactRow, Equations
+from atwood.numerics.body_order import by_least, neighbours_of
 
 _LARGEST_FILL = 60_000
 """More products than these are left to a loop when the program runs."""
@@ -385,27 +385,12 @@ def _order(places: Sequence[Place], signs: Sequence[int]) -> list[int]:
     A constraint can have its turn once all masses that it touches have had theirs: what is left of it by these is then
     positive, as long as constraints are independent.
     """
-    touching: dict[int, set[int]] = {i: set() for i in range(len(signs))}
-    for i, j in places:
-        if i != j:
-            touching[i].add(j)
-            touching[j].add(i)
-    waiting = {i: sum(signs[j] > 0 for j in around) for i, around in touching.items() if signs[i] < 0}
-    meets = {i: [j for j in around if signs[j] < 0] for i, around in touching.items() if signs[i] > 0}
-    heap = [(len(around), i) for i, around in touching.items() if not waiting.get(i)]
-    heapq.heapify(heap)
+    around = neighbours_of(places, len(signs))
+    waiting = {i: sum(signs[j] > 0 for j in others) for i, others in enumerate(around) if signs[i] < 0}
+    meets = {i: [j for j in others if signs[j] < 0] for i, others in enumerate(around) if signs[i] > 0}
     order: list[int] = []
-    while heap:
-        degree, i = heapq.heappop(heap)
-        if i not in touching or degree != len(touching[i]):
-            continue
-        around = touching.pop(i)
+    for i in by_least(around, lambda one: None if waiting.get(one) else len(around[one])):
         order.append(i)
         for a in meets.get(i, ()):
             waiting[a] -= 1
-        for a in around:
-            touching[a] |= around
-            touching[a] -= {a, i}
-            if not waiting.get(a):
-                heapq.heappush(heap, (len(touching[a]), a))
     return order

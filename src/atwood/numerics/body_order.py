@@ -1,4 +1,4 @@
-"""In which order the bodies of a mechanism leave a sparse linear system, and which constraints go with them.
+"""In which order unknowns leave a sparse linear system, and bodies of a mechanism, with which constraints.
 
 A body that hangs on one other alone couples nothing anew when it is eliminated together with the constraints of its
 joint: its inertia is added to that of the other (R. Featherstone, *Rigid Body Dynamics Algorithms*, chapter 8). From
@@ -11,14 +11,59 @@ from __future__ import annotations
 
 import heapq
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from atwood.arrays import IndexArray
 from atwood.lazy_dataclasses import dataclass
+
+
+def neighbours_of(places: Iterable[tuple[int, int]], size: int) -> list[set[int]]:
+    """Return for each unknown the others with which it has an entry of a matrix."""
+    around: list[set[int]] = [set() for _ in range(size)]
+    for i, j in places:
+        if i != j:
+            around[i].add(j)
+            around[j].add(i)
+    return around
+
+
+def eliminated(around: Sequence[set[int]], i: int) -> set[int]:
+    """Return the neighbours of an unknown that goes, which become neighbours of each other."""
+    others = around[i]
+    for a in others:
+        around[a] |= others
+        around[a] -= {a, i}
+    return others
+
+
+def by_least(around: Sequence[set[int]], key: Callable[[int], Any]) -> Iterator[int]:
+    """Yield unknowns, which then go: always that of the least key.
+
+    Parameters
+    ----------
+    around
+        The neighbours of each, which change on the way; those of what has gone stay as they were when it went.
+    key
+        Says of an unknown, whenever it has got other neighbours, when its turn is; None if that has to wait.
+    """
+    heap = [(at, i) for i in range(len(around)) if (at := key(i)) is not None]
+    heapq.heapify(heap)
+    gone = set[int]()
+    while heap:
+        at, i = heapq.heappop(heap)
+        if i in gone or at != key(i):
+            continue
+        gone.add(i)
+        others = eliminated(around, i)
+        yield i
+        for a in others:
+            if (at := key(a)) is not None:
+                heapq.heappush(heap, (at, a))
 
 
 @dataclass(frozen=True)
@@ -55,7 +100,7 @@ def elimination_stages(
     joints, by_multiplier = _joints(rows, columns, equations, bodies, of_row)
     a, b = of_row[rows], bodies[columns]
     apart = (a >= 0) & (b >= 0) & (a != b)
-    couples = {tuple(pair) for pair in np.unique(np.sort(np.stack([a[apart], b[apart]]), axis=0), axis=1).T.tolist()}
+    couples = {(i, j) for i, j in np.unique(np.sort(np.stack([a[apart], b[apart]]), axis=0), axis=1).T.tolist()}
     count = int(bodies.max(initial=-1)) + 1
     depth, parent = _hang(joints, count)
     order = _order(joints, couples, depth, count)
@@ -125,32 +170,19 @@ def _hang(joints: Sequence[_Joint], count: int) -> tuple[list[int], list[int]]:
         queue = list(around[root])
 
 
-def _order(joints: Sequence[_Joint], couples: set[tuple[int, ...]], depth: Sequence[int], count: int) -> list[int]:
+def _order(joints: Sequence[_Joint], couples: set[tuple[int, int]], depth: Sequence[int], count: int) -> list[int]:
     """Return the bodies by how many others they are coupled with when their turn comes, the world included."""
-    around: list[set[int]] = [set() for _ in range(count)]
     held = [0] * count
     for joint in joints:
         if len(joint.bodies) == 1:
             held[next(iter(joint.bodies))] = 1
         couples.update(combinations(sorted(joint.bodies), 2))
-    for one, other in couples:
-        around[one].add(other)
-        around[other].add(one)
-    heap = [(len(around[body]) + held[body], -depth[body], body) for body in range(count)]
-    heapq.heapify(heap)
-    gone, order = [False] * count, []
-    while heap:
-        degree, _, body = heapq.heappop(heap)
-        if gone[body] or degree != len(around[body]) + held[body]:
-            continue
-        gone[body] = True
+    around = neighbours_of(couples, count)
+    order: list[int] = []
+    for body in by_least(around, lambda one: (len(around[one]) + held[one], -depth[one])):
         order.append(body)
-        others = around[body]
-        for other in others:
-            around[other] |= others
-            around[other] -= {other, body}
-            held[other] |= held[body] if len(others) == 1 else 0
-            heapq.heappush(heap, (len(around[other]) + held[other], -depth[other], other))
+        if len(around[body]) == 1:
+            held[next(iter(around[body]))] |= held[body]
     return order
 
 

@@ -117,6 +117,14 @@ def span(matrix: FloatArray, errors: Errors = None) -> FloatArray:
     return decompose(matrix, errors, is_whole=False).range
 
 
+def least_inertia(mass: FloatArray) -> float:
+    """Return the least eigenvalue of a mass matrix in units of its diagonal; zero where that is not all positive."""
+    own = np.diag(mass)
+    if not (np.isfinite(mass).all() and np.all(own > 0.0)):
+        return 0.0
+    return float(np.min(np.linalg.eigvalsh(mass / np.sqrt(own[:, None] * own)), initial=1.0))
+
+
 def is_clear(rows: FloatArray) -> bool:
     """Return whether rows of size one are independent beyond doubt, so that no place near by need be asked."""
     return bool(singular_values(rows)[-1:].sum() > tolerances.CLEAR)

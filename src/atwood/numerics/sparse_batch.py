@@ -8,7 +8,6 @@ entry, and one column for each state.
 from __future__ import annotations
 
 import ctypes
-import heapq
 from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
 from typing import Any
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray, IndexArray
 from atwood.codegen.llvm.elimination import LISTS, elimination_functions
+from atwood.numerics.body_order import by_least, neighbours_of
 from atwood.numerics.matrices import or_one
 
 _SHARE = 1e-13
@@ -92,31 +92,17 @@ class Elimination:
     """
 
     def __init__(self, size: int, places: Iterable[tuple[int, int]], late: Iterable[int] = ()) -> None:
-        around: list[set[int]] = [set() for _ in range(size)]
-        for i, j in places:
-            if i != j:
-                around[i].add(j)
-                around[j].add(i)
+        around = neighbours_of(places, size)
         self.size = size
-        self.order: list[int] = []
         self.number: dict[tuple[int, int], int] = {(i, i): i for i in range(size)}
         for i, others in enumerate(around):
             for j in others:
                 if i < j:
                     self._place(i, j)
         last = set(late)
-        heap = [(i in last, len(around[i]), i) for i in range(size)]
-        heapq.heapify(heap)
-        gone = [False] * size
         lists: dict[str, list[int]] = {name: [] for name in LISTS}
-        while heap:
-            _, degree, p = heapq.heappop(heap)
-            if gone[p] or degree != len(around[p]):
-                continue
-            gone[p] = True
-            self._eliminate(p, around, lists)
-            for j in around[p]:
-                heapq.heappush(heap, (j in last, len(around[j]), j))
+        for p in by_least(around, lambda i: (i in last, len(around[i]))):
+            self._eliminate(p, sorted(around[p]), lists)
         begins = [*lists["begins"], len(lists["below"])]
         lists["begins"], lists["starts"] = begins, [*lists["starts"], len(lists["changed"])]
         self._touched = max((b - a for a, b in pairwise(begins)), default=0)
@@ -126,23 +112,18 @@ class Elimination:
     def _place(self, i: int, j: int) -> int:
         return self.number.setdefault((i, j) if i < j else (j, i), len(self.number))
 
-    def _eliminate(self, p: int, around: list[set[int]], lists: dict[str, list[int]]) -> None:
-        others = sorted(around[p])
-        for j in others:
-            around[j].discard(p)
+    def _eliminate(self, p: int, others: list[int], lists: dict[str, list[int]]) -> None:
+        """Note what an unknown that goes changes of its neighbours."""
         lists["pivot"].append(p)
         lists["begins"].append(len(lists["below"]))
         lists["starts"].append(len(lists["changed"]))
         lists["others"] += others
         lists["below"] += [self._place(p, j) for j in others]
         for a, j in enumerate(others):
-            around[j].update(others[a + 1 :])
             for b in range(a, len(others)):
-                around[others[b]].add(j)
                 lists["first"].append(a)
                 lists["second"].append(b)
                 lists["changed"].append(self._place(j, others[b]))
-            around[j].discard(j)
 
     def factorise(self, entries: FloatArray) -> FloatArray:
         """Return the factors, from entries by their `number`; where a pivot is zero nothing finite comes out."""

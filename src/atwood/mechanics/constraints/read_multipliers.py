@@ -36,6 +36,7 @@ from atwood.mechanics.dynamics.augmented import (
 from atwood.mechanics.dynamics.equations import Constraint, ContactRow, Equations
 from atwood.mechanics.kinematics.mechanism import Derivation, Mechanism, decide
 from atwood.model.local.parts import multiplier_symbol
+from atwood.numerics.rank import least_inertia
 
 _ITERATIONS = 6
 """Each step squares the error; from a friction of half the normal force on, this many reach that of rounding."""
@@ -248,10 +249,7 @@ def _has_inertia(
     full = np.zeros((len(number), len(number)))
     for (i, j), entry in zip(mass, mechanism.values_at_start(mass.values(), place), strict=True):
         full[number[i], number[j]] = entry
-    own = np.diag(full)
-    if not (np.isfinite(full).all() and np.all(own > 0.0)):
-        return False
-    return bool(np.min(np.linalg.eigvalsh(full / np.sqrt(own[:, None] * own)), initial=1.0) > _LEAST_INERTIA)
+    return least_inertia(full) > _LEAST_INERTIA
 
 
 def _close_loops(mechanism: Mechanism, constraints: Sequence[Constraint]) -> bool:

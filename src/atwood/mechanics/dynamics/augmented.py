@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from atwood.expr import Expression, Graph, live
 from atwood.expr.core import algebra
 from atwood.lazy_dataclasses import dataclass, replace
+from atwood.numerics.body_order import by_least, eliminated, neighbours_of
 
 Tidy = Callable[[list[Expression]], list[Expression]]
 Place = tuple[int, int]
@@ -161,44 +162,15 @@ def back_substitute(step: Step, known: Mapping[int, Expression]) -> Expression:
 
 def minimum_degree(places: Sequence[Place], size: int, first: Sequence[int] = ()) -> list[int]:
     """Return an order of elimination that adds few entries: always the unknown with the fewest neighbours."""
-    touching: dict[int, set[int]] = {i: set() for i in range(size)}
-    for i, j in places:
-        if i != j:
-            touching[i].add(j)
-            touching[j].add(i)
-    preferred = set(first)
-    order: list[int] = []
-    heap = [(len(around), i not in preferred, -i) for i, around in touching.items()]
-    heapq.heapify(heap)
-    while heap:
-        degree, _, negative = heapq.heappop(heap)
-        i = -negative
-        if i not in touching or degree != len(touching[i]):
-            continue
-        around = touching.pop(i)
-        order.append(i)
-        for a in around:
-            touching[a] |= around
-            touching[a] -= {a, i}
-            heapq.heappush(heap, (len(touching[a]), a not in preferred, -a))
-    return order
+    around, preferred = neighbours_of(places, size), set(first)
+    return list(by_least(around, lambda i: (len(around[i]), i not in preferred, -i)))
 
 
 def fill_of(places: Sequence[Place], order: Sequence[int]) -> int:
     """Return the number of products that an elimination takes."""
-    around: dict[int, set[int]] = {i: set() for i in order}
-    for i, j in places:
-        if i != j:
-            around[i].add(j)
-            around[j].add(i)
-    total = 0
-    for p in order:
-        others = around.pop(p)
-        total += len(others) * (len(others) + 7) // 2
-        for j in others:
-            around[j] |= others
-            around[j] -= {j, p}
-    return total
+    around = neighbours_of(places, len(order))
+    sizes = (len(eliminated(around, p)) for p in order)
+    return sum(size * (size + 7) // 2 for size in sizes)
 
 
 def place_differences(

@@ -18,6 +18,7 @@ from atwood.expr import Program
 from atwood.forms.assembly import Assembly, Coordinates
 from atwood.forms.balance_program import RatesProgram
 from atwood.mechanics.dynamics.equations import Equations
+from atwood.mechanics.kinematics.orientation import quaternion_product
 from atwood.numerics.matrices import Matrix, from_entries, is_full, least_squares, to_array
 from atwood.numerics.sparse import csr_of
 
@@ -177,18 +178,8 @@ def orientations() -> tuple[tuple[float, ...], ...]:
         for sign in (1.0, -1.0)
     ]
     cube = np.array([*square, *halves, *edges])
-    w, x, y, z = cube.T
     askew = np.array([0.95, 0.21, 0.15, 0.17]) / np.linalg.norm([0.95, 0.21, 0.15, 0.17])
-    a, b, c, d = askew
-    turned = np.stack(
-        [
-            w * a - x * b - y * c - z * d,
-            w * b + x * a + y * d - z * c,
-            w * c + y * a + z * b - x * d,
-            w * d + z * a + x * c - y * b,
-        ],
-        axis=1,
-    )
+    turned = np.stack(quaternion_product([*cube.T], [*askew]), axis=1)
     return tuple(tuple(float(value) for value in row) for row in (*cube, *turned))
 
 

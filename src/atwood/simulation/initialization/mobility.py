@@ -20,7 +20,7 @@ from atwood.mechanics.dynamics.equations import Constraint
 from atwood.model.declare.component import Component
 from atwood.model.declare.laws import Kind
 from atwood.numerics.matrices import LARGEST_FULL, Matrix, is_full, scaled, to_array
-from atwood.numerics.rank import independent_rows, open_directions
+from atwood.numerics.rank import independent_rows, least_inertia, open_directions
 from atwood.numerics.sparse import csr_of, massless_directions
 from atwood.simulation.dynamics.balance import BalanceValues, balance_of, is_wide
 from atwood.simulation.dynamics.reactions import maximal_state
@@ -265,7 +265,7 @@ def _sizes_of_inertia(mass: Matrix, sizes: FloatArray) -> FloatArray:
     if not np.any(has):
         return sizes
     even = np.where(has, 1.0 / np.sqrt(np.where(has, own, 1.0)), 0.0)
-    return np.where(has, even, sizes * _median(even[has] / sizes[has]))
+    return np.where(has, even, sizes * np.median(even[has] / sizes[has]))
 
 
 def _massless_directions(assembly: Assembly, moving: FloatArray, state: State) -> StartError:
@@ -306,10 +306,7 @@ def _masses_apart(assembly: Assembly, t: float, q: FloatArray, u: FloatArray) ->
     mass = to_array(balance_of(assembly, "dae").at(t, big_q, big_u).mass)
     own = np.diag(mass)
     moved = [i for i, one in enumerate(maximal.speed_names) if one.unit == "m/s"]
-    if not np.all(own > 0.0) or not moved:
-        return ""
-    units = np.sqrt(own)
-    if np.linalg.eigvalsh(mass / units[:, None] / units[None, :])[0] < 1e-12:
+    if not moved or least_inertia(mass) < 1e-12:
         return ""
     names = motion_names(maximal)
     light, heavy = min(moved, key=lambda i: own[i]), max(moved, key=lambda i: own[i])
@@ -352,9 +349,3 @@ def _acting_on(assembly: Assembly, where: str) -> list[str]:
         if bodies.body_of[node] in own and (local.loads or local.potentials or local.dissipations or local.lagrangians):
             found[path] = None
     return list(found)
-
-
-def _median(values: FloatArray) -> float:
-    """Return the median; NumPy's loads its masked arrays, which takes longer than many a run."""
-    ordered, half = np.sort(values), len(values) // 2
-    return float(0.5 * (ordered[half] + ordered[-half - 1]))

@@ -25,6 +25,7 @@ from atwood.forms.loose import balance_with_masses, has_touched, is_loose, loose
 from atwood.forms.quantities import to_maximal
 from atwood.integrators.embedded.rates import CompiledAccelerations, OwnRates
 from atwood.integrators.protocol import MET, PROJECTION, RATES, STEPS, CompiledRates, ExplicitProblem, Values
+from atwood.numerics.rank import least_inertia
 from atwood.simulation.problem.problem import SceneProblem
 from atwood.topology.graph import connected_groups
 
@@ -290,19 +291,11 @@ def _light_speeds(plan: SceneProblem, t: float, y: FloatArray) -> tuple[int, ...
     found: list[int] = []
     for group in connected_groups(range(program.speeds), places):
         block = np.array([[value.get((i, j), 0.0) for j in group] for i in group])
-        if not _is_definite(block):
+        if not least_inertia(block) > _LEAST:
             found += group
     if assembly.form == "reduced":
         return tuple(range(plan.program.speeds)) if found else ()
     return tuple(sorted(found))
-
-
-def _is_definite(block: FloatArray) -> bool:
-    """Return whether there is inertia in each direction, in units of that along each speed."""
-    own = np.diag(block)
-    if not np.all(own > 0.0):
-        return False
-    return bool(np.linalg.eigvalsh(block / np.sqrt(own[:, None] * own[None, :]))[0] > _LEAST)
 
 
 def _projected(nearer: BoundKernel, t: float, y: FloatArray, coordinates: int) -> FloatArray:
