@@ -45,19 +45,19 @@ class RunFunction:
         self,
         make: Callable[[RunFunction], Callable[[Any], Any]],
         assembly: Assembly,
-        quantities: Iterable[str],
-        parameters: Iterable[str],
-        start: Iterable[str],
+        quantities: tuple[str, ...],
+        parameters: tuple[str, ...],
+        start: tuple[str, ...],
         inputs: Mapping[str, Any] | Iterable[str],
         between: str,
-        t_end: float | str | None,
+        t_end: float | None,
         outputs: Any,
         rtol: float,
     ) -> None:
-        begin, end = assembly.flat.t_start, assembly.flat.t_end if t_end is None else float(t_end)
-        self.assembly, self.parameters, self.start = assembly, tuple(parameters), tuple(start)
+        begin, end = assembly.flat.t_start, assembly.flat.t_end if t_end is None else t_end
+        self.assembly, self.parameters, self.start = assembly, parameters, start
         self.between, self.end, self.rtol = between, end, rtol
-        self.quantities = tuple(quantities)
+        self.quantities = quantities
         self.time = np.linspace(begin, end, outputs) if isinstance(outputs, int) else np.asarray(outputs, dtype=float)
         driven, self.driven = with_inputs(assembly, inputs, between, end)
         self._last: tuple[bytes, Result, tuple[Driven, ...]] | None = None
@@ -232,8 +232,10 @@ def as_jax(
     AtwoodError
         If JAX is not installed (``pip install jax``), or something has no derivative.
     """
-    about = quantities, parameters, start, inputs, between, t_end, outputs, rtol
-    return RunFunction(_with_jax, assembly_of(scene, form=form), *about)
+    assembly = assembly_of(scene, form=form)
+    end = None if t_end is None else float(t_end)
+    about = tuple(quantities), tuple(parameters), tuple(start), inputs, between, end, outputs, rtol
+    return RunFunction(_with_jax, assembly, *about)
 
 
 @takes(**_KINDS)
@@ -270,5 +272,7 @@ def as_torch(
     AtwoodError
         If PyTorch is not installed (``pip install torch``), or something has no derivative.
     """
-    about = quantities, parameters, start, inputs, between, t_end, outputs, rtol
-    return RunFunction(_with_torch, assembly_of(scene, form=form), *about)
+    assembly = assembly_of(scene, form=form)
+    end = None if t_end is None else float(t_end)
+    about = tuple(quantities), tuple(parameters), tuple(start), inputs, between, end, outputs, rtol
+    return RunFunction(_with_torch, assembly, *about)
