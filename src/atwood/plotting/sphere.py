@@ -22,11 +22,16 @@ def draw_sphere(axes: Axes) -> None:
 
 
 def draw_on_sphere(
-    axes: Axes, curve: FloatArray, colour: str, width: float, outwards: FloatArray | None = None
+    axes: Axes,
+    curve: FloatArray,
+    colour: str,
+    width: float,
+    outwards: FloatArray | None = None,
+    seen: FloatArray = SEEN,
 ) -> None:
     """Draw a curve on the sphere, or on a surface with normals of its own, faint where it is behind."""
-    x, y, depth = SEEN @ curve.T
-    front = (depth if outwards is None else SEEN[2] @ outwards.T) >= 0.0
+    x, y, depth = seen @ curve.T
+    front = (depth if outwards is None else seen[2] @ outwards.T) >= 0.0
     for shown, alpha in ((front, 1.0), (~front, 0.22)):
         wide = shown | np.roll(shown, 1)
         axes.plot(np.where(wide, x, np.nan), np.where(wide, y, np.nan), color=colour, linewidth=width, alpha=alpha)

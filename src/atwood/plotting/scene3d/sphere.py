@@ -11,9 +11,9 @@ from atwood.errors import UsageError
 from atwood.plotting.camera import Camera, View, as_camera
 from atwood.plotting.canvas import COLOURS, INK, Axes, Figure, bare, finished, new_figure, panels_of
 from atwood.plotting.scene3d.drawing import draw_corner_axes, draw_sphere
-from atwood.plotting.scene3d.painter import lighter
 from atwood.plotting.scene3d.picture import Trail
 from atwood.plotting.sheet import Sheet
+from atwood.plotting.sphere import draw_on_sphere
 from atwood.result.result import Result
 
 _COLUMNS = 4
@@ -97,15 +97,8 @@ def _trail(result: Result, path: str, colour: str) -> Trail:
 
 def _draw_path(axes: Axes, camera: Camera, trail: Trail) -> None:
     """Draw a path on the sphere, fainter on its far side, and the direction at its end."""
-    from matplotlib.collections import LineCollection
-
     page, depth = camera.project(trail.points), camera.depth(trail.points)
-    pieces = np.stack([page[:-1], page[1:]], axis=1)
-    near = depth[:-1] + depth[1:] > 0.0
-    for part, share, width, layer in ((~near, 0.55, 1.0, 1.5), (near, 0.0, 1.6, 3.0)):
-        lines = LineCollection(list(pieces[part]), colors=[tuple(lighter(trail.colour, share))], linewidths=width)
-        lines.set(zorder=layer, capstyle="round")
-        axes.add_collection(lines)
+    draw_on_sphere(axes, trail.points, trail.colour, 1.6, seen=camera.axes)
     end, inside = page[-1], 2.0 if depth[-1] > 0.0 else 1.4
     axes.plot([0.0, end[0]], [0.0, end[1]], color=INK, linewidth=1.6, solid_capstyle="round", zorder=inside)
     axes.plot([0.0], [0.0], marker="o", markersize=3.5, color=INK, linestyle="none", zorder=inside)
