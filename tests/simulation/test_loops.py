@@ -64,6 +64,22 @@ def test_the_first_choice_is_that_of_a_pivoted_factorisation() -> None:
         assert choose_dependent_coordinates(slope, scales) == tuple(sorted(int(one) for one in pivots[:rows]))
 
 
+@pytest.mark.parametrize("share", [0.04, 0.1, 1.0])
+def test_the_first_choice_in_a_large_mechanism_is_that_of_a_pivoted_factorisation(share: float) -> None:
+    from scipy.linalg import qr
+    from scipy.sparse import csr_array
+
+    random = np.random.default_rng(4)
+    for rows, columns in ((60, 61), (60, 90), (130, 150)):
+        slope, scales = random.standard_normal((rows, columns)), 10.0 ** random.uniform(-1.0, 1.0, columns)
+        slope *= (random.random(slope.shape) < share) | np.eye(rows, columns, dtype=bool)
+        size = np.max(np.abs(slope * scales), axis=1)
+        *_, pivots = qr(slope * scales / size[:, None], pivoting=True, mode="economic")
+        expected = tuple(sorted(int(one) for one in pivots[:rows]))
+        assert choose_dependent_coordinates(slope, scales) == expected
+        assert choose_dependent_coordinates(csr_array(slope), scales) == expected
+
+
 def test_a_choice_that_cannot_be_solved_is_left() -> None:
     slope = np.array([[1.0, 1.0, 0.0, 0.0], [1.0, 1.0, 0.0, 0.5]])
     assert review_partitioning(slope, np.ones(4), (0, 1)) in {(0, 3), (1, 3)}

@@ -18,7 +18,7 @@ from atwood.arrays import FloatArray, uneven
 from atwood.codegen.rounding import ROUGHNESS
 from atwood.errors import KernelEvaluationError
 from atwood.lazy_dataclasses import dataclass, replace
-from atwood.numerics.matrices import is_full, or_one, scaled, to_array
+from atwood.numerics.matrices import Matrix, is_full, or_one, scaled, to_array
 from atwood.numerics.rank import (
     independent_by_groups,
     independent_rows,
@@ -230,12 +230,11 @@ _ALL = 50
 """Of so many constraints each is taken to touch all others, which takes no longer."""
 
 
-def choose_dependent_coordinates(jacobian: FloatArray, scales: FloatArray) -> tuple[int, ...]:
-    """Return the coordinates that the constraints determine best: in turn, the column of which most is left.
-
-    Of a large mechanism each touches few others, and only these are worked on.
-    """
+def choose_dependent_coordinates(jacobian: Matrix, scales: FloatArray) -> tuple[int, ...]:
+    """Return the coordinates that the constraints determine best: in turn, the column of which most is left."""
     count = jacobian.shape[0]
+    if count > _ALL:
+        return _choose_among_many(jacobian, scales)
     rows = or_one(np.max(np.abs(jacobian * scales), axis=1, initial=0.0))
     left = jacobian * scales / rows[:, None]
     sizes = np.einsum("ij,ij->j", left, left)
@@ -244,16 +243,55 @@ def choose_dependent_coordinates(jacobian: FloatArray, scales: FloatArray) -> tu
         best = int(np.argmax(sizes))
         is_chosen[best] = True
         if sizes[best] > 0.0:
-            own = np.flatnonzero((left[:, best] != 0.0) | (count <= _ALL))
-            columns = np.flatnonzero(np.any(left[own] != 0.0, axis=0) | (count <= _ALL))
-            direction, part = left[own, best] / np.sqrt(sizes[best]), left.take(own, axis=0).take(columns, axis=1)
-            for _ in range(2):  # once more, against rounding
-                part = part - direction[:, None] * (direction @ part)
-            left[np.ix_(own, columns)] = np.where((np.abs(part) < _LOST) & (count > _ALL), 0.0, part)
-            whole = left.take(columns, axis=1)
-            sizes[columns] = np.where(is_chosen[columns], -1.0, np.einsum("ij,ij->j", whole, whole))
+            left = _without(left[:, best] / np.sqrt(sizes[best]), left)
+            sizes = np.where(is_chosen, -1.0, np.einsum("ij,ij->j", left, left))
         sizes[best] = -1.0
     return tuple(np.flatnonzero(is_chosen).tolist())
+
+
+def _without(direction: FloatArray, part: FloatArray) -> FloatArray:
+    """Return what is left of columns without a direction, taken out once more against rounding."""
+    for _ in range(2):
+        part = part - direction[:, None] * (direction @ part)
+    return part
+
+
+def _choose_among_many(jacobian: Matrix, scales: FloatArray) -> tuple[int, ...]:
+    """Return the same for a large mechanism, of which each constraint touches few others: only these are worked on."""
+    count, width = jacobian.shape
+    rows, columns = jacobian.nonzero()
+    values = np.asarray(jacobian[rows, columns]).ravel() * scales[columns]
+    units = np.zeros(count)
+    np.maximum.at(units, rows, np.abs(values))
+    left: list[dict[int, float]] = [{} for _ in range(count)]
+    touching: list[set[int]] = [set() for _ in range(width)]
+    for i, j, value in zip(*(one.tolist() for one in (rows, columns, values / or_one(units)[rows])), strict=True):
+        left[i][j] = value
+        touching[j].add(i)
+
+    def size(column: int) -> float:
+        return sum(left[i][column] ** 2 for i in sorted(touching[column]))
+
+    sizes = np.array([size(j) for j in range(width)])
+    chosen: set[int] = set()
+    for _ in range(count):
+        best = int(np.argmax(sizes))
+        chosen.add(best)
+        if sizes[best] > 0.0:
+            own = sorted(touching[best])
+            touched = sorted(set[int]().union(*(left[i] for i in own)))
+            part = np.array([[left[i].get(j, 0.0) for j in touched] for i in own])
+            part = _without(part[:, touched.index(best)] / np.sqrt(sizes[best]), part)
+            for i, row in zip(own, np.where(np.abs(part) < _LOST, 0.0, part).tolist(), strict=True):
+                for j, value in zip(touched, row, strict=True):
+                    if value:
+                        left[i][j] = value
+                        touching[j].add(i)
+                    elif left[i].pop(j, None) is not None:
+                        touching[j].remove(i)
+            sizes[touched] = [-1.0 if j in chosen else size(j) for j in touched]
+        sizes[best] = -1.0
+    return tuple(sorted(chosen))
 
 
 def review_partitioning(jacobian: FloatArray, scales: FloatArray, dependent: tuple[int, ...]) -> tuple[int, ...]:

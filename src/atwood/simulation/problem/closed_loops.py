@@ -63,6 +63,9 @@ _MOST, _FEWEST, _WORK = 60, 3, 120
 """So many choices of independent coordinates are tried at most; of mechanisms of many coordinates fewer, down to the
 second number: the third divided by the number of coordinates. Each costs formulas for the whole mechanism."""
 
+_LONG = 400
+"""Of mechanisms of more coordinates the first choice that is good enough is taken, as of those of several freedoms."""
+
 
 @dataclass(frozen=True, eq=False)
 class Solved:
@@ -164,6 +167,7 @@ class _Choices:
         Formulas whose divisor is zero by structure, as between axes that are always parallel, are none.
         """
         if independent not in self._forms:
+            graph, start = self.equations.graph, len(self.equations.graph)
             with assembly.shared.lock:
                 found = self.loops.solve(independent)
                 try:
@@ -174,6 +178,7 @@ class _Choices:
                     )
                 except DivisionByExactZeroError:
                     self._forms[independent] = None
+                graph.forget(start)
         return self._forms[independent]
 
 
@@ -258,7 +263,8 @@ def _solve_at(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -> Sol
             continue
         if best is None or found.margin > best.margin:
             best = found
-        if found.least or (form is not None and len(form.loops.speeds) > 1 and found.margin > _AMPLE):
+        is_enough = len(found.form.loops.speeds) > 1 or len(plan.assembly.reduced.coordinates) > _LONG
+        if found.least or (is_enough and found.margin > _AMPLE):
             return found
     return best
 

@@ -24,7 +24,6 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.model.declare.component import bind
 from atwood.model.local.parts import LocalPart
 from atwood.model.values.space import Vector
-from atwood.numerics.matrices import to_array
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.numerical_failure import ADVICE_AT_START, undefined_value_at
 from atwood.simulation.dynamics.reactions import check_read_reactions
@@ -86,7 +85,7 @@ def _make_problem(
         raise _singular_start(assembly, finding)
     dependent: tuple[tuple[int, ...], tuple[int, ...]] = (), ()
     if assembly.form == "reduced" and finding.kept:
-        dependent = dependent_speeds_of(balance, finding, to_array(now.jacobian), sizes)
+        dependent = dependent_speeds_of(balance, finding, now.jacobian, sizes)
     program = assembly.form_program(kept_rows(finding), *dependent)
     kept = np.asarray(finding.kept, dtype=np.intp) if finding.redundant else None
     accelerations, _ = balance.accelerate(t, q, u, kept, now)

@@ -21,7 +21,7 @@ from atwood.forms.residuals import NullSpaceProgram, keep_constraints, null_spac
 from atwood.integrators.methods import Method
 from atwood.integrators.protocol import ImplicitProblem, LinearSolver, NativeCallbacks
 from atwood.lazy_dataclasses import dataclass, replace
-from atwood.numerics.matrices import to_array
+from atwood.numerics.matrices import Matrix, to_array
 from atwood.simulation.dynamics.balance import Balance, balance_of, columns_of
 from atwood.simulation.dynamics.redundancy import (
     RankFinding,
@@ -208,7 +208,7 @@ class SceneProblem:
         """Keep other constraints from a place on; programs and sessions for those before have had their day."""
         self.finding, self._kernels, self._null_space = finding, None, None
         if self.dependent_speeds:
-            now = to_array(self.balance.constraints_at(t, q, np.zeros_like(self.sizes)).jacobian)
+            now = self.balance.constraints_at(t, q, np.zeros_like(self.sizes)).jacobian
             self.dependent, self.dependent_speeds = dependent_speeds_of(self.balance, finding, now, self.sizes)
         self.program = self.assembly.form_program(finding.kept, self.dependent, self.dependent_speeds)
 
@@ -405,7 +405,7 @@ def kept_rows(finding: RankFinding) -> tuple[int, ...] | None:
 
 
 def dependent_speeds_of(
-    balance: Balance, finding: RankFinding, constraint_jacobian: FloatArray, sizes: FloatArray
+    balance: Balance, finding: RankFinding, constraint_jacobian: Matrix, sizes: FloatArray
 ) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Return the speeds whose displacements follow from constraints on positions, and those that follow from all."""
     holding = balance.holding(finding.kept)
