@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from math import nan
+from math import inf, nan
 
 from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Record, Routine, Value, call_kernel, place_of
 from atwood.integrators.event_location import FIELDS as LOCATOR
 from atwood.integrators.event_routines import Search
 from atwood.integrators.jumps import ENTRY, FIELDS, TABLE
+from atwood.integrators.set_routines import BLURRED, ROUNDED, STEP
 
 SPANS = 3, 12
 """At least and at most so many intervals between jumps say how fast these follow each other."""
@@ -40,7 +41,8 @@ def write_routines() -> list[Routine]:
     before, after, response, impulse = (room.at(size + gaps * k) for k in range(4))
     slow, gains = m.table[search.count * TABLE.index("slow") + one], before[row] + after[row] > after[row] * _MORE
     r.give_if(~((before[row] + slow < 0.0) & (after[row] > slow)) | gains, 1)
-    _leave_series(r, m, t, response)
+    newest = _leave_series(r, m, t, response)
+    _leave_rounding(r, m, search, one, newest, (before[row], after[row]))
     # Times are rounded, and always past the zero: the impact is made there, and what follows takes up the rest.
     late = r.least(r.most((search.row("known")[one] - m.shift[one]) / before[row], 0.0), search.after - search.before)
     there = search.shifted
@@ -83,8 +85,11 @@ def _alone(r: Routine, m: Record, search: Search) -> Value:
     return which
 
 
-def _leave_series(r: Routine, m: Record, t: Value, response: Value) -> None:
-    """Leave it to Python where intervals shrink like a geometric series that ends soon, of parts that move together."""
+def _leave_series(r: Routine, m: Record, t: Value, response: Value) -> Value:
+    """Leave it to Python where intervals shrink like a geometric series that ends soon, of parts that move together.
+
+    Return the newest interval, infinity where there are few.
+    """
     gaps, parts, log, stride = m.gaps, m.parts, m.log, m.log_stride
     largest, moved = r.variable(0.0), m.moved
     with r.count(gaps) as i:
@@ -112,7 +117,25 @@ def _leave_series(r: Routine, m: Record, t: Value, response: Value) -> None:
     with r.count(spans.now - 1):
         power.now = power.now * share
     ends_soon = newest.now < oldest.now * power.now
-    r.give_if((spans.now >= SPANS[0]) & (newest.now > 0.0) & ends_soon, 1)
+    is_series = (spans.now >= SPANS[0]) & (newest.now > 0.0)
+    r.give_if(is_series & ends_soon, 1)
+    return r.choose(is_series, newest.now, inf)
+
+
+def _leave_rounding(
+    r: Routine, m: Record, search: Search, one: Value, newest: Value, speeds: tuple[Value, Value]
+) -> None:
+    """Leave it to Python where rounding of the coordinates tells in the bounces of what loses energy."""
+    (before, after), y, others, moved = speeds, search.y, search.row("others"), r.variable(0.0)
+    height = newest * (0.0 - before) * (1.0 + after / before)
+    with r.when((height > 0.0) & (height < inf)):
+        with r.count(m.coordinates) as i:
+            kept = y[i]
+            y[i] = kept + kept * STEP
+            r.call(search.events, search.root, y, search.yp, others, search.data)
+            moved.now = moved.now + r.size(others[one] - search.row("known")[one])
+            y[i] = kept
+        r.give_if(height < moved.now * (BLURRED * ROUNDED / STEP), 1)
 
 
 def _watch_again(r: Routine, m: Record, search: Search, one: Value, t: Value) -> None:

@@ -157,6 +157,15 @@ _SETS = 12
 ROUNDED = 0.25 * 2.0**-52
 """Of the scene's size: a bounce that is no higher is rounding."""
 
+BLURRED = 512.0
+"""Times rounding of a gap by the share of energy that is lost: rounding tells in bounces that are no higher.
+
+Each adds about its rounding to their height; where losses take as much away they would go on for ever.
+"""
+
+STEP = 2.0**-26
+"""Of coordinates: by so much each is moved to see how its rounding moves a gap."""
+
 FAST = 1e3
 """What bounces no higher than rounding is looked for where forces pull it back by so much times what falls, at most."""
 
@@ -921,7 +930,8 @@ def _touch() -> Routine:
         closed = state[k] == float(STICKS)
         in_series = m.unit("series")[k] != 0.0
         blur, pace = r.choose(in_series, m.blur, 1.0), r.choose(in_series, m.pace, 1.0)
-        is_near = closed | (values[row] <= m.unit("small")[k] * blur)
+        closes = m.unit("trigger")[k] == float(CLOSES)  # far from the origin it is off by more than what is small
+        is_near = closed | closes | (values[row] <= m.unit("small")[k] * blur)
         is_slow = (m.unit("speed")[k] == 0.0) | closed | (rates[row] <= m.unit("slow")[k] * pace)
         is_one = (m.unit("slip")[k] == 0.0) & is_near & is_slow
         chosen[k] = r.choose(is_one, 1.0, 0.0)
@@ -1381,20 +1391,44 @@ def _end_series(r: Routine, m: Sets, spans: Value, number: Value, closing: tuple
         r.give()
     speed = r.size(m.row("rates")[r.truncated(m.unit("first")[closing[1]])])
     is_squeezed = speed > pull * lasted.now
-    is_level = (share.now > LEVEL) & (spans[0] < m.later * SHORT) & ~is_squeezed
+    restitution, blur = m.result("restitution")[r.truncated(m.unit("first")[closing[1]])], r.variable(0.0)
+    lost = 1.0 - restitution
+    with r.when((share.now > LEVEL) & ~is_squeezed & (lost > 0.0)):
+        blur.now = r.call("gap_rounding", r.arguments[0], closing[0], closing[1], result=NUMBER)
+    is_blurred = spans[0] * speed * lost < blur.now * BLURRED
+    is_level = (share.now > LEVEL) & (spans[0] < m.later * SHORT) & ~is_squeezed | is_blurred
     left = r.choose(is_level, spans[0], rest)
     flattens = 1.0 - spans[0] / spans[1] < FLATTENS * (1.0 - share.now)
     is_steady = long.now >= r.choose(even.now < RECENT + 1, even.now, RECENT + 1, INTEGER)
     longest = r.choose(is_steady, r.choose(flattens, m.rough, m.ahead), m.later)
     is_closed = (rest < inf) & (spans[0] * speed < m.unit("small")[closing[1]] * SQUEEZED)
     stays = (left < inf) & (speed * share.now <= m.unit("slow")[closing[1]])  # it would rest untold
-    with r.when(r.choose(is_squeezed, is_closed, (left < longest) | stays, BOOLEAN)):
+    with r.when(r.choose(is_squeezed, is_closed, (left < longest) | stays | is_blurred, BOOLEAN)):
         m.stops = r.choose(left > m.ahead * WAITS, 1, 2, INTEGER)
         m.ahead, m.blur, m.pace, m.lasted = left, NEAR_REST, NEAR_REST, lasted.now
         sum_ = _sum_of_series(r, spans, long.now)
-        most = r.choose(is_level, spans[0] * r.choose(is_elastic, 1.0, float(LONG)), left * 2.0)
+        longer = r.most(2.0 / lost, float(LONG))
+        most = r.choose(is_level, spans[0] * r.choose(is_elastic, 1.0, longer), left * 2.0)
         with r.when((sum_ >= 0.0) & (sum_ <= most)):
             m.ahead = sum_
+
+
+def _gap_rounding() -> Routine:
+    """Return by how much rounding of the coordinates moves a gap."""
+    r, m, (t, k) = _open("gap_rounding", {"t": NUMBER, "unit": INTEGER}, NUMBER)
+    y, total = m.y, r.variable(0.0)
+    value = m.result("values")[r.truncated(m.unit("first")[k])]
+    with r.count(m.coordinates) as i:
+        kept = y[i]
+        with r.when(kept != 0.0):
+            y[i] = kept + kept * STEP
+            code = r.call("read_contacts", r.arguments[0], t)
+            there = m.result("values")[r.truncated(m.unit("first")[k])]
+            total.now = total.now + r.choose(code == 0, r.size(there - value), 0.0)
+            y[i] = kept
+    r.call("read_contacts", r.arguments[0], t)
+    r.give(r.most(total.now * (ROUNDED / STEP), m.unit("rounding")[k]))
+    return r
 
 
 def _bouncing(r: Routine, m: Sets, lasted: Value, t: Value, closes: Value, least: Value) -> tuple[Value, Value]:
@@ -1462,6 +1496,6 @@ def write_sets() -> list[Routine]:
     """Return the routines; they take the address of the memory of sets, and ``resolve`` is the one to be called."""
     sets = (_solve, _least, _equations, _moved, _met, _contradiction, _improved, _find, _direction, _determined)
     shares = (_share, _let_go, _weighted, _rank, _lawful)
-    impacts = (_impulses, _strike, _account, _collide, _stop, _end_impacts, _series)
+    impacts = (_impulses, _strike, _account, _collide, _stop, _end_impacts, _series, _gap_rounding)
     moments = (_read, _push, _touch, _hold, _barely_rising, _settle, _check)
     return [_resolve(), *(write() for write in (*sets, *shares, *impacts, *moments))]

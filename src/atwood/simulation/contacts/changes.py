@@ -20,6 +20,7 @@ from atwood.integrators.set_routines import (
     ASTRAY,
     BEGINS,
     BEND,
+    BLURRED,
     EVEN,
     FAST,
     FLATTENS,
@@ -40,6 +41,7 @@ from atwood.integrators.set_routines import (
     SPANS,
     SQUEEZED,
     STEADY,
+    STEP,
     UNDETERMINED,
     WAITS,
 )
@@ -147,12 +149,13 @@ class _Moment:
 
     @property
     def touching(self) -> list[int]:
-        """The gaps that are closed."""
+        """The gaps that are closed; that of an event is, also where rounding far from the origin is no longer small."""
         values, small = self.values.values.tolist(), self.small.tolist()
         return [
             k
             for k, is_slip in enumerate(self.layout.is_slip)
-            if not is_slip and (self.before[k][0] == STICKS or values[self.units[k][0]] <= small[k])
+            if not is_slip
+            and (self.before[k][0] == STICKS or self.trigger(k) == CLOSES or values[self.units[k][0]] <= small[k])
             if k not in self.layout.speeds or self.before[k][0] == STICKS or self._is_slow(k)
         ]
 
@@ -252,17 +255,26 @@ class _Moment:
         if speed > pull * lasted:  # it is squeezed
             is_over = math.isfinite(left) and spans[0] * speed < SQUEEZED * self.small[closing[0]]
         else:
-            if share > LEVEL and spans[0] < SHORT * longest[2]:  # rounding makes each bounce from the one before
-                left, most = spans[0], spans[0] * (1 if is_elastic else LONG)
+            lost = 1.0 - float(self.values.restitution[self.units[closing[0]][0]])
+            is_blurred = share > LEVEL and spans[0] * speed * lost < BLURRED * self._rounding(closing[0]) and lost > 0.0
+            # Rounding makes each bounce from the one before.
+            if is_blurred or (share > LEVEL and spans[0] < SHORT * longest[2]):
+                left, most = spans[0], spans[0] * (1 if is_elastic else max(2.0 / lost, LONG))
             flattens = 1.0 - ratios[0] < FLATTENS * (1.0 - share)
             stays = share * speed <= self.slow[closing[0]] and math.isfinite(left)  # it would rest untold
-            is_over = stays or left < (longest[1 if flattens else 0] if long >= min(count, RECENT) else longest[2])
+            is_over = stays or is_blurred or left < (longest[1 if flattens else 0] if long >= min(count, RECENT) else longest[2])
         if not is_over or (is_elastic and (share <= LEVEL or spans[0] > LOSSLESS * longest[2])):
             return None
         self._series = self._accumulating(closing, impacts, self.t - lasted)
         self.small, self.slow = (self._blurred(one, NEAR_REST) for one in (self.small, self.slow))
         found = sum_of_series(np.array(spans[: long + 1]))
         return found if 0.0 <= found <= most else left
+
+    def _rounding(self, k: int) -> float:
+        """Return by how much rounding of the coordinates moves a gap."""
+        row = self.units[k][0]
+        moved = [abs(float(one[row] - self.values.values[row])) for one in self.values.moved(STEP)]
+        return max(ROUNDED / STEP * sum(moved), float(self.rounding[k]))
 
     def _bouncing(self, closes: int, moved: BoolArray, parts: Collection[str]) -> tuple[bool, float]:
         """Return whether impacts of some parts lose nothing, and how fast what they move falls, at most."""

@@ -6,7 +6,7 @@ A unit force along a row i makes accelerations ``X_i``, with the joints holding:
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from copy import copy
 from functools import cached_property
 
@@ -234,6 +234,11 @@ class ContactValues:
         self._limits, self._shares, (self.restitution, self.compliance) = limits[:4], limits[4:8], limits[8:]
         self.slopes = np.zeros((len(self.contacts), len(u)))
         self.slopes[self.layout.slopes] = slopes
+
+    def moved(self, step: float) -> Iterator[FloatArray]:
+        """Go through the values with each coordinate moved by a share of itself."""
+        for by in np.diag(step * self.q)[self.q != 0.0]:
+            yield np.array(self._kernel([self.t], self.q + by, self.u, self.read)[0])
 
     def touching(self, near: float) -> FloatArray:
         """Return 1 for each gap that is as near to zero, in units of the scene, and for the slips at it; else 0."""

@@ -309,9 +309,10 @@ class EventProbe:
         sided = np.array([one.target == SIDE for one in self.event_functions], dtype=np.bool_)
         # What has just passed zero, or will soon, is off by rounding.
         self.shift = np.where(sided & (values <= 0.0), 2.0 * np.abs(values) + TINY, self.shift)
-        opening = self._opening(t, q, u, small) & (np.abs(values) <= small)
+        opening = self._opening(t, q, u, small) & (happened | (np.abs(values) <= small))
         if opening.any():
             blur = _BLUR * self._rounding(t, q, u, values)
+            opening &= np.abs(values) <= np.maximum(small, blur)  # far from the origin the second is larger
             self.shift = np.where(opening, np.where(values > blur, 0.0, 2.0 * np.abs(values) + blur), self.shift)
         happened &= ~opening
         self._arm(values, small, happened, (t, q, u))
