@@ -14,6 +14,7 @@ import numpy as np
 
 from atwood.arrays import BoolArray, FloatArray
 from atwood.errors import SolveError, StartError
+from atwood.expr import evaluate
 from atwood.forms.assembly import Assembly
 from atwood.integrators.set_routines import (
     ALIKE,
@@ -97,6 +98,9 @@ _TOGETHER = "With static friction above that of slipping all begin to slip toget
 
 _ALONG = 1e-3
 """Of what is slow: by so much goes what is moved along."""
+
+_INSIDE = 32.0
+"""Times rounding of the coordinates: a gap that starts no deeper is closed."""
 
 _MOST_IMPACTS = 1000
 """So many impacts one after the other happen at one moment at most."""
@@ -270,10 +274,10 @@ class _Moment:
         found = sum_of_series(np.array(spans[: long + 1]))
         return found if 0.0 <= found <= most else left
 
-    def _rounding(self, k: int) -> float:
-        """Return by how much rounding of the coordinates moves a gap."""
+    def _rounding(self, k: int, far: float = 0.0) -> float:
+        """Return by how much rounding of the coordinates moves a gap, with places counted from as far away."""
         row = self.units[k][0]
-        moved = [abs(float(one[row] - self.values.values[row])) for one in self.values.moved(STEP)]
+        moved = [abs(float(one[row] - self.values.values[row])) for one in self.values.moved(STEP, far)]
         return max(ROUNDED / STEP * sum(moved), float(self.rounding[k]))
 
     def _bouncing(self, closes: int, moved: BoolArray, parts: Collection[str]) -> tuple[bool, float]:
@@ -724,7 +728,10 @@ class _Moment:
         )
 
     def check_start(self) -> None:
-        """Refuse a start inside of something."""
+        """Refuse a start inside of something; places that are given far away are rounded there."""
+        table = self.values.assembly.mechanism.table
+        places = evaluate([table.graph.convert(one) for one in table.origin], table.values)
+        far = max(map(abs, places), default=0.0)
         for k, one in enumerate(self.first):
             unit, row = ALONG[one.law.options.unit], self.units[k][0]
             if one.is_speed and self.values.rates[row] < -self.slow[k]:
@@ -734,7 +741,7 @@ class _Moment:
                     advice="Start where that speed is zero or positive.",
                 )
             value = self.values.values[row]
-            if not one.is_slip and value < -self.small[k]:
+            if not one.is_slip and value < -self.small[k] and value < -_INSIDE * self._rounding(k, far):
                 raise StartError(
                     f"it starts inside, by {-value:.6g} {unit}",
                     where=one.row.key[0],

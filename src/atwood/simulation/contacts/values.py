@@ -35,7 +35,7 @@ from atwood.simulation.dynamics.balance import (
     even_balance,
 )
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
-from atwood.simulation.dynamics.scales import Scales, motion_scales
+from atwood.simulation.dynamics.scales import Scales, coordinate_scales, motion_scales
 from atwood.simulation.problem.problem import SceneProblem
 
 _LAYOUT: Key[Layout] = Key("gaps and slips")
@@ -235,9 +235,10 @@ class ContactValues:
         self.slopes = np.zeros((len(self.contacts), len(u)))
         self.slopes[self.layout.slopes] = slopes
 
-    def moved(self, step: float) -> Iterator[FloatArray]:
-        """Go through the values with each coordinate moved by a share of itself."""
-        for by in np.diag(step * self.q)[self.q != 0.0]:
+    def moved(self, step: float, far: float = 0.0) -> Iterator[FloatArray]:
+        """Go through the values with each coordinate moved by a share of itself, lengths by one of what is far, too."""
+        sizes = np.abs(self.q) + (coordinate_scales(self.assembly.maximal, far) if far else 0.0)
+        for by in np.diag(step * sizes)[sizes != 0.0]:
             yield np.array(self._kernel([self.t], self.q + by, self.u, self.read)[0])
 
     def touching(self, near: float) -> FloatArray:

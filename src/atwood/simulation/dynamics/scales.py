@@ -163,7 +163,7 @@ def find_scales(
     """Return the sizes of a scene from its start."""
     gravity = next((v for s, v in assembly.mechanism.table.values.items() if s.name == "gravity"), 0.0)
     time = float(find_times(length, speeds, accelerations, sizes, gravity, span))
-    return Scales(length, time, float(total_masses(assembly)) * length / time**2)
+    return Scales(length, time, float(total_masses(assembly, length)) * length / time**2)
 
 
 _MASSES: Key[Program] = Key("masses")
@@ -187,14 +187,19 @@ def _without_rounding(sizes: FloatArray) -> FloatArray:
     return np.asarray(np.ldexp(np.round(np.ldexp(share, 34)), power - 34))
 
 
-def total_masses(assembly: Assembly, rows: FloatArray | None = None) -> FloatArray | float:
-    """Return the mass of all that moves, at the start, kg; 1 kg where nothing that moves has a mass."""
+def total_masses(assembly: Assembly, lengths: Sizes, rows: FloatArray | None = None) -> FloatArray | float:
+    """Return the mass of all that moves, at the start, kg; where only shafts turn, that which has their moments there.
+
+    Of what has neither it is 1 kg.
+    """
     if rows is None:
-        total = float(sum(assembly.kernel(_masses(assembly))([assembly.flat.t_start])[0])) or 1.0
-        return float(_without_rounding(np.asarray(total)))
-    kernel = assembly.compiled(_masses(assembly), vectorized=True).bind(rows.T)
-    found = np.sum(kernel(np.full((1, len(rows)), assembly.flat.t_start))[0], axis=0)
-    return _without_rounding(or_one(found))
+        every = [sum(one) for one in assembly.kernel(_masses(assembly))([assembly.flat.t_start])]
+    else:
+        kernel = assembly.compiled(_masses(assembly), vectorized=True).bind(rows.T)
+        every = [np.sum(one, axis=0) for one in kernel(np.full((1, len(rows)), assembly.flat.t_start))]
+    masses, moments = map(np.asarray, every)
+    found = _without_rounding(or_one(np.where(masses > 0.0, masses, moments / np.square(lengths))))
+    return found if np.ndim(found) else float(found)
 
 
 def _masses(assembly: Assembly) -> Program:
@@ -203,8 +208,12 @@ def _masses(assembly: Assembly) -> Program:
         found = [graph.convert(one.mass) for one in masses.bodies.values()]
         found += [graph.convert(m) for one in masses.coupled for row in one.masses for m in row]
         found += [graph.convert(one.mass) for _, one in masses.varying]
+        turning = [one.moment for one in masses.bodies.values()]
+        moments = [row[i] for one in turning if isinstance(one, tuple) for i, row in enumerate(one)]
+        moments += [one for one in turning if not isinstance(one, tuple)]
         time = InputGroup("t", (assembly.mechanism.time,))
-        return Program("masses", (time,), assembly.parameters, (OutputGroup("masses", tuple(found)),))
+        groups = OutputGroup("masses", tuple(found)), OutputGroup("moments", tuple(map(graph.convert, moments)))
+        return Program("masses", (time,), assembly.parameters, groups)
 
     return assembly.shared.get(_MASSES, make)
 

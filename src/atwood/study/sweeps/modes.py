@@ -126,7 +126,7 @@ class SweepMode:
 
         y = np.concatenate([q, u], axis=1)
         found = values_at(y)
-        mass = total_masses(self.assembly, values)
+        mass = total_masses(self.assembly, lengths, values)
         small = np.empty((runs, count))
         for k, one in enumerate(self.functions):
             small[:, k] = MARGIN * tolerance * size_of(one.unit, lengths, time, mass)
