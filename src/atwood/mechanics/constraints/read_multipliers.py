@@ -343,8 +343,8 @@ def weights_of(
 ) -> list[Number]:
     """Return by which weights D the least forces ``f D f`` are meant, where nothing else says how forces are shared.
 
-    They are by how much rows move by their own forces with nothing else held. So in one row coordinates without inertia
-    count as those that have some.
+    They are by how much rows move by their own forces with nothing else held. Coordinates without inertia have that
+    which rows give them together, so that their units make no difference.
 
     Parameters
     ----------
@@ -355,15 +355,26 @@ def weights_of(
     none
         A zero for each row.
     """
-    found, own = list(none), dict[int, list[Number]]()
+    found, own, light = list(none), dict[int, list[Number]](), dict[int, Number]()
     for (r, c), entry in slopes.items():
         if c in inertia:
             own.setdefault(r, []).append(1.0 / inertia[c])
             found[r] = found[r] + entry * entry / inertia[c]
     for (r, c), entry in slopes.items():
         if c not in inertia and r in own:
-            found[r] = found[r] + entry * entry * (sum(own[r], none[r]) / float(len(own[r])))
+            given = entry * entry * float(len(own[r])) / sum(own[r], none[r])
+            light[c] = light.get(c, none[r]) + given
+    for (r, c), entry in slopes.items():
+        if c in light:
+            found[r] = found[r] + entry * entry / _or_one(light[c])
     return found
+
+
+def _or_one(size: Number) -> Number:
+    """Return a size to divide by: one in place of zero."""
+    if isinstance(size, Expression):
+        return select(size > 0.0, size, 1.0)
+    return size or 1.0
 
 
 def _iterated(system: _System, masked: Sequence[Expression]) -> list[Expression]:
