@@ -1407,7 +1407,7 @@ def _end_series(r: Routine, m: Sets, spans: Value, number: Value, closing: tuple
         m.stops = r.choose(left > m.ahead * WAITS, 1, 2, INTEGER)
         m.ahead, m.blur, m.pace, m.lasted = left, NEAR_REST, NEAR_REST, lasted.now
         sum_ = _sum_of_series(r, spans, long.now)
-        longer = r.most(2.0 / lost, float(LONG))
+        longer = r.most(2.0 / r.choose(lost > 0.0, lost, 1.0), float(LONG))
         most = r.choose(is_level, spans[0] * r.choose(is_elastic, 1.0, longer), left * 2.0)
         with r.when((sum_ >= 0.0) & (sum_ <= most)):
             m.ahead = sum_

@@ -373,7 +373,8 @@ def weights_of(
 def _or_one(size: Number) -> Number:
     """Return a size to divide by: one in place of zero."""
     if isinstance(size, Expression):
-        return select(size > 0.0, size, 1.0)
+        found: Expression = select(size > 0.0, size, 1.0)
+        return found
     return size or 1.0
 
 

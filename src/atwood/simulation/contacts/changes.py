@@ -263,10 +263,11 @@ class _Moment:
             is_blurred = share > LEVEL and spans[0] * speed * lost < BLURRED * self._rounding(closing[0]) and lost > 0.0
             # Rounding makes each bounce from the one before.
             if is_blurred or (share > LEVEL and spans[0] < SHORT * longest[2]):
-                left, most = spans[0], spans[0] * (1 if is_elastic else max(2.0 / lost, LONG))
+                left, most = spans[0], spans[0] * (1 if is_elastic else max(2.0 / (lost or 1.0), LONG))
             flattens = 1.0 - ratios[0] < FLATTENS * (1.0 - share)
             stays = share * speed <= self.slow[closing[0]] and math.isfinite(left)  # it would rest untold
-            is_over = stays or is_blurred or left < (longest[1 if flattens else 0] if long >= min(count, RECENT) else longest[2])
+            most_left = (longest[1] if flattens else longest[0]) if long >= min(count, RECENT) else longest[2]
+            is_over = stays or is_blurred or left < most_left
         if not is_over or (is_elastic and (share <= LEVEL or spans[0] > LOSSLESS * longest[2])):
             return None
         self._series = self._accumulating(closing, impacts, self.t - lasted)
