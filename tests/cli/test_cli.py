@@ -101,6 +101,20 @@ def test_a_run_is_shown_as_text() -> None:
     assert done.stderr == ""
 
 
+def test_of_many_events_the_first_and_the_last_are_shown_in_order() -> None:
+    text = run("run", "bouncing-ball").stdout
+    lines = [line for line in text.splitlines() if line.startswith(("event", "    "))]
+    assert [line.startswith("event") for line in lines] == [True] * 12 + [False] + [True] * 4
+    assert lines[12].strip() == "83 more events until t = 8.57854 s: --json shows all"
+    assert lines[-1].endswith("t = 8.57894918 s, floor: impacts have accumulated: it rests")
+    assert "work -9.81 J" in text
+
+
+def test_work_that_is_rounding_is_not_shown() -> None:
+    text = run("run", "newtons-cradle").stdout
+    assert "energy     -47.8491 J to -47.8491 J; the balance" in text
+
+
 @pytest.mark.parametrize("suffix", ["nc", "npz", "csv"])
 def test_a_run_is_saved(tmp_path: Path, suffix: str) -> None:
     file = tmp_path / f"swing.{suffix}"

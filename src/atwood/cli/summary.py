@@ -23,6 +23,7 @@ if TYPE_CHECKING:  # a run that shows no energies does without files of results
 
 _ROWS = 16
 _MOST = 40  # components in the table of energies
+_FIRST_EVENTS, _LAST_EVENTS = 12, 4
 _NARROWEST, _WIDEST = 9, 32  # of a small picture of a curve
 _BARS = "▁▂▃▄▅▆▇█"
 
@@ -117,7 +118,7 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
         why = {"stopped": "stopped", "step_limit": "out of steps", "time_limit": "out of time"}
         said = why.get(result.status, result.status)
         yield "ended early", f"{said}: {result.message}" if result.message else said
-    yield from (("event", one.describe()) for one in result.events if one.target != "stop")
+    yield from _events(result)
     yield from _passages(result)
     if result.coordinate_switches:
         times = sorted({one.time for one in result.coordinate_switches})
@@ -143,6 +144,17 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
         yield "constraints", f"missed by {max(missed['position'], missed['velocity']):.1e} of the scene's size{before}"
 
 
+def _events(result: Result) -> Iterator[tuple[str, str]]:
+    """Yield the events of a run by their times; of many, the first and the last."""
+    found = sorted((one for one in result.events if one.target != "stop"), key=lambda one: one.time)
+    hidden = found[_FIRST_EVENTS:-_LAST_EVENTS] if len(found) > _FIRST_EVENTS + _LAST_EVENTS + 1 else []
+    for number, one in enumerate(found):
+        if not hidden or number < _FIRST_EVENTS or number >= len(found) - _LAST_EVENTS:
+            yield "event", one.describe()
+        elif number == _FIRST_EVENTS:
+            yield "", f"{count_of(len(hidden), 'more event')} until t = {hidden[-1].time:.6g} s: --json shows all"
+
+
 def _passages(result: Result) -> Iterator[tuple[str, str]]:
     """Yield the singular positions of a run: the first of each kind, and when it came to others like it."""
     for through in (True, False):
@@ -159,7 +171,8 @@ def _passages(result: Result) -> Iterator[tuple[str, str]]:
 def _energy(result: Result) -> str:
     ledger = result.energy
     first, last = (0.0 if abs(e) <= ledger.uncertainty else e for e in (ledger.total[0], ledger.total[-1]))
-    work = f", work {ledger.work[-1] - ledger.work[0]:.6g} J" if np.any(ledger.work) else ""
+    is_work = np.max(np.abs(ledger.work), initial=0.0) > ledger.uncertainty
+    work = f", work {ledger.work[-1] - ledger.work[0]:.6g} J" if is_work else ""
     return f"{first:.6g} J to {last:.6g} J{work}; {ledger.describe()}"
 
 

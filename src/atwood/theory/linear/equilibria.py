@@ -142,7 +142,7 @@ class Equilibria(Shown, list[Equilibrium]):
 
     def tables(self) -> tuple[Table, ...]:
         """Return how stable each is, and where."""
-        rows = [(one.stability + one._besides, f"{one.growth_rate:.6g}", values_text(one.values)) for one in self]
+        rows = [(one.stability, f"{one.growth_rate:.6g}", values_text(one.values) + one._besides) for one in self]
         title = f"{self.scene}: {len(self)} equilibri{'um' if len(self) == 1 else 'a'}"
         return (table(("", "growth, 1/s>", "where"), rows, title),)
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from atwood.arguments import FLAG, TEXT, Kind, check, command, number, takes, whole
 from atwood.arrays import ComplexArray, FloatArray
-from atwood.display import data_of, fitted, plain
+from atwood.display import count_of, data_of, fitted, plain
 from atwood.errors import UsageError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import dataclass, replace
@@ -158,7 +158,7 @@ class NormalModes(Shown):
             if len(group) > 1
         ]
         notes += [f"Contacts: {words_text(self.contacts)}."] if self.contacts else []
-        title = f"{self.scene}: {len(self)} modes about {values_text(self.values)}"
+        title = f"{self.scene}: {count_of(len(self), 'mode')} about {values_text(self.values)}"
         return (
             table(
                 ("mode", "rad/s>", "Hz>", "period, s>", "growth, 1/s>", "damping ratio>", "shape"), rows, title, notes
