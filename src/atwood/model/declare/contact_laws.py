@@ -128,8 +128,8 @@ class ContactLaw(ObservableLaw[Any]):
                 found[one] = ObservableLaw(_says(_element(name, i), self.says), law)
         if self.contact.kind == "unilateral":
             return {**found, f"{name}_state": discrete_state(doc=f"1 where {name} is closed, else 0.")}
-        found[f"{name}_state"] = discrete_state(doc=f"0 where nothing rubs, 1 where {name} goes on, 2 where it sticks.")
-        says = f"Direction in which {name} goes on; 0 where it does not."
+        found[f"{name}_state"] = discrete_state(doc="0 where nothing rubs, 1 where it slips, 2 where it sticks.")
+        says = f"Direction of {name}; 0 where it does not slip."
         return {**found, **{f"{one}_direction": discrete_state(doc=says) for one in self.names}}
 
 

@@ -287,7 +287,7 @@ function openMode(mode, options) {
         if (is !== was) tell(k, is ? "closes" : "opens", `${name} ${is ? "closes" : "opens"}`);
       } else if (is === 1 && was === 1) {
         if (way.reduce((sum, x, i) => sum + x * last[i], 0) < 0) tell(k, "reverses", `${name} reverses`);
-      } else if (is && is !== was) tell(k, is === 2 ? "sticks" : "slips", `${name} ${is === 2 ? "sticks" : "goes on"}`);
+      } else if (is && is !== was) tell(k, is === 2 ? "sticks" : "slips", `${name} ${is === 2 ? "sticks" : "begins"}`);
     });
     if (!isStart) return {state: after, events: inOwnWords(told, before, found, t)};
     const begun = before.map(([is, ...way], k) => [is || data.contacts.closed[k], ...way]);

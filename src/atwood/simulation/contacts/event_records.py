@@ -75,7 +75,7 @@ def told_change(t: float, first: ContactRow, before: State, after: State) -> Eve
     elif first.is_slip and state == was == GOES_ON and float(np.dot(way, last)) < 0.0:
         said, kind = f"{name} reverses", "reverses"
     elif first.is_slip and state != was and state:
-        said, kind = (f"{name} sticks", "sticks") if state == STICKS else (f"{name} goes on", "slips")
+        said, kind = (f"{name} sticks", "sticks") if state == STICKS else (f"{name} begins", "slips")
     return EventRecord(t, part, name, said, "", False, kind) if said else None
 
 
