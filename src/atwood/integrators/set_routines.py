@@ -28,7 +28,7 @@ from atwood.codegen.routines import (
     place_of,
 )
 from atwood.integrators.event_routines import do_or_return
-from atwood.numerics.contact_sets import CLEAR, FIRM, GOES_ON, NOTHING, OPEN, SLACK, STICKS, STILL, TURNS
+from atwood.numerics.contact_sets import CLEAR, FIRM, GOES_ON, NOTHING, OPEN, SLACK, STICKS, STILL, SWEEPS, TURNS
 
 FIELDS: dict[str, Kind] = {
     **dict.fromkeys(("program", "derived", "scratch", "y", "out", "units", "rows", "matrix", "left"), ADDRESS),
@@ -603,7 +603,55 @@ def _find() -> Routine:
         for name in ("", "_x", "_y"):
             r.copy(m.unit(f"next{name}"), m.unit(f"found{name}"), m.count)
         r.give(r.call("meet_states", r.arguments[0]))
-    r.give(1)
+    r.call("relax", r.arguments[0])
+    r.give(r.call("improve", r.arguments[0]))
+    return r
+
+
+def _relaxed() -> Routine:
+    """Choose the states of forces that are projected one by one on what they may be (Jean and Moreau, 1992)."""
+    r, m, () = _open("relax")
+    forces, free, size, response = m.row("forces"), m.row("wanted"), m.size, m.result("response")
+    state, x, y = m.unit("next"), m.unit("next_x"), m.unit("next_y")
+    fallen, moved, most = r.variable(0.0), r.variable(0.0), r.variable(0.0)
+    r.clear(forces, forces.at(size))
+    with r.count(size) as i:
+        fallen.now = r.most(fallen.now, r.size(free[i]))
+    with r.count(SWEEPS):
+        moved.now, most.now = 0.0, 0.0
+        with _each(r, m, "chosen") as (k, row, is_pair):
+            first, second = row, row + is_pair.integer()
+            own = response[first * size + first] + r.choose(is_pair, response[second * size + second], 0.0)
+            step = 1.0 / r.choose(own > 0.0, own, 1.0)
+            a, b = (free[i] + _sum(r, size, response.at(i * size), forces) for i in (first, second))
+            motion = _norm(r, a, r.choose(is_pair, b, 0.0))
+            before = r.variable(forces[first]).now, r.variable(forces[second]).now
+            push = before[0] - step * a, r.choose(is_pair, before[1] - step * b, 0.0)
+            length, given = r.variable(_norm(r, *push)).now, m.unit("given")[k] != 0.0
+            group = (~is_pair & (push[0] > 0.0)).integer() * 2
+            holds = r.choose(m.unit("slip")[k] == 0.0, push[0] > 0.0 - _limit(r, m, k, 1), length == 0.0, BOOLEAN)
+            limit = r.variable(r.most(_limit(r, m, k, group), 0.0)).now
+            holds = r.variable(holds | ((m.unit("slip")[k] != 0.0) & ~given & ~(length > limit)), BOOLEAN).now
+            unit = r.choose(length > 0.0, length, 1.0)
+            way = (
+                r.variable(r.choose(given, m.unit(f"given_{axis}")[k], 0.0 - part / unit)).now
+                for axis, part in zip("xy", push, strict=True)
+            )
+            x[k], y[k] = way
+            with r.when(m.unit("slip")[k] == 0.0):
+                forces[first], state[k] = r.choose(holds, push[0], 0.0), r.choose(holds, float(STICKS), float(OPEN))
+            with r.otherwise():
+                sticks = holds | (~given & (motion <= SLACK * fallen.now))
+                state[k] = r.choose(sticks, float(STICKS), float(GOES_ON))
+                with r.when(is_pair):
+                    forces[second] = r.choose(holds, push[1], 0.0 - limit * y[k])
+                forces[first] = r.choose(holds, push[0], 0.0 - limit * x[k])
+            for row, old in zip((first, second), before, strict=True):
+                moved.now = r.most(moved.now, r.size(forces[row] - old))
+                most.now = r.most(most.now, r.size(forces[row]))
+        with r.when(moved.now <= SLACK * most.now):
+            r.give(0)
+    r.give(0)
     return r
 
 
@@ -1495,7 +1543,7 @@ def _resolve() -> Routine:
 def write_sets() -> list[Routine]:
     """Return the routines; they take the address of the memory of sets, and ``resolve`` is the one to be called."""
     sets = (_solve, _least, _equations, _moved, _met, _contradiction, _improved, _find, _direction, _determined)
-    shares = (_share, _let_go, _weighted, _rank, _lawful)
+    shares = (_relaxed, _share, _let_go, _weighted, _rank, _lawful)
     impacts = (_impulses, _strike, _account, _collide, _stop, _end_impacts, _series, _gap_rounding)
     moments = (_read, _push, _touch, _hold, _barely_rising, _settle, _check)
     return [_resolve(), *(write() for write in (*sets, *shares, *impacts, *moments))]

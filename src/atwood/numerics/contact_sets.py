@@ -44,7 +44,7 @@ NOTHING = 1e-14
 _GIVES = 0.03
 """Of what rows move by their own forces: what gives way does so by as much while forces are projected one by one."""
 
-_SWEEPS = 5000
+SWEEPS = 5000
 """So often all forces are projected; each time takes some ten microseconds for each."""
 
 STILL = 1e-12
@@ -337,7 +337,7 @@ def _relaxed(contacts: Contacts) -> tuple[tuple[State, ...], FloatArray]:
     steps = [1.0 / (float(np.linalg.norm(response[np.ix_(one.rows, one.rows)], 2)) or 1.0) for one in contacts.units]
     usual = float(np.max(np.abs(free), initial=0.0)) * max(steps)
     small = SLACK * float(np.max(np.abs(free), initial=0.0))
-    for _ in range(_SWEEPS):
+    for _ in range(SWEEPS):
         states, last = [], forces.copy()
         for k, (unit, step) in enumerate(zip(contacts.units, steps, strict=True)):
             rows, none = list(unit.rows), (0.0,) * len(unit.rows)

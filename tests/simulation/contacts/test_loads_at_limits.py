@@ -16,6 +16,8 @@ from atwood_library import (
     Force,
     Ground,
     Link,
+    PointContact,
+    PointMass,
     RigidBody,
     RotaryDrive,
     Slider,
@@ -138,4 +140,22 @@ def test_c_decides_an_impact_where_slip_and_gap_move_each_other(tmp_path: Path) 
     assert sum(one.kind == "impact" for one in result.events) >= 6
     found = printed(built(scene, tmp_path, "reduced", ["-O0", *FLAGS[1:]]), 0.5, 1e-11, 3)
     worst, where, _ = apart(found, result, assemble(scene))
+    assert worst <= 1e-9, where
+
+
+@needs_a_compiler
+def test_c_throws_a_ball_out_of_a_rough_corner(tmp_path: Path) -> None:
+    """Each wall rubs along the normal of the other; changed one by one, states came round, and C refused the impact."""
+    scene = Scene(gravity=0.0)
+    ground, ball = scene.add("ground", Ground()), scene.add("m", PointMass(mass=2.0))
+    walls = {"f": ((0.0, 0.0, 1.0), 0.5, 0.1), "w": ((1.0, 0.0, 0.0), 0.8, 0.2)}
+    for name, (normal, restitution, friction) in walls.items():
+        wall = scene.add(name, PointContact(normal=normal, restitution=restitution, friction=friction))
+        scene.connect(ground.frame, wall.plane)
+        scene.connect(ball.point, wall.point)
+    scene.start.update({f"m.{what}.{axis}": x for what, x in (("position", 0.5), ("velocity", -1.0)) for axis in "xz"})
+    found = printed(built(scene, tmp_path, "reduced", ["-O0", *FLAGS[1:]]), 1.0, 1e-11, 3)
+    assert found["m.velocity.x"][-1] == pytest.approx(0.8, abs=1e-12)
+    assert found["m.velocity.z"][-1] == pytest.approx(0.5, abs=1e-12)
+    worst, where, _ = apart(found, simulate(scene, t_end=1.0, rtol=1e-11, outputs=[0.0, 0.5, 1.0]), assemble(scene))
     assert worst <= 1e-9, where
