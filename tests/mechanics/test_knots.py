@@ -13,11 +13,14 @@ from atwood import AtwoodError, Scene, assemble, linearize, simulate
 from atwood_library import (
     Bar,
     Damper,
+    DistanceContact,
     Force,
     Gear,
     Ground,
     Inertia,
+    Mass1D,
     PointMass,
+    RotationalFriction,
     RotationalSpringDamper,
     Spherical,
     Spring,
@@ -269,3 +272,33 @@ def test_a_damped_spin_without_inertia_is_none(form: str) -> None:
     assert_allclose(2.0 * found, true[:3], atol=1e-6)
     spins = [sum(result[f"bar.angular_velocity.{a}"][i] * found["xyz".index(a), i] for a in "xyz") for i in range(11)]
     assert_allclose(spins, 0.0, atol=1e-7)
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("damping", [0.0, 5.0])
+def test_a_buffer_without_mass_is_refused_by_name(form: str, damping: float) -> None:
+    """Its place would be read from a force that is there while it touches: the error named a symbol."""
+    scene = Scene(space="line")
+    ground, pad, mass = scene.add("g", Ground()), scene.add("pad", Mass1D(mass=0.0)), scene.add("m", Mass1D(mass=1.0))
+    touch = scene.add("c", DistanceContact(lower=0.2))
+    for name, part in {"s": Spring(stiffness=100.0, natural_length=1.0), "d": Damper(damping=damping)}.items():
+        added = scene.add(name, part)
+        scene.connect(ground.frame, added.a)
+        scene.connect(pad.flange, added.b)
+    scene.connect(pad.flange, touch.a)
+    scene.connect(mass.flange, touch.b)
+    scene.start.update({"m.displacement": 2.0, "m.speed": -2.0})
+    with pytest.raises(AtwoodError, match=r"^pad: it has no mass, and c\.above_lower acts on it.*Give it a mass"):
+        simulate(scene, form=form, t_end=1.0)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_shaft_without_inertia_before_a_clutch_is_refused_by_name(form: str) -> None:
+    scene = Scene()
+    motor, between, load = (scene.add(name, Inertia(moment=m)) for name, m in (("a", 1.0), ("b", 0.0), ("c", 2.0)))
+    spring, clutch = scene.add("s", RotationalSpringDamper(stiffness=9.0)), scene.add("k", RotationalFriction())
+    for one, other in ((motor, spring.a), (between, spring.b), (between, clutch.a), (load, clutch.b)):
+        scene.connect(one.flange, other)
+    scene.start.update({"a.angle": 0.0, "a.angular_velocity": 3.0, "c.angle": 0.0, "c.angular_velocity": 0.0})
+    with pytest.raises(AtwoodError, match=r"^b: it has no mass, and k\.slip acts on it"):
+        simulate(scene, form=form, t_end=1.0)

@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from atwood.errors import AtwoodError
+from atwood.errors import AtwoodError, TopologyError
 from atwood.expr import Expression, depends_on, jacobian, jvp, live, substitute
 from atwood.expr.core.analysis import dependents
 from atwood.mechanics.constraints.elimination import solved_with
@@ -47,6 +47,7 @@ def linear_knots(
             continue
         if depends_on([value for _, _, value in values], [own]):
             continue
+        _check_untouched(derivation, state.speed_names[k].name, force)
         found = solved_with(found, force, own, slope)
     return found
 
@@ -70,6 +71,7 @@ def balance_knots(
         slope = None if own is None else _slope(derivation, state, force, own)
         if slope is None or (is_rate and _bends(force, state.speeds)):
             continue  # nothing balances it, and it is refused as what has no mass
+        _check_untouched(derivation, name.name, force)
         value = force / slope
         if is_rate:
             rate, (second,) = value, jvp([value], along)
@@ -131,6 +133,18 @@ def _without_inertia(rows: Sequence[Expression], state: Movement) -> list[int]:
     heavy = dependents(live(rows), state.accelerations)
     light = [k for k, row in enumerate(rows) if row.index not in heavy]
     return light if len(light) < len(rows) else []
+
+
+def _check_untouched(mechanism: Mechanism, name: str, force: Expression) -> None:
+    """Refuse a balance with the force of a gap or a slip, which has a value where it holds alone."""
+    for path, local in mechanism.locals_.items():
+        for one in local.contacts:
+            if depends_on(force, [one.multiplier]):
+                raise TopologyError(
+                    f"it has no mass, and {path}.{one.law.name} acts on it: nothing else says how it moves",
+                    where=_part_of(mechanism, name),
+                    advice="Give it a mass, or a moment of inertia; a small one will do.",
+                )
 
 
 def _slope(derivation: Derivation, state: Movement, force: Expression, own: Expression) -> Expression | None:
