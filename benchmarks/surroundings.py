@@ -25,8 +25,8 @@ from atwood_library.scenes import SCENES
 SPAN, OUTPUTS, ALLOWANCE, AT_MOST = 2.0, 201, 0.3, (2.0, 3.0)
 """Seconds of motion, outputs, ms that a call may take besides, and the goals: mostly, and always."""
 
-RUNS_BEFORE = 6
-"""After so many runs what pays is compiled."""
+RUNS_BEFORE = 30
+"""After so many runs what pays is compiled, and classes that a run makes instances of have their constructors."""
 
 _spent = [0.0]
 

@@ -40,7 +40,7 @@ _AGED = count(1)
 """How often what was made counted as old at once."""
 
 
-_REMEMBERED = 16
+_REMEMBERED = 64
 """Of so many values it is known what was made of them: a run begins anew at its start, and comes to the same events."""
 
 

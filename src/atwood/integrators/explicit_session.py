@@ -270,6 +270,10 @@ class ExplicitSession(SteppingSession):
         """Whether stability, and not accuracy, has kept steps short: an implicit method would take far fewer."""
         return self._stepper.counts.stiff > 0
 
+    def stop_at(self, end: float) -> None:
+        """Let no step go beyond a time, of a method that would."""
+        self._stepper.stop_at(end)
+
     def limit_steps(self, longest: float) -> None:
         """Take no longer steps from now on than this, nor than the options allow, where they can be limited."""
         self._stepper.limit_steps(longest)

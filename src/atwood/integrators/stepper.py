@@ -396,6 +396,10 @@ class Stepper:
         """Take no longer steps from now on than this, nor than the options allow, where they can be limited."""
         return
 
+    def stop_at(self, end: float) -> None:
+        """Let no step go beyond a time, of a method that would."""
+        return
+
     def renew(self, horizon: float, absolute: FloatArray | None = None) -> None:
         """Count from zero again, for a run of another typical length, s, and perhaps with other tolerances."""
         raise UsageError("only compiled steps can be begun again")

@@ -44,7 +44,8 @@ class ColumnProgram:
         self.inputs = [len(group.symbols) for group in program.inputs]
         self.outputs = [len(group.expressions) for group in program.outputs]
         sizes = (*self.inputs, *self.outputs)
-        self.counts = np.array(sizes, dtype=np.int64)
+        self.counts, self.width = np.array(sizes, dtype=np.int64), sum(sizes)
+        self.counts_at = address_of(self.counts)
         self.begins = 8 * np.array([0, *accumulate(sizes)][:-1], dtype=np.int64)
         self._function: tuple[Built | None, Callable[[int], None]] = None, lambda _: None
 
@@ -73,7 +74,7 @@ class ColumnKernel:
     """
 
     def __init__(self, code: ColumnProgram, derived: FloatArray) -> None:
-        self.code, self._derived = code, derived
+        self.code, self._derived, self._derived_at = code, derived, address_of(derived)
 
     def __call__(self, *groups: FloatArray) -> tuple[FloatArray, ...]:
         """Evaluate the program; what is outside the domain of an operation gives nan."""
@@ -82,12 +83,11 @@ class ColumnKernel:
         given = [_full(one, (size, states)) for one, size in zip(groups, code.inputs, strict=True)]
         found = [np.empty((size, states)) for size in code.outputs]
         (built, call), began, taken = code.function(), perf_counter(), len(given)
-        room = np.empty(int(code.counts.sum()) + built.scratch)
-        arrays = np.array([address_of(one) for one in (*given, *found)], dtype=np.int64)
-        places = code.begins + address_of(room)
-        tables = [(address_of(one), address_of(one) + 8 * taken) for one in (arrays, code.counts, places)]
-        scratch = address_of(room) + 8 * (len(room) - built.scratch)
-        data = *(one for pair in tables for one in pair), address_of(self._derived), scratch
+        room = np.empty(code.width + built.scratch)
+        begin = address_of(room)
+        arrays, places = np.array([*map(address_of, (*given, *found))], dtype=np.int64), code.begins + begin
+        a, b, c = address_of(arrays), code.counts_at, address_of(places)
+        data = a, a + 8 * taken, b, b + 8 * taken, c, c + 8 * taken, self._derived_at, begin + 8 * code.width
         job = (c_int64 * len(_FIELDS))(*data, taken, len(found), states)
         call(ctypes.addressof(job))
         code.tiers.spend_on(states, perf_counter() - began)

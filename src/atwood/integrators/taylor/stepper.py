@@ -435,6 +435,10 @@ class CompiledStepper(Stepper):
         self._parameters = recurrences.addresses["start_prologue"], derived.ctypes.data, base + 8 * at["scratch"]
         self._outputs = base + 8 * at["values"], base + 8 * (at["values"] + n)
 
+    def stop_at(self, end: float) -> None:
+        """Let no step go beyond a time."""
+        self._set(stop_time=end)
+
     def renew(self, horizon: float, absolute: FloatArray | None = None) -> None:
         """Count from zero again, for a run of another typical length, s, and perhaps with other tolerances."""
         if absolute is not None:

@@ -250,6 +250,8 @@ class SceneProblem:
         self,
         events: Callable[[float, FloatArray, FloatArray], FloatArray] | None = None,
         directions: tuple[int, ...] = (),
+        rough: tuple[int, ...] = (),
+        signs: tuple[int, ...] = (),
     ) -> ImplicitProblem:
         """Return the problem for a driver; its functions follow changes of the dependent coordinates."""
         size = self.program.size
@@ -284,6 +286,8 @@ class SceneProblem:
             events=events,
             event_count=len(directions),
             event_directions=directions,
+            event_rough=rough,
+            event_signs=signs,
             native=self._native(),
             pivots=self._pivots if self.program.form == "dae" and not self._present.derivative.by_columns else None,
         )

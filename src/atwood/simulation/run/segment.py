@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING
@@ -15,6 +15,7 @@ from atwood.arrays import FloatArray
 from atwood.clock import TimeIsUp, check_time, more_time, time_left
 from atwood.errors import AtwoodError, SolveError, StartError
 from atwood.forms.assembly import Assembly
+from atwood.forms.caches import Key
 from atwood.forms.loose import kept_touching
 from atwood.integrators.explicit_session import ExplicitSession
 from atwood.integrators.methods import AUTO, Method
@@ -53,6 +54,8 @@ if TYPE_CHECKING:
 
 _BLOCKS = 50
 """Progress is told about so many times."""
+
+_PACKED: Key[dict[tuple[Hashable, ...], tuple[FloatArray, FloatArray]]] = Key("starts of implicit methods")
 
 _Jumps = tuple[FloatArray, FloatArray]
 """Times, and states before and after."""
@@ -121,7 +124,13 @@ def _state_for(
     method: Method, plan: SceneProblem, t: float, q: FloatArray, u: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return a state for a method: with multipliers and rates for implicit ones alone."""
-    return pack_state(plan, t, q, u) if method.is_implicit else (np.concatenate([q, u]), np.zeros(0))
+    if not method.is_implicit:
+        return np.concatenate([q, u]), np.zeros(0)
+    if plan.not_compilable:  # functions in Python are asked again
+        return pack_state(plan, t, q, u)
+    about = t, q.tobytes(), u.tobytes(), plan.finding.kept, plan.program.extra
+    y, yp = plan.assembly.kept.recall(_PACKED, lambda: pack_state(plan, t, q, u), *about)
+    return y.copy(), yp.copy()
 
 
 class _Runner:

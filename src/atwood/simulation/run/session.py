@@ -187,8 +187,7 @@ def _implicit_task(request: SolverRequest, method: Method, t: float, y: FloatArr
 
 def _implicit_problem(request: SolverRequest) -> ImplicitProblem:
     probe = request.probe
-    problem = request.plan.problem(probe.function(), probe.directions)
-    return replace(problem, event_rough=probe.rough, event_signs=probe.handed)
+    return request.plan.problem(probe.function(), probe.directions, probe.rough, probe.handed)
 
 
 def _guarded(problem: ImplicitProblem, request: SolverRequest, method: Method) -> ImplicitProblem:
@@ -402,7 +401,7 @@ def _opened_with(
     steps = options.relative_tolerance, options.absolute_tolerance, options.first_step, options.max_step, options.order
     asked = options.step, options.max_order, options.impacts, options.nominal, options.conditions
     told = is_loose(plan.assembly), on_stiff is None, request.kept.jumps(plan.assembly), request.kept.is_undisturbed
-    end = request.end if method.kind == "series" else None  # no series goes beyond it
+    end = request.end if method.kind == "series" and plan.balance.constraints else None  # no series goes beyond it
     seen = plan.program, plan.scales, plan.sizes, plan.finding, request.guard(method)
     return (method, *scene, *seen), (steps, asked, told, end)
 
@@ -411,7 +410,7 @@ def _can_be_kept(problem: ExplicitProblem, method: Method) -> bool:
     """Return whether a session can be begun again: nothing in Python belongs to the segment that it was opened for."""
     is_watched = problem.events is not None and problem.compiled_events is None
     is_judged = problem.guard is not None and not problem.guard.function
-    return method.tableau is not None and not (is_judged or is_watched)
+    return (method.tableau is not None or method.kind == "series") and not (is_judged or is_watched)
 
 
 def _open_tree(request: SolverRequest, method: Method, t: float, y: FloatArray, on_stiff: OnStiff | None) -> Session:
@@ -421,7 +420,9 @@ def _open_tree(request: SolverRequest, method: Method, t: float, y: FloatArray, 
     if session is not None:
         return session
     problem, assembly = _explicit_problem(request, method), plan.assembly
-    own = own_rates(assembly) if _can_be_kept(problem, method) else None
+    is_kept = _can_be_kept(problem, method)
+    own = own_rates(assembly) if is_kept and method.tableau is not None else None
+    fill: Callable[[SolverRequest], None] | None
     fill = None if own is None else Filling(*own, problem, lambda one: one.assembly.parameter_values)
     if own is not None and fill is not None:
         fill(request)
@@ -440,10 +441,48 @@ def _open_tree(request: SolverRequest, method: Method, t: float, y: FloatArray, 
         series=series,
         hamiltonian=canonical,
     )
+    if is_kept and method.kind == "series":
+        recurrences = series()
+        task = replace(task, series=lambda: recurrences)
     opened = method.open(task)
+    if is_kept and method.kind == "series":
+        assert isinstance(opened, ExplicitSession)
+        fill = FillingOfSeries(recurrences, problem, opened)
     if fill is not None:
         kept.keep(request, method, on_stiff, opened, fill)
     return opened
+
+
+@dataclass(frozen=True, eq=False)
+class FillingOfSeries:
+    """What gives the recurrences of a session, and its events if there are any, the parameters of a request.
+
+    Attributes
+    ----------
+    series
+        The recurrences.
+    problem, session
+        What the session was opened for, and the session.
+    """
+
+    series: TaylorProblem
+    problem: ExplicitProblem
+    session: ExplicitSession
+
+    def __call__(self, request: SolverRequest) -> None:
+        """Give them the parameters of a request, and the time beyond which no step goes."""
+        code, derived = self.series.compiled()
+        derived[:] = code.bind(request.plan.assembly.parameter_values)
+        self.session.stop_at(request.end)
+        _fill_events(self.problem, request)
+
+
+def _fill_events(problem: ExplicitProblem, request: SolverRequest) -> None:
+    """Give the events of a session the parameters of a request."""
+    events = problem.compiled_events
+    found = None if events is None else request.probe.code(for_ida=False)
+    if found is not None and events is not None:
+        found.fill(events, request.plan.assembly.parameter_values, request.probe.shift)
 
 
 @dataclass(frozen=True, eq=False)
@@ -468,7 +507,7 @@ class Filling:
     def __call__(self, request: SolverRequest) -> None:
         """Give them the parameters of a request."""
         self.code.fill(self.own, self.values(request.plan))
-        events, jumps = self.problem.compiled_events, self.problem.jumps
+        jumps = self.problem.jumps
         if jumps is not None:
             from atwood.integrators.set_jumps import SetJumps
             from atwood.simulation.contacts.bounces import fill_bounces
@@ -479,9 +518,7 @@ class Filling:
                 fill_sets(jumps, plan, request.probe, options.relative_tolerance, past, request.kept.shortest)
             else:
                 fill_bounces(jumps, plan, request.probe, options.relative_tolerance, past)
-        found = None if events is None else request.probe.code(for_ida=False)
-        if found is not None and events is not None:
-            found.fill(events, request.plan.assembly.parameter_values, request.probe.shift)
+        _fill_events(self.problem, request)
 
 
 def equations_of(
@@ -526,7 +563,8 @@ def _open_on_constraints(
     absolute = np.asarray(settings.absolute_tolerances)[: len(y)]
     settings = replace(settings, absolute_tolerances=absolute)
     explicit = _watched(request, problem, method)
-    own = own_rates_on_constraints(plan, t, y) if _can_be_kept(explicit, method) else None
+    is_kept = method.tableau is not None and _can_be_kept(explicit, method)
+    own = own_rates_on_constraints(plan, t, y) if is_kept else None
     rates = None if own is None else own[1].rates
     if own is not None and explicit.compiled_events is not None and kept.jumps(plan.assembly):
         from atwood.simulation.contacts.bounces import bounces_of
