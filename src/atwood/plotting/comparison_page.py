@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from atwood.files import write_atomically
 from atwood.plotting.canvas import need_matplotlib
 from atwood.plotting.plots.precision import plot_comparison, style_of
 from atwood.study.comparison.found import RELATIVE, Comparison, cost_at, write_rows
+from atwood.table import facts
 
 _ERRORS = (1e-3, 1e-6, 1e-9)
 """Errors whose costs stand in the table of all scenes."""
@@ -35,12 +36,12 @@ def write_page(comparisons: Sequence[Comparison], failed: Mapping[str, str], dir
     labels = list(dict.fromkeys(row.label for one in comparisons for row in one.rows if not row.reason))
     body = [
         "<h1>What each form costs for which error</h1>",
-        _environment(comparisons[0].environment if comparisons else {}),
+        facts((comparisons[0].environment if comparisons else {}).items()).html(),
         f"<p>{escape(RELATIVE)} Times are of the integration alone. * as accurate as the reference itself.</p>",
         _legend(labels),
         _overview(comparisons, labels),
-        *(_section(one, labels) for one in comparisons),
-        _failures(failed),
+        *(_section(one) for one in comparisons),
+        facts(failed.items(), "Without an answer").html() if failed else "",
     ]
     page = (
         "<!doctype html><html lang='en'><head><meta charset='utf-8'><title>Atwood: forms compared</title>"
@@ -50,11 +51,6 @@ def write_page(comparisons: Sequence[Comparison], failed: Mapping[str, str], dir
     write_atomically(target, lambda part: part.write_text(page, encoding="utf-8"))
     write_rows(comparisons, directory / "comparisons.csv")
     return target
-
-
-def _environment(given: Mapping[str, str]) -> str:
-    rows = "".join(f"<tr><th>{escape(key)}</th><td>{escape(value)}</td></tr>" for key, value in given.items())
-    return f"<table class='environment'>{rows}</table>"
 
 
 def _legend(labels: Sequence[str]) -> str:
@@ -105,45 +101,17 @@ def _costs_of(one: Comparison, labels: Sequence[str]) -> str:
     return f"<tr><th class='scene'><a href='#{_anchor(one.scene)}'>{escape(one.scene)}</a></th>{cells}</tr>"
 
 
-def _section(one: Comparison, labels: Sequence[str]) -> str:
-    """Return what was found of a scene: sentence, picture and table."""
+def _section(one: Comparison) -> str:
+    """Return what was found of a scene: sentence, picture and tables."""
     stream = io.BytesIO()
     plot_comparison(one).savefig(stream, format="svg", metadata={"Date": None})
     picture = base64.b64encode(stream.getvalue()).decode("ascii")
-    note = f"<p>{escape(one.reference.note)}</p>" if one.reference.note else ""
     return (
         f"<h2 id='{_anchor(one.scene)}'>{escape(one.scene)}, to t = {one.t_end:g} s</h2>"
-        f"<p><b>{escape(one.verdict)}</b></p><p>Errors are against {escape(one.reference.description)}.</p>{note}"
-        f"<img alt='error against time and steps' src='data:image/svg+xml;base64,{picture}'>{_table(one, labels)}"
+        f"<p><b>{escape(one.verdict)}</b></p>"
+        f"<img alt='error against time and steps' src='data:image/svg+xml;base64,{picture}'>"
+        f"<details><summary>{len(one.rows)} runs</summary>{''.join(each.html() for each in one.tables())}</details>"
     )
-
-
-def _table(one: Comparison, labels: Sequence[str]) -> str:
-    heads = [*(column.heading for column in one.tables()[0].columns), "look-out, ms", "outputs, ms"]
-    rows = ["<tr>" + "".join(f"<th>{escape(head)}</th>" for head in heads) + "</tr>"]
-    for row in one.rows:
-        colour = style_of(row.label, labels)[0] if row.label in labels else "#8d99a6"
-        name = f"<td class='form'><span class='mark' style='background:{colour}'></span>{escape(row.label)}</td>"
-        if row.reason:
-            told = f"<td class='reason' colspan='{len(heads) - 2}'>{escape(row.reason)}</td>"
-        else:
-            more = (f"{1e3 * (spent or 0.0):.3g}" for spent in (row.monitor_s, row.outputs_s))
-            told = _cells((*row.cells()[2:], *more))
-        rows.append(f"<tr>{name}<td>{row.rtol:.0e}</td>{told}</tr>")
-    return f"<details><summary>{len(one.rows)} runs</summary><table>{''.join(rows)}</table></details>"
-
-
-def _cells(texts: Iterable[str]) -> str:
-    return "".join(f"<td>{escape(text)}</td>" for text in texts)
-
-
-def _failures(failed: Mapping[str, str]) -> str:
-    if not failed:
-        return ""
-    rows = "".join(
-        f"<tr><th class='scene'>{escape(k)}</th><td class='reason'>{escape(v)}</td></tr>" for k, v in failed.items()
-    )
-    return f"<h2>Without an answer</h2><table>{rows}</table>"
 
 
 _STYLE = """
@@ -151,8 +119,7 @@ body{font:15px/1.45 system-ui,sans-serif;color:#22303c;max-width:1150px;margin:2
 h1{font-size:1.6em}h2{font-size:1.15em;margin-top:2.2em}
 table{border-collapse:collapse;font-size:13px;font-variant-numeric:tabular-nums}
 td,th{padding:2px 10px;text-align:right;border-bottom:1px solid #e6eaee;white-space:nowrap}
-th{color:#5a6773;font-weight:600}.scene,.form,.environment th,.environment td,.reason{text-align:left}
-.reason,.environment td{white-space:normal}
+th{color:#5a6773;font-weight:600}.scene{text-align:left}td:nth-child(2):last-child{white-space:normal}
 .mark{display:inline-block;width:.8em;height:.8em;margin:0 .4em 0 1em;border-radius:2px}
 img{width:100%;max-width:1000px;display:block}a{color:#2a6fbb;text-decoration:none}summary{cursor:pointer;color:#5a6773}
 """

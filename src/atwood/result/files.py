@@ -20,6 +20,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import field
 from importlib import import_module
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -331,12 +332,10 @@ _LAST_LINE = "# rows: {rows}, sha256: {checksum}\n"
 
 def _write_csv(saved: SavedResult, file: Path) -> None:
     columns = [saved.time.tolist(), *(values.tolist() for values in saved.quantities.values())]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["time [s]", *(f"{path} [{saved.units[path]}]" for path in saved.quantities)])
-    writer.writerows([repr(value) for value in row] for row in zip(*columns, strict=True))
+    heads = ["time [s]", *(f"{path} [{saved.units[path]}]" for path in saved.quantities)]
+    rows = (map(repr, row) for row in zip(*columns, strict=True))
     about = {"meanings": saved.meanings, "metadata": saved.metadata}
-    write_with_companion(file, text.getvalue().encode(), about)
+    write_with_companion(file, chain([heads], rows), about)
 
 
 def _read_csv(file: Path) -> SavedResult:

@@ -6,9 +6,11 @@ replaced, the one beside it knows the contents before as well, so that whoever i
 
 from __future__ import annotations
 
+import csv
 import hashlib
+import io
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -42,8 +44,11 @@ def _read(file: Path) -> list[dict[str, Any]]:
     return found
 
 
-def write_with_companion(file: Path, content: bytes, about: Mapping[str, Any]) -> None:
-    """Write a CSV file, and beside it its checksum and what else is known."""
+def write_with_companion(file: Path, rows: Iterable[Iterable[object]], about: Mapping[str, Any]) -> None:
+    """Write rows as a CSV file, and beside it its checksum and what else is known."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    content = text.getvalue().encode()
     entry = {"sha256": hashlib.sha256(content).hexdigest(), "about": json.loads(json_text(about))}
     with _REPLACING:
         try:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import os
 import platform
@@ -230,16 +228,14 @@ def write_rows(comparisons: Sequence[Comparison], file: str | os.PathLike[str]) 
     target = check_rows_file(file)
     names = ["scene", "t_end", *names_of(ComparisonRow)]
 
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(names)
+    rows: list[Sequence[object]] = [names]
     for one in comparisons:
         for row in one.rows:
             cells = (getattr(row, name) for name in names[2:])
             cells = (" ".join(f"{k}={v:.3g}" for k, v in c.items()) if isinstance(c, dict) else c for c in cells)
-            table.writerow([one.scene, one.t_end, *("" if cell is None else cell for cell in cells)])
+            rows.append([one.scene, one.t_end, *("" if cell is None else cell for cell in cells)])
     environment = comparisons[0].environment if comparisons else {}
-    write_with_companion(target, text.getvalue().encode(), {"environment": environment})
+    write_with_companion(target, rows, {"environment": environment})
     return target
 
 

@@ -12,7 +12,7 @@ import hashlib
 import io
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -151,17 +151,15 @@ def _write_csv(sweep: Sweep, file: Path) -> None:
     heads = ["run", "status", *(_head(label, sweep.units.get(path, "")) for path, label in named.items()), "time [s]"]
     heads += [_head(path, sweep.units[path]) for path in sweep.paths]
     varied = [values.tolist() for values in sweep.varied.values()]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(heads)
+    rows: list[Sequence[object]] = [heads]
     for run, status in enumerate(sweep.status):
         first = [run, status, *(_cell(values[run]) for values in varied)]
         for k, t in enumerate(sweep.time.tolist()):
             row = [_cell(float(values[run, k])) for values in sweep.quantities.values()]
-            writer.writerow([*first, _cell(t), *row])
+            rows.append([*first, _cell(t), *row])
     whole = sweep.to_dict()
     known = {"end_time": whole["end_time"], "steps": whole["steps"]}
-    write_with_companion(file, text.getvalue().encode(), {**about_sweep(sweep), **known, "meanings": sweep.meanings})
+    write_with_companion(file, rows, {**about_sweep(sweep), **known, "meanings": sweep.meanings})
 
 
 def _head(name: str, unit: str) -> str:
