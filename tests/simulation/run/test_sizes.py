@@ -14,6 +14,7 @@ from atwood import (
     assemble,
     connector,
     event,
+    exp,
     parameter,
     simulate,
     sweep,
@@ -22,6 +23,7 @@ from atwood.simulation.dynamics.scales import scene_length
 from atwood_library import (
     Box,
     BoxContact,
+    Force,
     Ground,
     Link,
     Mass1D,
@@ -29,6 +31,7 @@ from atwood_library import (
     PointMass,
     PointOnCurve,
     PointOnLevelSurface,
+    Potential,
     RigidBody,
     Spring,
     SurfaceContact,
@@ -196,3 +199,39 @@ def test_a_length_that_an_event_alone_reads_is_a_size() -> None:
     bead, trap = scene.add("bead", PointMass(mass=1.0)), scene.add("trap", Trap())
     scene.connect(bead.point, trap.a)
     assert scene_length(assemble(scene)) == 3.0
+
+
+def alone(speed: float, stiffness: float = 0.0, place: float = 0.0) -> Scene:
+    """Return one mass of 1 kg without lengths, free or on a spring that pulls it to the origin, for ten seconds."""
+    scene = Scene(space="line", gravity=0.0, t_end=10.0)
+    mass = scene.add("mass", Mass1D(mass=1.0))
+    if stiffness:
+        field = scene.add("field", Potential(energy_function=f"{0.5 * stiffness!r}*x^2"))
+        scene.connect(field.point, mass.flange)
+    scene.start.update({"mass.displacement": place, "mass.speed": speed})
+    return scene
+
+
+@pytest.mark.parametrize("solver", ["explicit", "taylor", "ida"])
+@pytest.mark.parametrize("form", FORMS)
+def test_a_small_scene_without_lengths_is_as_large_as_its_way(form: str, solver: str) -> None:
+    for speed in (1e-3, 1e-9):
+        run = simulate(alone(speed, 49.0), solver=solver, form=form, outputs=2)
+        exact = speed / 7.0 * np.sin(70.0)
+        assert run["mass.displacement"][-1] == pytest.approx(exact, rel=1e-4)
+    swept = sweep(alone(1e-9, 49.0), start={"mass.speed": [1e-9, 1e-3]}, solver=solver, form=form, outputs=2)
+    ends = np.array([swept["mass.displacement"][k, -1] / speed for k, speed in enumerate((1e-9, 1e-3))])
+    np.testing.assert_allclose(ends, np.sin(70.0) / 7.0, rtol=1e-4)
+
+
+@pytest.mark.parametrize("solver", ["explicit", "taylor", "ida"])
+def test_where_a_single_body_floats_says_nothing_of_its_size(solver: str) -> None:
+    scene = Scene(gravity=0.0, t_end=10.0)
+    mass = scene.add("mass", PointMass(mass=1.0))
+    push = scene.add("push", Force(direction=(1.0, 0.0, 0.0), value=lambda t: 100.0 * exp(-((100.0 * (t - 5.0)) ** 2))))
+    scene.connect(push.point, mass.point)
+    scene.start.update(
+        {"mass.position.x": 1e6, "mass.position.z": -1e6, "mass.velocity.x": 0.0, "mass.velocity.z": 0.0}
+    )
+    run = simulate(scene, solver=solver, outputs=2)
+    assert run["mass.velocity.x"][-1] == pytest.approx(np.sqrt(np.pi), rel=1e-5)

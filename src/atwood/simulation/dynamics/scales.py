@@ -74,10 +74,11 @@ _NO_EXTENT = 1e-12
 
 
 def scene_length(assembly: Assembly) -> float:
-    """Return the extent of a scene, from its parameters and start values that are lengths; 1 m if it has none.
+    """Return the extent of a scene, from its parameters and start values that are lengths.
 
     Positions of a mechanism far from the world's origin count from where all others do, those of bodies that float far
-    from it from each other. Positions alone that are rounding beside the way that the speeds lead are none.
+    from it from each other. Positions alone that are rounding beside the way that the speeds lead are none. A scene
+    without lengths is as large as that way, or as that of a fall, and 1 m where these are longer or nothing.
     """
     given, fastest = [], 0.0
     for path, value in assembly.flat.start.items():
@@ -87,13 +88,29 @@ def scene_length(assembly: Assembly) -> float:
         if observable is not None and observable.unit == "m":
             given.append((observable.value, value - origin_part(assembly, observable)))
     own, farthest = extent(assembly.mechanism), max((abs(at) for _, at in given), default=0.0)
+    way = way_of(assembly, fastest)
+    alone = float(size_of_way(way))
     if farthest > FAR * own:
         near = max(own, spread(assembly, given))
-        if farthest > FAR * near > 0.0:
-            return near
-    if not own and farthest < _NO_EXTENT * fastest * (assembly.flat.t_end - assembly.flat.t_start):
-        return 1.0
-    return max(own, farthest) or 1.0
+        if farthest > FAR * near:
+            return near or alone
+    return alone if not own and farthest < _NO_EXTENT * way else max(own, farthest) or alone
+
+
+def way_of(assembly: Assembly, fastest: Sizes) -> Sizes:
+    """Return how far start speeds, or gravity, lead in the time of a scene, m."""
+    span = assembly.flat.t_end - assembly.flat.t_start
+    return np.maximum(fastest, gravity_of(assembly) * span) * span
+
+
+def size_of_way(way: Sizes) -> FloatArray:
+    """Return the size of a scene without lengths, m: what speeds and gravity lead it, and 1 m at most."""
+    return or_one(np.minimum(way, 1.0))
+
+
+def gravity_of(assembly: Assembly) -> float:
+    """Return the acceleration of gravity of a scene, m/s^2; 0 where it has none."""
+    return abs(next((v for s, v in assembly.mechanism.table.values.items() if s.name == "gravity"), 0.0))
 
 
 def origin_part(assembly: Assembly, observable: Observable) -> float:
@@ -161,8 +178,7 @@ def find_scales(
     span: float,
 ) -> Scales:
     """Return the sizes of a scene from its start."""
-    gravity = next((v for s, v in assembly.mechanism.table.values.items() if s.name == "gravity"), 0.0)
-    time = float(find_times(length, speeds, accelerations, sizes, gravity, span))
+    time = float(find_times(length, speeds, accelerations, sizes, gravity_of(assembly), span))
     return Scales(length, time, float(total_masses(assembly, length)) * length / time**2)
 
 

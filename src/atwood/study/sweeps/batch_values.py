@@ -20,9 +20,8 @@ from atwood.model.compose.composite import Model
 from atwood.model.declare.component import Component
 from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.local.flatten import flatten
-from atwood.numerics.matrices import or_one
 from atwood.pipeline import scene_of
-from atwood.simulation.dynamics.scales import motion_scales, origin_part
+from atwood.simulation.dynamics.scales import motion_scales, origin_part, size_of_way, way_of
 from atwood.simulation.initialization.many import meet_positions, meet_speeds
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.initialization.system import Conditions, Level, sort_targets, start_conditions
@@ -204,12 +203,15 @@ class StartRows:
             has_loops = bool(equations.constraints)
             places = self._conditions_of(equations, positions, False) if has_loops else None
             self._conditions = self._conditions_of(equations, speeds, True), places
-        flat = assembly.flat
-        self._lengths = [
-            columns.get(path, value) - origin_part(assembly, assembly.start_observables[path])
-            for path, value in flat.start.items()
-            if assembly.start_observables[path].unit == "m"
-        ]
+        observables = assembly.start_observables
+        self._lengths, self._fast = (
+            [
+                columns.get(path, value) - origin_part(assembly, observables[path])
+                for path, value in assembly.flat.start.items()
+                if observables[path].unit == unit
+            ]
+            for unit in ("m", "m/s")
+        )
 
     def _conditions_of(self, equations: Equations, level: Level, of_speeds: bool) -> _Conditions:
         """Return the conditions on places or on speeds, and what each is to be."""
@@ -283,7 +285,10 @@ class StartRows:
             lengths = _moving_lengths(assembly, parameters)
         for given in self._lengths:
             lengths = np.maximum(lengths, np.abs(_of(given, runs)))
-        return or_one(lengths)
+        fastest = np.zeros(len(runs))
+        for given in self._fast:
+            fastest = np.maximum(fastest, np.abs(_of(given, runs)))
+        return np.where(lengths > 0.0, lengths, size_of_way(way_of(assembly, fastest)))
 
 
 def read_starts(
