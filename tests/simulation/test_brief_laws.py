@@ -118,6 +118,22 @@ def test_a_brief_force_on_what_rests_is_felt(solver: str, pulse: str) -> None:
     assert result["mass.displacement"][-1] == pytest.approx(place, abs=1e-5)
 
 
+@pytest.mark.parametrize("width", [1e-3, 1e-9])
+@pytest.mark.parametrize("solver", ["explicit", "ida"])
+def test_what_exponentials_divide_is_at_rest_where_these_are_large(solver: str, width: float) -> None:
+    def edge(t: Any) -> Any:  # before 3.3 s
+        return 1.0 / (1.0 + atwood.exp((t - 3.3) / width))
+
+    def pulse(t: Any) -> Any:
+        return 1.0 / (math.pi * width * atwood.cosh((t - 3.3) / width))
+
+    for law, speed, place in ((edge, 3.3, 0.5 * 3.3**2 + 3.3 * 6.7), (pulse, 1.0, 6.7)):
+        result = simulate(on_a_line(force=law, speed=0.0), solver=solver, outputs=2, max_steps=1000)
+        assert result.status == "finished"
+        assert result["mass.speed"][-1] == pytest.approx(speed, abs=2e-6)
+        assert result["mass.displacement"][-1] == pytest.approx(place, abs=2e-5)
+
+
 def test_a_force_that_dies_away_slowly_beside_its_peak_is_felt() -> None:
     expected = 1e-3 * (math.atan(7e3) + math.atan(3e3))  # the integral of 1/(1 + s^2)
     for solver in PLAIN:

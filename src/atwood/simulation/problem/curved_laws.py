@@ -10,6 +10,7 @@ coordinates and speeds; these lie between the control points of the cubics throu
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from math import inf
 
@@ -21,7 +22,7 @@ from atwood.expr.core.functions import Scalar, absolute, exp, log, maximum, mini
 from atwood.expr.core.intervals import bounds
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
-from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.dynamics.forces import in_joint_coordinates, place_part
@@ -32,7 +33,11 @@ _CURVED: Key[tuple[Curved, ...]] = Key("functions that may change fast")
 _EXTERNAL: Key[tuple[Expression, ...]] = Key("functions in Python in laws")
 
 _FAINT = 60.0
-"""An exponential of less than minus this is as good as zero, whatever it is multiplied by."""
+"""An exponential of less than minus this is as good as zero, whatever it is multiplied by; so is what is divided by one
+of more."""
+
+_GROWING = frozenset({"exp", "sinh", "cosh"})
+"""What grows so fast that a quotient with it as divisor is as good as zero soon."""
 
 _FLAT = 20.0
 """Beyond this argument a hyperbolic tangent is one, to rounding."""
@@ -55,11 +60,15 @@ _UNESTIMATED = frozenset({"sqrt", "sin", "cos"})
 
 @dataclass(frozen=True)
 class Curved:
-    """A function in a law that may change fast: its operation, what it is of, and its exponent if it is a power."""
+    """A function in a law that may change fast: its operation, what it is of, and its exponent if it is a power.
+
+    What grows in divisors alone, as in ``1/(1 + exp(x))``, is as good as infinite where it is large.
+    """
 
     operation: str
     argument: Expression
     exponent: Expression | None = None
+    divides: bool = False
 
 
 def find_curved(assembly: Assembly, is_estimated: bool = True) -> tuple[Curved, ...]:
@@ -113,7 +122,7 @@ def _find(assembly: Assembly, equations: Equations, more: frozenset[str]) -> Ite
             if assembly.sides is not None:
                 both = assembly.sides.taken_out(both)
             triples = zip(mine, both[: len(mine)], both[len(mine) :], strict=True)
-            found |= dict.fromkeys(Curved(a.operation, b, None if a.exponent is None else c) for a, b, c in triples)
+            found |= dict.fromkeys(replace(a, argument=b, exponent=a.exponent and c) for a, b, c in triples)
     known = _known(assembly, equations)
     for one in found:
         nodes = live([one.argument] if one.exponent is None else [one.argument, one.exponent])
@@ -139,7 +148,7 @@ def _has_root(value: Expression) -> bool:
 
 
 def _curved_in(outputs: Sequence[Expression], operations: frozenset[str]) -> Iterable[Curved]:
-    nodes = live(outputs)
+    nodes, direct = live(outputs), _not_dividing(outputs)
     for node in nodes:
         if node.is_parametric or node.operation not in operations:
             continue
@@ -160,7 +169,19 @@ def _curved_in(outputs: Sequence[Expression], operations: frozenset[str]) -> Ite
             if power > _HIGH:
                 yield Curved("pow", base, node.graph.constant(power))
         else:
-            yield Curved(node.operation, first)
+            yield Curved(node.operation, first, divides=node.operation in _GROWING and node.index not in direct)
+
+
+def _not_dividing(outputs: Sequence[Expression]) -> set[int]:
+    """Return the numbers of what outputs are made of otherwise than as divisors, or inside these."""
+    found: set[int] = set()
+    ahead = list(outputs)
+    while ahead:
+        node = ahead.pop()
+        if node.index not in found:
+            found.add(node.index)
+            ahead += node.arguments[:1] if node.operation == "div" else node.arguments
+    return found
 
 
 # -- how far an argument goes, in units of the function's scale ----------------------------------------------------
@@ -169,6 +190,8 @@ def _curved_in(outputs: Sequence[Expression], operations: frozenset[str]) -> Ite
 def _share(one: Curved, argument: Pair, exponent: Pair | None, reach: Scalar) -> Scalar:
     """Return how far a function changes between bounds of its argument, as a share of how far it may."""
     low, high = argument
+    if one.divides:
+        low, high = (maximum(minimum(x, _FAINT), -_FAINT) for x in argument)
     if one.operation == "exp":
         return (maximum(high, -_FAINT) - maximum(low, -_FAINT)) / reach
     if one.operation == "tanh":
@@ -184,6 +207,8 @@ def _share(one: Curved, argument: Pair, exponent: Pair | None, reach: Scalar) ->
     least, most = magnitude(argument)
     if one.operation == "sqrt":
         return most / (maximum(least, 1e-150) * exp(_ROOT * reach))
+    if one.operation == "div":
+        least, most = (minimum(x, math.exp(_FAINT)) for x in (least, most))
     if exponent is None:  # a quotient or a logarithm
         return most / (maximum(least, 1e-150) * exp(0.5 * reach))
     power = maximum(absolute(exponent[0]), absolute(exponent[1]))
