@@ -175,14 +175,8 @@ def _log() -> Routine:
     r, m, _, sets = _open("log_jump")
     size, count, past = m.size, sets.count, sets.past
     entry = m.log.at(m.logged * m.stride)
-    stopped = r.variable(-1, INTEGER)
-    with r.count(count) as i:
-        k = count - 1 - i
-        is_one = (sets.unit("stopped")[k] != 0.0) & (sets.unit("slip")[k] == 0.0)
-        stopped.now = r.choose(is_one, k, stopped.now)
-    with r.when(sets.stops == 0):
-        stopped.now = -1
-    entry[0], entry[1], entry[2], entry[3] = m.now, stopped.now.number(), sets.ahead, sets.logged.number()
+    stopped = r.choose(sets.stops == 0, -1, sets.told, INTEGER)
+    entry[0], entry[1], entry[2], entry[3] = m.now, stopped.number(), sets.ahead, sets.logged.number()
     r.copy(entry.at(HEAD), m.before, size)
     r.copy(entry.at(size + HEAD), sets.y, size)
     r.copy(entry.at(size * 2 + HEAD), sets.unit("next"), count * 3)

@@ -246,8 +246,7 @@ class SetSolver:
         if self._resolve(pieces["sets"].ctypes.data, t, is_start, 1) or self._said("shared"):
             return None
         struck = pieces["struck"][: self._said("logged") * self._each].reshape(-1, self._each).copy()
-        gaps = np.flatnonzero((units[UNITS["stopped"]] != 0.0) & (units[UNITS["slip"]] == 0.0))
-        stopped = int(gaps[0]) if self._said("stops") and len(gaps) else -1
+        stopped = self._said("told") if self._said("stops") else -1
         left = float(pieces["sets"][_PLACES["sets"]["ahead"][1]])
         states = units[UNITS["next"] : UNITS["next"] + 3].copy()
         made = SetJump(t, np.array([y, pieces["y"]]), states, stopped, left, struck)

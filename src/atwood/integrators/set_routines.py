@@ -36,13 +36,14 @@ FIELDS: dict[str, Kind] = {
     **dict.fromkeys(("finite", "blur", "pace", "tolerance", "inside", "ahead", "rough", "later"), NUMBER),
     **dict.fromkeys(("better_x", "better_y", "lasted"), NUMBER),
     **dict.fromkeys(("count", "size", "entries", "coordinates", "speeds", "number", "better"), INTEGER),
-    **dict.fromkeys(("logged", "known", "stops", "repeats", "shared", "tried"), INTEGER),
+    **dict.fromkeys(("logged", "known", "stops", "told", "repeats", "shared", "tried"), INTEGER),
 }
 """The memory of sets. `finite` is 0 where limits are of impulses, which finite forces do not have; `blur` and `pace`
 are multiples of what is small and slow; `inside` is how deep a gap may be, in multiples of what is small; `ahead` is
 how long impacts may still go on that are summed, and then how long they do, `rough` how long where rounding tells the
 length of their intervals, `later` how long where these are uneven, `lasted` how long these have gone on; `stops` is 1
-where these come to an end and may still wait for one more, 2 where they come to an end; `shared` is 1 where forces of a
+where these come to an end and may still wait for one more, 2 where they come to an end, `told` which gap is said to
+rest then; `shared` is 1 where forces of a
 set that was found are not determined, as rows repeat each other, or where another share might let rest what begins to
 slip, and `repeats` where those solved for last are not. `tried` is 0, or which share that holds everything is taken
 whatever its forces are here: joints have a part in those that are reported."""
@@ -1167,6 +1168,12 @@ def _stop() -> Routine:
     with _each(r, m, "chosen") as (k, row, _), r.when(rates[row] > r.most(coming.now * ALIKE, slow[k] * m.pace)):
         chosen[k] = 0.0  # it only passes: its impacts have not come to an end
     r.copy(m.unit("stopped"), chosen, m.count)
+    m.told, state = -1, m.unit("state")
+    with _each(r, m, "chosen") as (k, _, _):
+        with r.when(m.told < 0):
+            m.told = k
+        with r.when((state[k] == float(OPEN)) & (state[m.told] != float(OPEN))):  # and was not closed all along
+            m.told = k
     m.pace, m.finite = 1.0, 0.0
     _choose_slips(r, m)
     with r.count(m.count) as k, r.when(m.unit("slip")[k] != 0.0):

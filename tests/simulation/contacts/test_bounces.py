@@ -20,6 +20,8 @@ from atwood.simulation.problem.preparation import problem_of_run
 from atwood.simulation.run import session
 from atwood.simulation.run.run import Walk
 from atwood_library import (
+    Box,
+    BoxContact,
     DistanceContact,
     Force,
     Ground,
@@ -465,3 +467,25 @@ def test_a_time_of_rest_says_by_how_much_it_may_be_off(
     said = f", at a time that may be off by {doubt:.1g} s" if doubt else ""
     assert rest.message == f"impacts have accumulated: it rests{said}"
     assert rest.time == pytest.approx(known, rel=0.0, abs=doubt or 1e-9)
+
+
+@pytest.mark.parametrize("solver", ["explicit", "taylor"])
+def test_a_rest_is_told_of_what_bounced(solver: str) -> None:
+    """The second corner of a box comes to rest beside one that has: that was told again, with its old doubts."""
+    scene = Scene()
+    ground, box = (
+        scene.add("ground", Ground()),
+        scene.add("box", Box(mass=1.0, length_x=0.3, length_y=0.1, length_z=0.2)),
+    )
+    floor = scene.add("floor", BoxContact(length=0.3, width=0.1, height=0.2, friction=0.3, restitution=0.3))
+    scene.connect(ground.frame, floor.plane)
+    scene.connect(box.frame, floor.box)
+    scene.start.update({"box.position.x": 0.0, "box.position.z": 0.4, "box.angle": 0.3, "box.angular_speed": 0.0})
+    scene.start.update({"box.velocity.x": 0.0, "box.velocity.z": 0.0})
+    events = simulate(scene, t_end=0.5, solver=solver).events
+    rests = [one for one in events if one.kind == "rests"]
+    assert [one.part for one in rests] == ["floor.corner[0]", "floor.corner[2]"]
+    last = [max(each.time for each in events if each.kind == "impact" and each.part == one.part) for one in rests]
+    assert all(0.0 < one.time - before < 1e-4 for one, before in zip(rests, last, strict=True))
+    assert "may be off" in rests[0].message
+    assert "may be off" not in rests[1].message

@@ -143,11 +143,9 @@ static int resolve_contacts(scene *s, double t, int is_start)
     code = find_set(s, t, before, is_start);
     for (k = 0; k < CONTACTS; k++) s->triggers[k] = 0.0;
     if (code != 0) return say(s, FAILED, refused[code]);
-    for (k = 0; k < CONTACTS && s->sets[SET_stops].i != 0 && !is_start; k++) {
-        if (unit(s, UNIT_stopped)[k].f == 0.0) continue;
-        if (contact_names[2 * k] < 0) log_event(s, t + s->sets[SET_ahead].f, EVENTS + k, scene_RESTS, 0.0);
-        break;
-    }
+    k = s->sets[SET_told].i;
+    if (s->sets[SET_stops].i != 0 && !is_start && contact_names[2 * k] < 0)
+        log_event(s, t + s->sets[SET_ahead].f, EVENTS + k, scene_RESTS, 0.0);
     for (k = 0; k < CONTACTS; k++) struck[k] = NULL;
     states_after(s, after);
     for (i = 0; i < s->sets[SET_logged].i; i++) {

@@ -259,7 +259,7 @@ function openMode(mode, options) {
       return {failed: `${part}${REFUSED[code]}`};
     }
     const told = [], tell = (k, kind, message, time = t) => told.push({time, part: keys[k][0], law: keys[k][1], message, target: "", kind});
-    if (at("stops")) tell(Array.from(units("stopped")).indexOf(1), "rests", "impacts have accumulated: it rests", t + at("ahead"));
+    if (at("stops")) tell(at("told"), "rests", "impacts have accumulated: it rests", t + at("ahead"));
     for (let i = 0; i < at("logged"); i++) {
       const [k, speed] = read_(touch.log + i * (size + SET.entry), 2);
       tell(k, "impact", `an impact at ${Number((-speed).toPrecision(6))} ${rates[k]}`);

@@ -327,7 +327,8 @@ class _Moment:
             push = self._end_of_impacts(resting, still, rubs=False)
         self.resting = resting
         self.u = self.u + self.values.speeds_by(push)
-        self.events += [told_rest(self.t, self.first[k].row.key[:2], left) for k in resting[:1]]
+        bounced = [k for k in resting if self.before[k][0] == OPEN] or resting  # and were not closed all along
+        self.events += [told_rest(self.t, self.first[k].row.key[:2], left) for k in bounced[:1]]
 
     def _work_of(self, impulses: FloatArray, rates: FloatArray) -> tuple[FloatArray, FloatArray, bool]:
         """Return the rates after impulses, the work that each does, and whether together they do more than rounding."""
