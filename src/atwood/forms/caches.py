@@ -104,13 +104,14 @@ class Kept:
     def recall(self, key: Key[dict[tuple[Hashable, ...], T]], make: Callable[[], T], *about: Hashable) -> T:
         """Return what was made of some values, making it if that is not known any more; so much is of the last ones."""
         known = self.get(key, dict)
-        if about not in known:
+        try:
+            return known[about]
+        except KeyError:  # or another thread has just dropped it
             made = make()
-            for oldest in [*known][: len(known) - _REMEMBERED + 1]:
-                known.pop(oldest, None)
-            known[about] = made
-            return made
-        return known[about]
+        for oldest in [*known][: max(0, len(known) - _REMEMBERED + 1)]:
+            known.pop(oldest, None)
+        known[about] = made
+        return made
 
     def take(self, key: Key[T]) -> T | None:
         """Return what was last made under a key, which then is the caller's alone; None if nothing was."""

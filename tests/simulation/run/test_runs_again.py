@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -14,6 +14,7 @@ from tests.calls import calls
 
 from atwood import Model, Result, assemble, simulate
 from atwood.forms.assembly import Assembly
+from atwood.forms.caches import Kept, Key
 from atwood.simulation.problem import projection
 from atwood_library.scenes import (
     BouncingBall,
@@ -156,3 +157,19 @@ def test_states_that_formulas_give_are_compared_with_the_constraints_once(monkey
     ends = [ran(assembly, {"outputs": outputs}).run.segments[-1] for outputs in (2, 30)]
     assert len(looked) == 2
     assert_array_equal(ends[0].coordinates[:, -1], ends[1].coordinates[:, -1])
+
+
+def test_what_is_recalled_is_what_was_made_last() -> None:
+    """As many values as are remembered are made once; the oldest goes first, and none before there is no room."""
+    kept, key, made = Kept(), Key[dict[tuple[Hashable, ...], int]]("squares"), list[int]()
+
+    def recalled(number: int) -> int:
+        def make() -> int:
+            made.append(number)
+            return number**2
+
+        return kept.recall(key, make, number)
+
+    for number in (*range(60), *range(60), *range(60, 100), 99, 0):
+        assert recalled(number) == number**2
+    assert made == [*range(100), 0]
