@@ -334,8 +334,7 @@ def _write_csv(saved: SavedResult, file: Path) -> None:
     columns = [saved.time.tolist(), *(values.tolist() for values in saved.quantities.values())]
     heads = ["time [s]", *(f"{path} [{saved.units[path]}]" for path in saved.quantities)]
     rows = (map(repr, row) for row in zip(*columns, strict=True))
-    about = {"meanings": saved.meanings, "metadata": saved.metadata}
-    write_with_companion(file, chain([heads], rows), about)
+    write_with_companion(file, chain([heads], rows), {"meanings": saved.meanings, "metadata": saved.metadata})
 
 
 def _read_csv(file: Path) -> SavedResult:
