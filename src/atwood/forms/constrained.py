@@ -24,7 +24,6 @@ from atwood.forms.residuals import keep_constraints
 from atwood.lazy_dataclasses import dataclass, names_of
 from atwood.mechanics.dynamics.augmented import Step, SymmetricSystem, eliminate, fill_of, solution_of, with_right
 from atwood.mechanics.dynamics.equations import Constraint, ContactRow, Equations
-from atwood.numerics.body_order import by_least, neighbours_of
 
 _LARGEST_FILL = 60_000
 """More products than these are left to a loop when the program runs."""
@@ -385,6 +384,8 @@ def _order(places: Sequence[Place], signs: Sequence[int]) -> list[int]:
     A constraint can have its turn once all masses that it touches have had theirs: what is left of it by these is then
     positive, as long as constraints are independent.
     """
+    from atwood.numerics.body_order import by_least, neighbours_of
+
     around = neighbours_of(places, len(signs))
     waiting = {i: sum(signs[j] > 0 for j in others) for i, others in enumerate(around) if signs[i] < 0}
     meets = {i: [j for j in others if signs[j] < 0] for i, others in enumerate(around) if signs[i] > 0}

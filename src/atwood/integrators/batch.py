@@ -20,6 +20,7 @@ from atwood.arrays import FloatArray
 from atwood.codegen.llvm.build import Built, RoutineSource, build_code, once
 from atwood.codegen.llvm.module import CodeOptions
 from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Kind, Record, Routine, Value, Variable
+from atwood.integrators.protocol import paced
 from atwood.lazy_dataclasses import dataclass
 
 NOTICED = 5
@@ -168,10 +169,7 @@ class Job:
         is_done: bool = self._call(self._job.ctypes.data) == 0
         taken = time.perf_counter() - began
         self.seconds += taken
-        if taken > 2.0 * _MOMENT:
-            self._allowed = max(1, int(self._allowed * _MOMENT / taken))
-        elif not is_done and taken < 0.5 * _MOMENT:
-            self._allowed *= 2
+        self._allowed = paced(self._allowed, taken, not is_done, _MOMENT, NO_LIMIT)
         if is_done:  # what a run that ended early did not reach may have been half written
             self.values[(self.codes != 0) & (self.codes != NOTICED)] = np.nan
         return is_done

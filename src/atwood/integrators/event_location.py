@@ -36,15 +36,14 @@ from atwood.arrays import FloatArray
 from atwood.codegen.llvm.build import RoutineSource, build_code, once
 from atwood.codegen.llvm.module import CodeOptions
 from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Kind
-from atwood.codegen.sundials.events import EVENTS
 from atwood.errors import KernelEvaluationError
 from atwood.integrators.protocol import JUST_HAPPENED, ExplicitProblem, ImplicitProblem, State
-from atwood.integrators.python_calls import PythonCalls
 from atwood.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from atwood.codegen.llvm.build import Built
     from atwood.codegen.sundials.events import EventData
+    from atwood.integrators.python_calls import PythonCalls
 
 Interpolant = Callable[[float], State]
 
@@ -167,11 +166,15 @@ class EventLocator:
         events: EventData | None = None,
         interpolation: tuple[int, int] = (0, 0),
     ) -> None:
-        count, size, calls = problem.event_count, problem.size, PythonCalls()
+        count, size = problem.event_count, problem.size
+        self._calls: PythonCalls | None = None
         self._at: Interpolant | None = None  # what a function in Python reads
-        self._calls = calls if events is None else None
         if events is None:
+            from atwood.codegen.sundials.events import EVENTS
+            from atwood.integrators.python_calls import PythonCalls
+
             assert problem.events is not None
+            self._calls = calls = PythonCalls()
             interpolation = calls.address(_INTERPOLATE, self._read, {2: size, 3: size}), 0
             function, data = calls.address(EVENTS, problem.events, {1: size, 2: size}, (3, count)), 0
         else:

@@ -28,6 +28,7 @@ from atwood.integrators.protocol import (
     Status,
     StepMonitor,
     StepResult,
+    paced,
 )
 from atwood.integrators.session import SteppingSession, copied
 from atwood.integrators.stepper import Outcome, Stepper
@@ -434,10 +435,7 @@ class ExplicitSession(SteppingSession):
         """Come closer to a chunk that takes a moment; see whether looks are to be taken by faster code."""
         if self._spend is not None:
             self._spend(seconds)
-        if seconds > 2.0 * _MOMENT:
-            self._chunk = max(1, int(self._chunk * _MOMENT / seconds))
-        elif outcome is Outcome.USED_UP and seconds < 0.5 * _MOMENT:
-            self._chunk = min(2 * self._chunk, LARGEST_CHUNK)
+        self._chunk = paced(self._chunk, seconds, outcome is Outcome.USED_UP, _MOMENT, LARGEST_CHUNK)
 
     def _step(self, t_out: float) -> StepResult | None:
         """Take steps, and return an answer only if that failed."""

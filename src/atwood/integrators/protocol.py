@@ -201,6 +201,13 @@ class Budget:
         return self.max_steps is None and self.wall_seconds is None and self.poll is None
 
 
+def paced(steps: int, seconds: float, is_used_up: bool, moment: float, most: int) -> int:
+    """Return how many steps a call may take, so that it takes about a moment, after one that took so many seconds."""
+    if seconds > 2.0 * moment:
+        return max(1, int(steps * moment / seconds))
+    return min(2 * steps, most) if is_used_up and seconds < 0.5 * moment else steps
+
+
 class Status(Enum):
     """Why an advance ended; `STIFF` where another method was asked to take over, `NOTICED` by a `StepMonitor`."""
 

@@ -170,8 +170,7 @@ class SteppingSession(Session):
             self._stale = True
             return self._stopped(Status.INTERRUPTED, "interrupted")
         except KernelEvaluationError as error:
-            self._stale = True
-            return self._stopped(Status.FAILED, str(error))
+            return self._failed(str(error))
         except BaseException:
             self._stale = True
             raise
@@ -225,6 +224,11 @@ class SteppingSession(Session):
         if budget.wall_seconds is not None and time.perf_counter() - self._opened >= budget.wall_seconds:
             return self._stopped(Status.TIME_LIMIT, f"the limit of {budget.wall_seconds:g} s was used up")
         return None
+
+    def _failed(self, reason: str) -> StepResult:
+        """Return that the run cannot go on; the method starts anew where it does all the same."""
+        self._stale = True
+        return self._stopped(Status.FAILED, reason)
 
     def _stopped(self, status: Status, reason: str) -> StepResult:
         """Return where the run ended, and why."""

@@ -10,7 +10,7 @@ from tests.helpers.contact_scenes import rough_pendulum
 
 import atwood as aw
 from atwood import Scene, UsageError, simulate
-from atwood.integrators.event_location import EventLocator
+from atwood.integrators.python_calls import PythonCalls
 from atwood.simulation.contacts import changes, compiled
 from atwood_library import (
     BallContact,
@@ -134,7 +134,7 @@ def test_sets_are_found_by_the_routine_of_explicit_steps(
         return plain(*given)  # type: ignore[arg-type]
 
     monkeypatch.setattr(changes, "resolve", counted)
-    monkeypatch.setattr(EventLocator, "search", lambda *_: pytest.fail("an event is looked for in Python"))
+    monkeypatch.setattr(PythonCalls, "address", lambda *_: pytest.fail("an event is looked for in Python"))
     for counts in (1, 6):
         in_python.clear()
         found.append(simulate(StickSlip(), solver=solver, form=form, t_end=2.0, rtol=1e-8).events)

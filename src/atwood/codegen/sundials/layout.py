@@ -42,22 +42,34 @@ class SundialsLayout:
     sparse_pointers: int
 
 
+INDEX_BYTES = {
+    **dict.fromkeys(("int", "int32_t"), 4),
+    **dict.fromkeys(("long int", "long long", "long long int", "int64_t"), 8),
+    "long": ctypes.sizeof(ctypes.c_long),
+}
+"""How wide the types are that indices may have."""
+
+
+def build_settings(package: Path) -> dict[str, str]:
+    """Return how SUNDIALS was built, as scikit-sundae recorded it; nothing where it did not."""
+    try:
+        text = (package / "py_config.pxi").read_text(encoding="utf-8")
+    except OSError:
+        return {}
+    return dict(re.findall(r"^(\w+)\s*=\s*[\"'](.*)[\"']", text, re.MULTILINE))
+
+
 @cache
 def sundials_layout() -> SundialsLayout:
     """Return the layout of the structures in the libraries that scikit-sundae ships."""
     found = importlib.util.find_spec("sksundae")
-    path = Path(found.origin).with_name("py_config.pxi") if found is not None and found.origin else None
-    try:
-        text = path.read_text() if path is not None else ""
-    except OSError:
-        text = ""
-    settings = dict(re.findall(r"^(\w+)\s*=\s*[\"'](.*)[\"']", text, re.MULTILINE))
-    widths = {"int": 4, "int32_t": 4, "long": ctypes.sizeof(ctypes.c_long), "long int": 8, "long long": 8, "int64_t": 8}
-    index_bytes = widths.get(settings.get("SUNDIALS_INT_TYPE", ""))
+    package = Path(found.origin).parent if found is not None and found.origin else None
+    settings = {} if package is None else build_settings(package)
+    index_bytes = INDEX_BYTES.get(settings.get("SUNDIALS_INT_TYPE", ""))
     if index_bytes is None or settings.get("SUNDIALS_FLOAT_TYPE") != "double":
         raise UnsupportedError(
             "scikit-sundae does not say how its SUNDIALS libraries were built, or not with 64-bit floats",
-            where=str(path) if path is not None else "",
+            where=str(package or ""),
         )
     return layout_for(index_bytes)
 

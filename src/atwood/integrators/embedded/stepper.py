@@ -33,7 +33,6 @@ from atwood.integrators.protocol import (
     StepMonitor,
     absolute_tolerances,
 )
-from atwood.integrators.python_calls import PythonCalls
 from atwood.integrators.stepper import (
     COUNTED,
     LANE_FIELDS,
@@ -53,6 +52,7 @@ if TYPE_CHECKING:
     from atwood.integrators.event_location import EventLocator
     from atwood.integrators.jumps import Jumps
     from atwood.integrators.moments import Changes, Moments
+    from atwood.integrators.python_calls import PythonCalls
 
 FIELDS = fields_of(
     (
@@ -116,12 +116,15 @@ class CompiledStepper(Stepper):
 
     def __init__(self, problem: ExplicitProblem, options: SolverOptions, pair: Tableau) -> None:
         self._size, self._options, self._rows = problem.size, options, pair.rows
-        self._calls = PythonCalls()
+        self._calls: PythonCalls | None = None
         self._restart: Callable[[float], None] | None = None
         self._faster_events: Callable[[float], int | None] | None = None
         self._jumps: Jumps | None = None
         guard = problem.guard
-        self._calls_python = problem.compiled is None or (guard is not None and not guard.function)
+        if problem.compiled is None or (guard is not None and not guard.function):
+            from atwood.integrators.python_calls import PythonCalls
+
+            self._calls = PythonCalls()
         rates = self._in_python(problem) if problem.compiled is None else problem.compiled()
         self._rates, self._keep = rates, rates.keep
         n, padded = problem.size, -(-problem.size // WIDTH) * WIDTH
@@ -140,9 +143,10 @@ class CompiledStepper(Stepper):
         self._set(longest=options.max_step or inf, horizon=options.horizon)
         if guard is not None:
             self._keep = (self._keep, guard)
-            function = guard.function or self._calls.address(
-                _GUARDS, guard.passes, dict.fromkeys((1, 2, 4, 5), problem.size)
-            )
+            function = guard.function
+            if self._calls is not None and not function:
+                places = dict.fromkeys((1, 2, 4, 5), problem.size)
+                function = self._calls.address(_GUARDS, guard.passes, places)
             self._set(guard=function, guard_data=guard.data)
         first = self._session + 8 * len(FIELDS)
         self._outputs = first, first + 8 * n
@@ -193,7 +197,7 @@ class CompiledStepper(Stepper):
 
     def interpolation(self) -> tuple[int, int] | None:
         """Return the addresses of the function that reads the last step, and of its session."""
-        return None if self._calls_python else super().interpolation()
+        return super().interpolation() if self._calls is None else None
 
     def expect(self, signs: FloatArray) -> None:
         """Say which sign each event has; where it is zero, every step is noticed."""
@@ -227,7 +231,7 @@ class CompiledStepper(Stepper):
 
     def nearest(self, t: FloatArray, y: FloatArray, sizes: FloatArray) -> Nearest | None:
         """Take states, one row each, onto the constraints as steps are; None where none can be taken so."""
-        if self._calls_python or not self._count("project"):
+        if self._calls is not None or not self._count("project"):
             return None
         times, y = np.ascontiguousarray(t), np.ascontiguousarray(y)
         found, left, moved = np.empty(y.shape), np.empty(len(t), dtype=np.int64), np.empty(len(t))
@@ -283,11 +287,12 @@ class CompiledStepper(Stepper):
     def _call(self, function: str, *arguments: float) -> int:
         """Call a function of the steps and return its code, or raise what Python functions raised in it."""
         own = super()._call
-        return self._calls.run(own, function, *arguments) if self._calls_python else own(function, *arguments)
+        return own(function, *arguments) if self._calls is None else self._calls.run(own, function, *arguments)
 
     def _in_python(self, problem: ExplicitProblem) -> CompiledRates:
         """Return rates and projection that call Python."""
         size, calls = problem.size, self._calls
+        assert calls is not None
         rates = calls.address(RATES, problem.rates, {1: size}, (2, size))
         project = 0 if problem.project is None else calls.address(PROJECTION, problem.project, {1: size}, (1, size))
         return CompiledRates(rates, project=project, keep=calls)

@@ -21,6 +21,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, cast
 
+from atwood.codegen.sundials.layout import INDEX_BYTES, build_settings
 from atwood.errors import AtwoodError
 from atwood.integrators.ida.linear_solvers import BY_COLUMNS, OneAtATime, SparseSolver, table_layout
 
@@ -28,7 +29,6 @@ OLDEST = 7
 """The first major version with the calls that are used here."""
 
 _ENDINGS = r"\.(?:so(?:\.[0-9]+)*|(?:[0-9]+\.)*dylib|dll)$"
-_INDEX_TYPES = {"int": 32, "int32_t": 32, "long int": 64, "long long int": 64, "int64_t": 64}
 
 _FREE_OF_CHARGE = ("sundials_core", "sundials_ida")
 _MATRIX_LIBRARIES = (
@@ -238,13 +238,13 @@ class SundialsLibrary:
 
     def _read_index_type(self, package: Path) -> type[c_int32] | type[c_int64]:
         """Return the type of indices that the library was built with, as it says and as it does."""
-        settings = _settings(package)
+        settings = build_settings(package)
         number_type = settings.get("SUNDIALS_FLOAT_TYPE", "double")
         if number_type != "double":
             raise SundialsMissing(f"SUNDIALS was built for numbers of type {number_type}, not double")
         found = self._measure_index_width()
         said = settings.get("SUNDIALS_INT_TYPE")
-        if said is not None and _INDEX_TYPES.get(said, found) != found:
+        if said is not None and 8 * INDEX_BYTES.get(said, found // 8) != found:
             raise SundialsMissing(f"SUNDIALS' indices have {found} bits, but scikit-sundae says {said!r}")
         return c_int32 if found == 32 else c_int64
 
@@ -309,15 +309,6 @@ def _library_files(package: Path) -> dict[str, Path]:
         if all(name in files for name in _FREE_OF_CHARGE):
             return files
     raise SundialsMissing(f"no SUNDIALS libraries were found near {package}")
-
-
-def _settings(package: Path) -> dict[str, str]:
-    """Return how SUNDIALS was built, as scikit-sundae recorded it."""
-    try:
-        text = (package / "py_config.pxi").read_text(encoding="utf-8")
-    except OSError:
-        return {}
-    return dict(re.findall(r'^(\w+)\s*=\s*"([^"]*)"', text, flags=re.MULTILINE))
 
 
 _lock = threading.Lock()

@@ -85,9 +85,6 @@ class NativeSession(SteppingSession):
         budget: Budget | None = None,
         tuning: IdaTuning | None = None,
     ) -> None:
-        super().__init__(problem, options.horizon, budget)
-        self._horizon = options.horizon
-        self._given_step = options.first_step or 0.0
         self._record = Record()
         state = checked_state(problem.size, t, y, yp)
         linear_solver = choose_linear_solver(problem, options, has_fixed=library().has_fixed_solvers)
@@ -95,10 +92,11 @@ class NativeSession(SteppingSession):
         self._memory = prepare(
             problem, options, tuning or IdaTuning(), linear_solver, self._native, self._record, state
         )
-        events, self._reader = None if self._native is None else self._native.watched, None
-        if events is not None:  # nothing of a search runs in Python
-            self._reader = self._memory.reader()
-            self._locator = EventLocator(problem, options.horizon, None, events, self._reader.interpolation)
+        watched = None if self._native is None else self._native.watched
+        self._reader = None if watched is None else self._memory.reader()  # then nothing of a search runs in Python
+        super().__init__(problem, options.horizon, budget)
+        self._horizon = options.horizon
+        self._given_step = options.first_step or 0.0
         self._stop_time = None if tuning is None else tuning.stop_time
         self._guard = self._memory.library.sparse_guard if linear_solver == "sparse" else nullcontext()
         # Whether IDA itself can tell in which steps something happens.
@@ -114,6 +112,11 @@ class NativeSession(SteppingSession):
         self._pending: StepResult | None = None
         self._watchdog = Watchdog(FIRST_CHUNK if self._record.calls_python else first_chunk(problem.size))
         self._begin(state)
+
+    def _new_locator(self, horizon: float, signs: tuple[int, ...] | None) -> EventLocator | None:
+        if self._native is None or self._reader is None:
+            return super()._new_locator(horizon, signs)
+        return EventLocator(self._problem, horizon, signs, self._native.watched, self._reader.interpolation)
 
     def __enter__(self) -> NativeSession:
         return self
@@ -242,8 +245,7 @@ class NativeSession(SteppingSession):
         if t_out > self._here[0]:
             state = self._interpolate(t_out)
             if not is_finite(state[1], state[2]):
-                self._stale = True
-                return self._stopped(Status.FAILED, "the solution is no longer finite")
+                return self._failed("the solution is no longer finite")
             self._here = state
         return StepResult(*copied(self._here), Status.REACHED, self._no_events)
 
@@ -403,8 +405,7 @@ class NativeSession(SteppingSession):
             self._reached = self._memory.time()
             if flag == self._noticed_flag:
                 if not is_finite(self._memory.y, self._memory.yp):
-                    self._stale = True
-                    return self._stopped(Status.FAILED, "the solution is no longer finite")
+                    return self._failed("the solution is no longer finite")
                 self._here = t, self._memory.y.copy(), self._memory.yp.copy()
             if self._locator is not None:
                 # IDA has looked for events: up to where it was sent, or not up to the end of a step that has one.
@@ -465,8 +466,7 @@ class NativeSession(SteppingSession):
                 Status.FAILED, REASONS.get(flag) or EVENT_REASONS.get(flag, f"IDA stopped with flag {flag}")
             )
         if not finite:
-            self._stale = True
-            return self._stopped(Status.FAILED, "the solution is no longer finite")
+            return self._failed("the solution is no longer finite")
         if self._watchdog.stalls(t, self._memory.steps()):
             self._stale = True
             if self._native is not None:
@@ -481,8 +481,7 @@ class NativeSession(SteppingSession):
             self._memory.call("IDASetEtaFixedStepBounds", 1.0, growth)
         if not is_endless:
             return None
-        self._stale = True
-        return self._stopped(Status.FAILED, "rounding keeps the steps so short that the run would not end")
+        return self._failed("rounding keeps the steps so short that the run would not end")
 
     def _repeated(self) -> int:
         counts = self._memory.counts()

@@ -169,11 +169,9 @@ class SundaeSession(SteppingSession):
             # After an interpolation IDA first hands out the step that it has already taken.
             result = self._solver.step(t_before + self._horizon, "onestep", None)
         if result.status < 0:
-            self._stale = True
-            return self._stopped(Status.FAILED, REASONS.get(result.status, f"IDA stopped with flag {result.status}"))
+            return self._failed(REASONS.get(result.status, f"IDA stopped with flag {result.status}"))
         if not isfinite(result.y.dot(result.y)) and not np.isfinite(result.y).all():
-            self._stale = True
-            return self._stopped(Status.FAILED, "the solution is no longer finite")
+            return self._failed("the solution is no longer finite")
         self._newest, self._reached, self._behind = (result.t, result.y, result.yp), result.t, False
         self._is_first = False
         self._taken_steps += 1
@@ -183,8 +181,7 @@ class SundaeSession(SteppingSession):
         else:
             self._stalled += 1
         if self._stalled >= STALLED_STEPS:
-            self._stale = True
-            return self._stopped(Status.FAILED, "the steps became too small to move the time")
+            return self._failed("the steps became too small to move the time")
         return None
 
     def _stopped(self, status: Status, reason: str) -> StepResult:

@@ -8,6 +8,7 @@ from math import inf
 
 from atwood.integrators.event_location import ROUNDING
 from atwood.integrators.ida.sundae import STALLED_STEPS
+from atwood.integrators.protocol import paced
 from atwood.lazy_dataclasses import dataclass
 
 MOMENT = 0.02
@@ -66,10 +67,7 @@ class Watchdog:
 
     def learn(self, seconds: float, used_up: bool) -> None:
         """Come closer to a chunk that takes a moment."""
-        if seconds > 2 * MOMENT:
-            self.chunk = max(1, int(self.chunk * MOMENT / seconds))
-        elif used_up and seconds < 0.5 * MOMENT:
-            self.chunk = min(2 * self.chunk, LARGEST_CHUNK)
+        self.chunk = paced(self.chunk, seconds, used_up, MOMENT, LARGEST_CHUNK)
 
     def stalls(self, t: float, steps: int) -> bool:
         """Tell whether the last steps have moved the time by no more than rounding."""

@@ -13,7 +13,6 @@ from collections.abc import Callable, Mapping, Sequence
 from atwood.expr import Expression, Graph, live
 from atwood.expr.core import algebra
 from atwood.lazy_dataclasses import dataclass, replace
-from atwood.numerics.body_order import by_least, eliminated, neighbours_of
 
 Tidy = Callable[[list[Expression]], list[Expression]]
 Place = tuple[int, int]
@@ -162,12 +161,16 @@ def back_substitute(step: Step, known: Mapping[int, Expression]) -> Expression:
 
 def minimum_degree(places: Sequence[Place], size: int, first: Sequence[int] = ()) -> list[int]:
     """Return an order of elimination that adds few entries: always the unknown with the fewest neighbours."""
+    from atwood.numerics.body_order import by_least, neighbours_of
+
     around, preferred = neighbours_of(places, size), set(first)
     return list(by_least(around, lambda i: (len(around[i]), i not in preferred, -i)))
 
 
 def fill_of(places: Sequence[Place], order: Sequence[int]) -> int:
     """Return the number of products that an elimination takes."""
+    from atwood.numerics.body_order import eliminated, neighbours_of
+
     around = neighbours_of(places, len(order))
     sizes = (len(eliminated(around, p)) for p in order)
     return sum(size * (size + 7) // 2 for size in sizes)

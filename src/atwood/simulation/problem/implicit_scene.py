@@ -5,6 +5,7 @@ from __future__ import annotations
 import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from atwood.codegen.sundials.null_space import (
     NullSpaceShape,
     compile_null_space_callbacks,
 )
+from atwood.codegen.sundials.residuals import Callbacks, UserData
 from atwood.forms.program import FormProgram
 from atwood.forms.residuals import NullSpaceProgram
 from atwood.integrators.protocol import LinearSolver, NativeCallbacks
@@ -37,6 +39,12 @@ def compile_null_space(program: NullSpaceProgram, linear_solver: LinearSolver) -
         null_space_shape(program),
         sparse=linear_solver == "sparse",
     )
+
+
+def native_callbacks(code: Callbacks, data: UserData, **more: Any) -> NativeCallbacks:
+    """Return functions of IDA's with what they are given."""
+    addresses = code.residual_address, code.jacobian_address, data.address, code.weights_address
+    return NativeCallbacks(*addresses, data.set_weights, keep=(code, data), data_bytes=data.bytes, **more)
 
 
 @dataclass
@@ -72,17 +80,7 @@ class CompiledNullSpace:
         def attend(t: float, y: FloatArray) -> bool | None:
             return review(t, y) if data.take_attention() else None
 
-        return NativeCallbacks(
-            code.residual_address,
-            code.jacobian_address,
-            data.address,
-            code.weights_address,
-            data.set_weights,
-            attend=attend,
-            last_rate=lambda: data.rate,
-            keep=(code, data),
-            data_bytes=data.bytes,
-        )
+        return native_callbacks(code, data, attend=attend, last_rate=lambda: data.rate)
 
     def choose(self, places: tuple[int, ...], speeds: tuple[int, ...]) -> None:
         """Make other displacements and speeds the dependent ones, in all sessions."""

@@ -327,6 +327,8 @@ class SceneProblem:
 
     def compiled(self, linear_solver: LinearSolver) -> NativeCallbacks:
         """Return residual and Jacobian as machine code, for one session."""
+        from atwood.simulation.problem.implicit_scene import native_callbacks
+
         program = self._present
         code = self.assembly.shared.get(
             _IDA,
@@ -343,16 +345,7 @@ class SceneProblem:
             program,
             linear_solver,
         )
-        data = code.bind(self.values)
-        return NativeCallbacks(
-            code.residual_address,
-            code.jacobian_address,
-            data.address,
-            code.weights_address,
-            data.set_weights,
-            keep=(code, data),
-            data_bytes=data.bytes,
-        )
+        return native_callbacks(code, code.bind(self.values))
 
     @property
     def angles(self) -> tuple[int, ...]:
