@@ -134,6 +134,14 @@ def test_what_exponentials_divide_is_at_rest_where_these_are_large(solver: str, 
         assert result["mass.displacement"][-1] == pytest.approx(place, abs=2e-5)
 
 
+@pytest.mark.parametrize("solver", ["explicit", "ida"])
+@pytest.mark.parametrize("width", [1e-9, 1e-8])
+def test_a_roof_with_corners_is_crossed_however_narrow(width: float, solver: str) -> None:
+    result = simulate(on_a_line(f"0.4*max(0, 1 - abs(x - 1.5)/{width})"), solver=solver, outputs=2)
+    assert result["mass.speed"][-1] == pytest.approx(1.0, abs=1e-5)
+    assert result["mass.displacement"][-1] == pytest.approx(10.0, abs=1e-4)
+
+
 def test_a_force_that_dies_away_slowly_beside_its_peak_is_felt() -> None:
     expected = 1e-3 * (math.atan(7e3) + math.atan(3e3))  # the integral of 1/(1 + s^2)
     for solver in PLAIN:

@@ -28,6 +28,9 @@ _ROUNDING = 64.0 * float(np.finfo(np.float64).eps)
 _AHEAD = 1e-8, 1e-5
 """Of the scene's time: so far ahead it is seen to which side a difference goes, farther where it hardly moves."""
 
+_NEARER = 1e-10, 1e-12
+"""So far ahead where it seems to come back: a steep law may have turned the motion by then."""
+
 
 @dataclass(frozen=True, eq=False)
 class Found:
@@ -70,20 +73,23 @@ def find_sides(
     if not near:
         return Found(values, frozenset())
     passed = tuple(reader.other(i, before[i], differences[i]) if i in changed else x for i, x in enumerate(values))
-    stuck: list[int] = []
-    for share in _AHEAD:
+
+    def look(share: float) -> tuple[tuple[float, ...], list[int], list[int]]:
         tried = [passed]
         while True:
             ahead, undecided = _ahead(plan, reader, (t, q, u), tried[-1], near, share * plan.scales.time)
             stuck = undecided or [i for i in near if ahead[i] != tried[-1][i]]
             if undecided or ahead in tried:
-                break
+                return ahead, stuck, undecided
             tried.append(ahead)
-        if not stuck:
-            return Found(ahead, frozenset())
+
+    for share in _AHEAD:
+        ahead, stuck, undecided = look(share)
         if not undecided:
             break
-    return Found(values, frozenset(stuck))
+    nearer = (look(share) for share in _NEARER if stuck and not undecided)
+    ahead, left = next(((there, again) for there, again, _ in nearer if not again), (ahead, stuck))
+    return Found(values if left else ahead, frozenset(left))
 
 
 def _ahead(
