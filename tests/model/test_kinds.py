@@ -47,7 +47,7 @@ def described(one: Any, open_: tuple[int, ...] = ()) -> Iterator[str]:
 
 def made(assembly: Assembly) -> tuple[Any, ...]:
     mechanism = assembly.mechanism
-    parts = {path: list(described(local)) for path, local in mechanism.locals_.items()}
+    parts = {path: [sorted(local.unread), *described(local)] for path, local in mechanism.locals_.items()}
     values = [(symbol.index, value) for symbol, value in mechanism.table.values.items()]
     return mechanism.table.graph.plain(), values, parts
 

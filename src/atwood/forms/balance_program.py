@@ -85,7 +85,7 @@ class RatesProgram:
 
 def balance_program(name: str, equations: Equations, parameters: Collection[Expression]) -> BalanceProgram:
     """Return the balance of forces of a set of equations."""
-    at_rest = dict.fromkeys(equations.accelerations, 0.0)
+    at_rest, start = dict.fromkeys(equations.accelerations, 0.0), len(equations.graph)
     inputs, known = state_groups(equations), tuple(parameters)
     mass, product = SparseMatrix((), (), ()), None
     if equations.forest.form == "reduced" and is_too_long(equations.rows, equations.accelerations):
@@ -108,6 +108,7 @@ def balance_program(name: str, equations: Equations, parameters: Collection[Expr
         OutputGroup("jacobian", tuple(constraint_jacobian.entries)),
         OutputGroup("explicit_rate", tuple(substitute(rates, still))),
     )
+    equations.graph.forget(start)
     return BalanceProgram(
         Program(f"{name} balance", inputs, known, outputs),
         np.asarray(mass.rows, dtype=np.intp),

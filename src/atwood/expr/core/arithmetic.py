@@ -85,9 +85,9 @@ def _known_together(a: Expression, b: Expression) -> Expression | None:
     known_a, known_b = _known_term(a), _known_term(b)
     if known_a is not None and known_b is not None:
         return subtract(_other(a, known_a), _other(b, known_b)) if known_a is known_b else None
-    if known_a is not None and b.is_parametric:
+    if known_a is not None and not b.reads:
         return subtract(_other(a, known_a), subtract(b, known_a))
-    if known_b is not None and a.is_parametric:
+    if known_b is not None and not a.reads:
         return subtract(subtract(a, known_b), _other(b, known_b))
     return None
 
@@ -105,9 +105,9 @@ def _from_origin(a: Expression, b: Expression) -> Expression:
     """
     for one, other in ((a, b), (b, a)):
         term = _origin_term(one)
-        if term is not None and not other.is_parametric:
+        if term is not None and other.reads:
             return a.graph.node("add", (term, add(_other(one, term), other)))
-        if one.operation == "sub" and one.arguments[1].is_parametric and not other.is_parametric:
+        if one.operation == "sub" and not one.arguments[1].reads and other.reads:
             return a.graph.node("sub", (add(one.arguments[0], other), one.arguments[1]))
     return a.graph.node("add", _in_order(a, b))
 
@@ -117,10 +117,10 @@ def _apart_from_origin(a: Expression, b: Expression) -> Expression | None:
     term = _origin_term(a)
     if term is not None and _known_term(b) is None:
         return a.graph.node("add", (term, subtract(_other(a, term), b)))
-    if a.operation != "sub" or not a.arguments[1].is_parametric:
+    if a.operation != "sub" or a.arguments[1].reads:
         return None
     place, known = a.arguments
-    if b.is_parametric:
+    if not b.reads:
         return subtract(place, add(known, b))
     term = _origin_term(b)
     return None if term is None else subtract(subtract(place, _other(b, term)), add(known, term))
@@ -128,9 +128,9 @@ def _apart_from_origin(a: Expression, b: Expression) -> Expression | None:
 
 def _known_term(total: Expression) -> Expression | None:
     """Return the term of a sum of two that is known and no constant, if the other is not known."""
-    if total.operation != "add" or total.is_parametric:
+    if total.operation != "add" or not total.reads:
         return None
-    return next((one for one in total.arguments if one.is_parametric and not one.is_constant), None)
+    return next((one for one in total.arguments if not one.reads and not one.is_constant), None)
 
 
 def _other(total: Expression, term: Expression) -> Expression:
@@ -228,13 +228,13 @@ def multiply(a: Expression, b: Expression) -> Expression:
         return negate(multiply(a.arguments[0], b))
     if a is b and a.operation == "sqrt":
         return a.arguments[0]
-    if a.operation == b.operation == "exp" and a is not b and not a.is_parametric and not b.is_parametric:
+    if a.operation == b.operation == "exp" and a is not b and a.reads and b.reads:
         power = add(a.arguments[0], b.arguments[0])  # one factor may be too large for a number where the product is not
         if power.operation == "constant":
             return graph.constant(ON_FLOATS["exp"](power.payload))
         return graph.node("exp", (power,))
-    if a.is_parametric != b.is_parametric:
-        known, other = (a, b) if a.is_parametric else (b, a)
+    if (not a.reads) != (not b.reads):
+        known, other = (b, a) if a.reads else (a, b)
         inner, rest = _parametric_factor(other)
         if inner is not None:
             return multiply(multiply(known, inner), rest)
@@ -282,11 +282,11 @@ def _in_order(a: Expression, b: Expression) -> tuple[Expression, Expression]:
 
 def _parametric_factor(a: Expression) -> tuple[Expression | None, Expression]:
     """Return a product as its factor that depends on parameters alone and the rest; None if it has no such factor."""
-    if a.operation == "mul" and not a.is_parametric:
+    if a.operation == "mul" and a.reads:
         p, q = a.arguments
-        if p.is_parametric:
+        if not p.reads:
             return p, q
-        if q.is_parametric:
+        if not q.reads:
             return q, p
     return None, a
 

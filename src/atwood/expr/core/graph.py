@@ -64,20 +64,17 @@ class Expression:
         :class:`~atwood.expr.core.operations.ExternalFunction`; otherwise ``None``.
     index
         The position in order of creation.
-    is_parametric
-        Whether it depends on constants and parameters alone, so that it is computed once a run.
     reads
         A bit for each kind of symbols that it depends on, of which parameters are none; see `Graph`.
     """
 
-    __slots__ = ("arguments", "graph", "index", "is_parametric", "operation", "payload", "reads")
+    __slots__ = ("arguments", "graph", "index", "operation", "payload", "reads")
 
     graph: Graph
     operation: str
     arguments: tuple[Expression, ...]
     payload: Any
     index: int
-    is_parametric: bool
     reads: int
 
     def __init__(
@@ -87,7 +84,6 @@ class Expression:
         arguments: tuple[Expression, ...],
         payload: Any,
         index: int,
-        is_parametric: bool,
         reads: int,
     ) -> None:
         self.graph = graph
@@ -95,8 +91,12 @@ class Expression:
         self.arguments = arguments
         self.payload = payload
         self.index = index
-        self.is_parametric = is_parametric
         self.reads = reads
+
+    @property
+    def is_parametric(self) -> bool:
+        """Whether it depends on constants and parameters alone, so that it is computed once a run."""
+        return not self.reads
 
     @property
     def is_constant(self) -> bool:
@@ -213,14 +213,14 @@ class RenamedNode(NamedTuple):
         Places of its arguments, among nodes that are there and those before it in its record.
     payload
         As of a node; of a symbol what stands before and after the name.
-    is_parametric
-        Whether it depends on constants and parameters alone.
+    reads
+        As of a node.
     """
 
     operation: str
     arguments: tuple[int, ...]
     payload: Any
-    is_parametric: bool
+    reads: int
 
 
 class Graph:
@@ -352,15 +352,17 @@ class Graph:
 
     def renamed(self, foreign: Sequence[Expression], record: Sequence[RenamedNode], name: str) -> Sequence[Expression]:
         """Return nodes that are there, and after them nodes of a record with another name, made where they are not."""
-        found, table = list(foreign), self._table
-        for operation, places, payload, is_parametric in record:
+        check_time()
+        found, table, nodes = list(foreign), self._table, self.nodes
+        for operation, places, payload, reads in record:
             arguments = tuple([found[place] for place in places])
             if operation == "symbol":
                 payload = payload[0] + name + payload[1]
             key = arguments if payload is None else _key(arguments, payload)
             node = table[operation].get(key)
             if node is None:
-                node = self._insert(key, operation, arguments, payload, is_parametric)
+                node = table[operation][key] = Expression(self, operation, arguments, payload, len(nodes), reads)
+                nodes.append(node)
             found.append(node)
         return found
 
@@ -374,15 +376,15 @@ class Graph:
     ) -> Expression:
         if not len(self.nodes) % _LOOK:
             check_time()
-        known, reads = is_parameter or operation == "constant" or bool(arguments), 0
+        reads = 0
         for argument in arguments:
-            if not argument.is_parametric:
-                known = False
-                reads |= argument.reads
-        if operation == "symbol" and not known:
+            reads |= argument.reads
+        if operation == "symbol" and not is_parameter:
             kinds = self._kinds
             reads = 1 << kinds.setdefault(payload.partition(":")[0] if ":" in payload else "", len(kinds)) % KINDS
-        created = Expression(self, operation, arguments, payload, len(self.nodes), known, reads)
+        elif operation == "external" and not arguments:
+            reads = 1  # it may be another number each time
+        created = Expression(self, operation, arguments, payload, len(self.nodes), reads)
         self._table[operation][key] = created
         self.nodes.append(created)
         return created

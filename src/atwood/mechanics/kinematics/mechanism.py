@@ -233,15 +233,12 @@ def sizing_parameters(mechanism: Mechanism) -> Iterator[tuple[str, str, float]]:
     """
     sources = {path for path, _ in mechanism.links.values()}
     for path, local in mechanism.locals_.items():
-        bodies = {mechanism.bodies.body_of[mechanism.graph.node_of[path, name]] for name in local.connectors}
-        if bodies == {0}:
-            continue  # where the ground is says nothing about the size of what moves
-        for name, spec in local.part.component.parameter_specs().items():
-            is_length = spec.unit.exponents == (0, 1, 0, 0) and not spec.place
-            if not is_length or local.part.values[name] is None:
-                continue
-            if path in sources or name not in local.unread:
-                yield path, name, spec.default if spec.unit_length else 0.0
+        specs, values = local.part.component.parameter_specs(), local.part.values
+        lengths = [n for n, one in specs.items() if one.unit.exponents == (0, 1, 0, 0) and not one.place]
+        read = [name for name in lengths if values[name] is not None and (path in sources or name not in local.unread)]
+        if read and {mechanism.bodies.body_of[mechanism.graph.node_of[path, name]] for name in local.connectors} != {0}:
+            for name in read:  # where the ground is says nothing about the size of what moves
+                yield path, name, specs[name].default if specs[name].unit_length else 0.0
 
 
 def check_closures(mechanism: Mechanism) -> None:

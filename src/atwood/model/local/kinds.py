@@ -77,7 +77,7 @@ class Kinds:
         local = read_laws(part)
         record = None if local.binding.asked else take_down(local, graph, start)
         if record is not None and seen and seen[-1] == record:
-            self._writers[kind] = record.writer(graph)
+            self._writers[kind] = record.writer(graph, local.unread)
         seen.append(record)
         return local
 

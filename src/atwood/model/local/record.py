@@ -76,12 +76,13 @@ class Record:
     def _told(self) -> tuple[object, ...]:
         return self.foreign, self.nodes, self.mentioned, self.tree
 
-    def writer(self, graph: Graph) -> Callable[[Part], LocalPart]:
-        """Return what writes the same down for another part."""
+    def writer(self, graph: Graph, unread: frozenset[str]) -> Callable[[Part], LocalPart]:
+        """Return what writes the same down for another part, which reads the same of its parameters."""
         build, foreign, nodes = _Writer(self, graph).function(), self.foreign, self.nodes
 
         def write(part: Part) -> LocalPart:
             found: LocalPart = build(part, part.component, part.path, graph.renamed(foreign, nodes, part.path))
+            vars(found)["unread"] = unread
             return found
 
         return write
@@ -177,7 +178,7 @@ def _nodes_of(
             node.operation,
             tuple([numbers[one.index] for one in node.arguments]),
             _around(node.name, path) if node.is_symbol else node.payload,
-            node.is_parametric,
+            node.reads,
         )
         for node in own.values()
     ]
