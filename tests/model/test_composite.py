@@ -71,6 +71,7 @@ REFUSED = {
     "unlike": (aw.ConnectError, lambda s: s.connect(s.bar.a, Wheel().groove), "not in this model"),
     "no connector": (aw.ConnectError, lambda s: s.connect(s.bar, s.hook), "Name one of its connectors: a, b, hooks"),
     "a name": (aw.ConnectError, lambda s: s.connect("bar.a", "hook.frame"), "no connector"),
+    "a signal": (aw.ConnectError, lambda s: s.connect(s.bar.length, s.hook.frame), r"signals as table\.output"),
     "an array of connectors": (aw.ConnectError, lambda s: s.connect(s.bar.hooks, s.hook.frame), "hooks\\[0\\]"),
     "part of another": (aw.ConnectError, lambda s: s.connect(Bar(length=1.0).a, s.bar.b), "Add the part first"),
     "connector of a class": (aw.ConnectError, lambda s: s.connect(Pendulum.top, s.bar.b), "another class"),

@@ -95,7 +95,7 @@ def _check_is_end(end: Any, where: str) -> None:
             advice=f"Connect its elements one by one, as in {name}[0]; in a method build(self) if their number varies.",
         )
     if not isinstance(end, (Connector, ConnectorSpec, InputRef, OutputRef)):
-        advice = "Connect things like rod.a or mass.point."
+        advice = "Connect things like rod.a or mass.point; signals as table.output('value') and drive.input('motion')."
         if isinstance(end, Component):
             where = end.path or where
             advice = f"Name one of its connectors: {', '.join(end.connector_specs())}."
