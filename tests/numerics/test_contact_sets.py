@@ -77,6 +77,18 @@ def test_what_was_there_before_is_kept_where_several_sets_fit() -> None:
         assert found.states == one.states
 
 
+def test_gaps_that_open_together_are_not_held_closed_by_a_load_elsewhere() -> None:
+    """The ends of a beam on a hinge, both from floors that fall away; they were closed with accelerations of 1."""
+    response, shares = np.array([[1.0, -1.0, 0.0], [-1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), np.zeros((3, 3))
+    units = tuple(Unit((k,), False, (0.0,), -1) for k in range(3))
+    limits = Limits(np.zeros(3), shares, np.zeros(3), shares)
+    closed = [(STICKS, (0.0,))] * 3
+    found = find_states(Contacts(response, np.array([1.0, 1.0, -1.0]), units, limits), closed)
+    assert found is not None
+    assert [state for state, _ in found.states] == [OPEN, OPEN, STICKS]
+    assert not found.is_redundant
+
+
 def places_on_one_body(seed: int, count: int) -> Contacts:
     """Return gaps with friction in space below one rigid body on a floor: more rows than it has velocities."""
     chance = np.random.default_rng([seed, count])

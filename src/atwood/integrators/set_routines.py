@@ -8,7 +8,7 @@ A program gives rates, accelerations, responses and limits, and the speeds chang
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from math import inf, sqrt
 
@@ -353,6 +353,12 @@ def _least() -> Routine:
     return r
 
 
+def _copy_states(r: Routine, m: Sets, target: str, source: str) -> None:
+    """Copy the states of all units, with their directions."""
+    for one in ("", "_x", "_y"):
+        r.copy(m.unit(f"{target}{one}"), m.unit(f"{source}{one}"), m.count)
+
+
 # -- sets -----------------------------------------------------------------------------------------------------------
 
 
@@ -503,6 +509,7 @@ def _contradiction() -> Routine:
 def _check_gap(r: Routine, m: Sets, worst: _Worst, k: Value, f: Value, a: Value, static: Value) -> None:
     with r.when(m.unit("next")[k] == float(STICKS)):
         worst.consider(k, 0.0 - f - static, OPEN)
+        worst.consider(k, a, OPEN)  # rows that depend on each other cannot all stick
     worst.consider(k, 0.0 - a, STICKS)
 
 
@@ -598,11 +605,9 @@ def _find() -> Routine:
                 r.give(1)
             r.copy(after, m.row("motions"), m.size)
             some.now, m.shared = True, 1
-            for name in ("", "_x", "_y"):
-                r.copy(m.unit(f"found{name}"), m.unit(f"next{name}"), m.count)
+            _copy_states(r, m, "found", "next")
     with r.when(some.now):
-        for name in ("", "_x", "_y"):
-            r.copy(m.unit(f"next{name}"), m.unit(f"found{name}"), m.count)
+        _copy_states(r, m, "next", "found")
         r.give(r.call("meet_states", r.arguments[0]))
     r.call("relax", r.arguments[0])
     r.give(r.call("improve", r.arguments[0]))
@@ -758,7 +763,7 @@ def _share() -> Routine:
     """Let all rest, or let go what need not hold, where nothing determines forces; see `find_states` and `_shared`."""
     r, m, (rests,) = _open("share_forces", {"rests": INTEGER})
     place, state, repeats = r.arguments[0], m.unit("next"), r.variable(m.repeats, INTEGER)
-    names, small = ("", "_x", "_y"), _small_motion(r, m)
+    small = _small_motion(r, m)
     goes, moves = r.variable(False, BOOLEAN), r.variable(False, BOOLEAN)
     with _each(r, m, "chosen") as (k, row, is_pair), r.when(m.unit("given")[k] == 0.0):
         is_moved = _size_of_slip(r, row, is_pair, m.row("motions"))[2] > small
@@ -766,8 +771,7 @@ def _share() -> Routine:
     tries = r.variable(goes.now & (rests != 0), BOOLEAN)
     with r.when(~tries.now & (repeats.now == 0)):
         r.give(0)
-    for name in names:
-        r.copy(m.unit(f"found{name}"), m.unit(f"next{name}"), m.count)
+    _copy_states(r, m, "found", "next")
     with r.when(tries.now):
         with _each(r, m, "chosen") as (k, _, _), r.when(m.unit("given")[k] == 0.0):
             state[k], m.unit("next_x")[k], m.unit("next_y")[k] = float(STICKS), 0.0, 0.0
@@ -777,16 +781,13 @@ def _share() -> Routine:
             m.shared = 1
             with r.when(r.call("let_go", place) == 0):
                 r.give(0)
-        for name in names:
-            r.copy(m.unit(f"next{name}"), m.unit(f"found{name}"), m.count)
+        _copy_states(r, m, "next", "found")
         r.call("meet_states", place)
     with r.when(repeats.now == 0):
         r.give(0)
     with r.when(tries.now & ~moves.now):  # friction that is at its limit may say how the load is shared
         n = r.variable(0, INTEGER)
-        with _each(r, m, "chosen") as (k, _, _), r.when(m.unit("given")[k] == 0.0):
-            m.unit("holds")[n.now] = k.number()
-            n.now = n.now + 1
+        _list(r, m, n, lambda k: m.unit("given")[k] == 0.0)
         r.call("weighted_forces", place)
         with r.when(r.call("is_lawful", place, n.now) == 0):
             r.give(0)
@@ -795,6 +796,13 @@ def _share() -> Routine:
         state[k] = r.choose(is_moved, float(GOES_ON), float(STICKS))
     r.give(r.call("let_go", place) * UNDETERMINED)
     return r
+
+
+def _list(r: Routine, m: Sets, n: Variable, is_one: Callable[[Value], Value]) -> None:
+    """Add chosen units to those that hold, and count them."""
+    with _each(r, m, "chosen") as (k, _, _), r.when(is_one(k)):
+        m.unit("holds")[n.now] = k.number()
+        n.now = n.now + 1
 
 
 def _small_motion(r: Routine, m: Sets) -> Value:
@@ -819,10 +827,8 @@ def _let_go() -> Routine:
         with _rows(r, m, k) as (_, i):
             most.now = r.most(response[i * m.size + i], most.now)
         state[k] = r.choose(most.now > top.now * NOTHING, float(STICKS), float(OPEN))  # joints hold it
-    for is_slip in (1.0, 0.0):
-        with _each(r, m, "chosen") as (k, _, _), r.when((m.unit("slip")[k] == is_slip) & (state[k] == float(STICKS))):
-            holds[n.now] = k.number()
-            n.now = n.now + 1
+    _list(r, m, n, lambda k: (m.unit("slip")[k] == 1.0) & (state[k] == float(STICKS)))
+    _list(r, m, n, lambda k: (m.unit("slip")[k] == 0.0) & (state[k] == float(STICKS)))
     least = r.variable(r.call("rank_of_rows", place, CLEAR, result=INTEGER), INTEGER)
 
     def put(what: int) -> None:

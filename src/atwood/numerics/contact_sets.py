@@ -616,6 +616,7 @@ def _misses(
         yield (-f[0] - static, (OPEN, none)) if state[0] == STICKS else (-a[0], (STICKS, none))
         if state[0] == STICKS:
             yield -a[0], (STICKS, none)
+            yield a[0], (OPEN, none)  # rows that depend on each other cannot all stick
         return
     is_alone = unit.at < 0 and not reads
     if is_alone and max(limit, static) <= 0.0:  # nothing is pressed
@@ -625,7 +626,7 @@ def _misses(
         size = math.hypot(*f)
         way = tuple(-x / size for x in f) if size else (1.0, *none[1:])
         yield size - static, (GOES_ON, way)
-        yield math.hypot(*a), (GOES_ON, way)  # rows that depend on each other cannot all stick
+        yield math.hypot(*a), (GOES_ON, way)
         return
     if state[0] == GOES_ON:
         if is_alone:  # at a gap it is negative only where the gap pulls, which is said there

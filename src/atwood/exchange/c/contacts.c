@@ -119,7 +119,7 @@ static int32_t find_set(scene *s, double t, const double *before, int is_start)
         s->sets[SET_later].f = 0.001 * ahead > bounce ? 0.001 * ahead : bounce;
         s->sets[SET_tried].i = tried;
         code = resolve(s->sets, t, 1, 1);
-        if (code != 0 && (code != UNDETERMINED || tried > 0)) return code;
+        if ((code != 0 && (code != UNDETERMINED || tried > 0)) || tried == 500) return code != 0 ? code : UNDETERMINED;
         if (code == 0) {
             if (s->sets[SET_shared].i == 0 || s->sets[SET_tried].i != 0) return code;
             states_after(s, after);

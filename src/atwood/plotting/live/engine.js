@@ -251,7 +251,8 @@ function openMode(mode, options) {
     if (isStart) touch.past = [];
     touch.past.flat().forEach((x, i) => { M[touch.impacts + i] = x; });
     const ahead = 10 * Math.sqrt(options.rtol) * data.time, rough = Math.max(ahead, 0.01 * data.time);
-    set({known: touch.past.length, inside: isStart ? 1 : Math.max(1, HELD / near), ahead, rough});
+    const later = Math.max(0.001 * ahead, 2 ** -23 * data.time); // or two bounces that rounding makes
+    set({known: touch.past.length, inside: isStart ? 1 : Math.max(1, HELD / near), ahead, rough, later});
     M.set(state, y);
     const code = functions.resolve(touch.sets, t, 1, 1), at = name => M[touch.sets + SETS[name]];
     if (code !== 0) {
