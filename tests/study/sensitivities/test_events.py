@@ -19,7 +19,7 @@ from atwood import (
     simulate,
 )
 from atwood_library import Force, Ground, PointContact, PointMass, Pulse, Rod, Rope, Sine
-from atwood_library.scenes import BouncingBall, CartPole, NewtonsCradle, RockingBlock, StickSlip, Woodpecker
+from atwood_library.scenes import BouncingBall, CartPole, Clutches, NewtonsCradle, RockingBlock, StickSlip, Woodpecker
 
 
 def slack_rope():
@@ -171,3 +171,18 @@ def test_of_a_bounce():
 def test_where_there_are_none(make, given, t_end, said):
     with pytest.raises(SolveError, match=said):
         sensitivities(make(), **given, t_end=t_end)
+
+
+def test_functions_that_a_scene_makes_anew_do_not_shape_its_equations():
+    """A library scene whose torques are functions was refused: each time it is built they are other objects."""
+    paths = [f"rotor{i}.angular_velocity" for i in (1, 4)]
+    found = sensitivities(Clutches(), paths, parameters=["moment"], t_end=2.0)
+    runs = [simulate(Clutches(moment=1.0 + by), t_end=2.0, rtol=1e-12, outputs=[0.0, 2.0]) for by in (1e-6, -1e-6)]
+    for path in paths:
+        known = (runs[0][path][-1] - runs[1][path][-1]) / 2e-6
+        assert found[path, "moment"][-1] == pytest.approx(known, abs=1e-7)
+    other = assemble(Clutches()).with_values({"drive": 11.0})  # which one of these functions reads
+    assert "motor.value is a function" in other.why_new
+    assert simulate(other, t_end=0.3)["rotor1.angular_velocity"][-1] != pytest.approx(
+        simulate(Clutches(), t_end=0.3)["rotor1.angular_velocity"][-1], abs=1e-3
+    )
