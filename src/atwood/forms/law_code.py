@@ -18,8 +18,8 @@ _CONSTANT = {
 """Modules whose names nobody binds anew; of any other, a law may read what changes."""
 
 
-def law_code(classes: Iterable[type]) -> list[Any] | None:
-    """Return code and values that laws are written with, to be compared; None where one may change and stay the same.
+def law_code(classes: Iterable[type | FunctionType]) -> list[Any] | None:
+    """Return code and values that laws of classes, or functions, are written with; None where one may change unseen.
 
     Atwood's own classes and functions are taken to stay as they are.
     """

@@ -47,6 +47,14 @@ def is_loose(assembly: Assembly) -> bool:
     return assembly.kept.get(_LOOSE, find)
 
 
+def in_no_contact(assembly: Assembly) -> Assembly:
+    """Return a scene in which nothing touches, slips or sticks."""
+    held = list(assembly.held_now)
+    for place in _states(assembly):
+        held[place] = 0.0
+    return assembly.with_held(held)
+
+
 def kept_touching(assembly: Assembly) -> Assembly:
     """Return a scene in which nothing touches, slips or sticks, with the programs for all states."""
     if not is_loose(assembly):

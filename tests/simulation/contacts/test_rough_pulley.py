@@ -120,3 +120,17 @@ def test_an_end_that_reaches_the_pulley_ends_the_run() -> None:
     result = simulate(capstan((1.0, 3.0), speed=2.0, friction=0.2), t_end=5.0)
     assert result.events[-1].message == "an end of the rope has reached the pulley"
     assert result["a.position.z"][-1] == pytest.approx(0.0, abs=1e-5)
+
+
+@FORMS
+def test_a_free_pulley_without_mass_is_named(form: str) -> None:
+    """It was said that the rope's reaction has no value, and to look whether points coincide."""
+    scene = Scene(space="plane")
+    pulley, rope = scene.add("pulley", Pulley()), scene.add("rope", RoughPulley(length=3.0))
+    scene.connect(pulley.groove, rope.over)
+    scene.guess.update({"pulley.position.x": 0.0, "pulley.position.z": -1.0})
+    for name, end, depth in (("a", rope.a, -2.0), ("b", rope.b, -3.0)):
+        scene.connect(scene.add(name, PointMass(mass=1.0)).point, end)
+        scene.guess.update({f"{name}.position.x": 0.0, f"{name}.position.z": depth})
+    with pytest.raises(aw.StartError, match=r"^pulley: something without inertia .* along pulley\.position\.x"):
+        simulate(scene, form=form, t_end=0.1)

@@ -17,7 +17,7 @@ from atwood.expr import Expression, InputGroup, OutputGroup, Program, Scalar, de
 from atwood.forms.accelerations import accelerations_of
 from atwood.forms.assembly import Assembly
 from atwood.forms.event_program import solved_reactions
-from atwood.forms.loose import kept_touching
+from atwood.forms.loose import in_no_contact, kept_touching
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import find_observables
 from atwood.forms.sides import in_pieces
@@ -35,7 +35,7 @@ from atwood.model.values.space import planar_axes
 from atwood.model.values.units import ALONG
 from atwood.plotting.live.parameters import find_parameters
 from atwood.plotting.live.pulls import PULL, pulls_of
-from atwood.simulation.contacts.compiled import in_no_contact, set_data, why_in_python
+from atwood.simulation.contacts.compiled import set_data, why_in_python
 from atwood.simulation.contacts.values import with_own_sizes
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.reactions import ReactionSolver

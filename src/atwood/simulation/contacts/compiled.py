@@ -12,7 +12,7 @@ from atwood.expr import Program, depends_on, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.constrained import contacts_program
-from atwood.forms.loose import is_loose, kept_touching, loose_equations
+from atwood.forms.loose import in_no_contact, is_loose, kept_touching, loose_equations
 from atwood.integrators import set_routines as sets
 from atwood.integrators.embedded.rates import OwnRates
 from atwood.integrators.set_jumps import EVENTS, SetCode, SetJump, SetJumps, SetLog, SetSolver
@@ -90,14 +90,6 @@ def why_in_python(assembly: Assembly) -> str:
         if depends_on(list(jacobian(limits, own).entries), own):
             return f"the limit of {name} is curved in a force"
     raise AssertionError("no limit is curved, and none reads forces of joints")
-
-
-def in_no_contact(assembly: Assembly) -> Assembly:
-    """Return a scene in which nothing touches, slips or sticks."""
-    held = list(assembly.held_now)
-    for place in (place for places in layout_of(assembly).places for place in places):
-        held[place] = 0.0
-    return assembly.with_held(held)
 
 
 def not_touching(assembly: Assembly) -> bool:

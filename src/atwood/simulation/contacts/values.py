@@ -16,7 +16,7 @@ from atwood.arrays import FloatArray
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, jacobian, read_by, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
-from atwood.forms.loose import state_paths
+from atwood.forms.loose import in_no_contact, state_paths
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import to_maximal
 from atwood.lazy_dataclasses import dataclass, replace
@@ -186,10 +186,7 @@ def with_own_sizes(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -
 
 def without_contacts(assembly: Assembly) -> Balance:
     """Return the balance of forces in maximal coordinates of a scene in which nothing touches, slips or sticks."""
-    held = list(assembly.held_now)
-    for place in (place for places in layout_of(assembly).places for place in places):
-        held[place] = 0.0
-    return balance_of(assembly.with_held(held), "dae")
+    return balance_of(in_no_contact(assembly), "dae")
 
 
 class ContactValues:

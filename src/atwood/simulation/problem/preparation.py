@@ -19,6 +19,7 @@ from atwood.expr import Expression, live
 from atwood.expr.core.program import Program
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
+from atwood.forms.loose import in_no_contact
 from atwood.lazy_dataclasses import replace
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.model.declare.component import bind
@@ -58,9 +59,18 @@ def problem_of_run(
         found = undefined_value_at(assembly, t, q, u)
         if found is None:
             raise
+        if assembly.own_equations.contacts:
+            _check_without_contacts(in_no_contact(assembly), t, q, u, length)
         raise StartError(
             f"{found.describe()}, so that the run cannot start", where=found.part, advice=ADVICE_AT_START
         ) from error
+
+
+def _check_without_contacts(assembly: Assembly, t: float, q: FloatArray, u: FloatArray, length: float) -> None:
+    """Refuse what nothing but gaps and slips would hold, and has no mass: their reactions have no value."""
+    sizes, balance = motion_scales(assembly.own_equations, length), balance_of(assembly, assembly.form)
+    now, kept = balance.at(t, q, u), list(find_rank(balance, t, q, sizes).kept)
+    check_massless_directions(assembly, now, now.jacobian[kept], sizes, (t, q, u))
 
 
 def _make_problem(
