@@ -170,7 +170,7 @@ class Shared:
 _FORMAT = 1
 """Counts changes to what an entry holds."""
 
-SOURCES = ("expr", "forms", "mechanics")
+SOURCES = ("expr", "forms", "mechanics", "numerics")
 """The rooms whose code derives; what other rooms give is read as expressions."""
 
 _PLAIN = 2
