@@ -44,6 +44,6 @@ class Ratchet(Component):
         return between(self)[0] - (self.passed + 1.0) * self.pitch()
 
     @update(at="passes", sets="passed", pure=True)
-    def count(self) -> float:
+    def count(self) -> Scalar:
         """Return how many teeth have passed then."""
-        return float(self.passed) + 1.0
+        return self.passed + 1.0

@@ -15,9 +15,11 @@ from atwood_library import (
     Disc,
     Force,
     Ground,
+    Inertia,
     Link,
     PointContact,
     PointMass,
+    Ratchet,
     RigidBody,
     RotaryDrive,
     Slider,
@@ -159,3 +161,14 @@ def test_c_throws_a_ball_out_of_a_rough_corner(tmp_path: Path) -> None:
     assert found["m.velocity.z"][-1] == pytest.approx(0.5, abs=1e-12)
     worst, where, _ = apart(found, simulate(scene, t_end=1.0, rtol=1e-11, outputs=[0.0, 0.5, 1.0]), assemble(scene))
     assert worst <= 1e-9, where
+
+
+@needs_a_compiler
+def test_c_counts_the_teeth_of_a_ratchet(tmp_path: Path) -> None:
+    """It was refused: the count of teeth was no formula."""
+    scene = Scene()
+    wheel, ratchet = scene.add("wheel", Inertia(moment=0.2)), scene.add("ratchet", Ratchet(teeth=12, against="ground"))
+    scene.connect(wheel.flange, ratchet.b)
+    scene.start.update({"wheel.angle": 0.1, "wheel.angular_velocity": 1.0})
+    found = printed(built(scene, tmp_path, "reduced", ["-O0", *FLAGS[1:]]), 2.0, 1e-11, 3)
+    assert found["ratchet.passed"][-1] == 4.0  # 2.1 rad
