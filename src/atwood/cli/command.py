@@ -21,7 +21,6 @@ from atwood.cli.scenes import pairs
 from atwood.docstrings import documented, first_sentence, without_marks
 from atwood.errors import UsageError
 from atwood.lazy_dataclasses import replace
-from atwood.plotting.canvas import check_picture
 
 SCENE_HELP = """SCENE is the name of a scene of an installed library (see `atwood list`), or FILE.py:NAME, where NAME
 is a Scene class, a scene, or a function that returns one."""
@@ -44,7 +43,13 @@ def written_as(check_file: Callable[[Path], object], word: str = "FILE") -> tupl
     return replace(FILE, read=read, word=word), None
 
 
-PICTURE = written_as(check_picture)
+def _check_picture(file: Path) -> None:
+    from atwood.plotting.canvas import check_picture  # few runs draw
+
+    check_picture(file)
+
+
+PICTURE = written_as(_check_picture)
 """The option of a picture."""
 
 _OR_NONE = ", or None."

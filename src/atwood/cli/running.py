@@ -16,7 +16,6 @@ from atwood.errors import AtwoodError, UsageError
 from atwood.forms.assembly import Assembly
 from atwood.lazy_dataclasses import replace
 from atwood.pipeline import assemble, simulate
-from atwood.plotting.canvas import ANIMATED, SUFFIXES, check_picture
 from atwood.result.result import Result
 from atwood.stages import watching
 
@@ -125,6 +124,7 @@ def _check_results(file: Path) -> None:
 
 
 def _check_drawing(file: Path) -> None:
+    from atwood.plotting.canvas import ANIMATED, SUFFIXES, check_picture
     from atwood.plotting.moving import check_moving
 
     check_moving(file) if file.suffix.lower() in ANIMATED else check_picture(file, (*SUFFIXES, *ANIMATED))
@@ -133,6 +133,7 @@ def _check_drawing(file: Path) -> None:
 def _draw(result: Result, file: Path, view: str | None) -> None:
     """Draw the mechanism at a few times, or moving; the suffix says which."""
     from atwood.plotting import animate, plot_mechanism
+    from atwood.plotting.canvas import ANIMATED
 
     if file.suffix.lower() in ANIMATED:
         animate(result, file, view=view)
