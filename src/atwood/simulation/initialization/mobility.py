@@ -265,7 +265,9 @@ def _sizes_of_inertia(mass: Matrix, sizes: FloatArray) -> FloatArray:
     if not np.any(has):
         return sizes
     even = np.where(has, 1.0 / np.sqrt(np.where(has, own, 1.0)), 0.0)
-    return np.where(has, even, sizes * np.median(even[has] / sizes[has]))
+    ratios, count = np.sort(even[has] / sizes[has]), np.count_nonzero(has)
+    middle = np.mean(ratios[(count - 1) // 2 : count // 2 + 1])  # NumPy's median loads masked arrays, longer than a run
+    return np.where(has, even, sizes * middle)
 
 
 def _massless_directions(assembly: Assembly, moving: FloatArray, state: State) -> StartError:
