@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import functools
+import math
+from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
 import pytest
 from numpy.testing import assert_array_equal
 
-from atwood import Model, Result, Scalar, Scene, potential, simulate
+from atwood import Model, Result, Scalar, Scene, cos, potential, simulate, sin
 from atwood.forms.reassembly import STRUCTURES
-from atwood_library import Ground, PointMass, Spring
+from atwood_library import Force, Ground, PointMass, Spring
 from atwood_library.scenes import SCENES, Chain, DoublePendulum, FourBar, StewartPlatform
 
 SPAN = 0.05
@@ -160,6 +163,105 @@ def test_what_laws_read_by_name_may_change(kind: type[Spring], monkeypatch: pyte
     after = run(hanging(None, kind))
     assert after["mass.acceleration.x"][0] - before["mass.acceleration.x"][0] == pytest.approx(-10.0 * 0.5)
     assert after.assembly.shared is not before.assembly.shared
+
+
+LEFT, MIDDLE, RIGHT, SHAPE = 1.0, 2.0, 1.0, sin
+
+
+class ByPlace(Spring):
+    """A spring whose law reads several numbers, two of which are one object, and a function."""
+
+    @potential
+    def elastic_energy(self) -> Scalar:
+        return 0.5 * (LEFT + 10.0 * MIDDLE + 20.0 * RIGHT) * SHAPE(self.length()) ** 2
+
+
+@pytest.mark.parametrize("changed", [{"LEFT": MIDDLE}, {"SHAPE": cos}])
+def test_what_laws_read_is_compared_place_by_place(changed: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    alone(hanging(None, ByPlace))
+    for name, value in changed.items():
+        monkeypatch.setitem(globals(), name, value)
+    after = run(hanging(None, ByPlace))
+    same(after, alone(hanging(None, ByPlace)))
+
+
+class Setting:
+    """An object that a function reads."""
+
+    rate = 1.0
+
+    def pull(self, t: float) -> float:
+        return self.rate * t
+
+
+SETTING = Setting()
+
+
+def pull_by_global() -> Callable[[float], float]:
+    return lambda t: LEFT * t
+
+
+NUMBERS = {"rate": 10.0}
+
+
+def pull_by_table() -> Callable[[float], float]:
+    values = NUMBERS
+    return lambda t: values["rate"] * t
+
+
+def pull_by_places() -> Callable[[float], float]:
+    left, middle, right = LEFT, MIDDLE, RIGHT
+    return lambda t: left * t + middle * t**2 + right * t**3
+
+
+def pull_by_wrapper() -> Callable[[float], float]:
+    rate = LEFT
+    inner = functools.wraps(math.sin)(lambda t: rate * t)
+    return lambda t: inner(t)
+
+
+def pull_by_scene() -> Callable[[float], float]:
+    other = Scene()
+    other.gravity = LEFT
+    return lambda t: other.gravity * t
+
+
+def pull_by_attribute() -> Callable[[float], float]:
+    return lambda t: SETTING.rate * t
+
+
+def pull_by_sign() -> Callable[[float], float]:
+    zero = math.copysign(0.0, 1.5 - LEFT)
+    return lambda t: math.copysign(1.0, zero) * t
+
+
+PULLS = [pull_by_global, pull_by_table, pull_by_places, pull_by_wrapper, pull_by_scene, pull_by_attribute, pull_by_sign]
+
+
+GIVEN = [pull_by_global(), pull_by_table()]
+
+
+@pytest.mark.parametrize("make", [*PULLS, lambda: GIVEN[0], lambda: GIVEN[1], lambda: SETTING.pull])
+def test_functions_of_time_are_compared_by_what_they_give(
+    make: Callable[[], Callable[[float], float]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever they read may change where nobody sees it; what they give is written down as a scene is taken apart."""
+
+    def pulled() -> Scene:
+        scene = hanging(None, Spring)
+        force = scene.add("force", Force(direction="x", value=make()))
+        scene.connect(force.point, scene["mass"].point)
+        return scene
+
+    before = alone(pulled())
+    again = run(pulled())
+    assert again.assembly.shared.family is before.assembly.shared.family
+    monkeypatch.setitem(globals(), "LEFT", MIDDLE)
+    monkeypatch.setitem(NUMBERS, "rate", 30.0)
+    monkeypatch.setattr(SETTING, "rate", 3.0)
+    after = run(pulled())
+    same(after, alone(pulled()))
+    assert after["mass.acceleration.x"][-1] != before["mass.acceleration.x"][-1]
 
 
 def test_a_law_may_be_changed_in_place(monkeypatch: pytest.MonkeyPatch) -> None:

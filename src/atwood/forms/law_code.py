@@ -18,22 +18,24 @@ _CONSTANT = {
 """Modules whose names nobody binds anew; of any other, a law may read what changes."""
 
 
-def law_code(classes: Iterable[type | FunctionType]) -> list[Any] | None:
-    """Return code and values that laws of classes, or functions, are written with; None where one may change unseen.
+def law_code(classes: Iterable[type]) -> list[Any] | None:
+    """Return code and values that laws are written with, to be compared; None where one may change unseen.
 
     Atwood's own classes and functions are taken to stay as they are.
     """
     found: list[Any] = []
-    seen: set[int] = set()
+    seen: dict[int, int] = {}
     waiting: list[Any] = list(classes)
     while waiting:
         one = waiting.pop()
-        if id(one) in seen or _is_own(one):
-            continue
-        seen.add(id(one))
         if isinstance(one, _PLAIN):
-            found.append((type(one), one))
-        elif isinstance(one, (tuple, list, dict)):
+            found.append((type(one), repr(one)))  # 0.0 is not -0.0
+            continue
+        if id(one) in seen or _is_own(one):
+            found.append(seen.get(id(one), one if isinstance(one, (type, FunctionType)) else None))
+            continue
+        seen[id(one)] = len(seen)
+        if isinstance(one, (tuple, list, dict)):
             found.append((type(one), len(one)))
             waiting += one
             waiting += one.values() if isinstance(one, dict) else ()

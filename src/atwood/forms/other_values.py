@@ -10,13 +10,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
 from atwood.errors import StartError, UsageError, suggestion, suggestion_in_parts
 from atwood.expr import Expression
 from atwood.forms.caches import Key, Shared
-from atwood.forms.law_code import law_code
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.constraints.values import holds_velocities
 from atwood.mechanics.dynamics.equations import Equations
@@ -130,10 +128,11 @@ def with_values_of(
     if reason or shape is None:
         return None, reason or "not every number can be traced to its place"
     for slot in shape.fixed:
+        steps = [one.parts[slot.part].steps.get(slot.name) if slot.part else None for one in (flat, other)]
+        if all(steps) and steps[0] != steps[1]:
+            return None, f"{slot.path} is a function that gives something else now"
         before, now = slot.read(flat), slot.read(other)
-        if not _is_same(before, now):
-            if isinstance(before, FunctionType) and isinstance(now, FunctionType):
-                return None, f"{slot.path} is a function that is another one, or reads other values, now"
+        if not all(steps) and (any(steps) or not _is_same(before, now)):
             return None, f"{slot.path} was {_shown(before)} and is {_shown(now)}"
     values: dict[Expression, float] = {}
     for symbol, slot in shape.free:
@@ -185,11 +184,7 @@ def _changed_parts(flat: FlatScene, other: FlatScene) -> str:
 
 
 def _is_same(before: Any, now: Any) -> bool:
-    """Return whether values are the same; a function that a scene makes anew is as long as it reads the same."""
-    if before is now or not isinstance(before, FunctionType):
-        return before is now or (type(before) is type(now) and bool(before == now))
-    own = law_code([before])  # empty where it is taken to stay as it is
-    return bool(own) and isinstance(now, FunctionType) and own == law_code([now])
+    return before is now or (type(before) is type(now) and bool(before == now))
 
 
 def _shown(value: Any) -> str:

@@ -6,6 +6,7 @@ import math
 import sys
 import warnings
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import field
 from types import FrameType
 from typing import Any
@@ -20,6 +21,7 @@ from atwood.model.declare.connectors import InputRef, OutputRef
 from atwood.model.declare.fields import LARGEST_ANGLE, FieldReference, too_large_an_angle
 from atwood.model.declare.function_values import Function
 from atwood.model.declare.parameter_expressions import ParameterExpression
+from atwood.model.declare.time_functions import write_function
 from atwood.model.values.space import Space, make_space
 from atwood.model.values.units import Unit, parse_quantity, parse_si_unit, parse_unit, split_quantity, unit_of
 
@@ -38,12 +40,16 @@ class Part:
         Its parameters by name.
     signals
         Its inputs by name: a number, or a function of time.
+    steps
+        Of these functions, by name, the steps that they took when the scene was taken apart; not of those that call an
+        external function.
     """
 
     path: str
     component: Component
     values: Mapping[str, Any]
     signals: Mapping[str, Any]
+    steps: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -175,11 +181,20 @@ def _collect(
             path = part.path
             signals = {name: part._value(name) for name in part.signal_specs()}
             part.check_values()
-            leaves[path] = Part(path, part, part.parameters(), signals)
+            leaves[path] = Part(path, part, part.parameters(), signals, _steps(signals))
     if isinstance(model, Scene):  # after the parts, so that the outer scene has the last word
         for target, given in ((start, model.start), (guess, model.guess)):
             target.update({prefix + key: _number(value, model, key, prefix) for key, value in given.items()})
         symbols |= {prefix + key: letter for key, letter in model.symbols.items()}
+
+
+def _steps(signals: Mapping[str, Any]) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for name, value in signals.items():
+        if callable(value) and not isinstance(value, Function):  # which is compared as it is
+            with suppress(ParameterError):  # it calls an external function, and is like no other
+                found[name] = repr(write_function(value, name))
+    return found
 
 
 def _number(value: Any, model: Model, key: str, prefix: str) -> float:
