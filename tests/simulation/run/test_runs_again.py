@@ -123,7 +123,7 @@ def test_runs_of_several_scenes_at_the_same_time() -> None:
     ("make", "options", "most"),
     [
         (SimplePendulum, {"t_end": 2.0}, 305),
-        (StickSlip, {"t_end": 3.0, "rtol": 1e-10}, 440),
+        (StickSlip, {"t_end": 3.0, "rtol": 1e-10}, 445),
         (DoublePendulum, {"t_end": 2.0, "form": "dae"}, 400),
         (CartPole, {"t_end": 2.0}, 590),
         (Trebuchet, {"t_end": 2.0}, 850),

@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 from atwood import (
     Component,
     DeclarationError,
+    Load,
     Point,
     Scalar,
     Scene,
+    Vector,
     assemble,
     connector,
+    discrete_state,
     event,
     exp,
+    force,
     parameter,
     simulate,
+    sin,
     sweep,
+    update,
 )
 from atwood.simulation.dynamics.scales import scene_length
 from atwood_library import (
@@ -235,3 +244,84 @@ def test_where_a_single_body_floats_says_nothing_of_its_size(solver: str) -> Non
     )
     run = simulate(scene, solver=solver, outputs=2)
     assert run["mass.velocity.x"][-1] == pytest.approx(np.sqrt(np.pi), rel=1e-5)
+
+
+AMPLITUDES = {
+    "sine": (lambda t: sin(3 * t), lambda t: math.sin(3 * t)),
+    "pulse": (lambda t: exp(-(((t - 5) / 0.1) ** 2)), lambda t: math.exp(-(((t - 5) / 0.1) ** 2))),
+}
+"""Forces of time that are nothing at the start, for the equations and as numbers."""
+
+
+@pytest.mark.parametrize("solver", ["explicit", "taylor", "ida"])
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("law", AMPLITUDES)
+def test_a_scene_without_lengths_that_a_force_moves_from_rest_is_as_large_as_its_motion(
+    law: str, form: str, solver: str
+) -> None:
+    symbolic, number = AMPLITUDES[law]
+    exact = quad(lambda t: number(t) * math.sin(7 * (10 - t)) / 7, 0, 10, points=[4.5, 5, 5.5], limit=200)[0]
+    for size in (1e-2, 1e-9):
+        scene = alone(0.0, 49.0)
+        push = scene.add("push", Force(direction=(1.0, 0.0, 0.0), value=lambda t, f=size: f * symbolic(t)))
+        scene.connect(push.point, scene.parts["mass"].flange)
+        run = simulate(scene, solver=solver, form=form, outputs=2)
+        assert run["mass.displacement"][-1] == pytest.approx(size * exact, rel=1e-4)
+        assert 0.0 < run.start.length < size
+
+
+class Push(Component):
+    """A force of time that varies with a parameter."""
+
+    point: Point = connector(Point, "What it pushes.")
+    size: float = parameter(1.0, unit="N", doc="Its largest value.")
+
+    @force
+    def push(self) -> list[Load]:
+        """Return the force."""
+        return [Load(self.point, force=Vector(self.size * sin(3.0 * self.time), 0.0, 0.0))]
+
+
+def pushed(size: float = 1.0) -> Scene:
+    """Return 1 kg at rest in a plane without lengths, which a force moves."""
+    scene = Scene(gravity=0.0, t_end=10.0)
+    mass, push = scene.add("mass", PointMass(mass=1.0)), scene.add("push", Push(size=size))
+    scene.connect(push.point, mass.point)
+    scene.start.update({f"mass.{kind}.{axis}": 0.0 for kind in ("position", "velocity") for axis in "xz"})
+    return scene
+
+
+@pytest.mark.parametrize("until", [None, "mass.velocity.z crosses 1"])
+@pytest.mark.parametrize("outputs", [2, 50])
+def test_runs_of_a_sweep_without_lengths_are_each_as_large_as_their_motion(until: str | None, outputs: int) -> None:
+    sizes = [1.0, 1e-3, 1e-6, 1e-9] * 2
+    options = {"outputs": outputs} | ({"until": until} if until else {})
+    swept = sweep(pushed(), vary={"push.size": sizes}, quantities=["mass.position.x"], **options)
+    exact = 10.0 / 3.0 - math.sin(30.0) / 9.0
+    found = swept.quantities["mass.position.x"]
+    np.testing.assert_allclose(found[:, -1] / sizes, exact, rtol=1e-7)
+    np.testing.assert_array_equal(found[3], simulate(pushed(1e-9), **options)["mass.position.x"])
+
+
+def test_what_moves_little_under_updates_that_are_not_asked_twice_is_told() -> None:
+    class Kept(Component):
+        """Holds a force that was there at its last sample."""
+
+        point: Point = connector(Point, "What it pushes.")
+        held: float = discrete_state(0.0, unit="N", doc="The force.")
+
+        @update(every=1.0, sets=("held",))
+        def sample(self) -> float:
+            return 1e-9
+
+        @force
+        def push(self) -> list[Load]:
+            return [Load(self.point, force=Vector(self.held, 0.0, 0.0))]
+
+    scene = Scene(gravity=0.0, t_end=10.0)
+    mass, kept = scene.add("mass", PointMass(mass=1.0)), scene.add("kept", Kept())
+    scene.connect(kept.point, mass.point)
+    scene.start.update({f"mass.{kind}.{axis}": 0.0 for kind in ("position", "velocity") for axis in "xz"})
+    with pytest.warns(UserWarning, match="without lengths it counts as 1 m large, and moves by 5e-08 m"):
+        simulate(scene)
+    assert simulate(scene, nominal={"mass.position.x": 5e-8}).status == "finished"

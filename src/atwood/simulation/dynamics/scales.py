@@ -8,7 +8,7 @@ from place to place, do not float.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import TypeAlias
 
@@ -27,6 +27,7 @@ from atwood.mechanics.outputs.observables import Observable
 from atwood.model.values.units import ALONG, parse_unit
 from atwood.numerics.matrices import or_one
 from atwood.topology.graph import connected_groups
+from atwood.topology.spanning_forest import Coordinate
 
 Sizes: TypeAlias = "FloatArray | float"
 """Of one scene, or of many."""
@@ -76,25 +77,73 @@ _NO_EXTENT = 1e-12
 def scene_length(assembly: Assembly) -> float:
     """Return the extent of a scene, from its parameters and start values that are lengths.
 
-    Positions of a mechanism far from the world's origin count from where all others do, those of bodies that float far
-    from it from each other. Positions alone that are rounding beside the way that the speeds lead are none. A scene
-    without lengths is as large as that way, or as that of a fall, and 1 m where these are longer or nothing.
+    A scene without lengths is as large as its start speeds lead it, or as a fall does, and 1 m where these are longer
+    or nothing; a run may tell that it is smaller, see `smaller_size`.
     """
-    given, fastest = [], 0.0
+    return own_length(assembly) or float(size_of_way(way_of(assembly, _fastest(assembly))))
+
+
+_OWN_LENGTH: Key[float] = Key("its extent, from what is said of it")
+
+
+def own_length(assembly: Assembly) -> float:
+    """Return the extent of a scene from its parameters and start values that are lengths, m; 0 if these say nothing.
+
+    Positions of a mechanism far from the world's origin count from where all others do, those of bodies that float far
+    from it from each other. Positions alone that are rounding beside the way that the speeds lead are none.
+    """
+    return assembly.kept.get(_OWN_LENGTH, lambda: _own_length(assembly))
+
+
+def _own_length(assembly: Assembly) -> float:
+    given = []
     for path, value in assembly.flat.start.items():
         observable = assembly.start_observables.get(path)
-        if observable is not None and observable.unit == "m/s":
-            fastest = max(fastest, abs(value))
         if observable is not None and observable.unit == "m":
             given.append((observable.value, value - origin_part(assembly, observable)))
     own, farthest = extent(assembly.mechanism), max((abs(at) for _, at in given), default=0.0)
-    way = way_of(assembly, fastest)
-    alone = float(size_of_way(way))
     if farthest > FAR * own:
         near = max(own, spread(assembly, given))
         if farthest > FAR * near:
-            return near or alone
-    return alone if not own and farthest < _NO_EXTENT * way else max(own, farthest) or alone
+            return near
+    is_rounding = not own and farthest < _NO_EXTENT * way_of(assembly, _fastest(assembly))
+    return 0.0 if is_rounding else max(own, farthest)
+
+
+def _fastest(assembly: Assembly) -> float:
+    """Return the largest of the start values that are speeds, m/s."""
+    known = assembly.start_observables
+    fast = (abs(v) for path, v in assembly.flat.start.items() if path in known and known[path].unit == "m/s")
+    return max(fast, default=0.0)
+
+
+TOO_LARGE = 1e-2
+"""A scene without lengths that moves by less than this share of its size is run again with the size of its motion."""
+
+_ROUNDING = 1e-8
+"""Of the largest coordinate: tolerances of a smaller motion are near its rounding."""
+
+
+def smaller_size(length: float, passed: Iterable[tuple[Sequence[Coordinate], FloatArray]]) -> float:
+    """Return the size that a scene without lengths shows by its motion, m; 0 where its size has been right.
+
+    Parameters
+    ----------
+    length
+        The size that it was run with, m.
+    passed
+        Coordinates of stretches of the run: what they are called, and their values, shape (number, samples).
+    """
+    least: dict[str, float] = {}
+    most: dict[str, float] = {}
+    for names, rows in passed:
+        for one, row in zip(names, rows, strict=False):
+            if one.unit == "m":
+                least[one.name] = min(least.get(one.name, np.inf), float(np.min(row)))
+                most[one.name] = max(most.get(one.name, -np.inf), float(np.max(row)))
+    moved = max((most[one] - least[one] for one in most), default=0.0)
+    farthest = max((max(abs(least[one]), abs(most[one])) for one in most), default=0.0)
+    return moved if max(_NO_EXTENT * length, _ROUNDING * farthest) < moved < TOO_LARGE * length else 0.0
 
 
 def way_of(assembly: Assembly, fastest: Sizes) -> Sizes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import partial
 from operator import attrgetter
@@ -28,6 +29,7 @@ from atwood.simulation.dynamics.orientation_coordinates import (
     switch_coordinates,
     to_regular,
 )
+from atwood.simulation.dynamics.scales import own_length, smaller_size
 from atwood.simulation.events.modes import LAST, EventProbe, EventRecord, ToldLater
 from atwood.simulation.events.sampling import Updated, find_sampler
 from atwood.simulation.events.sides import SIDE
@@ -81,6 +83,9 @@ _SURELY = 1e-3
 _CHATTER, _MOST_CONTACTS = 50, 2000
 """So many changes of mode without time passing end a run, and so many of gaps and slips."""
 
+_SIZES_TRIED = 4
+"""A scene without lengths is run so often at most, each time with the size of its motion before."""
+
 _MANY_IMPACTS = 50
 """So many impacts one after the other, while no time passes, are why a run ends."""
 
@@ -95,13 +100,38 @@ def run(
     options = allowed(options)
     clock = Clock(options.max_seconds) if clock is None else clock
 
-    try:
-        with clock.kept(GRACE):
-            walk = _prepared(Walk, assembly, start, reassemble, options, np.zeros(0))
-    except TimeIsUp:
-        return run_out_of_time(assembly, start, options)
-    with clock.kept():
-        return walk.go()
+    for _ in range(_SIZES_TRIED):
+        try:
+            with clock.kept(GRACE):
+                walk = _prepared(Walk, assembly, start, reassemble, options, np.zeros(0))
+        except TimeIsUp:
+            return run_out_of_time(assembly, start, options)
+        with clock.kept():
+            made = walk.go()
+            size = 0.0 if own_length(assembly) else _smaller(made, walk)
+        if not size:
+            break
+        start = replace(start, length=size)
+    return made
+
+
+def _smaller(made: Run, walk: Walk) -> float:
+    """Return the size with which a run is to be made again, m; 0 where it is good, or its sizes were asked for."""
+    assembly, options = made.assembly, made.options
+    known = [assembly.observables[path].unit for path in options.nominal if path in assembly.observables]
+    if "m" in known or options.step is not None or made.status not in ("finished", "stopped"):
+        return 0.0
+    passed = ((one.plan.assembly.own_equations.names, one.coordinates) for one in made.stretches)
+    size = smaller_size(walk.start.length, passed)
+    if size and not walk.sampler.is_pure:  # updates may have a memory, and are not asked twice
+        path = next(path for path, one in assembly.observables.items() if one.unit == "m")
+        warnings.warn(
+            f"{assembly.flat.name}: without lengths it counts as {walk.start.length:.3g} m large, and moves by "
+            f"{size:.3g} m, so that its errors may be as large. Give sizes, such as nominal={{{path!r}: ...}}.",
+            stacklevel=5,
+        )
+        return 0.0
+    return size
 
 
 def choice_at_start(assembly: Assembly, start: Start, options: RunOptions, reassemble: Reassemble) -> Choice:

@@ -147,6 +147,7 @@ class _Batches:
         good = (batch.codes == 0) & np.all(np.isfinite(batch.values), axis=(1, 2))
         if options.solver == AUTO:
             good &= batch.stiff == 0  # what has turned out stiff is made by itself, and may change its solver
+        good &= self.starts.are_right(ready.runs, ready.parameters, lambda: self._moved(ready, batch.values))
         return self._record(ready, batch.values, batch.steps, good, batch.seconds)
 
     def _places(self) -> BatchPlaces:
@@ -173,6 +174,13 @@ class _Batches:
         return _Prepared(runs[good], state[good], None if values is None else values[good], tolerances[good])
 
     # -- after the last step --------------------------------------------------------------------------------------
+
+    def _moved(self, ready: _Prepared, states: FloatArray) -> FloatArray:
+        """Return how far the coordinates that are lengths went in each run, m."""
+        names = self.request.assembly.reduced.names
+        places = [k for k, i in enumerate(self.motion.columns()) if i < len(names) and names[i].unit == "m"]
+        away: FloatArray = np.abs(states - ready.state[:, None])[:, :, places]
+        return np.asarray(np.max(away, axis=(1, 2), initial=0.0))
 
     def _record(
         self, ready: _Prepared, states: FloatArray, steps: NDArray[np.int64], good: NDArray[np.bool_], seconds: float

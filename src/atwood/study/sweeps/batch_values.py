@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from atwood.model.declare.component import Component
 from atwood.model.declare.parameter_expressions import ParameterExpression
 from atwood.model.local.flatten import flatten
 from atwood.pipeline import scene_of
-from atwood.simulation.dynamics.scales import motion_scales, origin_part, size_of_way, way_of
+from atwood.simulation.dynamics.scales import TOO_LARGE, motion_scales, origin_part, size_of_way, way_of
 from atwood.simulation.initialization.many import meet_positions, meet_speeds
 from atwood.simulation.initialization.start import find_start
 from atwood.simulation.initialization.system import Conditions, Level, sort_targets, start_conditions
@@ -279,16 +279,31 @@ class StartRows:
 
     def _extents(self, runs: NDArray[np.intp], parameters: FloatArray | None) -> FloatArray:
         """Return the extent of the scene for each run, as `scene_length` has it."""
+        fastest = np.zeros(len(runs))
+        for given in self._fast:
+            fastest = np.maximum(fastest, np.abs(_of(given, runs)))
+        lengths = self._own_lengths(runs, parameters)
+        return np.where(lengths > 0.0, lengths, size_of_way(way_of(self._request.assembly, fastest)))
+
+    def _own_lengths(self, runs: NDArray[np.intp], parameters: FloatArray | None) -> FloatArray:
+        """Return what parameters and start values that are lengths say of it, as `own_length` has it."""
         assembly = self._request.assembly
         lengths = np.full(len(runs), extent(assembly.mechanism))
         if parameters is not None:
             lengths = _moving_lengths(assembly, parameters)
         for given in self._lengths:
             lengths = np.maximum(lengths, np.abs(_of(given, runs)))
-        fastest = np.zeros(len(runs))
-        for given in self._fast:
-            fastest = np.maximum(fastest, np.abs(_of(given, runs)))
-        return np.where(lengths > 0.0, lengths, size_of_way(way_of(assembly, fastest)))
+        return lengths
+
+    def are_right(
+        self, runs: NDArray[np.intp], parameters: FloatArray | None, moved: Callable[[], FloatArray]
+    ) -> NDArray[np.bool_]:
+        """Return which runs have had the right size by how far their lengths changed, m; see `smaller_size`."""
+        right = self._own_lengths(runs, parameters) > 0.0
+        if not np.all(right):
+            share = moved() / self._extents(runs, parameters)
+            right |= (share == 0.0) | (share >= TOO_LARGE)
+        return right
 
 
 def read_starts(

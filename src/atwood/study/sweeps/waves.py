@@ -114,7 +114,7 @@ class Waves:
         states = [
             _State(run, row, begin, np.concatenate([q[row], u[row]]), first) for row, run in enumerate(runs.tolist())
         ]
-        piece = _Piece(self, lengths, parameters, stop)
+        piece = _Piece(self, np.concatenate([q, u], axis=1), lengths, parameters, stop)
         while states:
             if stop.is_set():
                 return 0
@@ -153,9 +153,16 @@ class Waves:
 class _Piece:
     """Runs that are made together."""
 
-    def __init__(self, waves: Waves, lengths: FloatArray, parameters: FloatArray | None, stop: threading.Event) -> None:
+    def __init__(
+        self,
+        waves: Waves,
+        begun: FloatArray,
+        lengths: FloatArray,
+        parameters: FloatArray | None,
+        stop: threading.Event,
+    ) -> None:
         self.waves, self.request, self.lengths, self.parameters = waves, waves.request, lengths, parameters
-        self.stop = stop
+        self.begun, self.stop = begun, stop
         self.samples: dict[tuple[tuple[str, str], ...], list[_Samples]] = {}
         self.ended: dict[int, tuple[_State, str]] = {}
         self.seconds = 0.0
@@ -309,7 +316,10 @@ class _Piece:
                 many = len(one.t)
                 records.values[:, one.state.run, one.first : one.first + many] = found[:, at : at + many]
                 at += many
-        done = [run for run, is_whole in whole.items() if is_whole]
+        rows = np.array([self.ended[run][0].row for run in whole], dtype=np.intp)
+        parameters, runs = self.parameters, np.array([*whole], dtype=np.intp)
+        right = self.waves.starts.are_right(runs, None if parameters is None else parameters[rows], self._moved)
+        done = [run for run, is_right in zip(whole, right.tolist(), strict=True) if is_right and whole[run]]
         for run in done:
             state, how = self.ended[run]
             records.steps[run] = state.steps
@@ -322,6 +332,19 @@ class _Piece:
             records.seconds += self.seconds
             records.batched += len(done)
         return len(done)
+
+    def _moved(self) -> FloatArray:
+        """Return how far the coordinates that are lengths went in each run that came to an end, m."""
+        found = dict.fromkeys(self.ended, 0.0)
+        for modes, parts in self.samples.items():
+            mode = self.waves.mode(modes, parts[0].state, self)
+            assert mode is not None
+            places = [k for k, one in enumerate(mode.motion.assembly.reduced.names) if one.unit == "m"]
+            for one in parts:
+                if one.state.run in found and one.y.shape[1] == self.begun.shape[1]:
+                    away = np.abs(one.y - self.begun[one.state.row])[:, places]
+                    found[one.state.run] = max(found[one.state.run], float(np.max(away, initial=0.0)))
+        return np.array([*found.values()])
 
     def _read(self, modes: tuple[tuple[str, str], ...], parts: Sequence[_Samples]) -> FloatArray | None:
         mode = self.waves.mode(modes, parts[0].state, self)
