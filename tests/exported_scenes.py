@@ -56,9 +56,9 @@ def printed(program: Path, end: float, rtol: float, points: int, *more: str) -> 
     return dict(zip(head.split(","), rows.T, strict=True))
 
 
-def happened(program: Path, end: float, rtol: float) -> list[tuple[str, str, float]]:
+def happened(program: Path, end: float, rtol: float, outputs: int = 2) -> list[tuple[str, str, float]]:
     """Return what a program says of events: kinds, what they are of, and times."""
-    done = subprocess.run([program, repr(end), repr(rtol), "2", "--events"], capture_output=True, text=True)
+    done = subprocess.run([program, repr(end), repr(rtol), str(outputs), "--events"], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     _, *lines = done.stdout.splitlines()
     texts = [one for line in lines for one in line.split('"')[1].split("; ") if one]

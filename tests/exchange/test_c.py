@@ -21,6 +21,7 @@ from ..exported_scenes import FLAGS, apart, built, compiler, happened, printed
 from ..helpers.tethers import Caught, Loose, Tether
 from ..library.test_slack_ropes import swung, thrown_up
 from ..library.test_tables import hoisted
+from ..simulation.contacts.test_bounces import tilted_box
 from ..simulation.contacts.test_drive_trains import lossy_train
 from ..simulation.test_sides import band, moving
 
@@ -85,6 +86,17 @@ def test_what_happens_in_c_is_what_happens_in_runs(name: str, tmp_path: Path) ->
     assert [one[:2] for one in found] == [one[:2] for one in known]
     assert [one[2] for one in found] == pytest.approx([one[2] for one in known], abs=1e-12)
     assert len(found) == count
+
+
+@needs_a_compiler
+def test_a_rest_that_is_known_ahead_is_told_in_the_order_of_time(tmp_path: Path) -> None:
+    """It came before what happens until then; now it does also where rows are printed in between."""
+    program = built(tilted_box(), tmp_path, "reduced", QUICK)
+    known = [one.kind for one in simulate(tilted_box(), t_end=0.5, rtol=1e-9).events]
+    for outputs in (2, 20_001):
+        found = happened(program, 0.5, 1e-9, outputs)
+        assert [one[0] for one in found] == known
+        assert [one[2] for one in found] == sorted(one[2] for one in found)
 
 
 @needs_a_compiler

@@ -13,6 +13,7 @@ from atwood import Component, Point, Result, Scalar, Scene, connector, external,
 from atwood.clock import check_time
 from atwood.errors import ResultError
 from atwood.expr import ExternalFunction
+from atwood.result.energy import EnergyLedger
 from atwood.result.work import integral_in_steps, integral_of_samples, nodes_between
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run.run_record import Run, run_again, times_of_steps
@@ -143,7 +144,7 @@ def test_swings_that_rounding_hides_are_no_alarm_and_are_said(form: str) -> None
     energy = simulate(hanging(1e-8), form=form, rtol=1e-11, outputs=11).energy
     assert energy.max_drift == 0.0
     assert energy.uncertainty > energy.exchanged
-    assert "leaves open" in repr(energy)
+    assert "which rounding leaves open" in repr(energy)
     assert simulate(hanging(1e-3), rtol=1e-3, outputs=11, solver="explicit").energy.max_drift > 0.01
 
 
@@ -307,6 +308,13 @@ def test_power_that_has_no_value_at_a_sample_is_an_error_and_no_drift_of_zero() 
     result = simulate(scene, t_end=1.0, solver="ida")
     with pytest.raises(ResultError, match="has no value"):
         _ = result.energy
+
+
+def test_what_leaves_a_balance_open_is_said_with_the_error_of_the_work() -> None:
+    """Rounding was said to leave open what the integral of a work does."""
+    flat, end = np.zeros(2), np.array([0.0, 0.1])
+    told = "which rounding and the estimated error of the work leave open by 4.0e-03 J"
+    assert told in EnergyLedger(flat, flat, end, 1.7e-9, 7.0, 4e-3).describe()
 
 
 def test_the_limit_of_a_run_holds_for_making_it_again() -> None:

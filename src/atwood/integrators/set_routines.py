@@ -692,6 +692,13 @@ def _make_square(r: Routine, row: Value, direction: Value, count: Value) -> None
             row[j] = row[j] - share * direction[j]
 
 
+def _alike(m: Sets, k: Value, row: Value) -> Value:
+    """Return how a row of a unit moves by its own force, where lengths and angles are compared; see `sizes_of`."""
+    unit = m.unit("rounding")[k]
+    response: Value = m.result("response")[row * m.size + row]
+    return response / (unit * unit)
+
+
 def _determined() -> Routine:
     """Refuse a set in which shares of forces between parts that nothing determines move something.
 
@@ -705,10 +712,10 @@ def _determined() -> Routine:
     count, left, stride = r.call("contact_equations", place, result=INTEGER), m.left, size + 1
     r.clear(every, every.at(size))
     with _each(r, m, "chosen") as (k, _, _), _rows(r, m, k) as (_, i):
-        top.now = r.most(response[i * size + i], top.now)
+        top.now = r.most(_alike(m, k, i), top.now)
     with _each(r, m, "chosen") as (k, _, _), _rows(r, m, k) as (_, i):
         own = response[i * size + i]
-        every[i] = r.choose(own > top.now * NOTHING, r.sqrt(r.size(own)), 0.0)
+        every[i] = r.choose(_alike(m, k, i) > top.now * NOTHING, r.sqrt(r.size(own)), 0.0)
 
     def scale(row: Value, of: Value) -> None:
         """Divide a row by what its columns are scaled by; zero where joints hold what it is of."""
@@ -819,13 +826,13 @@ def _let_go() -> Routine:
     r, m, () = _open("let_go")
     place, state, holds, gone = r.arguments[0], m.unit("next"), m.unit("holds"), m.unit("gone")
     n, many, tried, last = (r.variable(0, INTEGER) for _ in range(4))
-    response, top, most = m.result("response"), r.variable(0.0), r.variable(0.0)
-    with r.count(m.size) as i:
-        top.now = r.most(response[i * m.size + i], top.now)
+    top, most = r.variable(0.0), r.variable(0.0)
+    with r.count(m.count) as k, _rows(r, m, k) as (_, i):
+        top.now = r.most(_alike(m, k, i), top.now)
     with _each(r, m, "chosen") as (k, _, _), r.when((m.unit("slip")[k] == 1.0) & (state[k] == float(STICKS))):
         most.now = 0.0
         with _rows(r, m, k) as (_, i):
-            most.now = r.most(response[i * m.size + i], most.now)
+            most.now = r.most(_alike(m, k, i), most.now)
         state[k] = r.choose(most.now > top.now * NOTHING, float(STICKS), float(OPEN))  # joints hold it
     _list(r, m, n, lambda k: (m.unit("slip")[k] == 1.0) & (state[k] == float(STICKS)))
     _list(r, m, n, lambda k: (m.unit("slip")[k] == 0.0) & (state[k] == float(STICKS)))
@@ -889,17 +896,18 @@ def _rank() -> Routine:
     """Return how many rows of what sticks are independent."""
     r, m, (least,) = _open("rank_of_rows", {"least": NUMBER}, result=INTEGER)
     acting, response, size, n = m.row("acting"), m.result("response"), m.size, r.variable(0, INTEGER)
-    top, known = r.variable(0.0), r.variable(0, INTEGER)
+    top, known, alike = r.variable(0.0), r.variable(0, INTEGER), m.row("solution")
     with _each(r, m, "chosen") as (k, _, _):
         sticks = (m.unit("next")[k] == float(STICKS)) & ~_is_loose(r, m, k)
         with r.when(sticks), _rows(r, m, k) as (_, row):
             acting[n.now] = row.number()
-            top.now = r.most(response[row * size + row], top.now)
+            alike[row] = _alike(m, k, row)
+            top.now = r.most(alike[row], top.now)
             n.now = n.now + 1
     with r.count(n.now) as i, r.count(n.now) as j:
         a, b = r.truncated(acting[i]), r.truncated(acting[j])
         own, other = response[a * size + a], response[b * size + b]
-        moves = (own > top.now * NOTHING) & (other > top.now * NOTHING)
+        moves = (alike[a] > top.now * NOTHING) & (alike[b] > top.now * NOTHING)
         unit = r.sqrt(r.choose(moves, own, 1.0)) * r.sqrt(r.choose(moves, other, 1.0))
         m.matrix[i * size + j] = r.choose(moves, response[a * size + b] / unit, 0.0)
     with r.count(n.now), r.when(r.call("take_direction", r.arguments[0], n.now, n.now, m.left, least) == 0):

@@ -105,7 +105,8 @@ class Contacts:
     """What is asked of some gaps and slips: A, b, the units and their limits, also those of what goes backwards.
 
     The static limit of a gap is what it bears that is pulled open. Rows that give way, as springs do that are ever so
-    stiff, share a load by that where nothing else determines it; the others have zeros there.
+    stiff, share a load by that where nothing else determines it; the others have zeros there. Rows may be lengths and
+    angles: motions of these sizes are alike.
     """
 
     response: FloatArray
@@ -114,6 +115,7 @@ class Contacts:
     limits: Limits
     backwards: Limits | None = None
     compliance: FloatArray | None = None
+    sizes: FloatArray | float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +151,7 @@ class _Listed:
     units: tuple[Unit, ...]
     sides: tuple[_Side, _Side]
     compliance: FloatArray | None
+    sizes: FloatArray
 
 
 _Side = tuple[list[float], list[list[float]], list[float], list[list[float]]]
@@ -159,7 +162,8 @@ def _listed(contacts: Contacts) -> _Listed:
     ahead, back = _side(contacts.limits), contacts.backwards
     sides = ahead, ahead if back is None else _side(back)
     gives = None if contacts.compliance is None or not contacts.compliance.any() else contacts.compliance
-    return _Listed(contacts.response.tolist(), contacts.free.tolist(), contacts.units, sides, gives)
+    sizes = np.broadcast_to(contacts.sizes, contacts.free.shape)
+    return _Listed(contacts.response.tolist(), contacts.free.tolist(), contacts.units, sides, gives, sizes)
 
 
 def _side(one: Limits) -> _Side:
@@ -272,7 +276,7 @@ def _judged(contacts: Contacts, found: Found) -> Found:
     if not acting:
         return found
     # A motion of each row by the force that would make it alone: no unit has a say.
-    every = sizes_of(np.diag(contacts.response))
+    every = sizes_of(np.diag(contacts.response), contacts.sizes)
     size = np.where(np.isfinite(every), every, 1.0)[acting]
     matrix = np.where(np.isfinite(every[acting]), 1.0, 0.0)[:, None] * np.array(rows) / size
     matrix = matrix / or_one(np.max(np.abs(matrix), axis=1, keepdims=True))
@@ -382,14 +386,18 @@ def _sticking(units: Sequence[Unit], states: Sequence[State]) -> set[int]:
     return {row for unit, (state, _) in zip(units, states, strict=True) if state == STICKS for row in unit.rows}
 
 
-def sizes_of(own: FloatArray) -> FloatArray:
-    """Return by what rows are scaled, from how each moves by its own force; infinite where joints hold it."""
-    return np.sqrt(np.where(own > NOTHING * np.max(own, initial=0.0), own, np.inf))
+def sizes_of(own: FloatArray, sizes: FloatArray | float) -> FloatArray:
+    """Return by what rows are scaled, from how each moves by its own force; infinite where joints hold it.
+
+    Lengths and angles are compared by motions that are alike.
+    """
+    alike = own / np.square(sizes)
+    return np.sqrt(np.where(alike > NOTHING * np.max(alike, initial=0.0), own, np.inf))
 
 
-def balancing(response: FloatArray, gives: BoolArray) -> FloatArray:
-    """Return forces that balance each other, of the rows that give way, a column each."""
-    soft, every = np.flatnonzero(gives), sizes_of(np.diag(response))
+def balancing(response: FloatArray, gives: BoolArray, sizes: FloatArray) -> FloatArray:
+    """Return forces that balance each other, of the rows that give way, a column each; see `sizes_of`."""
+    soft, every = np.flatnonzero(gives), sizes_of(np.diag(response), sizes)
     scaled = response[:, soft] / every[:, None] / every[soft]
     some = null_space(scaled, CLEAR) / np.where(np.isfinite(every[soft]), every[soft], 1.0)[:, None]
     found = np.zeros((len(every), some.shape[1]))
@@ -407,7 +415,8 @@ def _by_springs(contacts: _Listed, acting: Sequence[int], holding: Collection[in
     if contacts.compliance is not None and places:
         rows = [acting[i] for i in places]
         gives = contacts.compliance[rows]
-        more = (gives[:, None] * balancing(np.array(contacts.response)[np.ix_(rows, rows)], gives > 0.0)).T
+        response = np.array(contacts.response)[np.ix_(rows, rows)]
+        more = (gives[:, None] * balancing(response, gives > 0.0, contacts.sizes[rows])).T
         found = np.zeros((len(more), len(acting)))
         found[:, places] = more
     return found

@@ -90,7 +90,8 @@ class EnergyLedger:
         """Return how well it balances, and relative to what, in words."""
         told = f"the balance drifts by {self.max_drift:.1e} of the {self.exchanged:.3g} J exchanged"
         if self.uncertainty > max(self.max_drift, 1e-8) * self.exchanged:
-            told += f", which rounding leaves open by {self.uncertainty:.1e} J"
+            causes = "rounding and the estimated error of the work leave" if np.any(self.work) else "rounding leaves"
+            told += f", which {causes} open by {self.uncertainty:.1e} J"
         return told
 
 

@@ -2,6 +2,7 @@
  * time and quantities by path.  --set gives parameters other values, which the start is found for.  --events adds a column with what has happened since the row before: kind, source, time, speed of approach. */
 #include "scene.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -37,14 +38,17 @@ static int set(scene *s, const char *text)
     return 0;
 }
 
-static void print_events(const scene *s, int told)
+/* Print events from a number on up to a time, and return the number of the next. */
+static int print_events(const scene *s, int told, double until)
 {
     int k;
     for (k = told > s->happened - scene_LOGGED ? told : s->happened - scene_LOGGED; k < s->happened; k++) {
         const scene_happening *const one = s->log + k % scene_LOGGED;
+        if (one->time > until) break;
         printf("%s%s %s %.17g %.17g", k > told ? "; " : "", scene_kinds[one->kind], scene_sources[one->source], one->time,
                one->speed);
     }
+    return k;
 }
 
 int main(int count, char **given)
@@ -98,9 +102,8 @@ int main(int count, char **given)
         for (k = 0; k < chosen; k++) printf(",%.17g", values[shown[k]]);
         if (shows_events) {
             printf(",\"");
-            print_events(&s, told);
+            told = print_events(&s, told, i + 1.0 < outputs ? t : HUGE_VAL);
             printf("\"");
-            told = s.happened;
         }
         printf("\n");
     }

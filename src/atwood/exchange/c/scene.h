@@ -49,7 +49,8 @@ typedef struct scene {
     /* How the last call returned, and why. */
     int status;
     const char *text;
-    /* How much has happened, and the last of it: number k is in log[k % scene_LOGGED]. */
+    /* How much has happened, and the last of it in the order of time: number k is in log[k % scene_LOGGED]. That
+     * impacts come to an end is told before they do: what happens until then gets the number of that event. */
     int happened;
     scene_happening log[scene_LOGGED];
     /* The last event of a part, its time, and the constraint that a failure or a singular position names. */

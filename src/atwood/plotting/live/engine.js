@@ -743,6 +743,7 @@ function createEngine(model, options = {}) {
       if (met.failed) return say("failed", met.failed, t);
       take(t, met.state);
       events.push(...met.events);
+      events.sort((one, other) => one.time - other.time); // a rest is told ahead of its time
       const stop = met.events.find(one => one.target === "stop");
       if (stop) return say("stopped", `${stop.part}: ${stop.message}`, t);
     }

@@ -53,7 +53,6 @@ from atwood.numerics.contact_sets import (
     CLEAR,
     FIRM,
     GOES_ON,
-    NOTHING,
     OPEN,
     SLACK,
     STICKS,
@@ -550,8 +549,8 @@ class _Moment:
         neither presses nor rubs, and stays where it is. What would have to slip with the shares so far needs others.
         """
         states, is_slip = self._on_every(chosen, found), self.layout.is_slip
-        own = np.diag(self.values.response)
-        fixed = [bool(np.max(own[list(rows)]) <= NOTHING * np.max(own)) for rows in self.units]  # by joints
+        sizes = sizes_of(np.diag(self.values.response), self.values.row_sizes)
+        fixed = [bool(np.all(np.isinf(sizes[list(rows)]))) for rows in self.units]  # by joints
         idle = [k for k, one in enumerate(states) if (one[0] == STICKS and fixed[k] if is_slip[k] else one[0] == OPEN)]
         states = self._without(states, idle)
         holding = [k for k, one in enumerate(states) if one[0] == STICKS]
@@ -601,7 +600,7 @@ class _Moment:
         """Return how many of the rows that hold are independent."""
         held = rows_that_hold(self.units, states)
         response = self.values.response[np.ix_(held, held)]
-        size = sizes_of(np.diag(response))
+        size = sizes_of(np.diag(response), self.values.row_sizes[held])
         return rank(response / size / size[:, None], clear) if held else 0
 
     def _hold(self, states: list[State], going: Collection[int]) -> None:

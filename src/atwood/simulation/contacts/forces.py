@@ -43,7 +43,7 @@ def forces_in(values: ContactValues, states: Sequence[State], rates: FloatArray 
         if len(holding) > 1:
             slopes, offset = values.sharing
             gives = np.diag(slopes)[holding] > 0.0
-            alone = balancing(values.response[np.ix_(holding, holding)], gives).T
+            alone = balancing(values.response[np.ix_(holding, holding)], gives, values.row_sizes[holding]).T
             more, least = alone @ slopes[holding], np.zeros(len(alone))
             if rates is None:  # joints have no impulses before
                 least = alone @ offset[holding]

@@ -170,7 +170,7 @@ def with_own_sizes(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -
 
     def make() -> Scales:
         values = ContactValues(assembly, t, q, u, scales.length)
-        size = sizes_of(np.diag(values.response))
+        size = sizes_of(np.diag(values.response), values.row_sizes)
         inverse = least_norm(values.response / size / size[:, None], np.eye(len(size)), errors=LIGHT)
         falls = [scales.of(ALONG[one.law.options.unit]) / scales.time**2 for one in layout.contacts]
         each = np.abs(inverse / size / size[:, None]) @ np.array(falls)
@@ -210,6 +210,7 @@ class ContactValues:
             q = kinematic_map_of(assembly, "dae").normalized(q)
         self.q, self.u = q, u
         self.sizes = motion_scales(assembly.maximal, length)
+        self.row_sizes = np.array([length if one.law.options.unit == "N" else 1.0 for one in self.contacts])
         self._kernel = assembly.kernel(self.layout.program)
         self.read = np.zeros(len(self.layout.read))
         self._take(self.u)
@@ -243,9 +244,8 @@ class ContactValues:
         found = np.zeros(len(self.contacts))
         for rows, at in zip(self.units, self.gap_of, strict=True):
             gap = self.units[at][0] if at >= 0 else rows[0]
-            one = self.contacts[gap]
-            size = self.length if one.law.options.unit == "N" else 1.0
-            found[list(rows)] = not one.is_slip and self.values[gap] <= near * size
+            is_near = self.values[gap] <= near * self.row_sizes[gap]
+            found[list(rows)] = not self.contacts[gap].is_slip and is_near
         return found
 
     @cached_property
@@ -420,4 +420,5 @@ class ContactValues:
             )
             for some in limits
         )
-        return Contacts(self.response[rows][:, rows], free[rows], units, ahead, back, self.compliance[rows])
+        response, sizes = self.response[rows][:, rows], self.row_sizes[rows]
+        return Contacts(response, free[rows], units, ahead, back, self.compliance[rows], sizes)

@@ -98,12 +98,13 @@ class Run:
 
     @cached_property
     def events(self) -> tuple[EventRecord, ...]:
-        """Events, in order."""
+        """Events in the order of time."""
         found = tuple(one for some in self.told for one in (some.events if isinstance(some, ToldLater) else (some,)))
         if self.start is None or not any(one.kind == "rests" for one in found):
             return found
         from atwood.simulation.contacts.event_records import with_doubts
 
+        found = tuple(sorted(found, key=lambda one: one.time))  # a rest is told ahead of its time
         return with_doubts(found, 100.0 * self.options.relative_tolerance * (self.options.t_end - self.start.time))
 
     @property
