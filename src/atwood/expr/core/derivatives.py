@@ -246,7 +246,7 @@ def jvp(outputs: Sequence[Expression | float], tangents: Mapping[Expression, Exp
     list of Expression
         One derivative for each output; the constant 0 where the output does not move.
     """
-    graph, nodes = _graph_of(*outputs, *tangents), live(outputs, tangents)
+    graph, nodes = _graph_of(*outputs, next(iter(tangents), 0.0)), live(outputs, tangents)
     if len(tangents) > len(nodes):  # one part of a large scene
         tangents = {node: tangents[node] for node in nodes if node in tangents}
     seeds = {key.index: graph.convert(rate) for key, rate in tangents.items()}

@@ -105,14 +105,15 @@ def _left(mechanism: Mechanism, forest: SpanningForest, solution: Solution, solv
     gone = {f"{c.name}'" for i, c in enumerate(forest.coordinates) if every[i] in solution}
     gone |= {f"{speed.name.removeprefix('u:')}{end}" for speed in solved for end in ("'", "")}
     kept_speeds = [i for i, one in enumerate(forest.speeds) if one.name not in gone]
+    place, place_of_speed = ({i: k for k, i in enumerate(some)} for some in (kept, kept_speeds))
     stems = [forest.speeds[i].name.removesuffix("'") for i in kept_speeds]
     u = tuple(graph.symbol(f"u:{stem}") for stem in stems)
     a = tuple(graph.symbol(f"a:{stem}") for stem in stems)
     orientation_coordinates = tuple(
         replace(
             one,
-            coordinates=tuple(kept.index(i) for i in one.coordinates),
-            speeds=tuple(kept_speeds.index(i) for i in one.speeds if i in kept_speeds),
+            coordinates=tuple(place[i] for i in one.coordinates),
+            speeds=tuple(place_of_speed[i] for i in one.speeds if i in place_of_speed),
         )
         for one in forest.orientation_coordinates
     )
