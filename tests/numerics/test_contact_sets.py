@@ -135,3 +135,14 @@ def test_an_edge_rests_where_one_end_bears_what_the_other_cannot(turn: float) ->
     assert [state for state, _ in found.states] == [STICKS] * 4
     assert found.is_redundant
     laws_hold(contacts, found.states, found.forces, found.motions)
+
+
+@pytest.mark.parametrize(("above", "state"), [(1e-9, GOES_ON), (1e-12, GOES_ON), (0.0, STICKS), (-1e-12, STICKS)])
+def test_what_is_pushed_above_its_limit_goes(above: float, state: int) -> None:
+    """Weight 1, friction 0.3: what is pushed by 1e-9 more than that was held."""
+    units = Unit((0,), False, (0.0,), -1), Unit((1,), True, (0.0,), 0)
+    shares, none = np.array([[0.0, 0.0], [0.3, 0.0]]), np.zeros(2)
+    contacts = Contacts(np.eye(2), np.array([-1.0, 0.3 * (1.0 + above)]), units, Limits(none, shares, none, shares))
+    found = find_states(contacts, [(STICKS, (0.0,))] * 2)
+    assert found is not None
+    assert found.states == ((STICKS, (0.0,)), (state, (float(state == GOES_ON),)))

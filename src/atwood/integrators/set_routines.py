@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from itertools import product
 from math import inf, sqrt
 
 from atwood.codegen.routines import (
@@ -28,13 +29,13 @@ from atwood.codegen.routines import (
     place_of,
 )
 from atwood.integrators.event_routines import do_or_return
-from atwood.numerics.contact_sets import CLEAR, FIRM, GOES_ON, NOTHING, OPEN, SLACK, STICKS, STILL, SWEEPS, TURNS
+from atwood.numerics.contact_sets import CLEAR, FIRM, GOES_ON, NOTHING, OPEN, SLACK, STICKS, STILL, SWEEPS, TIGHT, TURNS
 
 FIELDS: dict[str, Kind] = {
     **dict.fromkeys(("program", "derived", "scratch", "y", "out", "units", "rows", "matrix", "left"), ADDRESS),
     **dict.fromkeys(("shares", "pattern", "past", "log"), ADDRESS),
     **dict.fromkeys(("finite", "blur", "pace", "tolerance", "inside", "ahead", "rough", "later"), NUMBER),
-    **dict.fromkeys(("better_x", "better_y", "lasted"), NUMBER),
+    **dict.fromkeys(("better_x", "better_y", "lasted", "slack"), NUMBER),
     **dict.fromkeys(("count", "size", "entries", "coordinates", "speeds", "number", "better"), INTEGER),
     **dict.fromkeys(("logged", "known", "stops", "told", "repeats", "shared", "tried"), INTEGER),
 }
@@ -53,15 +54,16 @@ UNITS = {
     for k, name in enumerate(
         (
             *("first", "width", "slip", "at", "speed", "poisson", "part", "owner", "small", "slow", "rounding"),
-            *("trigger", "state", "state_x", "state_y", "next", "next_x", "next_y", "closed"),
+            *("unmoved", "trigger", "state", "state_x", "state_y", "next", "next_x", "next_y", "closed"),
             *("chosen", "given", "given_x", "given_y", "turned_x", "turned_y", "struck", "stopped", "acts", "series"),
             *("found", "found_x", "found_y", "holds", "gone"),
         )
     )
 }
 """Of each gap and slip: its first row and their number, its kind and gap, its part, and a number that places of one
-part share, what is zero but for errors, and but for rounding, what has happened, its state and direction before and
-after, and whether it was closed at that moment; the rest is work. Of what has impacts that accumulate `series` is 1."""
+part share, what is zero but for errors, and but for rounding, by how little a unit of force moves it where only
+rounding does, what has happened, its state and direction before and after, and whether it was closed at that moment;
+the rest is work. Of what has impacts that accumulate `series` is 1."""
 
 ROWS = {
     name: k
@@ -163,6 +165,9 @@ BLURRED = 512.0
 
 Each adds about its rounding to their height; where losses take as much away they would go on for ever.
 """
+
+UNMOVED = 1e-28
+"""Of the inverse of the scene's mass: what a unit of force moves by less is moved by rounding, which is squared."""
 
 STEP = 2.0**-26
 """Of coordinates: by so much each is moved to see how its rounding moves a gap."""
@@ -468,7 +473,7 @@ class _Worst:
     """The state that contradicts most while it is looked for."""
 
     def __init__(self, r: Routine, m: Sets) -> None:
-        self.r, self.m, self.miss = r, m, r.variable(SLACK)
+        self.r, self.m, self.miss = r, m, r.variable(m.slack)
         m.number = -1
 
     def consider(self, k: Value, miss: Value, state: int, x: Operand = 0.0, y: Operand = 0.0) -> None:
@@ -587,7 +592,10 @@ def _find() -> Routine:
             with r.otherwise(), r.when(~kept):
                 state[k], x[k], y[k] = float(STICKS), 0.0, 0.0
 
-    for closes in (False, True):
+    _copy_states(r, m, "found", "next")
+    for closes, slack in product((False, True), (TIGHT, SLACK)):
+        m.slack = slack
+        _copy_states(r, m, "next", "found")
         allow(closes)
         with r.when(r.call("improve", r.arguments[0]) == 0):
             m.shared = r.choose(m.repeats != 0, 1, m.shared, INTEGER)
@@ -998,9 +1006,21 @@ def _touch() -> Routine:
         is_slow = (m.unit("speed")[k] == 0.0) | closed | (rates[row] <= m.unit("slow")[k] * pace)
         is_one = (m.unit("slip")[k] == 0.0) & is_near & is_slow
         chosen[k] = r.choose(is_one, 1.0, 0.0)
-        some.now = some.now + is_one.integer()
+        with r.when(is_one), r.when(_is_inert(r, m, k, row)):
+            chosen[k] = 0.0
+        some.now = some.now + (chosen[k] != 0.0).integer()
     r.give(some.now)
     return r
+
+
+def _is_inert(r: Routine, m: Sets, k: Value, row: Value) -> Value:
+    """Tell whether joints hold a gap and all that slips there; see `_Moment._is_inert` in `changes`."""
+    response, held, slow = m.result("response"), r.variable(False, BOOLEAN), m.unit("slow")[k]
+    still = (m.row("rates")[row] >= 0.0 - slow) & (m.result("free")[row] >= 0.0 - slow * slow / m.unit("small")[k])
+    held.now = still & (response[row * m.size + row] <= m.unit("unmoved")[k])
+    with r.when(held.now), r.count(m.count) as j, r.when(m.unit("at")[j] == k.number()), _rows(r, m, j) as (_, i):
+        held.now = held.now & (response[i * m.size + i] <= m.unit("unmoved")[j])
+    return held.now
 
 
 def _choose_slips(r: Routine, m: Sets) -> None:

@@ -29,6 +29,9 @@ OPEN, GOES_ON, STICKS = 0, 1, 2
 SLACK = 1e-9
 """Of the largest force, and of the largest motion: by so much an inequality may be missed, by rounding."""
 
+TIGHT = 1e-13
+"""The same where states are looked for first: rows that do not depend on each other have no more of it."""
+
 _MOST_SETS = 20_000
 """More sets than these are not looked through."""
 
@@ -312,7 +315,8 @@ def _found(contacts: Contacts, states: Sequence[State]) -> Found | None:
     present = tuple(_allowed(unit, *one) for unit, one in zip(contacts.units, states, strict=True))
     listed = _listed(contacts)
     closed = tuple(_allowed(unit, STICKS, (0.0,) * len(unit.rows)) for unit in contacts.units)
-    found = _improved(listed, present) or _improved(listed, closed)
+    tries = ((states, slack) for states in (present, closed) for slack in (TIGHT, SLACK))
+    found = next(filter(None, (_improved(listed, *one) for one in tries)), None)
     if found is not None:
         return found
     states, forces = _relaxed(contacts)
@@ -454,13 +458,13 @@ def _choices(unit: Unit) -> list[State]:
     return [(STICKS, none), *((GOES_ON, way) for way in ways)]
 
 
-def _improved(contacts: _Listed, tried: tuple[State, ...]) -> Found | None:
+def _improved(contacts: _Listed, tried: tuple[State, ...], slack: float = SLACK) -> Found | None:
     """Change the state that contradicts most, until none does or a set comes again."""
     seen: set[tuple[State, ...]] = set()
     while tried not in seen and len(seen) < TURNS * (1 + len(contacts.units)):
         seen.add(tried)
         tried, forces, motions = _met(contacts, tried)
-        number, better = _contradiction(contacts, tried, forces, motions)
+        number, better = _contradiction(contacts, tried, forces, motions, slack)
         if number < 0:
             return Found(tried, np.array(forces), np.array(motions))
         tried = (*tried[:number], better, *tried[number + 1 :])
@@ -574,11 +578,15 @@ def _solved(
 
 
 def _contradiction(
-    contacts: _Listed, states: Sequence[State], forces: Sequence[float], motions: Sequence[float]
+    contacts: _Listed,
+    states: Sequence[State],
+    forces: Sequence[float],
+    motions: Sequence[float],
+    slack: float = SLACK,
 ) -> tuple[int, State]:
     """Return the unit whose state contradicts most, and the state it has then; -1 where none does."""
     better: State = (OPEN, (0.0,))
-    worst, number = SLACK, -1
+    worst, number = slack, -1
     if not contacts.units:
         return number, better
     size = max(abs(_limits(contacts.sides[0], k, forces)[0]) for k in range(len(contacts.units)))

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from atwood import Scene, assemble, simulate
+from atwood import Scene, SolveError, assemble, simulate
 from atwood_library import (
     BallContact,
     BallPairContact,
@@ -17,13 +17,16 @@ from atwood_library import (
     Ground,
     Inertia,
     Link,
+    Pivot,
     PointContact,
     PointMass,
+    PointOnLine,
     Ratchet,
     RigidBody,
     RotaryDrive,
     Slider,
     TranslationalSpringDamper,
+    Weld,
 )
 
 from ...exported_scenes import FLAGS, apart, built, compiler, printed
@@ -172,3 +175,63 @@ def test_c_counts_the_teeth_of_a_ratchet(tmp_path: Path) -> None:
     scene.start.update({"wheel.angle": 0.1, "wheel.angular_velocity": 1.0})
     found = printed(built(scene, tmp_path, "reduced", ["-O0", *FLAGS[1:]]), 2.0, 1e-11, 3)
     assert found["ratchet.passed"][-1] == 4.0  # 2.1 rad
+
+
+def on_its_hinge(space: str, center: float, friction: float | None) -> Scene:
+    """Return a body on a hinge, with a place on the axis of it that touches a plane, where friction is given."""
+    scene = Scene(space=space)
+    ground, body = scene.add("ground", Ground()), scene.add("body", RigidBody(mass=1.0, moments=(0.1, 0.1, 0.1)))
+    pivot = scene.add("pivot", Pivot() if space == "plane" else Pivot(axis=(0, 1, 0)))
+    arm, toe = (scene.add(name, Weld(displacement=(-center, 0, 0))) for name in ("arm", "toe"))
+    for one, other in ((body.frame, arm.a), (ground.frame, pivot.a), (pivot.b, arm.b), (body.frame, toe.a)):
+        scene.connect(one, other)
+    if friction is not None:
+        floor = scene.add("floor", PointContact(friction=friction))
+        scene.connect(ground.frame, floor.plane)
+        scene.connect(toe.b, floor.point)
+    scene.start.update({"pivot.angle": 0.3, "pivot.angular_velocity": 2.0})
+    return scene
+
+
+@FORMS
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+@pytest.mark.parametrize("space", ["plane", "space"])
+def test_a_place_on_the_axis_of_a_hinge_is_open(space: str, friction: float, form: str) -> None:
+    """Nothing presses it. Without friction it had no finite value; in space friction was refused as undetermined."""
+    for center in (0.5, 1.0 / 3.0):
+        result = simulate(on_its_hinge(space, center, friction), form=form, t_end=1.0, rtol=1e-10)
+        known = simulate(on_its_hinge(space, center, None), t_end=1.0, rtol=1e-12)
+        assert result["pivot.angle"][-1] == pytest.approx(known["pivot.angle"][-1], abs=1e-9)
+        assert not np.any(result["floor.gap_state"])
+        assert not result.events
+
+
+@FORMS
+def test_a_floor_along_a_guide_rubs_by_a_share_that_nothing_determines(form: str) -> None:
+    """Joints hold the gap as they do on the axis of a hinge, but what slips there moves."""
+    scene = Scene()
+    ground, mass = scene.add("ground", Ground()), scene.add("mass", PointMass(mass=1.0))
+    guide, floor = scene.add("guide", PointOnLine(axis=(1, 0, 0))), scene.add("floor", PointContact(friction=0.3))
+    pairs = (ground.frame, guide.a), (mass.point, guide.b), (ground.frame, floor.plane), (mass.point, floor.point)
+    for one, other in pairs:
+        scene.connect(one, other)
+    scene.start.update({"mass.position.x": 0.0, "mass.velocity.x": 1.0})
+    with pytest.raises(SolveError, match="which nothing determines"):
+        simulate(scene, form=form, t_end=1.0)
+
+
+@FORMS
+@pytest.mark.parametrize("above", [2e-9, 1e-11, 0.0, -1e-11])
+def test_a_push_above_the_limit_moves(above: float, form: str) -> None:
+    """A push of up to 2e-9 above it was held."""
+    scene = Scene()
+    ground, mass = scene.add("ground", Ground()), scene.add("mass", PointMass(mass=1.0))
+    floor, push = (
+        scene.add("floor", PointContact(friction=0.3)),
+        scene.add("push", Force(value=0.3 * G * (1.0 + above))),
+    )
+    for one, other in ((ground.frame, floor.plane), (mass.point, floor.point), (push.point, mass.point)):
+        scene.connect(one, other)
+    scene.start.update({f"mass.{what}.{axis}": 0.0 for what in ("position", "velocity") for axis in "xz"})
+    found = simulate(scene, form=form, t_end=1e3, rtol=1e-10)["mass.position.x"][-1]
+    assert found == pytest.approx(0.5e6 * 0.3 * G * max(above, 0.0), rel=1e-4)

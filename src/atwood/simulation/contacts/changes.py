@@ -44,6 +44,7 @@ from atwood.integrators.set_routines import (
     STEADY,
     STEP,
     UNDETERMINED,
+    UNMOVED,
     WAITS,
 )
 from atwood.lazy_dataclasses import dataclass, replace
@@ -53,6 +54,7 @@ from atwood.numerics.contact_sets import (
     CLEAR,
     FIRM,
     GOES_ON,
+    NOTHING,
     OPEN,
     SLACK,
     STICKS,
@@ -67,7 +69,7 @@ from atwood.numerics.rank import rank
 from atwood.simulation.contacts.event_records import in_own_words, told_changes, told_impact, told_rest
 from atwood.simulation.contacts.forces import MOST_TURNS, forces_in, is_same, of_impulses, rows_that_hold
 from atwood.simulation.contacts.states import states_of, values_of_states, without_loose
-from atwood.simulation.contacts.values import ContactValues
+from atwood.simulation.contacts.values import ContactValues, unmoved
 from atwood.simulation.dynamics.orientation_coordinates import to_regular
 from atwood.simulation.dynamics.scales import Scales
 from atwood.simulation.events.mode_change import generalized_speeds
@@ -141,6 +143,7 @@ class _Moment:
         self.small = np.array([near * scales.of(ALONG[one.law.options.unit]) for one in self.first])
         self.slow = self.small / scales.time
         self.rounding = ROUNDED / near * self.small
+        self.unmoved = np.array([unmoved(one, scales) for one in self.first])
         self.triggers = {(one.part, one.law): one.target for one in triggers}
         self.events: list[EventRecord] = []
         self.resting: list[int] | None = None
@@ -160,7 +163,21 @@ class _Moment:
             if not is_slip
             and (self.before[k][0] == STICKS or self.trigger(k) == CLOSES or values[self.units[k][0]] <= small[k])
             if k not in self.layout.speeds or self.before[k][0] == STICKS or self._is_slow(k)
+            if not self._is_inert(k)
         ]
+
+    def _is_inert(self, k: int) -> bool:
+        """Return whether joints hold a gap and all that slips there, as a place on the axis of a hinge is held.
+
+        Nothing presses it then, and it rubs nowhere. What moves into it all the same contradicts.
+        """
+        values, row, slow = self.values, self.units[k][0], self.slow[k]
+        if values.response[row, row] > NOTHING / UNMOVED * self.unmoved[k] or self.rates()[row] < -slow:
+            return False
+        own = np.sum(values.by_free_ways()[0] ** 2, axis=1)  # what rounding makes of the response is no square
+        units = [k, *(j for j, gap in enumerate(values.gap_of) if gap == k)]
+        is_held = all(own[i] <= self.unmoved[j] for j in units for i in self.units[j])
+        return is_held and bool(values.accelerations()[row] >= -slow * slow / self.small[k])
 
     def _is_slow(self, k: int) -> bool:
         return bool(self.rates()[self.units[k][0]] <= self.slow[k])

@@ -27,7 +27,7 @@ from atwood.simulation.contacts.bounces import has_plain_impacts
 from atwood.simulation.contacts.changes import NEAR, Changed, longest_left
 from atwood.simulation.contacts.event_records import in_own_words, told_change, told_impact, told_rest
 from atwood.simulation.contacts.states import states_of
-from atwood.simulation.contacts.values import Layout, layout_of
+from atwood.simulation.contacts.values import Layout, layout_of, unmoved
 from atwood.simulation.events.modes import MARGIN, EventProbe, EventRecord, ToldLater, find_event_functions
 from atwood.simulation.problem.explicit_scene import (
     light_speeds,
@@ -134,6 +134,7 @@ def _units(layout: Layout, plan: SceneProblem) -> FloatArray:
             "small": size,
             "slow": size / plan.scales.time,
             "rounding": sets.ROUNDED * size,
+            "unmoved": unmoved(one, plan.scales),
         }
         for name, value in values.items():
             found[UNITS[name], k] = value

@@ -19,6 +19,7 @@ from atwood.forms.caches import Key
 from atwood.forms.loose import in_no_contact, state_paths
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import to_maximal
+from atwood.integrators.set_routines import UNMOVED
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.constraints.read_multipliers import weights_of
 from atwood.mechanics.dynamics.equations import ContactRow
@@ -182,6 +183,12 @@ def with_own_sizes(plan: SceneProblem, t: float, q: FloatArray, u: FloatArray) -
         return replace(scales, contacts=found)
 
     return replace(plan, scales=assembly.kept.get(_OWN_SIZES, make, t, q.tobytes(), u.tobytes(), scales.time))
+
+
+def unmoved(one: ContactRow, scales: Scales) -> float:
+    """Return by how little a unit of force moves a row where only rounding does, in a scene of some sizes."""
+    size = scales.of(ALONG[one.law.options.unit])
+    return UNMOVED * size**2 / (scales.force * scales.time**2 * scales.length)
 
 
 def without_contacts(assembly: Assembly) -> Balance:
