@@ -61,14 +61,14 @@ TABLE: dict[tuple[str, str], ByHand] = {
     ("four-bar", "reduced"): ByHand(3, 3, 0, 2, 6, flops=50, trig=8, solves=1),
     # hi ci, hi si of three half links: 6; pivots: 2 + 6 + 6 + 3; their rates: 6 products, 2 + 6 + 6 + 2;
     # forces on the centres: (3 + 4) for each; J alpha less the moments of the sums of both ends' forces: 7 each;
-    # positions' rows: 6 x 3; angles' rows: 3 x 7
-    ("four-bar", "dae"): ByHand(9, 9, 8, 8, 34, flops=126, trig=6),
+    # positions' rows: 6 x 3; angles' rows: 3 x 8, one of them by 1/L^2
+    ("four-bar", "dae"): ByHand(9, 9, 8, 8, 34, flops=129, trig=6),
     # th1' - w1: 1; l1 s1 + l2 s2: 3; l1 c1, l2 c2: 2; rate: 3; C, S of (th1 - th2): 1 + 2; two rows of 8;
     # r1 - G1 (r2/G2): 3
     ("slider-crank", "reduced"): ByHand(2, 2, 0, 1, 4, flops=31, trig=6),
     # hi ci, hi si: 4; pivots: 2 + 6 + 4; guide: z itself; rates: 4 products, 2 + 6 + 4; forces: 7 + 7, piston 2 + 4;
-    # moments: 7 + 7; positions' rows: 6 + 6 + 2 + 3; angles' rows: 7 + 7
-    ("slider-crank", "dae"): ByHand(8, 8, 7, 7, 30, flops=97, trig=4),
+    # moments: 7 + 7; positions' rows: 6 + 6 + 2 + 3; angles' rows: 8 + 8, one by 1/L^2
+    ("slider-crank", "dae"): ByHand(8, 8, 7, 7, 30, flops=99, trig=4),
     # for each link: l c, l s: 2; th' - w: 1; accelerations from the link above: w w, 4 products, 4 sums: 9 (the first
     # adds g and nothing else: 8); sums of m a from the end: 4 (the last: 2); l c Fz' + l s Fx': 3. So 19 N - 3.
     ("chain", "reduced"): ByHand(10, 10, 0, 0, 20, flops=187, trig=20),

@@ -208,7 +208,7 @@ def test_what_is_read_beside_redundant_constraints_is_written_out() -> None:
     read = assemble(four_bar(0.5), form="dae").maximal.read
     sizes = [node.payload for node in live(list(read.values())) if node.operation == "solve"]
     assert max(sizes) <= len(read)
-    assert len(live(list(read.values()))) <= 18_980  # six times 38 unknowns, and Newton's method
+    assert len(live(list(read.values()))) <= 19_003  # six times 38 unknowns, Newton's method, weights of rods
 
 
 @pytest.mark.parametrize("apart", [1e-3, 1e-5])

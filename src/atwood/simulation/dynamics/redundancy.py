@@ -233,7 +233,7 @@ _ALL = 50
 def choose_dependent_coordinates(jacobian: Matrix, scales: FloatArray) -> tuple[int, ...]:
     """Return the coordinates that the constraints determine best: in turn, the column of which most is left."""
     count = jacobian.shape[0]
-    if count > _ALL:
+    if count > _ALL or not isinstance(jacobian, np.ndarray):
         return _choose_among_many(jacobian, scales)
     rows = or_one(np.max(np.abs(jacobian * scales), axis=1, initial=0.0))
     left = jacobian * scales / rows[:, None]
