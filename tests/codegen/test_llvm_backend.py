@@ -12,8 +12,8 @@ from atwood import expr as ex
 from atwood.codegen import compile_native, compile_program
 from atwood.codegen.llvm.module import CodeOptions, Part, write_module
 from atwood.errors import KernelEvaluationError, UnsupportedError, UsageError
-from atwood.pipeline import assemble
 
+from ..helpers.runs import prepare
 from ..helpers.smooth import SMOOTH as SCENES
 
 _OPERATIONS = (
@@ -327,16 +327,10 @@ def test_many_threads_call_one_kernel_at_once():
 @pytest.mark.parametrize("form", ["reduced", "dae"])
 @pytest.mark.parametrize("name", SCENES)
 def test_every_scene_agrees_with_the_python_back_end(name, form):
-    assembly = assemble(SCENES[name](), form=form)
-    equations = assembly.own_equations
-    loops = len(assembly.reduced.constraints) if form == "reduced" else 0
-    size, speeds = len(equations.coordinates), len(equations.speeds)
-    dependent = tuple(range(size - loops, size)), tuple(range(speeds - loops, speeds))
-    made = assembly.form_program(None, *dependent)
+    plan = prepare(SCENES[name](), form).plan
     rng = np.random.default_rng(1)
-    for program in (made.residual, made.jacobian):
-        own = assembly.parameter_values  # after these comes what keeps the dae form on its constraints
-        parameters = np.concatenate([own, rng.uniform(0.2, 1.2, len(program.parameters) - len(own))])
+    for program in (plan.program.residual, plan.program.jacobian):
+        parameters = plan.values
         kernel = compile_native(program, cache=False).bind(parameters)
         reference = compile_program(program).bind(parameters)
         inputs = [rng.uniform(0.2, 1.2, len(group.symbols)) for group in program.inputs]
