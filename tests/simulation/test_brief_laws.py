@@ -142,6 +142,22 @@ def test_a_roof_with_corners_is_crossed_however_narrow(width: float, solver: str
     assert result["mass.displacement"][-1] == pytest.approx(10.0, abs=1e-4)
 
 
+@pytest.mark.parametrize(
+    "law",
+    [
+        lambda z: math.exp(100.0) / atwood.exp(100.0 + z * z),
+        lambda z: math.exp(100.0) / (1.0 + atwood.exp(100.0 + z * z)),
+        lambda z: atwood.exp(100.0 + 0.0 * z) / atwood.exp(100.0 + z * z),
+        lambda z: 1.0 / (1e-45 * atwood.exp(103.6163291847 + z * z)),
+    ],
+)
+@pytest.mark.parametrize("solver", ["explicit", "ida"])
+def test_exponentials_as_divisors_are_large_beside_what_they_divide(solver: str, law: Any) -> None:
+    """A tap of a millisecond was passed over where the exponent is large all the time."""
+    result = simulate(on_a_line(force=lambda t: 1e3 * law((t - 2.3) * 1e3), speed=0.0), solver=solver, outputs=2)
+    assert result["mass.speed"][-1] == pytest.approx(math.sqrt(math.pi), abs=1e-4)
+
+
 def test_a_force_that_dies_away_slowly_beside_its_peak_is_felt() -> None:
     expected = 1e-3 * (math.atan(7e3) + math.atan(3e3))  # the integral of 1/(1 + s^2)
     for solver in PLAIN:

@@ -33,11 +33,13 @@ _CURVED: Key[tuple[Curved, ...]] = Key("functions that may change fast")
 _EXTERNAL: Key[tuple[Expression, ...]] = Key("functions in Python in laws")
 
 _FAINT = 60.0
-"""An exponential of less than minus this is as good as zero, whatever it is multiplied by; so is what is divided by one
-of more."""
+"""An exponential of less than minus this is as good as zero, whatever it is multiplied by."""
 
 _GROWING = frozenset({"exp", "sinh", "cosh"})
 """What grows so fast that a quotient with it as divisor is as good as zero soon."""
+
+_LARGEST = 700.0
+"""An exponential of more is no number."""
 
 _FLAT = 20.0
 """Beyond this argument a hyperbolic tangent is one, to rounding."""
@@ -62,13 +64,14 @@ _UNESTIMATED = frozenset({"sqrt", "sin", "cos"})
 class Curved:
     """A function in a law that may change fast: its operation, what it is of, and its exponent if it is a power.
 
-    What grows in divisors alone, as in ``1/(1 + exp(x))``, is as good as infinite where it is large.
+    Beyond ``faint`` what grows in divisors alone, as in ``1/(1 + exp(x))``, is as good as infinite. It is an argument,
+    or the logarithm of a divisor.
     """
 
     operation: str
     argument: Expression
     exponent: Expression | None = None
-    divides: bool = False
+    faint: float = inf
 
 
 def find_curved(assembly: Assembly, is_estimated: bool = True) -> tuple[Curved, ...]:
@@ -148,7 +151,8 @@ def _has_root(value: Expression) -> bool:
 
 
 def _curved_in(outputs: Sequence[Expression], operations: frozenset[str]) -> Iterable[Curved]:
-    nodes, direct = live(outputs), _not_dividing(outputs)
+    nodes = live(outputs)
+    faint = _faint(outputs, nodes)
     for node in nodes:
         if node.is_parametric or node.operation not in operations:
             continue
@@ -161,7 +165,8 @@ def _curved_in(outputs: Sequence[Expression], operations: frozenset[str]) -> Ite
         elif node.operation == "div":
             over = node.arguments[1]
             if not over.is_parametric and (first.is_parametric or over.operation != "sqrt"):  # else a direction
-                yield Curved("div", over)
+                ends = [faint[one.index] for one in live([over]) if one.index in faint] if faint else []
+                yield Curved("div", over, faint=max(ends, default=inf))
         elif node.operation == "mul":
             base, power = node, 1.0
             while base.operation == "mul" and base.arguments[0] is base.arguments[1]:
@@ -169,7 +174,27 @@ def _curved_in(outputs: Sequence[Expression], operations: frozenset[str]) -> Ite
             if power > _HIGH:
                 yield Curved("pow", base, node.graph.constant(power))
         else:
-            yield Curved(node.operation, first, divides=node.operation in _GROWING and node.index not in direct)
+            yield Curved(node.operation, first, faint=faint.get(node.index, inf))
+
+
+def _faint(outputs: Sequence[Expression], nodes: Iterable[Expression]) -> dict[int, float]:
+    """Return from which arguments on functions that grow in divisors are as good as infinite, by their numbers.
+
+    Numbers beside them, as in ``1e50/(1e50 + exp(x))``, move that; where such a function is no divisor, or of
+    parameters alone, it is not known.
+    """
+    found: dict[int, float] = {}
+    if not any(one.operation in _GROWING and not one.is_parametric for one in nodes):
+        return found
+    for output in outputs:
+        within, direct = live([output]), _not_dividing([output])
+        growing = [one for one in within if one.operation in _GROWING]
+        sizes = [abs(one.value) for one in within if one.is_constant and one.value]
+        end = _FAINT + 2.0 * max((abs(math.log(one)) for one in sizes if math.isfinite(one)), default=0.0)
+        if end > _LARGEST or any(one.is_parametric or one.index in direct for one in growing):
+            end = inf
+        found |= {one.index: max(end, found.get(one.index, 0.0)) for one in growing}
+    return found
 
 
 def _not_dividing(outputs: Sequence[Expression]) -> set[int]:
@@ -190,8 +215,8 @@ def _not_dividing(outputs: Sequence[Expression]) -> set[int]:
 def _share(one: Curved, argument: Pair, exponent: Pair | None, reach: Scalar) -> Scalar:
     """Return how far a function changes between bounds of its argument, as a share of how far it may."""
     low, high = argument
-    if one.divides:
-        low, high = (maximum(minimum(x, _FAINT), -_FAINT) for x in argument)
+    if one.faint < inf:
+        low, high = (maximum(minimum(x, one.faint), -one.faint) for x in argument)
     if one.operation == "exp":
         return (maximum(high, -_FAINT) - maximum(low, -_FAINT)) / reach
     if one.operation == "tanh":
@@ -207,8 +232,8 @@ def _share(one: Curved, argument: Pair, exponent: Pair | None, reach: Scalar) ->
     least, most = magnitude(argument)
     if one.operation == "sqrt":
         return most / (maximum(least, 1e-150) * exp(_ROOT * reach))
-    if one.operation == "div":
-        least, most = (minimum(x, math.exp(_FAINT)) for x in (least, most))
+    if one.operation == "div" and one.faint < inf:
+        least, most = (minimum(x, math.exp(one.faint)) for x in (least, most))
     if exponent is None:  # a quotient or a logarithm
         return most / (maximum(least, 1e-150) * exp(0.5 * reach))
     power = maximum(absolute(exponent[0]), absolute(exponent[1]))
