@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from tests.calls import calls
 
-from atwood import Result, Scene, assemble, clock as clock_module, simulate, sweep
+from atwood import Result, Scene, assemble, clock as clock_module, exp, simulate, sweep
 from atwood.clock import Clock, TimeIsUp, check_time, more_time, time_left, within_time
 from atwood.errors import ResultError
 from atwood.integrators import explicit_session, session
@@ -20,6 +20,7 @@ from atwood.simulation.initialization import mobility as massless_directions
 from atwood.simulation.problem.options import RunOptions
 from atwood.simulation.run import stall_diagnosis as run_tolerances
 from atwood.simulation.run.session import SolverRequest
+from atwood_library import Force, PointMass
 from atwood_library.scenes import DoublePendulum, FourBar, FourBarRow, SimplePendulum
 
 FORMS = ("reduced", "dae")
@@ -58,6 +59,17 @@ def test_a_limit_of_time_is_looked_at_all_along(form: str, looks: list[int]) -> 
         if found.run.segments:
             count = np.searchsorted(found.time, whole.time[-1], side="right")
             np.testing.assert_array_equal(found.time[: count - 1], whole.time[: count - 1])
+
+
+def test_what_is_asked_of_a_run_afterwards_is_beyond_its_time() -> None:
+    """How large a scene is was asked within a time that was used up, and nobody took that up."""
+    scene = Scene(space="line")
+    mass, push = scene.add("mass", PointMass(mass=1.0)), scene.add("push", Force(direction="x"))
+    scene.connect(push.point, mass.point)
+    scene.set("push.value", lambda t: exp(1e-7 * t) / exp(1e-7 * t + (1e9 * t) ** 2))  # which takes short steps
+    scene.start["mass.position.x"] = 1.0
+    for _ in range(2):  # the second has its start from the first
+        assert simulate(scene, t_end=5.0, max_seconds=0.3).status == "time_limit"
 
 
 def test_a_crossing_is_left_when_the_time_is_used_up(looks: list[int]) -> None:

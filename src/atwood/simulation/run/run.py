@@ -108,7 +108,7 @@ def run(
             return run_out_of_time(assembly, start, options)
         with clock.kept():
             made = walk.go()
-            size = 0.0 if own_length(assembly) else _smaller(made, walk)
+        size = _smaller(made, walk)  # beyond the time, which a run may just have used up
         if not size:
             break
         start = replace(start, length=size)
@@ -119,7 +119,8 @@ def _smaller(made: Run, walk: Walk) -> float:
     """Return the size with which a run is to be made again, m; 0 where it is good, or its sizes were asked for."""
     assembly, options = made.assembly, made.options
     known = [assembly.observables[path].unit for path in options.nominal if path in assembly.observables]
-    if "m" in known or options.step is not None or made.status not in ("finished", "stopped"):
+    is_asked = "m" in known or options.step is not None
+    if is_asked or made.status not in ("finished", "stopped") or own_length(assembly):
         return 0.0
     passed = ((one.plan.assembly.own_equations.names, one.coordinates) for one in made.stretches)
     size = smaller_size(walk.start.length, passed)
