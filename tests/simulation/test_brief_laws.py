@@ -412,3 +412,43 @@ def test_functions_in_python_are_sampled_and_that_is_said(solver: str) -> None:
         result = simulate(scene, solver=solver)
     expected = delayed(lambda x: 0.45 * math.exp(-(((x - 2) / 0.1) ** 2)), 2.0, 0.1)
     assert result["mass.displacement"][-1] == pytest.approx(expected, abs=1e-4)
+
+
+@pytest.mark.parametrize("solver", ["explicit", "ida"])
+@pytest.mark.parametrize(
+    ("depth", "centre", "start"), [(-0.45, 7.353191649647968, 10.0), (100.0, 4.911627301488903, 10.0)]
+)
+def test_a_narrow_well_or_roof_with_corners_keeps_energy_far_off(
+    depth: float, centre: float, start: float, solver: str
+) -> None:
+    scene = on_a_line(f"{-depth}*max(0, 1 - abs(x - {start + centre})/1e-7)", x=start)
+    result = simulate(scene, solver=solver, outputs=2, max_steps=1000)
+    assert result["mass.speed"][-1] == pytest.approx(1.0, abs=3e-5)
+    assert result["mass.displacement"][-1] == pytest.approx(start + 10.0, abs=2e-4)
+
+
+def pushed_by_a_table(rows: list[tuple[float, float]], t_end: float) -> Scene:
+    scene = Scene(space="line", gravity=0.0, t_end=t_end)
+    mass, table = scene.add("mass", lib.Mass1D(mass=1.0)), scene.add("table", lib.Table(table=rows))
+    push = scene.add("push", lib.Force(direction=(1, 0, 0)))
+    scene.connect(table.output("value"), push.input("value"))
+    scene.connect(push.point, mass.flange)
+    scene.start.update({"mass.displacement": 0.0, "mass.speed": 0.0})
+    return scene
+
+
+@pytest.mark.parametrize("solver", PLAIN)
+@pytest.mark.parametrize("form", ["reduced", "dae"])
+@pytest.mark.parametrize("width", [1e-3, 1e-6, 1e-9])
+def test_steep_flanks_of_tables_give_their_momentum(width: float, form: str, solver: str) -> None:
+    rows = [(0.0, 0.3), (1.3, 0.3), (1.3 + width, -0.5), (2.7, -0.5), (2.7 + width, 0.3), (8.0, 0.3)]
+    for t_end in (1.3 + 0.4 * width, 2.7 + width, 7.3):  # within a flank, at a corner, behind all
+        speed = place = 0.0
+        for (a, x), (b, y) in pairwise(rows):
+            h = max(0.0, min(b, t_end) - a)
+            slope = (y - x) / (b - a)
+            place += speed * h + x * h**2 / 2 + slope * h**3 / 6
+            speed += x * h + slope * h**2 / 2
+        result = simulate(pushed_by_a_table(rows, t_end), form=form, solver=solver, outputs=2)
+        assert result["mass.speed"][-1] == pytest.approx(speed, abs=BOUND.get(solver, 1e-5))
+        assert result["mass.displacement"][-1] == pytest.approx(place, abs=BOUND.get(solver, 1e-5))

@@ -26,7 +26,7 @@ from atwood.integrators.ida.library import library
 from atwood.integrators.ida.memory import ONE_STEP, ROOT_RETURN, STOPPED_BY_WEIGHTS, TO_TIME, TOO_MUCH_WORK, Counts
 from atwood.integrators.ida.setup import IdaTuning, prepare
 from atwood.integrators.ida.states import checked_state, is_finite
-from atwood.integrators.ida.sundae import REASONS, SHORTER, TOO_LONG
+from atwood.integrators.ida.sundae import REASONS, TOO_LONG, hardly_moves, other_first_steps
 from atwood.integrators.ida.watchdog import FIRST_CHUNK, Watchdog, first_chunk
 from atwood.integrators.protocol import (
     Budget,
@@ -361,15 +361,15 @@ class NativeSession(SteppingSession):
         return failure
 
     def _first_step(self) -> tuple[int, float]:
-        """Take the first step; a shorter one where IDA, which makes it shorter by 4 ten times at most, gives up."""
+        """Take the first step; others where IDA, which makes it shorter by 4 ten times at most, gives up."""
         state = self._here
-        for share in (1.0, *SHORTER):
-            if share < 1.0:
-                self._memory.call("IDASetInitStep", share * self._horizon)
+        for first in (0.0, *other_first_steps(state[0], self._horizon)):
+            if first:
+                self._memory.call("IDASetInitStep", first)
                 self._restart(state)
                 self._starts -= 1  # which nobody asked for
             flag, t = self._solve(state[0] + self._horizon, ONE_STEP)
-            if flag not in TOO_LONG:
+            if flag not in TOO_LONG and (first or not hardly_moves(state[0], self._memory.time())):
                 break
         self._memory.call("IDASetInitStep", self._given_step)
         return flag, t

@@ -48,10 +48,13 @@ STALLED_STEPS = 50
 """So many steps in a row that do not move the time beyond rounding are a failure."""
 
 TOO_LONG = (-3, -4)
-"""Flags of IDA that at the start may mean that the first step was far too long."""
+"""Flags of IDA that at the start may mean that the first step was far too long, or too short."""
 
-SHORTER = (1e-9, 1e-15)
-"""Shares of the run that are then tried for it: IDA itself tries a thousandth and, from there, a millionth of that."""
+_LONGER = 1e-9
+"""Share of the run that is tried at last for it: IDA itself tries a thousandth and, from there, a millionth of that."""
+
+_MOVES = 1e3
+"""The shortest first step, in roundings of the time: IDA's own is shorter where much begins at once."""
 
 REASONS = {
     -2: "the tolerances ask for more accuracy than the arithmetic has",
@@ -68,6 +71,19 @@ REASONS = {
     -22: "the solver was given something that it cannot work with",
     -24: "an error weight became zero: an unknown passed zero and its absolute tolerance is zero",
 }
+
+
+def other_first_steps(t: float, horizon: float) -> tuple[float, float]:
+    """Return first steps, s, to try where IDA's own fails: it is too long, or too short to move the time.
+
+    The shorter one comes first. In a longer one, which is of order one, a force that acts briefly may be over.
+    """
+    return max(_MOVES * float(np.spacing(abs(t))), 1e-15 * horizon), _LONGER * horizon
+
+
+def hardly_moves(before: float, t: float) -> bool:
+    """Return whether a first step is near the rounding of the time: what it begins with is rounding, too."""
+    return bool(t - before < 0.1 * _MOVES * float(np.spacing(abs(before))))
 
 
 class SundaeSession(SteppingSession):
@@ -98,8 +114,8 @@ class SundaeSession(SteppingSession):
         self._begins = problem.begin
         self._horizon = options.horizon
         self._record = Record()
-        self._create: Callable[[float], Any] = lambda share: _create_solver(
-            problem, replace(options, first_step=share * options.horizon), self._record
+        self._create: Callable[[float], Any] = lambda first: _create_solver(
+            problem, replace(options, first_step=first), self._record
         )
         self._solver = _create_solver(problem, options, self._record)
         self._taken_steps = 0
@@ -160,9 +176,9 @@ class SundaeSession(SteppingSession):
         """Take one internal step, and return an answer only if that failed."""
         t_before = self._newest[0]
         result = self._solver.step(t_before + self._horizon, "onestep", None)
-        for share in SHORTER if self._is_first else ():
-            if result.status in TOO_LONG:
-                self._solver = self._create(share)
+        for first in other_first_steps(t_before, self._horizon) if self._is_first else ():
+            if result.status in TOO_LONG or hardly_moves(t_before, result.t):
+                self._solver = self._create(first)
                 self._solver.init_step(*self._newest)
                 result = self._solver.step(t_before + self._horizon, "onestep", None)
         if self._behind and result.t <= t_before:
