@@ -240,8 +240,7 @@ def write_batch(runs: int, memory: Callable[[Value], Memory], tolerances: str, l
             r.call("show", r.arguments[0], due, result=None)
             r.repeat(turns)
         r.give_if(m.active == 0, 0)
-        with r.when(turn.now >= job.budget):
-            r.give(1)
+        r.give_if(turn.now >= job.budget, 1)
         turn.now = turn.now + 1
         late = (m.taken >= job.most).integer() & m.active
         with r.when(late != 0):

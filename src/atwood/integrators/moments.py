@@ -227,8 +227,7 @@ def _sample(r: Routine, job: Record, most: object) -> None:
     code = r.call(job.sample, job.session, job.times.at(row), end - row, job.values.at(row * size), job.rates)
     job.row = row + job.filled.read(0, INTEGER)
     r.give_if(code != 0, code)
-    with r.when(k + 1 == job.count):
-        r.give(DONE)
+    r.give_if(k + 1 == job.count, DONE)
     r.copy(job.saved, job.steps, job.counts)
     job.now, job.changes = k + 1, 1
     state = job.values.at(end * size)

@@ -339,8 +339,7 @@ def _least() -> Routine:
             square = _sum(r, count, row, row)
             with r.when(square > largest.now):
                 largest.now, best.now = square, k
-        with r.when(~(largest.now > _SHORT)):
-            r.give(0)
+        r.give_if(~(largest.now > _SHORT), 0)
         one, unit = matrix.at(best.now * size), r.sqrt(largest.now)
         value = right[best.now] / unit
         with r.count(count) as j:
@@ -436,12 +435,10 @@ def _met() -> Routine:
             a, b = motions[row], motions[row + 1]
             length = _norm(r, a, b)
             unit = r.choose(length > 0.0, length, 1.0)
-            with r.when(~(a * x[k] + b * y[k] > 0.0)):
-                r.give(0)
+            r.give_if(~(a * x[k] + b * y[k] > 0.0), 0)
             turned[0][k], turned[1][k] = a / unit, b / unit
             most.now = r.most(r.size(a / unit - x[k]), r.most(r.size(b / unit - y[k]), most.now))
-        with r.when(~some.now | (most.now <= STILL)):
-            r.give(0)
+        r.give_if(~some.now | (most.now <= STILL), 0)
         with _each(r, m, "chosen") as (k, row, is_pair), r.when(is_cone(k, is_pair)):
             x[k], y[k] = turned[0][k], turned[1][k]
         count.now = r.call("contact_equations", place, result=INTEGER)
@@ -570,8 +567,7 @@ def _improved() -> Routine:
         r.call("meet_states", r.arguments[0])
         r.call("contradiction", r.arguments[0])
         number = m.number
-        with r.when(number < 0):
-            r.give(0)
+        r.give_if(number < 0, 0)
         state[number] = m.better.number()
         x[number], y[number] = m.better_x, m.better_y
     r.give(1)
@@ -663,8 +659,7 @@ def _relaxed() -> Routine:
             for row, old in zip((first, second), before, strict=True):
                 moved.now = r.most(moved.now, r.size(forces[row] - old))
                 most.now = r.most(most.now, r.size(forces[row]))
-        with r.when(moved.now <= SLACK * most.now):
-            r.give(0)
+        r.give_if(moved.now <= SLACK * most.now, 0)
     r.give(0)
     return r
 
@@ -682,8 +677,7 @@ def _direction() -> Routine:
         length = r.sqrt(_sum(r, count, matrix.at(i * size), matrix.at(i * size)))
         with r.when(length > largest.now):
             largest.now, best.now = length, i
-    with r.when(~(largest.now > least)):
-        r.give(1)
+    r.give_if(~(largest.now > least), 1)
     with r.count(count) as j:
         target[j] = matrix[best.now * size + j] / largest.now
     with r.count(rows) as i:
@@ -713,8 +707,7 @@ def _determined() -> Routine:
     Null vectors of the equations for forces that do are looked for; see `atwood.numerics.contact_sets._judged`.
     """
     r, m, () = _open("determined")
-    with r.when(m.repeats == 0):
-        r.give(0)
+    r.give_if(m.repeats == 0, 0)
     place, matrix, size, acting, every = r.arguments[0], m.matrix, m.size, m.row("acting"), m.row("solution")
     response, top, largest, known = m.result("response"), r.variable(0.0), r.variable(0.0), r.variable(0, INTEGER)
     count, left, stride = r.call("contact_equations", place, result=INTEGER), m.left, size + 1
@@ -750,10 +743,8 @@ def _determined() -> Routine:
         with r.count(known.now) as k:
             _make_square(r, row, left.at(k * stride), count)
     with r.count(count, known.now):
-        with r.when(r.call("take_direction", place, size, count, left, sqrt(CLEAR)) != 0):
-            r.give(0)
-        with r.when(_is_shared_by_parts(r, m, left)):
-            r.give(UNDETERMINED)
+        r.give_if(r.call("take_direction", place, size, count, left, sqrt(CLEAR)) != 0, 0)
+        r.give_if(_is_shared_by_parts(r, m, left), UNDETERMINED)
     r.give(0)
     return r
 
@@ -784,8 +775,7 @@ def _share() -> Routine:
         is_moved = _size_of_slip(r, row, is_pair, m.row("motions"))[2] > small
         goes.now, moves.now = goes.now | (state[k] != float(STICKS)), moves.now | is_moved
     tries = r.variable(goes.now & (rests != 0), BOOLEAN)
-    with r.when(~tries.now & (repeats.now == 0)):
-        r.give(0)
+    r.give_if(~tries.now & (repeats.now == 0), 0)
     _copy_states(r, m, "found", "next")
     with r.when(tries.now):
         with _each(r, m, "chosen") as (k, _, _), r.when(m.unit("given")[k] == 0.0):
@@ -794,18 +784,15 @@ def _share() -> Routine:
         tries.now = m.repeats != 0
         with r.when(tries.now):
             m.shared = 1
-            with r.when(r.call("let_go", place) == 0):
-                r.give(0)
+            r.give_if(r.call("let_go", place) == 0, 0)
         _copy_states(r, m, "next", "found")
         r.call("meet_states", place)
-    with r.when(repeats.now == 0):
-        r.give(0)
+    r.give_if(repeats.now == 0, 0)
     with r.when(tries.now & ~moves.now):  # friction that is at its limit may say how the load is shared
         n = r.variable(0, INTEGER)
         _list(r, m, n, lambda k: m.unit("given")[k] == 0.0)
         r.call("weighted_forces", place)
-        with r.when(r.call("is_lawful", place, n.now) == 0):
-            r.give(0)
+        r.give_if(r.call("is_lawful", place, n.now) == 0, 0)
     with _each(r, m, "chosen") as (k, row, is_pair), r.when((m.unit("given")[k] == 0.0) & (state[k] == float(GOES_ON))):
         is_moved = _size_of_slip(r, row, is_pair, m.row("motions"))[2] > small
         state[k] = r.choose(is_moved, float(GOES_ON), float(STICKS))
@@ -861,8 +848,7 @@ def _let_go() -> Routine:
                 r.call("meet_states", place)
                 with r.when(m.repeats != 0):
                     r.call("weighted_forces", place)
-                with r.when(r.call("is_lawful", place, n.now) == 0):
-                    r.give(0)
+                r.give_if(r.call("is_lawful", place, n.now) == 0, 0)
             put(STICKS)
             tried.now, last.now = tried.now + 1, -1
             with r.count(many.now) as i:
@@ -944,8 +930,7 @@ def _lawful() -> Routine:
         sticks = (m.unit("next")[k] == float(STICKS)) & ~_is_loose(r, m, k)
         moved = _size_of_slip(r, row, is_pair, motions)[2]
         is_beyond = sticks & (over > most.now * (SHARED * SLACK)) & (m.tried == 0)
-        with r.when((moved > moves.now * (SHARED * SLACK)) | is_beyond):
-            r.give(1)
+        r.give_if((moved > moves.now * (SHARED * SLACK)) | is_beyond, 1)
     with r.when(m.tried > 1):
         m.tried = m.tried - 1
         r.give(1)
@@ -962,8 +947,7 @@ def _read() -> Routine:
     r, m, (t,) = _open("read_contacts", {"t": NUMBER})
     y, shares, pattern, size, count, entries = m.y, m.shares, m.pattern, m.size, m.count, m.entries
     inputs = [place_of(r, t), y, y.at(m.coordinates)]
-    with r.when(call_kernel(r, m.program, inputs, m.derived, m.scratch, [m.out]) != 0):
-        r.give(NO_VALUE)
+    r.give_if(call_kernel(r, m.program, inputs, m.derived, m.scratch, [m.out]) != 0, NO_VALUE)
     found = m.result("shares")
     r.clear(shares, shares.at(count * size * 4))
     with r.count(4) as group, r.count(entries) as e:
@@ -1040,8 +1024,7 @@ def _impulses() -> Routine:
     m.finite = 0.0
     code = r.call("find_states", r.arguments[0])
     m.finite = 1.0
-    with r.when(code != 0):
-        r.give(NO_IMPULSES)
+    r.give_if(code != 0, NO_IMPULSES)
     do_or_return(r, "determined")
     with r.count(m.size) as i:
         impulses[i] = impulses[i] + forces[i]
@@ -1100,8 +1083,7 @@ def _account() -> Routine:
             worst.now, m.number = work[row], k
         r.give(GAINS)
     with _each(r, m, "struck") as (k, row, _), r.when(0.0 - rates[row] > m.unit("slow")[k] * m.pace):
-        with r.when(m.logged >= CAPACITY):
-            r.give(FULL)
+        r.give_if(m.logged >= CAPACITY, FULL)
         entry = log.at(m.logged * (size + len(ENTRY)))
         loss = r.variable(0.0 - work[row])
         rubs = _each(r, m, "chosen")
@@ -1126,8 +1108,7 @@ def _collide() -> Routine:
             struck[k] = chosen[k]
         with _each(r, m, "chosen") as (k, row, _):
             coming.now = coming.now | (m.row("rates")[row] < 0.0 - m.unit("slow")[k] * m.pace)
-        with r.when(~coming.now):
-            r.give(0)
+        r.give_if(~coming.now, 0)
         with r.count(m.count) as k, r.when(m.unit("speed")[k] != 0.0):
             chosen[k] = 1.0
         _choose_slips(r, m)
@@ -1151,8 +1132,7 @@ def _hold() -> Routine:
         share = r.choose((m.unit("next")[k] == float(GOES_ON)) & is_pair, moment.now, 0.0)
         acting[n.now], right[n.now] = row.number(), falls[row] * share - rates[row]
         n.now = n.now + 1
-    with r.when(n.now == 0):
-        r.give(0)
+    r.give_if(n.now == 0, 0)
     with r.count(n.now) as i:
         row = r.truncated(acting[i])
         with r.count(n.now) as j:
@@ -1255,8 +1235,7 @@ def _end_impacts() -> Routine:
     with r.count(m.size) as i:
         done, size_of_work = _work_of(r, m.row("forces")[i], rates[i], m.row("motions")[i])
         work.now, size.now = work.now + done, size.now + size_of_work
-    with r.when(work.now > size.now * GAIN):
-        r.give(GAINS)
+    r.give_if(work.now > size.now * GAIN, GAINS)
     r.give(0)
     return r
 
@@ -1319,8 +1298,7 @@ def _barely_rising() -> Routine:
         struck[k] = r.choose(rises & is_near, 1.0, 0.0)
         m.unit("next")[k] = r.choose(rises & ~is_near, float(OPEN), float(STICKS))
         some.now = some.now | (rises & is_near)
-    with r.when(~some.now):
-        r.give(0)
+    r.give_if(~some.now, 0)
     r.copy(m.row("wanted"), free, m.size)
     r.call("meet_states", r.arguments[0])
     with _each(r, m, "struck") as (k, row, _):
@@ -1350,8 +1328,7 @@ def _settle() -> Routine:
         trigger = m.unit("trigger")[k]
         rests.now = rests.now & (trigger != float(OPENS)) & (trigger != float(YIELDS))
     with r.when(some.now):
-        with r.when(r.call("find_states", r.arguments[0]) != 0):
-            r.give(NO_SET)
+        r.give_if(r.call("find_states", r.arguments[0]) != 0, NO_SET)
         do_or_return(r, "determined")
         do_or_return(r, "share_forces", rests.now.integer())
     with r.when(repeated.now):
@@ -1400,8 +1377,7 @@ def _series() -> Routine:
         k = m.count - 1 - i
         is_one = (m.unit("trigger")[k] == float(CLOSES)) & (m.unit("speed")[k] == 0.0)
         closing.now = r.choose(is_one, k, closing.now)
-    with r.when((closing.now < 0) | (m.known < SPANS[0])):
-        r.give()
+    r.give_if((closing.now < 0) | (m.known < SPANS[0]))
     row, largest = r.truncated(m.unit("first")[closing.now]), r.variable(0.0)
     moved = response.at(row * m.size)
     with r.count(m.size) as j:
@@ -1425,8 +1401,7 @@ def _series() -> Routine:
             r.leave(loop)
         spans[count.now] = span
         count.now, last.now = count.now + 1, time
-    with r.when((count.now < SPANS[0]) | ~(spans[0] > 0.0)):
-        r.give()
+    r.give_if((count.now < SPANS[0]) | ~(spans[0] > 0.0))
     _end_series(r, m, spans, count.now, (t, closing.now, largest.now * _MOVED))
     with r.when(m.stops != 0):
         _mark_series(r, m, t)
@@ -1462,8 +1437,7 @@ def _end_series(r: Routine, m: Sets, spans: Value, number: Value, closing: tuple
         is_near = (even.now == k) & (k < SPANS[1])
         even.now = r.choose(is_near & is_even, k + 1, even.now)
         long.now = r.choose((long.now == k) & is_steady, k + 1, long.now)
-    with r.when(even.now < SPANS[0]):
-        r.give()
+    r.give_if(even.now < SPANS[0])
     oldest, share = spans[even.now - 1], r.variable(typical.now)
     ratio, power = spans[0] / oldest, r.variable(1.0)
     with r.count(60):  # the root of the factor from the oldest to the newest, by Newton's method
@@ -1476,8 +1450,7 @@ def _end_series(r: Routine, m: Sets, spans: Value, number: Value, closing: tuple
     with r.count(even.now) as k:
         lasted.now = lasted.now + spans[k]
     is_elastic, pull = _bouncing(r, m, lasted.now, *closing)
-    with r.when(is_elastic & ((share.now <= LEVEL) | (spans[0] > m.later * LOSSLESS))):
-        r.give()
+    r.give_if(is_elastic & ((share.now <= LEVEL) | (spans[0] > m.later * LOSSLESS)))
     speed = r.size(m.row("rates")[r.truncated(m.unit("first")[closing[1]])])
     is_squeezed = speed > pull * lasted.now
     restitution, blur = m.result("restitution")[r.truncated(m.unit("first")[closing[1]])], r.variable(0.0)

@@ -597,8 +597,7 @@ def _drive() -> Routine:
         target = r.choose(looks, following, t_out)
         flag = r.call(solve, memory, target, reached, y, yp, r.value(1, CODE))
         r.give_if(~(looks & (flag == 0)), flag)
-        with r.when(r.call("look", reached[0], y_at, yp_at, data) != 0):
-            r.give(NOTICED)
+        r.give_if(r.call("look", reached[0], y_at, yp_at, data) != 0, NOTICED)
         r.give_if(taken() >= allowed, _WORKED_ENOUGH)
     return r
 

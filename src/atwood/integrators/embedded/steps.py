@@ -229,8 +229,7 @@ def _watched(pair: Tableau) -> Routine:
     r, m, (t_new,) = open_routine(pair, "watched", {"t_new": NUMBER})
     watch, t, steps = m.watch, m.t_old, m.steps
     r.give_if(r.is_null(watch), 0)
-    with r.when(~(t < t_new)):
-        r.give(0)
+    r.give_if(~(t < t_new), 0)
     y, end, trial, last = m.row("y"), m.row("end slope"), m.row("trial"), m.row("last")
     with r.forever():
         due = m.due[0]
@@ -386,16 +385,14 @@ def _run(pair: Tableau) -> Routine:
             r.repeat(steps)
         with r.when(m.crossed != 0):
             r.give_if(m.stop <= m.behind[0], _REACHED)
-            with r.when(r.call("begin", m.session, m.behind[1], m.behind.at(2)) != 0):
-                r.give(_TOO_SMALL)
+            r.give_if(r.call("begin", m.session, m.behind[1], m.behind.at(2)) != 0, _TOO_SMALL)
         t = m.t
         with r.when(t >= m.stop):
             with r.when(locates):
                 own.told = m.stop
             r.give(_REACHED)
         r.give_if(m.steps >= m.limit, _USED_UP)
-        with r.when(r.call("watched", m.session, t) != 0):
-            r.give(_NOTICED)
+        r.give_if(r.call("watched", m.session, t) != 0, _NOTICED)
         with r.when(m.crossed != 0):
             r.repeat(steps)
         begin, end = m.row(0), m.row("end slope")
@@ -461,8 +458,7 @@ def _shorten(pair: Tableau) -> Routine:
     r, m, (event,) = open_routine(pair, "shorten", {"event": NUMBER}, exported=True)
     h, short = m.h, (event - m.t_old) * _BEHIND
     r.give_if(~((short < h) & (short > 0.0)), 0)
-    with r.when(r.call("densify", m.session) != 0):
-        r.give(0)
+    r.give_if(r.call("densify", m.session) != 0, 0)
     x, term = short / h, _size(r, m, m.row("dense").at(m.padded * (pair.terms - 1)))
     for power in range(pair.terms):
         term = term * (1.0 - x if power % 2 else x)
@@ -481,8 +477,7 @@ def _retake(pair: Tableau) -> Routine:
     slopes(pair, r, m, range(1, pair.end), m.t_old, h, lambda: r.give(1))
     r.call(f"stage{pair.end}", m.session, h)
     r.give_if(r.call("held", m.session, t) != 0, 1)
-    with r.when(r.call("evaluate", m.session, t, m.row("trial"), m.row("end slope")) != 0):
-        r.give(1)
+    r.give_if(r.call("evaluate", m.session, t, m.row("trial"), m.row("end slope")) != 0, 1)
     r.copy(m.row("y"), m.row("trial"), m.padded)
     m.h, m.t, m.is_dense, m.steps = h, t, 0, m.steps + 1
     r.give(0)

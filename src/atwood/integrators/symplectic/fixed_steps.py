@@ -33,8 +33,7 @@ def run(
     with r.forever():
         t, steps = m.t, m.steps
         r.give_if(t >= stop, 0)
-        with r.when(steps >= limit):
-            r.give(1)
+        r.give_if(steps >= limit, 1)
         with r.when(attempt(r, m, t, h) != 0):
             failed(r, m)
             m.failures = m.failures + 1
@@ -64,8 +63,7 @@ def judge(layout: Layout) -> Routine:
 
     def read(time: Value, state: str, values: Value, rates: Value) -> None:
         r.give_if(r.call("speeds", m.session, time, m.at(state), values) != 0, 4)
-        with r.when(r.call(m.rates, time, values, rates, m.rates_data) != 0):
-            r.give(4)
+        r.give_if(r.call(m.rates, time, values, rates, m.rates_data) != 0, 4)
 
     with r.when(m.since == 1):
         read(t_old, "y_old", begin, begin_rates)

@@ -277,8 +277,7 @@ def _held() -> Routine:
     r, m, (t,) = open_routine(1, "held", {"t": NUMBER})
     project = m.project
     r.give_if(r.is_null(project), 0)
-    with r.when(r.call(project, t, m.row("new"), m.project_data) != 0):
-        r.give(1)
+    r.give_if(r.call(project, t, m.row("new"), m.project_data) != 0, 1)
     r.give(r.call("evaluate", m.session, m.new_in, m.new_out))
     return r
 
@@ -290,8 +289,7 @@ def _run() -> Routine:
     with r.forever():
         t = m.t
         r.give_if(t >= m.stop, _REACHED)
-        with r.when(m.steps >= m.limit):
-            r.give(_USED_UP)
+        r.give_if(m.steps >= m.limit, _USED_UP)
         r.give_if(r.call("expand", m.session) != 0, _TOO_SMALL)
         h.now = r.least(r.call("choose", m.session, result=NUMBER), m.longest)
         least, stop = r.size(t) * (10.0 * 2.0**-52), m.stop_time

@@ -133,8 +133,7 @@ def _settle() -> Routine:
             r.give(code)
         change = m.change
         changes[k] = change
-        with r.when(~(change <= TOO_FAR)):
-            r.give(NOWHERE)
+        r.give_if(~(change <= TOO_FAR), NOWHERE)
         with r.when((k >= PATIENCE) & (change > ROUNDED)), r.when(change > 0.3 * changes[k + (1 - PATIENCE)]):
             r.give(NOWHERE)
         left = r.choose(last.now < np.inf, change * change / last.now, change)  # what the next would change, about
@@ -161,8 +160,7 @@ def _sweep() -> Routine:
     with r.count(points) as i:
         state, row = held.at(i * width), i * width
         r.copy(state, m.states.at(row), width)
-        with r.when(misses(r, m, m.times[i], state, width)):
-            r.give(ELSEWHERE)
+        r.give_if(misses(r, m, m.times[i], state, width), ELSEWHERE)
         r.call(m.function, m.times[i], state, rates.at(row), m.function_data)
     for_speeds = n, width
     _integrate(r, m, for_speeds)
@@ -172,8 +170,7 @@ def _sweep() -> Routine:
         r.copy(state, held.at(i * width), n)
         holds = held.at(i * width)
         r.copy(holds, state, width)
-        with r.when(misses(r, m, m.times[i], holds, width)):
-            r.give(NOWHERE)
+        r.give_if(misses(r, m, m.times[i], holds, width), NOWHERE)
         with r.when(m.is_plain != 0):
             r.copy(rates.at(i * width), holds.at(n), n)
         with r.otherwise():

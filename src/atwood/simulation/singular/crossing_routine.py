@@ -241,8 +241,7 @@ def _lay() -> Routine:
     with r.count(POINTS, 1) as i, r.when(~(arc.times[i] > arc.times[i - 1])):
         r.give(1)
     r.call("guess", given)
-    with r.when(r.call("settle", way.arc) != SWEPT):
-        r.give(1)
+    r.give_if(r.call("settle", way.arc) != SWEPT, 1)
     r.give((~(arc.error < way.accurate)).code())
     return r
 
@@ -254,8 +253,7 @@ def _keep() -> Routine:
     way, arc, data, _, shape = _open(given)
     numbers = (POINTS + 1) * arc.unknowns
     entry = way.log.at(way.count * (shape.conditions + numbers + len(PASSED)))
-    with r.when(way.count >= way.capacity):
-        r.give(1)
+    r.give_if(way.count >= way.capacity, 1)
     for k, one in enumerate((time, way.start, way.start + 2.0 * arc.half, arc.error, way.far)):
         entry[k] = one
     r.copy(entry.at(len(PASSED)), data["rows"], shape.conditions)
@@ -315,11 +313,9 @@ def _cross() -> Routine:
         begin.now = r.choose(speed * (monitor.near - note[0]) >= REACH, note, begin.now)
     way.start = begin.now[0]
     r.copy(arc.first, begin.now.at(1), width)
-    with r.when(~(way.start < monitor.near) | misses(r, arc, way.start, arc.first, width)):
-        r.give(1)
+    r.give_if(~(way.start < monitor.near) | misses(r, arc, way.start, arc.first, width), 1)
     now = r.call("around", given, result=NUMBER)
-    with r.when(~r.is_finite(now)):
-        r.give(1)
+    r.give_if(~r.is_finite(now), 1)
     end = way.start + 2.0 * arc.half
     r.call("state", way.arc, (now - way.start) / arc.half - 1.0, state, result=None)
     speed = _fastest(r, data, arc, state)
@@ -328,18 +324,14 @@ def _cross() -> Routine:
         fastest.now = r.most(_fastest(r, data, arc, arc.later), fastest.now)
     is_slow = ~(speed * speed >= way.slow * fastest.now * fastest.now)
     left = r.call(way.measure, now, state, way.monitor, result=NUMBER)
-    with r.when(is_slow | ~(left < way.singular * way.far) | ~(end <= way.until)):
-        r.give(1)
+    r.give_if(is_slow | ~(left < way.singular * way.far) | ~(end <= way.until), 1)
     with r.count(shape.conditions) as i, r.when(~(r.size(data["values"][i] / data["rows"][i]) < way.fits)):
         r.give(1)
     behind, rates = way.behind.at(2), arc.rates
     r.copy(behind, arc.later, width)  # as it is at the end
-    with r.when(misses(r, arc, end, behind, width)):
-        r.give(1)
-    with r.when(r.call(arc.function, end, behind, rates, arc.function_data) != 0):
-        r.give(1)
-    with r.when(r.call("keep", given, now) != 0):
-        r.give(1)
+    r.give_if(misses(r, arc, end, behind, width), 1)
+    r.give_if(r.call(arc.function, end, behind, rates, arc.function_data) != 0, 1)
+    r.give_if(r.call("keep", given, now) != 0, 1)
     way.behind[0], way.behind[1] = begin.now[0], end  # before the looks of the way are forgotten
     restart_looks(r, (way.look, way.monitor), (data, monitor, shape.conditions), (end, behind, rates))
     r.give(0)

@@ -111,8 +111,7 @@ class _Writer:
                 target[j] = total
             if stage < self.pair.end:
                 time = t + h * self.pair.nodes[stage]
-                with r.when(self._rates(r, data, time, target, w.slopes.at(stage * n)) != 0):
-                    r.give(-1)
+                r.give_if(self._rates(r, data, time, target, w.slopes.at(stage * n)) != 0, -1)
         if not self.projects:
             r.give(0)
             return r
@@ -120,8 +119,7 @@ class _Writer:
             at, to = w.iterates.at(i * n), w.iterates.at((i + 1) * n)
             inputs, outputs = [place_of(r, t + h), at, at.at(self.split)], [to, to.at(self.split), w.more]
             code = call_kernel(r, "nearer", inputs, data.read(1, ADDRESS), data.read(4, ADDRESS), outputs)
-            with r.when(code != 0):
-                r.give(-1)
+            r.give_if(code != 0, -1)
             largest = r.variable(0.0)
             with r.count(self.speeds) as j:
                 largest.now = r.most(r.size(w.more[j]), largest.now)
@@ -138,8 +136,7 @@ class _Writer:
         w, n = _Work(r, work, self.n), self.n
         with r.count(count) as k:
             found = r.call("step", times[k], steps[k], begins.at(k * n), work, data, result=INTEGER)
-            with r.when(found < 0):
-                r.give(1)
+            r.give_if(found < 0, 1)
             r.copy(ends.at(k * n), w.iterates.at(found * n), n)
         r.give(r.value(0, CODE))
         return r
@@ -161,8 +158,7 @@ class _Writer:
             branches = place >= 0
             y = states.at(row * n)
             found = r.call("step", t, h, y, work, data, result=INTEGER)
-            with r.when(found < 0):
-                r.give(1)
+            r.give_if(found < 0, 1)
             with r.when(branches):
                 r.copy(w.base, weights.at(place * n), n)
             with r.otherwise():
@@ -184,8 +180,7 @@ class _Writer:
             with r.when(left.now <= 0):
                 r.leave(turns)
             left.now = left.now - 1
-            with r.when(self._pull(r, data, 1, t, w.iterates.at(left.now * self.n), w.base, w) != 0):
-                r.give(1)
+            r.give_if(self._pull(r, data, 1, t, w.iterates.at(left.now * self.n), w.base, w) != 0, 1)
             r.copy(w.base, w.pulled, self.n)
             self._gather(r, gradient, w)
 
@@ -198,8 +193,7 @@ class _Writer:
                 w.slopes[j + stage * n] = end * (h * pair.stages[pair.end - 1].get(stage, 0.0))
         for stage in reversed(range(pair.end)):
             time, place = t + h * pair.nodes[stage], w.stages.at(stage * n)
-            with r.when(self._pull(r, data, 0, time, place, w.slopes.at(stage * n), w) != 0):
-                r.give(1)
+            r.give_if(self._pull(r, data, 0, time, place, w.slopes.at(stage * n), w) != 0, 1)
             self._gather(r, gradient, w)
             with r.count(n) as j:
                 own = w.pulled[j]
