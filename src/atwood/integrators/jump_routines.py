@@ -8,7 +8,7 @@ from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Record, Routine, V
 from atwood.integrators.event_location import FIELDS as LOCATOR
 from atwood.integrators.event_routines import Search
 from atwood.integrators.jumps import ENTRY, FIELDS, TABLE
-from atwood.integrators.set_routines import BLURRED, ROUNDED, STEP
+from atwood.integrators.sets.sizes import BLURRED, ROUNDED, STEP
 
 SPANS = 3, 12
 """At least and at most so many intervals between jumps say how fast these follow each other."""

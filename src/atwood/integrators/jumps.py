@@ -79,7 +79,7 @@ class JumpLog:
 
 @once
 def _routines() -> Built:
-    files = tuple(f"integrators/{name}.py" for name in ("event_location", "event_routines", "jumps", "set_routines"))
+    files = tuple(f"integrators/{name}.py" for name in ("event_location", "event_routines", "jumps", "sets/sizes"))
     source = RoutineSource("integrators.jump_routines", files)
     return build_code([], CodeOptions(level=2), exports=("jump",), routines=source)
 

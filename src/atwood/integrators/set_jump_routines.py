@@ -6,7 +6,9 @@ from atwood.codegen.routines import ADDRESS, BOOLEAN, CODE, INTEGER, NUMBER, Rec
 from atwood.integrators.event_location import ALIKE, FIELDS as LOCATOR, LONGEST, PASSED, SHORT, TINY
 from atwood.integrators.event_routines import Search
 from atwood.integrators.set_jumps import EVENTS, HEAD, JUMP, MOST_IMPACTS
-from atwood.integrators.set_routines import CLOSES, ENTRY, FIELDS, LONG, Sets, write_sets
+from atwood.integrators.sets.record import CLOSES, ENTRY, FIELDS, Sets
+from atwood.integrators.sets.resolve import write_sets
+from atwood.integrators.sets.series import LONG
 from atwood.numerics.contact_sets import OPEN
 
 

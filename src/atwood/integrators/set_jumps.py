@@ -1,4 +1,4 @@
-"""Changes of a set of contacts at events, without Python; see `atwood.integrators.set_routines`.
+"""Changes of a set of contacts at events, without Python; see `atwood.integrators.sets`.
 
 What is not clear by the rules there is left to Python, and so is what opens all of them where other programs are then
 shorter.
@@ -21,7 +21,8 @@ from atwood.codegen.routines import ADDRESS, INTEGER, NUMBER, Kind
 from atwood.expr.core.program import Program
 from atwood.integrators.jumps import ROOM, JumpLog, Jumps
 from atwood.integrators.protocol import RATES, CompiledRates
-from atwood.integrators.set_routines import CAPACITY, ENTRY, FIELDS, LONG, ROWS, UNITS
+from atwood.integrators.sets.record import CAPACITY, ENTRY, FIELDS, ROWS, UNITS
+from atwood.integrators.sets.series import LONG
 
 if TYPE_CHECKING:
     from atwood.codegen.sundials.events import EventData
@@ -68,7 +69,7 @@ class SetJump(NamedTuple):
     """A change of a set: the states before and after, those of gaps and slips, and what has happened.
 
     `stopped` is the first gap that came to rest as impacts accumulate, or -1, and `left` how long these still go on;
-    `struck` has a row for each impact, as the log of `atwood.integrators.set_routines`.
+    `struck` has a row for each impact, as the log of `atwood.integrators.sets`.
     """
 
     time: float
@@ -115,7 +116,8 @@ class SetLog(JumpLog):
         return made
 
 
-_OWN = ("event_location", "event_routines", "set_jumps", "set_routines")
+_SETS = (*("record", "sizes", "solving", "checking", "finding", "shares", "impacts", "series", "stopping", "resolve"),)
+_OWN = ("event_location", "event_routines", "set_jumps", *(f"sets/{name}" for name in _SETS))
 _FILES = (*(f"integrators/{name}.py" for name in _OWN), "numerics/contact_sets.py")
 
 

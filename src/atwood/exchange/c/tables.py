@@ -8,7 +8,7 @@ from itertools import accumulate
 from typing import Any
 
 from atwood.codegen.c.printer import literal
-from atwood.integrators import set_routines as sets
+from atwood.integrators.sets import record as sets
 from atwood.mechanics.outputs.event_functions import CLOSES, RESTS, RUNS, UPDATE
 from atwood.plotting.live.mode import ModeText
 from atwood.simulation.events.sides import SIDE

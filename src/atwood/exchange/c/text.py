@@ -16,14 +16,15 @@ from atwood.exchange.c.modes import header_of_modes, header_with, mode_after, so
 from atwood.exchange.c.tables import ENDS, LEADS, NOTED, PASSES, SIDE_KINDS, UPDATES, sources, tables_of
 from atwood.expr.core.program import Program
 from atwood.forms.assembly import Assembly
-from atwood.integrators import set_routines as sets
 from atwood.integrators.embedded.rates import write_routines as write_rates
 from atwood.integrators.embedded.stepper import FIELDS
 from atwood.integrators.embedded.steps import write_routines as write_steps
 from atwood.integrators.event_location import FIELDS as SEARCH_FIELDS, MOST, ROWS as SEARCH_ROWS, STACK
 from atwood.integrators.event_routines import write_routines as write_search
 from atwood.integrators.methods.dormand_prince import TABLEAU
-from atwood.integrators.set_routines import write_sets
+from atwood.integrators.sets import record as sets
+from atwood.integrators.sets.resolve import write_sets
+from atwood.integrators.sets.series import LONG
 from atwood.integrators.step_guard import write_routines as write_guard
 from atwood.integrators.stepper import WIDTH
 from atwood.lazy_dataclasses import dataclass
@@ -210,7 +211,7 @@ def _sizes_of_changes(data: dict[str, Any], programs: dict[str, Program]) -> dic
     found["HELD_VALUES"] = len(data["held"])
     if contacts:
         found |= {"CONTACT_ROWS": contacts["size"], "PATTERN": len(contacts["pattern"]) // 2}
-        found |= {"PAST": sets.LONG, "UNITS": len(sets.UNITS), "ENTRY": len(sets.ENTRY)}
+        found |= {"PAST": LONG, "UNITS": len(sets.UNITS), "ENTRY": len(sets.ENTRY)}
         found |= {"WATCH_GAP": 1, "WATCH_REST": 2, "WATCH_RUN": 3}
         found |= {"OPENS": sets.OPENS, "YIELDS": sets.YIELDS, "UNDETERMINED": sets.UNDETERMINED}
     if passage:
@@ -278,7 +279,7 @@ def _memory(programs: dict[str, Program], sizes: dict[str, int]) -> list[str]:
         count, rows = sizes["CONTACTS"], sizes["CONTACT_ROWS"]
         words |= {"sets": len(sets.FIELDS), "units": len(sets.UNITS) * count, "set_rows": len(sets.ROWS) * rows}
         words |= {"matrix": rows * rows, "left": rows * (rows + 1), "shares": 4 * count * rows}
-        words |= {"pattern": 2 * sizes["PATTERN"], "impacts": 2 * sets.LONG}
+        words |= {"pattern": 2 * sizes["PATTERN"], "impacts": 2 * LONG}
         words |= {"log_of_sets": sets.CAPACITY * (rows + len(sets.ENTRY))}
     if sizes["PASSAGE"]:
         words["body"] = max(size, sizes["BODY_COORDINATES"] + sizes["BODY_SPEEDS"])

@@ -21,10 +21,10 @@ from atwood.forms.loose import in_no_contact, kept_touching
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import find_observables
 from atwood.forms.sides import in_pieces
-from atwood.integrators import set_routines as sets
 from atwood.integrators.embedded.rates import write_routines as write_rates
 from atwood.integrators.methods.dormand_prince import EXPLICIT
-from atwood.integrators.set_routines import write_sets
+from atwood.integrators.sets import record as sets
+from atwood.integrators.sets.resolve import write_sets
 from atwood.integrators.step_guard import write_routines as write_guard
 from atwood.lazy_dataclasses import replace
 from atwood.mechanics.kinematics.mechanism import Mechanism, world_position

@@ -18,12 +18,12 @@ from atwood.arrays import FloatArray
 from atwood.codegen.javascript.printer import print_routines
 from atwood.errors import AtwoodError
 from atwood.forms.assembly import Assembly
-from atwood.integrators import set_routines as sets
 from atwood.integrators.embedded.stepper import FIELDS
 from atwood.integrators.embedded.steps import write_routines as write_steps
 from atwood.integrators.event_location import FIELDS as SEARCH_FIELDS, MOST, ROWS as SEARCH_ROWS, STACK
 from atwood.integrators.event_routines import write_routines as write_search
 from atwood.integrators.methods.dormand_prince import TABLEAU
+from atwood.integrators.sets import record as sets
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import assembly_of

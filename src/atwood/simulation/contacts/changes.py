@@ -16,36 +16,37 @@ from atwood.arrays import BoolArray, FloatArray
 from atwood.errors import SolveError, StartError
 from atwood.expr import evaluate
 from atwood.forms.assembly import Assembly
-from atwood.integrators.set_routines import (
+from atwood.integrators.sets.record import REFUSED, UNDETERMINED
+from atwood.integrators.sets.series import (
     ALIKE,
-    ASTRAY,
-    BEGINS,
     BEND,
-    BLURRED,
     EVEN,
-    FAST,
     FLATTENS,
-    GAIN,
     LATER,
     LEVEL,
     LONG,
     LOSSLESS,
-    MOST_SHARES,
-    NEAR_REST,
     OFTEN,
     RECENT,
-    REFUSED,
-    ROUNDED,
-    SEEN,
-    SHARED,
     SHORT,
     SPANS,
     SQUEEZED,
     STEADY,
-    STEP,
-    UNDETERMINED,
-    UNMOVED,
     WAITS,
+)
+from atwood.integrators.sets.shares import MOST_SHARES
+from atwood.integrators.sets.sizes import (
+    ASTRAY,
+    BEGINS,
+    BLURRED,
+    FAST,
+    GAIN,
+    NEAR_REST,
+    ROUNDED,
+    SEEN,
+    SHARED,
+    STEP,
+    UNMOVED,
 )
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.outputs.event_functions import CLOSES, OPENS, RESTS, STOPS, YIELDS

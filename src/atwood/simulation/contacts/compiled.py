@@ -1,4 +1,4 @@
-"""What the routine of a set of contacts is given of a scene; see `atwood.integrators.set_routines`."""
+"""What the routine of a set of contacts is given of a scene; see `atwood.integrators.sets`."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.constrained import contacts_program
 from atwood.forms.loose import in_no_contact, is_loose, kept_touching, loose_equations
-from atwood.integrators import set_routines as sets
 from atwood.integrators.embedded.rates import OwnRates
 from atwood.integrators.set_jumps import EVENTS, SetCode, SetJump, SetJumps, SetLog, SetSolver
-from atwood.integrators.set_routines import UNITS
+from atwood.integrators.sets import record as sets
+from atwood.integrators.sets.record import UNITS
+from atwood.integrators.sets.sizes import ROUNDED
 from atwood.integrators.time_stepping.session import Change
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import ContactRow
@@ -133,7 +134,7 @@ def _units(layout: Layout, plan: SceneProblem) -> FloatArray:
             "owner": owners[k],
             "small": size,
             "slow": size / plan.scales.time,
-            "rounding": sets.ROUNDED * size,
+            "rounding": ROUNDED * size,
             "unmoved": unmoved(one, plan.scales),
         }
         for name, value in values.items():

@@ -19,7 +19,7 @@ from atwood.forms.caches import Key
 from atwood.forms.loose import in_no_contact, state_paths
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import to_maximal
-from atwood.integrators.set_routines import UNMOVED
+from atwood.integrators.sets.sizes import UNMOVED
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.constraints.read_multipliers import weights_of
 from atwood.mechanics.dynamics.equations import ContactRow
